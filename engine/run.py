@@ -1,0 +1,52 @@
+"""How long a case runs, which part of it is evaluated, and how accurately."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Unit = Literal["periods", "s"]
+Reset = Literal["contact", "literal"]
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A time from the start of the run, in seconds or in excitation periods."""
+
+    value: float
+    unit: Unit = "periods"
+
+    def in_periods(self, frequency: float) -> float:
+        """The same time in excitation periods of a machine excited at ``frequency`` (Hz)."""
+        return self.value if self.unit == "periods" else self.value * frequency
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Settings shared by every case of a batch.
+
+    Attributes
+    ----------
+    duration : Span
+        End of the run; it starts at t = 0.
+    window : tuple of two Spans, optional
+        Part of the run over which the characteristics are taken; by default the last third.
+    tolerance : float
+        Local relative error of a step, 1e-14 .. 1e-4.
+    reset : {"contact", "literal"}
+        Reading of equation (5) while torque is transmitted (MODEL.md A2).
+    max_steps, max_events_per_period : int
+        Budgets that end a case as ``step_budget`` or ``chatter`` instead of letting it hang.
+    """
+
+    duration: Span = Span(60.0)
+    window: tuple[Span, Span] | None = None
+    tolerance: float = 1e-9
+    reset: Reset = "contact"
+    max_steps: int = 5_000_000
+    max_events_per_period: int = 2_000
+
+    def window_in_periods(self, frequency: float) -> tuple[float, float]:
+        """Start and end of the window in excitation periods at ``frequency`` (Hz)."""
+        if self.window is None:
+            end = self.duration.in_periods(frequency)
+            return end * 2.0 / 3.0, end
+        return self.window[0].in_periods(frequency), self.window[1].in_periods(frequency)

@@ -1,0 +1,67 @@
+"""Parameters of a vibration drive: paths, SI units, ranges, defaults (MODEL.md A1, SPEC.md)."""
+
+import math
+from dataclasses import dataclass
+
+MAX_PENDULUMS = 8
+MAX_COEFFICIENTS = 12
+STANDARD_GRAVITY = 9.80665
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One numeric parameter.
+
+    ``path`` is the SPEC path with ``N`` for a pendulum's index. ``symbol`` is MODEL.md's letter. The allowed range is
+    ``low`` .. ``high`` in ``unit``; an open end excludes the bound itself. ``default`` None means the value is required.
+    """
+
+    path: str
+    symbol: str
+    unit: str
+    low: float
+    high: float
+    low_open: bool
+    default: float | None
+    help: str
+
+    def range_text(self) -> str:
+        """The allowed range as people write it."""
+        low = "" if self.low == -math.inf else f"{'>' if self.low_open else '>='} {self.low:g} {self.unit}"
+        high = "" if self.high == math.inf else f"<= {self.high:g} {self.unit}"
+        return " and ".join(part for part in (low, high) if part) or "any finite number"
+
+    def accepts(self, value: float) -> bool:
+        """Whether ``value`` (SI) is finite and in range."""
+        above = value > self.low if self.low_open else value >= self.low
+        return math.isfinite(value) and above and value <= self.high
+
+
+_INF = math.inf
+
+PARAMETERS: tuple[Parameter, ...] = (
+    Parameter("gravity", "g", "m/s^2", 0.0, 1e3, False, STANDARD_GRAVITY, "gravitational acceleration"),
+    Parameter("excitation.frequency", "nu/2pi", "Hz", 0.0, 1e5, True, None, "frequency of the base vibration"),
+    Parameter("excitation.amplitude_x", "d", "m", 0.0, 10.0, False, 0.0, "horizontal amplitude of the base"),
+    Parameter("excitation.amplitude_y", "b", "m", 0.0, 10.0, False, 0.0, "vertical amplitude of the base"),
+    Parameter("excitation.phase", "chi", "rad", -1e3, 1e3, False, 0.0, "phase of the vertical against the horizontal"),
+    Parameter("pendulums.N.inertia", "J", "kg*m^2", 0.0, 1e6, True, None, "inertia about the axis"),
+    Parameter("pendulums.N.mass", "M", "kg", 0.0, 1e6, False, None, "mass"),
+    Parameter("pendulums.N.arm", "l", "m", -1e3, 1e3, False, None, "axis to centre of mass; negative: hangs down"),
+    Parameter("pendulums.N.spring_rate", "c", "N/m", 0.0, 1e12, False, 0.0, "rate of the centring spring"),
+    Parameter("pendulums.N.spring_arm", "a", "m", -1e3, 1e3, False, 0.0, "arm of the centring spring"),
+    Parameter("pendulums.N.damping", "lambda", "N*m*s/rad", 0.0, 1e6, False, 0.0, "viscous damping"),
+    Parameter("pendulums.N.backlash", "delta", "rad", 0.0, 1e3, False, 0.0, "lost motion of the freewheel"),
+    Parameter("pendulums.N.initial_angle", "phi(0)", "rad", -1e3, 1e3, False, 0.0, "angle at t = 0"),
+    Parameter("pendulums.N.initial_speed", "phi'(0)", "rad/s", -1e6, 1e6, False, 0.0, "angular speed at t = 0"),
+    Parameter("shaft.inertia", "J_e", "kg*m^2", 0.0, 1e6, True, None, "reduced inertia of the driven side"),
+    Parameter("shaft.load", "M_c", "N*m", 0.0, 1e9, False, 0.0, "load torque, which resists rotation only"),
+    Parameter("shaft.initial_speed", "phi_e'(0)", "rad/s", 0.0, 1e6, False, 0.0, "shaft speed at t = 0"),
+)
+
+#: Coefficients of the clutch polynomial (MODEL.md (3)); ``K`` counts from 0, so K = 0 is c_1. Unit N*m/rad^K.
+CLUTCH_COEFFICIENT = Parameter("clutch.coefficients.K", "c_(K+1)", "N*m/rad^K", -1e30, 1e30, False, None, "clutch polynomial")
+#: End of the measured data; beyond it the law goes on straight (state BEYOND). Infinite: no end.
+CLUTCH_WINDUP_LIMIT = Parameter(
+    "clutch.windup_limit", "u_end", "rad", 0.0, _INF, True, _INF, "largest windup the clutch law was measured to"
+)

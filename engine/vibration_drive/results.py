@@ -1,0 +1,89 @@
+"""The characteristics of a vibration drive: names, units, meaning (MODEL.md A4, SPEC.md "Result names")."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Kind = Literal["real", "count"]
+
+
+@dataclass(frozen=True, slots=True)
+class ResultInfo:
+    """One result: SPEC name, SI unit ("1" where it has none), sentence for people, and whether it is a count."""
+
+    name: str
+    unit: str
+    description: str
+    kind: Kind = "real"
+
+    @property
+    def column(self) -> str:
+        """The name as a database column."""
+        return self.name.replace(".", "_")
+
+
+def _shaft() -> tuple[ResultInfo, ...]:
+    r = ResultInfo
+    return (
+        r("shaft.speed.mean", "rad/s", "mean speed of the output shaft over the window"),
+        r("shaft.speed.max", "rad/s", "largest speed of the output shaft"),
+        r("shaft.speed.min", "rad/s", "smallest speed of the output shaft"),
+        r("shaft.irregularity", "1", "(largest - smallest)/mean speed of the output shaft"),
+        r("shaft.turn", "rad", "turn of the output shaft during the window"),
+        r("shaft.acceleration.max", "rad/s^2", "largest angular acceleration of the output shaft"),
+        r("torque.mean", "N*m", "mean torque of all clutches on the shaft"),
+        r("torque.max", "N*m", "largest torque of all clutches on the shaft"),
+        r("power.useful.mean", "W", "mean power against the load torque"),
+        r("power.useful.max", "W", "largest power against the load torque"),
+        r("power.clutch.mean", "W", "mean power the clutches give to the shaft"),
+        r("power.clutch.max", "W", "largest power the clutches give to the shaft"),
+        r("power.input.mean", "W", "mean power the vibrating base puts into the pendulums"),
+        r("power.loss.mean", "W", "mean power lost in the pendulums' damping"),
+        r("efficiency", "1", "work against the load / work of the base, over the last whole periods of the window"),
+        r("fraction.rotating", "1", "share of the window in which the shaft is not held"),
+        r("fraction.held", "1", "share of the window in which the load holds the shaft"),
+        r("fraction.driven", "1", "share of the window in which some clutch transmits torque"),
+        r("clutches.driving_max", "1", "largest number of clutches transmitting torque at once", "count"),
+        r("clutches.engagements_per_period", "1", "engagements of all clutches per excitation period"),
+        r("runup.time", "s", "time from rest until the period-mean speed first reaches 95 % of its final value"),
+        r("balance.energy", "1", "residual of the energy balance over the window / largest energy in it"),
+        r("balance.momentum", "1", "residual of the shaft's momentum balance over the window / largest term in it"),
+        r("reset.energy_lost", "J", "clutch energy dropped by literal resets during the window"),
+        r("run.events", "1", "located transitions of clutches and shaft after t = 0, over the whole run", "count"),
+        r("run.steps", "1", "integration steps of the whole run", "count"),
+    )
+
+
+def _pendulum(index: int) -> tuple[ResultInfo, ...]:
+    def r(name: str, unit: str, description: str, kind: Kind = "real") -> ResultInfo:
+        return ResultInfo(f"pendulums.{index}.{name}", unit, description, kind)
+
+    return (
+        r("angle.mean", "rad", "mean angle"),
+        r("angle.max", "rad", "largest angle"),
+        r("angle.min", "rad", "smallest angle"),
+        r("angle.amplitude", "rad", "half the difference between largest and smallest angle"),
+        r("speed.max", "rad/s", "largest angular speed"),
+        r("speed.min", "rad/s", "smallest (most negative) angular speed"),
+        r("acceleration.max", "rad/s^2", "largest angular acceleration"),
+        r("acceleration.min", "rad/s^2", "smallest (most negative) angular acceleration"),
+        r("torque.mean", "N*m", "mean torque of its clutch"),
+        r("torque.max", "N*m", "largest torque of its clutch"),
+        r("windup.max", "rad", "largest windup of its clutch"),
+        r("fraction.engaged", "1", "share of the window in which its clutch transmits torque"),
+        r("fraction.beyond_data", "1", "share of the window with windup beyond the measured data"),
+        r("engagements", "1", "engagements of its clutch during the window", "count"),
+        r("power.input", "W", "mean power the base puts into it"),
+        r("power.loss", "W", "mean power lost in its damping"),
+    )
+
+
+SHAFT_RESULTS: tuple[ResultInfo, ...] = _shaft()
+PENDULUM_RESULTS_PER_PENDULUM = len(_pendulum(0))
+
+
+def result_infos(pendulums: int) -> tuple[ResultInfo, ...]:
+    """Every result of a drive with ``pendulums`` pendulums, in the order of the engine's result columns."""
+    infos = SHAFT_RESULTS
+    for index in range(pendulums):
+        infos += _pendulum(index)
+    return infos
