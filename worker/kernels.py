@@ -1,0 +1,294 @@
+"""The one module of the worker that knows the engine: a study and a range of cases in, plain arrays out.
+
+What is particular to a model (its catalogues, the shape of its results, how a study's columns become a call of the
+engine) stays behind the functions of this module. The numerical kernels are imported inside the functions that run them,
+so that reading a catalogue does not load a compiler.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from engine import ENGINE_VERSION, Ending, Run, Span
+from engine.run import Reset, Unit
+from engine.vibration_drive.parameters import (
+    CLUTCH_COEFFICIENT,
+    CLUTCH_WINDUP_LIMIT,
+    MAX_COEFFICIENTS,
+    MAX_PENDULUMS,
+    PARAMETERS,
+    Parameter,
+)
+from engine.vibration_drive.results import ResultInfo
+from engine.vibration_drive.results import result_infos as _vibration_drive_results
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from numpy.typing import NDArray
+
+    from engine.vibration_drive.clutch import (
+        ClutchFit,
+        ClutchFitError,
+        ClutchLaw,
+        ClutchLawError,
+        check_law,
+        fit_clutch,
+    )
+    from engine.vibration_drive.simulate import Trajectory
+    from worker.study import Study
+
+__all__ = [
+    "CLUTCH_COEFFICIENT",
+    "CLUTCH_WINDUP_LIMIT",
+    "ENDING_SENTENCES",
+    "ENGINE_VERSION",
+    "FLAG_SENTENCES",
+    "MAX_COEFFICIENTS",
+    "MAX_PENDULUMS",
+    "MODELS",
+    "OK",
+    "ChunkResult",
+    "ClutchFit",
+    "ClutchFitError",
+    "ClutchLaw",
+    "ClutchLawError",
+    "Parameter",
+    "ResultInfo",
+    "Run",
+    "Span",
+    "Trajectory",
+    "WorkerEnding",
+    "check_law",
+    "coefficients",
+    "estimate_seconds_per_case",
+    "fit_clutch",
+    "models",
+    "parameter_catalogue",
+    "pendulums",
+    "result_infos",
+    "result_shapes",
+    "run_chunk",
+    "run_of",
+    "run_trajectory",
+    "study_results",
+    "warm_up",
+]
+
+VIBRATION_DRIVE = "vibration-drive"
+MODELS: tuple[str, ...] = (VIBRATION_DRIVE,)
+
+OK = Ending.OK.value
+
+#: Flag of a case some of whose clutches worked beyond the end of the measured data.
+WINDUP_OUT_OF_DATA = "windup_out_of_data"
+FLAG_SENTENCES: dict[str, str] = {
+    WINDUP_OUT_OF_DATA: "Some clutch was wound up beyond the measured data; its law was continued straight there.",
+}
+
+
+class WorkerEnding(StrEnum):
+    """Endings that the worker gives to a case, because the engine did not come back from it."""
+
+    CRASHED = "crashed"
+    TIMED_OUT = "timed_out"
+    CANCELLED = "cancelled"
+
+
+#: Every ending of a case, stored as its key, and the sentence a user reads.
+ENDING_SENTENCES: dict[str, str] = {
+    **{ending.value: ending.sentence for ending in Ending},
+    WorkerEnding.CRASHED.value: (
+        "The process that ran this case died, twice, with no other case beside it: the case is set aside and can be "
+        "run again."
+    ),
+    WorkerEnding.TIMED_OUT.value: "The case did not come back within the time allowed for it, alone and twice.",
+    WorkerEnding.CANCELLED.value: "The study was cancelled before this case was run.",
+}
+
+_CLUTCH_NAMES = frozenset({"ClutchFit", "ClutchFitError", "ClutchLaw", "ClutchLawError", "check_law", "fit_clutch"})
+_PENDULUM = re.compile(r"pendulums\.(\d+)\.")
+_COEFFICIENT = re.compile(r"(?:^|\.)clutch\.coefficients\.(\d+)$")
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkResult:
+    """What a run of consecutive cases gave.
+
+    Attributes
+    ----------
+    first : int
+        Number of the first case.
+    endings : list of str, length ``count``
+        Names of the endings, keys of `ENDING_SENTENCES`.
+    flags : list of str, length ``count``
+        Names of the flags of each case joined by commas; "" where there is none.
+    values : float64 array, shape (count, results), C-contiguous
+        Results in the order of `result_infos`, SI units; NaN where a result could not be computed.
+    """
+
+    first: int
+    endings: list[str]
+    flags: list[str]
+    values: NDArray[np.float64]
+
+    @property
+    def count(self) -> int:
+        """Number of cases."""
+        return len(self.endings)
+
+
+def __getattr__(name: str) -> Any:
+    """Names of the engine that would load more than a catalogue needs, fetched when first asked for."""
+    if name in _CLUTCH_NAMES:
+        from engine.vibration_drive import clutch
+
+        return getattr(clutch, name)
+    if name == "Trajectory":
+        from engine.vibration_drive.simulate import Trajectory
+
+        return Trajectory
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def models() -> tuple[str, ...]:
+    """Names of the models a study may ask for."""
+    return MODELS
+
+
+def _require(model: str) -> None:
+    if model not in MODELS:
+        raise ValueError(f"unknown model {model!r}; there is: {', '.join(MODELS)}")
+
+
+def parameter_catalogue(model: str) -> tuple[Parameter, ...]:
+    """Every numeric parameter of ``model``: SPEC paths with ``N`` for a pendulum and ``K`` for a coefficient.
+
+    The two entries of the clutch stand under ``clutch.``; they may also stand in each pendulum
+    (``pendulums.N.clutch.``).
+    Raises ValueError for an unknown model.
+    """
+    _require(model)
+    return (*PARAMETERS, CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT)
+
+
+def result_shapes(model: str) -> range:
+    """The numbers of pendulums for which ``model`` has a set of results."""
+    _require(model)
+    return range(1, MAX_PENDULUMS + 1)
+
+
+def result_infos(model: str, pendulums: int) -> tuple[ResultInfo, ...]:
+    """Every result of ``model`` with that many pendulums, in the order of the columns of `ChunkResult.values`."""
+    _require(model)
+    return _vibration_drive_results(pendulums)
+
+
+def study_results(study: Study) -> tuple[ResultInfo, ...]:
+    """Every result of the cases of ``study``."""
+    return result_infos(study.model, pendulums(study))
+
+
+def _paths(study: Study) -> Iterable[str]:
+    yield from study.base
+    for axis in study.axes:
+        yield from axis.paths
+
+
+def pendulums(study: Study) -> int:
+    """Number of pendulums of the machine: one more than the largest index in the study's paths."""
+    return 1 + max(int(match[1]) for path in _paths(study) if (match := _PENDULUM.match(path)))
+
+
+def coefficients(study: Study) -> int:
+    """Number of coefficients of the longest clutch law of the study."""
+    return 1 + max((int(match[1]) for path in _paths(study) if (match := _COEFFICIENT.search(path))), default=0)
+
+
+def _span(value: object) -> Span:
+    number, unit = cast("tuple[float, Unit]", value)
+    return Span(float(number), unit)
+
+
+def run_of(study: Study) -> Run:
+    """The engine's settings of the run, from the plain data of the study."""
+    run = study.run
+    window = cast("list[object] | None", run.get("window"))
+    return Run(
+        duration=_span(run["duration"]),
+        window=None if window is None else (_span(window[0]), _span(window[1])),
+        tolerance=float(cast("float", run["tolerance"])),
+        reset=cast("Reset", run["reset"]),
+    )
+
+
+def _columns(study: Study, cases: range) -> Mapping[str, float | NDArray[np.float64]]:
+    return {**study.base, **study.columns(cases)}
+
+
+def run_chunk(study: Study, first: int, count: int) -> ChunkResult:
+    """Run the cases ``first`` .. ``first + count - 1`` of ``study``.
+
+    A physical failure is an ending in the result, never an exception; what is raised here is a fault of the program.
+    """
+    from engine.endings import ENDING_CODES
+    from engine.vibration_drive.simulate import simulate
+
+    batch = simulate(_columns(study, range(first, first + count)), run_of(study), cases=count)
+    names = [ending.value for ending in ENDING_CODES]
+    beyond = [index for index, info in enumerate(study_results(study)) if info.name.endswith(".fraction.beyond_data")]
+    outside = (batch.values[:, beyond] > 0.0).any(axis=1)
+    return ChunkResult(
+        first=first,
+        endings=[names[code] for code in batch.endings.tolist()],
+        flags=[WINDUP_OUT_OF_DATA if flag else "" for flag in outside.tolist()],
+        values=np.ascontiguousarray(batch.values, dtype=np.float64),
+    )
+
+
+def run_trajectory(study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
+    """Instantaneous values of one case at ``points`` equally spaced times from ``start`` to ``end`` (s)."""
+    from engine.vibration_drive.simulate import trajectory
+
+    columns = {**study.base, **study.case_parameters(case)}
+    return trajectory(columns, run_of(study), np.linspace(start, end, points))
+
+
+def duration_seconds(study: Study, case: int) -> float:
+    """Duration of the run of one case, in s."""
+    frequency = {**study.base, **study.case_parameters(case)}["excitation.frequency"]
+    duration = run_of(study).duration
+    return duration.value if duration.unit == "s" else duration.value / frequency
+
+
+def _mean_periods(study: Study) -> float:
+    """Excitation periods of a run, averaged over the cases of the study."""
+    duration = run_of(study).duration
+    for axis in study.axes:
+        if "excitation.frequency" in axis.paths:
+            frequency = math.fsum(axis.values) / len(axis.values)
+            break
+    else:
+        frequency = study.base["excitation.frequency"]
+    return duration.in_periods(frequency)
+
+
+def estimate_seconds_per_case(study: Study) -> float:
+    """Rough time of one case of ``study`` on one core, in s."""
+    from engine.vibration_drive.simulate import estimate_seconds
+
+    run = run_of(study)
+    return estimate_seconds(pendulums(study), coefficients(study), run.tolerance, _mean_periods(study))
+
+
+def warm_up(study: Study) -> None:
+    """Compile the kernel that ``study`` needs into the on-disk cache, or load it from there."""
+    from engine.vibration_drive.simulate import warm_up as engine_warm_up
+
+    engine_warm_up(pendulums(study), coefficients(study), run_of(study).tolerance)
