@@ -1,0 +1,36 @@
+"""Every limit on what a study may ask for, in one place."""
+
+from typing import Final
+
+#: Axes of one study.
+MAX_AXES: Final = 16
+#: Cases of one study.
+MAX_CASES: Final = 10_000_000
+#: Values on all axes of one study together (they are kept with the study).
+MAX_AXIS_VALUES: Final = 1_000_000
+#: Paths tied to one axis.
+MAX_TIED_PATHS: Final = 256
+
+#: Bytes of a spec, and of a request's body.
+MAX_BODY_BYTES: Final = 1024 * 1024
+#: Levels of nested lists and objects in a spec.
+MAX_DEPTH: Final = 32
+#: Characters of a study's name.
+MAX_NAME_LENGTH: Final = 200
+#: Characters of one quantity with its unit ("0.01 N*m*s/rad").
+MAX_QUANTITY_LENGTH: Final = 80
+#: Decimal digits of an integer in a spec; none above about 308 fits into a double.
+MAX_INTEGER_DIGITS: Final = 400
+#: Problems reported about one spec; what comes after is only counted.
+MAX_PROBLEMS: Final = 100
+
+#: Excitation periods of any case of a study.
+MAX_RUN_PERIODS: Final = 1e6
+#: Range of the integrator's local relative error.
+MIN_TOLERANCE: Final = 1e-14
+MAX_TOLERANCE: Final = 1e-4
+
+#: Rows of measured clutch data.
+MAX_CLUTCH_ROWS: Final = 10_000
+#: Different clutch laws of one study that are checked one by one.
+MAX_CLUTCH_LAWS: Final = 10_000

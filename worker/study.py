@@ -1,0 +1,266 @@
+"""A study in SI numbers: base parameters, axes, and the numbering of its cases. No units and no physics here."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES
+
+Combine = Literal["grid", "zip"]
+
+#: Two numbers closer than this (relative to the larger one) name the same value of an axis.
+SAME_VALUE = 1e-9
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Values that one parameter, or several tied ones, take in turn.
+
+    Attributes
+    ----------
+    paths : tuple of str
+        Flat SPEC paths that share the values, for instance ``("excitation.amplitude_x", "excitation.amplitude_y")``.
+    values : tuple of float
+        SI numbers, finite, each once, in the user's order.
+    """
+
+    paths: tuple[str, ...]
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if not self.paths or not self.values:
+            raise ValueError("an axis needs at least one path and one value")
+        if not all(map(math.isfinite, self.values)):
+            raise ValueError(f"axis {self.paths[0]}: every value must be a finite number")
+
+    def __reduce__(self) -> tuple[type[Axis], tuple[Any, ...]]:
+        # Without the arrays cached below, which would double what travels to the processes.
+        return Axis, (self.paths, self.values)
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @cached_property
+    def array(self) -> NDArray[np.float64]:
+        """The values as a read-only array, shape (values,)."""
+        array = np.array(self.values, dtype=np.float64)
+        array.flags.writeable = False
+        return array
+
+    def index_of(self, value: float) -> int | None:
+        """Position of the axis' value that is ``value`` (SI) within `SAME_VALUE`; None when there is none."""
+        if not math.isfinite(value):
+            return None
+        nearest = int(np.argmin(np.abs(self.array - value)))
+        return nearest if math.isclose(self.values[nearest], value, rel_tol=SAME_VALUE) else None
+
+
+@dataclass(frozen=True)
+class Study:
+    """One study: everything that decides its numbers, and nothing else but its name.
+
+    Attributes
+    ----------
+    model : str
+        Name of the model, for instance "vibration-drive".
+    name : str
+        The user's name for it; not part of `physics_hash`.
+    base : dict
+        Flat SPEC path -> SI number, every parameter, defaults filled in.
+    run : dict
+        ``{"duration": [60.0, "periods"], "window": [[40.0, "periods"], [60.0, "periods"]] or None, "tolerance": 1e-9,
+        "reset": "contact"}``; times in "periods" or "s".
+    axes : tuple of Axis
+    combine : "grid" or "zip"
+        Grid: every combination, the first axis varies slowest. Zip: the axes go together, all of one length.
+
+    Raises
+    ------
+    ValueError
+        When the parts contradict each other (a path twice, unequal lengths, beyond `worker.limits`).
+    """
+
+    model: str
+    name: str
+    base: dict[str, float]
+    run: dict[str, Any]
+    axes: tuple[Axis, ...] = ()
+    combine: Combine = "grid"
+
+    def __post_init__(self) -> None:
+        if self.combine not in get_args(Combine):
+            raise ValueError(f"combine must be 'grid' or 'zip', not {self.combine!r}")
+        paths = [path for axis in self.axes for path in axis.paths]
+        if len(set(paths)) != len(paths):
+            raise ValueError("a path stands on two axes")
+        if self.combine == "zip" and len({len(axis) for axis in self.axes}) > 1:
+            raise ValueError("axes that are zipped must have equal lengths")
+        if len(self.axes) > MAX_AXES or sum(map(len, self.axes)) > MAX_AXIS_VALUES or self.cases > MAX_CASES:
+            raise ValueError("the study is larger than the limits allow")
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lengths of the directions in which cases are numbered: one for each axis of a grid, one in all for a zip."""
+        if not self.axes:
+            return ()
+        return tuple(map(len, self.axes)) if self.combine == "grid" else (len(self.axes[0]),)
+
+    @property
+    def cases(self) -> int:
+        """Number of cases; 1 without axes."""
+        return math.prod(self.shape)
+
+    @property
+    def axis_paths(self) -> tuple[str, ...]:
+        """Every path that varies, in the order of the axes."""
+        return tuple(path for axis in self.axes for path in axis.paths)
+
+    def axis_of(self, path: str) -> int | None:
+        """Position of the axis that varies ``path``; None when it does not vary."""
+        return next((i for i, axis in enumerate(self.axes) if path in axis.paths), None)
+
+    def indices(self, cases: Sequence[int] | range | NDArray[np.integer[Any]]) -> tuple[NDArray[np.int64], ...]:
+        """Position on each axis of the given cases.
+
+        Parameters
+        ----------
+        cases : case numbers, 0 .. `cases` - 1, shape (m,)
+
+        Returns
+        -------
+        tuple of int64 arrays, shape (m,), one for each axis
+
+        Raises
+        ------
+        IndexError
+            When a case number does not exist.
+        """
+        if isinstance(cases, range):
+            numbers = np.arange(cases.start, cases.stop, cases.step, dtype=np.int64)
+        else:
+            numbers = np.asarray(cases, dtype=np.int64).reshape(-1)
+        if numbers.size and (numbers.min() < 0 or numbers.max() >= self.cases):
+            raise IndexError(f"the cases of this study are 0 .. {self.cases - 1}")
+        if self.combine == "zip":
+            return (numbers,) * len(self.axes)
+        found: list[NDArray[np.int64]] = []
+        for axis in reversed(self.axes):
+            numbers, index = np.divmod(numbers, len(axis))
+            found.append(index)
+        return tuple(reversed(found))
+
+    def columns(self, cases: Sequence[int] | range | NDArray[np.integer[Any]]) -> dict[str, NDArray[np.float64]]:
+        """Values of every varying path for the given cases: path -> array of shape (m,), SI.
+
+        What does not vary is not in it; a caller merges it over `base`. Raises IndexError as `indices` does.
+        """
+        found: dict[str, NDArray[np.float64]] = {}
+        for axis, index in zip(self.axes, self.indices(cases), strict=True):
+            column = axis.array[index]
+            found.update(dict.fromkeys(axis.paths, column))
+        return found
+
+    def case_parameters(self, case: int) -> dict[str, float]:
+        """Values (SI) of every varying path in one case, tied paths each; IndexError when there is no such case."""
+        return {path: float(column[0]) for path, column in self.columns([case]).items()}
+
+    def case_number(self, indices: Sequence[int]) -> int:
+        """Number of the case at one position for each direction of `shape`; IndexError outside."""
+        if len(indices) != len(self.shape):
+            raise IndexError(f"{len(self.shape)} positions are needed, not {len(indices)}")
+        number = 0
+        for index, length in zip(indices, self.shape, strict=True):
+            if not 0 <= index < length:
+                raise IndexError(f"position {index} is outside 0 .. {length - 1}")
+            number = number * length + index
+        return number
+
+    def cases_at(self, fixed: Mapping[str, float]) -> NDArray[np.int64]:
+        """Numbers of the cases in which every path in ``fixed`` has the given value (SI, within `SAME_VALUE`).
+
+        A path that does not vary matches when its base value does. Nothing is scanned but the axes of a zip.
+
+        Returns
+        -------
+        int64 array, ascending; empty when no case matches
+
+        Raises
+        ------
+        KeyError
+            When a path is neither on an axis nor in the base.
+        """
+        nothing: NDArray[np.int64] = np.empty(0, dtype=np.int64)
+        positions: dict[int, int] = {}
+        for path, value in fixed.items():
+            at = self.axis_of(path)
+            if at is None:
+                if not math.isclose(self.base[path], value, rel_tol=SAME_VALUE):
+                    return nothing
+                continue
+            index = self.axes[at].index_of(value)
+            if index is None or positions.setdefault(at, index) != index:
+                return nothing
+        if self.combine == "zip":
+            return self._zipped_at(positions)
+        numbers = np.zeros(1, dtype=np.int64)
+        for at, axis in enumerate(self.axes):
+            chosen = np.array([positions[at]]) if at in positions else np.arange(len(axis), dtype=np.int64)
+            numbers = (numbers[:, None] * len(axis) + chosen[None, :]).reshape(-1)
+        return numbers
+
+    def _zipped_at(self, positions: Mapping[int, int]) -> NDArray[np.int64]:
+        match = np.ones(self.cases, dtype=np.bool_)
+        for at, index in positions.items():
+            # A zipped axis may repeat a value, so its position alone does not say which cases have it.
+            match &= self.axes[at].array == self.axes[at].array[index]
+        return np.flatnonzero(match).astype(np.int64)
+
+    def values_with(self, cases: range) -> Iterator[dict[str, float]]:
+        """The varying parameters of consecutive cases, one dictionary (path -> SI number) at a time."""
+        columns = {path: column.tolist() for path, column in self.columns(cases).items()}
+        for row in range(len(cases)):
+            yield {path: column[row] for path, column in columns.items()}
+
+    def to_json(self) -> dict[str, Any]:
+        """The study as plain JSON data; `from_json` gives an equal study."""
+        return {
+            "model": self.model,
+            "name": self.name,
+            "base": dict(self.base),
+            "run": dict(self.run),
+            "axes": [{"paths": list(axis.paths), "values": list(axis.values)} for axis in self.axes],
+            "combine": self.combine,
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Study:
+        """The study that `to_json` wrote; KeyError, TypeError or ValueError when it is not one."""
+        return cls(
+            model=str(data["model"]),
+            name=str(data["name"]),
+            base={str(path): float(value) for path, value in data["base"].items()},
+            run=dict(data["run"]),
+            axes=tuple(Axis(tuple(axis["paths"]), tuple(map(float, axis["values"]))) for axis in data["axes"]),
+            combine=cast("Combine", data["combine"]),
+        )
+
+    def physics_hash(self, engine_version: str) -> str:
+        """SHA-256 (hexadecimal) of what decides the numbers: the study without its name, and the engine's version."""
+        physics = {key: value for key, value in self.to_json().items() if key != "name"}
+        text = json.dumps(
+            {"engine": engine_version, **physics},
+            sort_keys=True,
+            separators=(",", ":"),
+            ensure_ascii=True,
+            allow_nan=False,
+        )
+        return hashlib.sha256(text.encode("ascii")).hexdigest()
