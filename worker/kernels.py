@@ -1,8 +1,8 @@
 """The one module of the worker that knows the engine: a study and a range of cases in, plain arrays out.
 
 What is particular to a model (its catalogues, the shape of its results, how a study's columns become a call of the
-engine) stays behind the functions of this module. The numerical kernels are imported inside the functions that run them,
-so that reading a catalogue does not load a compiler.
+engine) stays behind the functions of this module. The numerical kernels are imported where they are run,
+so reading a catalogue loads no compiler.
 """
 
 from __future__ import annotations

@@ -1,0 +1,1 @@
+"""The database: the only channel between the service and the dispatcher."""

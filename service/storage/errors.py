@@ -1,0 +1,41 @@
+"""What can go wrong with the database, each in one plain sentence."""
+
+from worker.ports import StoreError
+
+__all__ = [
+    "DatabaseBusyError",
+    "DatabaseError",
+    "IdempotencyConflict",
+    "SchemaError",
+    "StoreError",
+    "StudyBusy",
+    "StudyNotFound",
+]
+
+
+class DatabaseError(StoreError):
+    """The database cannot be opened or used."""
+
+
+class SchemaError(DatabaseError):
+    """The database has another revision than this program; the message names the command that mends it."""
+
+
+class DatabaseBusyError(DatabaseError):
+    """Another process kept the database for longer than the busy timeout."""
+
+
+class StudyNotFound(StoreError):  # noqa: N818 - the name callers read
+    """There is no study of that id."""
+
+    def __init__(self, study_id: str) -> None:
+        super().__init__(f"there is no study {study_id!r}")
+        self.study_id = study_id
+
+
+class StudyBusy(StoreError):  # noqa: N818
+    """The study has not come to its end, so it cannot be deleted."""
+
+
+class IdempotencyConflict(StoreError):  # noqa: N818
+    """The idempotency key was already used with another body."""

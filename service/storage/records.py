@@ -1,0 +1,164 @@
+"""What the store hands out: plain frozen values, SI units, aware times in UTC."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from datetime import datetime
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from worker.kernels import ResultInfo
+    from worker.states import StudyState
+
+
+@dataclass(frozen=True, slots=True)
+class StudyRecord:
+    """A study without its heavy parts (`Store.spec`, `Store.study`).
+
+    ``number`` counts studies in order of submission; ``id`` is the public name. ``done`` counts cases with an ending,
+    ``ok`` those that ended ok. ``reason`` says why the study is held or failed. ``revision`` rises with every change of the
+    record or its rows: together with ``id`` it makes an ETag.
+    """
+
+    number: int
+    id: str
+    name: str
+    model: str
+    pendulums: int
+    state: StudyState
+    reason: str | None
+    cases: int
+    done: int
+    ok: int
+    chunk_cases: int
+    engine_version: str
+    physics_hash: str
+    warnings: tuple[str, ...]
+    revision: int
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+
+
+@dataclass(frozen=True, slots=True)
+class StudyPage:
+    """One page of studies, newest first; ``next_token`` is None on the last."""
+
+    studies: tuple[StudyRecord, ...]
+    next_token: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a study is, computed when asked.
+
+    ``rate`` is in cases/s over the recent chunks, ``seconds_left`` a (low, high) interval; both None before the first
+    chunk and when nothing is being run.
+    """
+
+    state: StudyState
+    total: int
+    done: int
+    ok: int
+    endings: dict[str, int]
+    rate: float | None
+    seconds_left: tuple[float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class CaseRow:
+    """One finished case; ``results`` maps every result name to its SI number, None where it could not be computed."""
+
+    case: int
+    ending: str
+    flags: tuple[str, ...]
+    results: dict[str, float | int | None]
+
+
+@dataclass(frozen=True, slots=True)
+class RowBlock:
+    """Finished cases in order of their numbers, as columns.
+
+    Attributes
+    ----------
+    infos : tuple of ResultInfo, length R
+        The columns of ``values``.
+    cases : int64 array, shape (m,)
+    endings, flags : list of str, length m
+        Flags of a case are joined by commas, "" where there is none.
+    values : float64 array, shape (m, R)
+        SI units, NaN for null.
+    """
+
+    infos: tuple[ResultInfo, ...]
+    cases: NDArray[np.int64]
+    endings: list[str]
+    flags: list[str]
+    values: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.endings)
+
+    def rows(self) -> Iterator[CaseRow]:
+        """The same, case by case."""
+        names = [info.name for info in self.infos]
+        counts = [info.kind == "count" for info in self.infos]
+        for case, ending, flags, values in zip(
+            self.cases.tolist(), self.endings, self.flags, self.values.tolist(), strict=True
+        ):
+            results = {
+                name: None if math.isnan(value) else int(value) if count else value
+                for name, count, value in zip(names, counts, values, strict=True)
+            }
+            yield CaseRow(case, ending, split_flags(flags), results)
+
+
+@dataclass(frozen=True, slots=True)
+class CaseColumns:
+    """Chosen results of chosen cases, aligned with the cases asked for.
+
+    Attributes
+    ----------
+    cases : int64 array, shape (m,)
+    endings : list, length m
+        None where the case has no row yet.
+    values : dict of float64 arrays, each shape (m,)
+        By result name; NaN for null and for missing rows.
+    """
+
+    cases: NDArray[np.int64]
+    endings: list[str | None]
+    values: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class DispatcherRecord:
+    """The dispatcher that took over last, and when it was last heard of."""
+
+    epoch: int
+    owner: str
+    started_at: datetime
+    heartbeat_at: datetime
+
+
+@dataclass(frozen=True, slots=True)
+class CheckReport:
+    """Findings of `Store.check`; ``problems`` is empty for a sound database."""
+
+    location: str
+    backend: str
+    backend_version: str
+    revision: str | None
+    expected_revision: str
+    problems: tuple[str, ...]
+
+
+def split_flags(flags: str) -> tuple[str, ...]:
+    """The stored flags of one case as a tuple of names."""
+    return tuple(flags.split(",")) if flags else ()

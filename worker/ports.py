@@ -1,0 +1,143 @@
+"""What the dispatcher needs from the world: a store, an executor, a clock. Values only; no database, no pool."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from datetime import datetime
+
+    from worker.kernels import ChunkResult
+    from worker.states import StudyState
+    from worker.study import Study
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Consecutive cases of one study, the unit of claim and commit.
+
+    ``study`` is the study's number in order of submission. ``failures`` counts how often these cases, as one chunk,
+    took their process down or ran out of time.
+    """
+
+    study: int
+    first: int
+    count: int
+    failures: int = 0
+
+    @property
+    def last(self) -> int:
+        """Number of the last case."""
+        return self.first + self.count - 1
+
+
+@dataclass(frozen=True, slots=True)
+class ActiveStudy:
+    """A study that has not come to its end, as the dispatcher's poll sees it."""
+
+    number: int
+    id: str
+    state: StudyState
+
+
+class StoreError(Exception):
+    """The store refuses; the message is one plain sentence for a user."""
+
+
+class EpochLostError(StoreError):
+    """Another dispatcher has taken over: this one must give up by itself and commit nothing more."""
+
+
+class Store(Protocol):
+    """The dispatcher's side of the database. Every write is one short transaction that first checks the epoch.
+
+    A method that takes ``epoch`` raises EpochLostError, and changes nothing, when the epoch is no longer the latest.
+    """
+
+    def take_over(self, owner: str) -> int:
+        """Raise the epoch, return every claim of an older one to waiting, and give the new epoch."""
+
+    def heartbeat(self, epoch: int) -> None:
+        """Note that the dispatcher is alive. Raises alarms when missing, never decides ownership."""
+
+    def active_studies(self) -> list[ActiveStudy]:
+        """Studies that have not ended, in order of submission."""
+
+    def study_of(self, number: int) -> Study:
+        """The study to compute."""
+
+    def open_chunks(self, number: int) -> list[Chunk]:
+        """Chunks of a study that are not done, in order of their cases."""
+
+    def claim(self, epoch: int, chunks: Sequence[Chunk]) -> list[Chunk]:
+        """Claim waiting chunks of studies that are queued or running; gives those that were got."""
+
+    def commit(self, epoch: int, chunk: Chunk, result: ChunkResult) -> bool:
+        """Insert the rows of a claimed chunk and mark it done. False, and no change, when the claim is no longer ours."""
+
+    def put_back(self, epoch: int, chunk: Chunk, detail: str) -> None:
+        """Return a claimed chunk to waiting, with ``chunk.failures`` as its new count and what happened to it."""
+
+    def split(self, epoch: int, chunk: Chunk, parts: Sequence[Chunk], detail: str) -> None:
+        """Replace a claimed chunk by waiting parts that cover the same cases."""
+
+    def quarantine(self, epoch: int, chunk: Chunk, ending: str, detail: str) -> None:
+        """Give every case of a claimed chunk ``ending`` without results and mark the chunk done."""
+
+    def fault(self, epoch: int, number: int, reason: str) -> None:
+        """Hold the study with a reason and return its claims to waiting."""
+
+    def settle(self, epoch: int, number: int) -> StudyState:
+        """Bring a study without open claims to its end: cancelled when that was asked for, else finished or failed."""
+
+
+class Fate(StrEnum):
+    """How the run of a chunk came out."""
+
+    DONE = "done"
+    CRASHED = "crashed"
+    TIMED_OUT = "timed_out"
+    STOPPED = "stopped"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The end of one submitted chunk; ``result`` is there when the fate is DONE, else ``detail`` says what happened."""
+
+    ticket: int
+    fate: Fate
+    result: ChunkResult | None = None
+    detail: str = ""
+
+
+class Executor(Protocol):
+    """Runs chunks somewhere. One outcome for every ticket, in any order."""
+
+    @property
+    def capacity(self) -> int:
+        """Number of chunks worth having in flight at once."""
+
+    def submit(self, ticket: int, study: Study, chunk: Chunk) -> None:
+        """Start a chunk; returns at once."""
+
+    def wait(self, timeout: float) -> list[Outcome]:
+        """Outcomes that have come in; waits for the first at most ``timeout`` s, gives [] when none came."""
+
+    def stop(self, ticket: int) -> None:
+        """Stop a chunk, running or not; its outcome is STOPPED unless it was just through."""
+
+    def close(self) -> None:
+        """Stop everything and leave no process behind."""
+
+
+class Clock(Protocol):
+    """Time, so that tests can hold it still."""
+
+    def now(self) -> datetime:
+        """The present moment, aware, UTC."""
+
+    def monotonic(self) -> float:
+        """Seconds on a clock that never goes back."""
