@@ -1,0 +1,304 @@
+"""What the dispatcher decides, without I/O: events in, instructions out.
+
+A chunk whose process dies or runs out of time is run once more, then split in two until the case is found; a case that
+fails alone twice is given its ending and left aside. Three chunks that share no case and crash with no success of the
+study between them show a fault of the engine, not of the cases: the study is held with the reason, nobody quarantined.
+Chunks that overlap count once, because one bad case explains the crash of every chunk around it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, assert_never
+
+from worker.kernels import WorkerEnding
+from worker.ports import Chunk, Fate
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+#: Failures of one chunk after which it is split, or quarantined when it is a single case.
+MAX_FAILURES = 2
+#: Chunks without a common case that crash in a row and so show an engine fault.
+FAULT_CRASHES = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Offered:
+    """A study may be run; ``chunks`` are those not done. For a study already known it only ends a pause."""
+
+    study: int
+    chunks: Sequence[Chunk] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Paused:
+    """No new chunks of the study; those in flight go on to their end."""
+
+    study: int
+
+
+@dataclass(frozen=True, slots=True)
+class Cancelled:
+    """The study is to end now."""
+
+    study: int
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """The store did not grant the claim of a chunk, so it was not started; the next poll tells why."""
+
+    ticket: int
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """A chunk in flight came to its end."""
+
+    ticket: int
+    fate: Fate
+    detail: str = ""
+
+
+Event = Offered | Paused | Cancelled | Refused | Ended
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Claim the chunk and start it."""
+
+    ticket: int
+    chunk: Chunk
+
+
+@dataclass(frozen=True, slots=True)
+class Commit:
+    """Store the rows of the chunk that was just done."""
+
+    ticket: int
+    chunk: Chunk
+
+
+@dataclass(frozen=True, slots=True)
+class PutBack:
+    """Return the chunk to waiting with its new count of failures."""
+
+    chunk: Chunk
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """Replace the chunk by its parts."""
+
+    chunk: Chunk
+    parts: tuple[Chunk, ...]
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class Quarantine:
+    """Give the chunk's single case that ending and leave it aside."""
+
+    chunk: Chunk
+    ending: WorkerEnding
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Stop a chunk in flight; its outcome is of no use any more unless it is just through."""
+
+    ticket: int
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """Hold the study with the reason and return its claims."""
+
+    study: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Settle:
+    """Nothing of the study is waiting or in flight: bring it to its end."""
+
+    study: int
+
+
+Instruction = Run | Commit | PutBack | Split | Quarantine | Stop | Fault | Settle
+
+
+@dataclass(slots=True)
+class _Open:
+    """A study that is being worked on."""
+
+    waiting: deque[Chunk]
+    running: dict[int, Chunk] = field(default_factory=dict)
+    held: bool = False
+    cancelled: bool = False
+    crashed: list[Chunk] = field(default_factory=list)
+
+
+def disjoint(chunks: Iterable[Chunk]) -> int:
+    """Largest number of chunks of one study no two of which share a case."""
+    count, end = 0, -1
+    for chunk in sorted(chunks, key=lambda chunk: chunk.last):
+        if chunk.first > end:
+            count, end = count + 1, chunk.last
+    return count
+
+
+def halves(chunk: Chunk) -> tuple[Chunk, Chunk]:
+    """The chunk in two parts. A part of several cases is split again at its next failure; a single case fails twice."""
+    size = chunk.count // 2
+
+    def part(first: int, count: int) -> Chunk:
+        return Chunk(chunk.study, first, count, failures=0 if count == 1 else MAX_FAILURES - 1)
+
+    return part(chunk.first, size), part(chunk.first + size, chunk.count - size)
+
+
+class Dispatch:
+    """The state machine. At most ``capacity`` chunks are in flight; every `Run` is answered by one Refused or Ended."""
+
+    def __init__(self, capacity: int) -> None:
+        self.capacity = capacity
+        self._open: dict[int, _Open] = {}
+        self._study_of: dict[int, int] = {}
+        self._next_ticket = 1
+
+    @property
+    def in_flight(self) -> int:
+        """Chunks that were started and have not ended."""
+        return len(self._study_of)
+
+    @property
+    def studies(self) -> frozenset[int]:
+        """Numbers of the studies being worked on."""
+        return frozenset(self._open)
+
+    def handle(self, event: Event) -> list[Instruction]:
+        """Take one event; gives what is to be done, in order. Events about what is not known are ignored."""
+        found: list[Instruction]
+        match event:
+            case Offered():
+                found = self._offered(event)
+            case Paused():
+                found = self._paused(event)
+            case Cancelled():
+                found = self._cancelled(event)
+            case Refused():
+                found = self._refused(event)
+            case Ended():
+                found = self._ended(event)
+            case _:
+                assert_never(event)
+        return found + self._fill()
+
+    def _offered(self, event: Offered) -> list[Instruction]:
+        known = self._open.get(event.study)
+        if known is None:
+            known = self._open[event.study] = _Open(deque(event.chunks))
+        known.held = False
+        return self._settled(event.study, known)
+
+    def _paused(self, event: Paused) -> list[Instruction]:
+        if known := self._open.get(event.study):
+            known.held = True
+        return []
+
+    def _cancelled(self, event: Cancelled) -> list[Instruction]:
+        known = self._open.setdefault(event.study, _Open(deque()))
+        if known.cancelled:
+            return []
+        known.cancelled = True
+        known.waiting.clear()
+        stops: list[Instruction] = [Stop(ticket) for ticket in known.running]
+        return stops + self._settled(event.study, known)
+
+    def _refused(self, event: Refused) -> list[Instruction]:
+        taken = self._take(event.ticket)
+        if taken is None:
+            return []
+        number, known, chunk = taken
+        known.held = True
+        if not known.cancelled:
+            known.waiting.appendleft(chunk)
+        return self._settled(number, known)
+
+    def _ended(self, event: Ended) -> list[Instruction]:
+        taken = self._take(event.ticket)
+        if taken is None:
+            return []
+        number, known, chunk = taken
+        found: list[Instruction]
+        if event.fate is Fate.DONE:
+            known.crashed.clear()
+            found = [Commit(event.ticket, chunk)]
+        elif known.cancelled:
+            found = []
+        elif event.fate is Fate.STOPPED:
+            known.waiting.appendleft(chunk)
+            found = [PutBack(chunk, event.detail)]
+        else:
+            found = self._failed(number, known, chunk, event)
+            if number not in self._open:
+                return found
+        return found + self._settled(number, known)
+
+    def _failed(self, number: int, known: _Open, chunk: Chunk, event: Ended) -> list[Instruction]:
+        crashed = event.fate is Fate.CRASHED
+        if crashed:
+            known.crashed.append(chunk)
+            if disjoint(known.crashed) >= FAULT_CRASHES:
+                return self._fault(number, known, event.detail)
+        failed = replace(chunk, failures=chunk.failures + 1)
+        if failed.failures < MAX_FAILURES:
+            known.waiting.appendleft(failed)
+            return [PutBack(failed, event.detail)]
+        if chunk.count == 1:
+            return [Quarantine(chunk, WorkerEnding.CRASHED if crashed else WorkerEnding.TIMED_OUT, event.detail)]
+        parts = halves(chunk)
+        known.waiting.extendleft(reversed(parts))
+        return [Split(chunk, parts, event.detail)]
+
+    def _fault(self, number: int, known: _Open, detail: str) -> list[Instruction]:
+        stops: list[Instruction] = [Stop(ticket) for ticket in known.running]
+        del self._open[number]
+        reason = f"engine fault: {FAULT_CRASHES} different chunks crashed with no success between them"
+        return [*stops, Fault(number, f"{reason} ({detail})" if detail else reason)]
+
+    def _take(self, ticket: int) -> tuple[int, _Open, Chunk] | None:
+        """Take a ticket out of flight; None when its study is not worked on any more."""
+        number = self._study_of.pop(ticket, None)
+        known = None if number is None else self._open.get(number)
+        chunk = None if known is None else known.running.pop(ticket, None)
+        return None if number is None or known is None or chunk is None else (number, known, chunk)
+
+    def _settled(self, number: int, known: _Open) -> list[Instruction]:
+        if known.waiting or known.running:
+            return []
+        del self._open[number]
+        return [Settle(number)]
+
+    def _fill(self) -> list[Instruction]:
+        """Start waiting chunks while there is room: of the study with the fewest in flight, the oldest of equals."""
+        found: list[Instruction] = []
+        while len(self._study_of) < self.capacity:
+            ready = [
+                (len(known.running), number) for number, known in self._open.items() if known.waiting and not known.held
+            ]
+            if not ready:
+                break
+            number = min(ready)[1]
+            known = self._open[number]
+            ticket, self._next_ticket = self._next_ticket, self._next_ticket + 1
+            chunk = known.waiting.popleft()
+            known.running[ticket] = chunk
+            self._study_of[ticket] = number
+            found.append(Run(ticket, chunk))
+        return found
