@@ -1,0 +1,277 @@
+"""Quantities with units at the edge: "157 rad/s", "2 mm", "0.01 N*m*s/rad" -> exact SI numbers.
+
+A strict grammar reads the number and the unit's text; pint converts the units, with a small registry of its own in
+which the angle is a dimension like length or mass (in pint's usual registry a radian is a plain 1 and a hertz is
+2 pi of nothing, so "1500 rpm" asked in Hz comes out 2 pi wrong). A revolution is one period: angular speeds become
+frequencies by division by 2 pi, and only where a frequency is asked for.
+
+Numbers are carried as fractions, so "1.1 mm" is the double nearest to 0.0011 and "1500 rpm" is 25 Hz exactly.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections import Counter
+from fractions import Fraction
+from functools import lru_cache
+from typing import Final
+
+import pint
+
+from worker.limits import MAX_QUANTITY_LENGTH
+
+#: The circle constant to 50 digits, so that its rounding never shows in a double.
+_TWO_PI: Final = "6.2831853071795864769252867665590057683943387987502"
+
+_DEFINITIONS: Final = (
+    *("nano- = 1e-9 = n-", "micro- = 1e-6 = µ- = u-", "milli- = 1e-3 = m-", "centi- = 1e-2 = c-", "deci- = 1e-1 = d-"),
+    *("kilo- = 1e3 = k-", "mega- = 1e6 = M-", "giga- = 1e9 = G-"),
+    *("meter = [length] = m = metre", "gram = [mass] = g", "second = [time] = s = sec", "radian = [angle] = rad"),
+    *(
+        "inch = 0.0254 * meter = in",
+        "foot = 0.3048 * meter = ft",
+        "tonne = 1e6 * gram = t",
+        "pound = 453.59237 * gram = lb",
+    ),
+    *("minute = 60 * second = min", "hour = 3600 * second = h = hr"),
+    f"turn = {_TWO_PI} * radian = _ = revolution = rev = cycle",
+    *("degree = turn / 360 = deg = °", "arcminute = degree / 60 = arcmin", "arcsecond = degree / 3600 = arcsec"),
+    "revolution_per_minute = turn / minute = rpm",
+    *("hertz = 1 / second = Hz", "newton = 1000 * gram * meter / second**2 = N", "joule = newton * meter = J"),
+    *("watt = joule / second = W", "kilogram_force = 9.80665 * newton = kgf = kp"),
+    "pound_force = 4.4482216152605 * newton = lbf",
+    "standard_gravity = 9.80665 * meter / second**2 = g_0 = g0",
+    # Torques are often written without the sign of multiplication.
+    *("newton_meter = newton * meter = Nm", "newton_centimeter = newton_meter / 100 = Ncm"),
+    *("newton_millimeter = newton_meter / 1000 = Nmm", "newton_meter_second = newton_meter * second = Nms"),
+)
+
+_EXAMPLES: Final = {
+    "Hz": '"25 Hz", "1500 rpm" or "157 rad/s"',
+    "m": '"2 mm"',
+    "rad": '"0.3 deg" or "0.005 rad"',
+    "rad/s": '"10 rad/s" or "95 rpm"',
+    "kg": '"0.5 kg"',
+    "kg*m^2": '"1e-3 kg*m^2"',
+    "N/m": '"9000 N/m"',
+    "N*m": '"0.1 N*m"',
+    "N*m*s/rad": '"0.01 N*m*s/rad"',
+    "m/s^2": '"9.81 m/s^2"',
+    "s": '"2 s"',
+}
+
+_QUANTITY: Final = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?)\s*(.*)", re.DOTALL)
+_TOKEN: Final = re.compile(
+    r"\s*(?:(?P<name>[A-Za-zµ°][A-Za-zµ°_0]*)|(?:\*\*|\^)\s*(?P<power>[+-]?[0-9]{1,2})(?![0-9])"
+    r"|(?P<operator>[*/()])|(?P<one>1)(?![0-9]))"
+)
+_SUPERSCRIPT: Final = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+")
+_LONGEST_UNIT: Final = 40
+_SUPERSCRIPTS: Final = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+_SIGNS: Final = str.maketrans(
+    {
+        "\u2212": "-",
+        "\u2013": "-",
+        "·": "*",
+        "⋅": "*",
+        "×": "*",
+        "\u2219": "*",
+        "μ": "µ",
+        "\u00a0": " ",
+        "\u202f": " ",
+        "\u2009": " ",
+    }
+)
+
+
+class QuantityError(ValueError):
+    """A value that is not a quantity of the unit asked for. ``str()`` is a plain sentence without the value."""
+
+
+def example(unit: str) -> str:
+    """A quantity in ``unit`` as a user would write it, in quotation marks."""
+    return _EXAMPLES.get(unit, f'"200 {unit}"')
+
+
+def parse_quantity(value: object, unit: str) -> float:
+    """The SI number that ``value`` means.
+
+    Parameters
+    ----------
+    value : int, float or str
+        A plain number is already in ``unit``; a string carries its own unit.
+    unit : str
+        SI unit wanted, for instance "Hz", "N*m*s/rad", "N*m/rad^3".
+
+    Returns
+    -------
+    float
+        Finite, correctly rounded.
+
+    Raises
+    ------
+    QuantityError
+        Not a number, not finite, no unit, an unknown unit or one of another kind.
+    """
+    return to_float(parse_exact(value, unit))
+
+
+def parse_exact(value: object, unit: str) -> Fraction:
+    """As `parse_quantity`, but exact: the decimal number as it was written, times the exact factor of its unit."""
+    if isinstance(value, str):
+        number, text = split_quantity(value)
+        if not text:
+            raise QuantityError(
+                f"a text needs its unit, for example {example(unit)}; a plain number is taken in {unit}"
+            )
+        return number * _factor(text, unit)
+    return exact_number(value, unit)
+
+
+def exact_number(value: object, unit: str) -> Fraction:
+    """A plain JSON number as the decimal it was written as; QuantityError when it is none (a bool is none)."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise QuantityError(f"must be a number in {unit} or a text with its unit, for example {example(unit)}")
+    if isinstance(value, int):
+        if value.bit_length() > 1024:
+            raise QuantityError("is beyond the range of numbers")
+        return Fraction(value)
+    if not math.isfinite(value):
+        raise QuantityError("must be a finite number")
+    return Fraction(repr(value))
+
+
+def split_quantity(text: str) -> tuple[Fraction, str]:
+    """Number and unit's text of "2 mm"; the unit may be empty. QuantityError when there is no number in front."""
+    if len(text) > MAX_QUANTITY_LENGTH:
+        raise QuantityError(f"is longer than the {MAX_QUANTITY_LENGTH} characters of any quantity")
+    match = _QUANTITY.fullmatch(text.translate(_SIGNS).strip())
+    if match is None:
+        raise QuantityError("must begin with a number (decimal point, no thousands separators) followed by its unit")
+    number = Fraction(match[1])
+    to_float(number)
+    if match[2].startswith((",", ".")):
+        raise QuantityError("must have a decimal point and no thousands separators")
+    return number, match[2].strip()
+
+
+def to_float(number: Fraction) -> float:
+    """The double nearest to ``number``; QuantityError when it is beyond the range of doubles."""
+    try:
+        value = number.numerator / number.denominator
+    except OverflowError:
+        raise QuantityError("is beyond the range of numbers") from None
+    if value == 0.0 and number:
+        raise QuantityError("is too small for a number, yet not 0")
+    return value
+
+
+@lru_cache(maxsize=1)
+def _registry() -> pint.UnitRegistry[Fraction]:
+    registry: pint.UnitRegistry[Fraction] = pint.UnitRegistry(None, non_int_type=Fraction, cache_folder=None)
+    for line in _DEFINITIONS:
+        registry.define(line)
+    return registry
+
+
+@lru_cache(maxsize=1)
+def _names() -> dict[str, str]:
+    """Unit names that a misspelled one is compared with, by their lower case."""
+    names = ["kg", "mm", "cm", "km", "kN"]
+    for line in _DEFINITIONS:
+        name, _definition, *aliases = (part.strip() for part in line.split("="))
+        names += [alias for alias in (name, *aliases) if alias != "_" and not alias.endswith("-")]
+    return {name.lower(): name for name in reversed(names)}
+
+
+@lru_cache(maxsize=1024)
+def _factor(text: str, unit: str) -> Fraction:
+    """What a number in ``text`` is multiplied by to be in ``unit``; QuantityError when they are of different kinds."""
+    expected = f"expected {unit}, for example {example(unit)}"
+    try:
+        factor, dimensions = _measure(text)
+    except QuantityError as error:
+        raise QuantityError(f"{error}; {expected}") from None
+    wanted_factor, wanted = _measure(unit)
+    angle, wanted_angle = dimensions.pop("radian", 0), wanted.pop("radian", 0)
+    if dimensions == wanted:
+        if angle == wanted_angle:
+            return factor / wanted_factor
+        if unit == "Hz" and angle == 1:
+            return factor / wanted_factor / Fraction(_TWO_PI)
+        if unit == "N*m*s/rad" and angle == 0:
+            return factor / wanted_factor  # N*m*s, as most books write it
+    raise QuantityError(f"is in '{text}', which is no unit of this field; {expected}")
+
+
+def _measure(text: str) -> tuple[Fraction, dict[str, int]]:
+    """Factor to the registry's root units (g, m, s, rad) and the powers of those in a unit like "N*m*s/rad".
+
+    Products, quotients, brackets and whole powers of names are worked out here, and pint is asked about names alone, so
+    that no text reaches it that could mean a computation.
+    """
+    if len(text) > _LONGEST_UNIT:
+        raise QuantityError(f"has a unit longer than {_LONGEST_UNIT} characters")
+    tokens: list[str] = []
+    position = 0
+    spelled = _SUPERSCRIPT.sub(lambda found: "^" + found[0].translate(_SUPERSCRIPTS), text)
+    while position < len(spelled):
+        match = _TOKEN.match(spelled, position)
+        if match is None:
+            raise QuantityError(f"has a unit that cannot be read: '{text}'")
+        tokens.append(f"^{match['power']}" if match["power"] else match[0].strip())
+        position = match.end()
+    tokens.reverse()
+    factor, powers = _product(tokens, text)
+    if tokens:
+        raise QuantityError(f"has a unit that cannot be read: '{text}'")
+    return factor, {name: power for name, power in powers.items() if power}
+
+
+def _product(tokens: list[str], text: str) -> tuple[Fraction, Counter[str]]:
+    """The product at the end of ``tokens`` (last one first), up to a closing bracket; takes its tokens away."""
+    factor, powers, sign = Fraction(1), Counter[str](), 1
+    while True:
+        part, part_powers = _operand(tokens, text)
+        factor *= part**sign
+        for name, power in part_powers.items():
+            powers[name] += sign * power
+        if not tokens or tokens[-1] == ")":
+            return factor, powers
+        # Two units side by side are multiplied, with the precedence of a written sign.
+        sign = -1 if tokens[-1] == "/" else 1
+        if tokens[-1] in {"*", "/"}:
+            tokens.pop()
+
+
+def _operand(tokens: list[str], text: str) -> tuple[Fraction, Counter[str]]:
+    first = tokens.pop() if tokens else ")"
+    if first == "(":
+        inner = _product(tokens, text)
+        if tokens and tokens.pop() == ")":
+            return inner
+    elif first == "1":
+        return Fraction(1), Counter()
+    elif first[0] not in "*/^)":
+        power = int(tokens.pop()[1:]) if tokens and tokens[-1][0] == "^" else 1
+        factor, root = _named(first)
+        return factor**power, Counter({name: power * of_one for name, of_one in root})
+    raise QuantityError(f"has a unit that cannot be read: '{text}'")
+
+
+@lru_cache(maxsize=1024)
+def _named(name: str) -> tuple[Fraction, tuple[tuple[str, int], ...]]:
+    """Factor and powers of the root units of one unit's name, from pint."""
+    registry = _registry()
+    try:
+        factor, root = registry.get_root_units(registry.parse_units(name))
+    except pint.UndefinedUnitError:
+        raise QuantityError(_unknown(name)) from None
+    return Fraction(str(factor)), tuple((str(unit), int(str(power))) for unit, power in root._units.items())
+
+
+def _unknown(name: str) -> str:
+    near = difflib.get_close_matches(name.lower(), _names(), n=1, cutoff=0.5)
+    return f"has an unknown unit '{name}'" + (f" (did you mean '{_names()[near[0]]}'?)" if near else "")
