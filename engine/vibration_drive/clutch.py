@@ -1,0 +1,257 @@
+"""Least-squares clutch characteristic from measured torque over angle (MODEL.md A3, equations (6), (7) of source 1).
+
+The polynomial is solved from the scaled matrix of powers by QR and SVD; the normal equations (7) are never formed.
+What the source's program reports of their matrix, eigenvalues and condition number, is found from singular values.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from engine.vibration_drive.clutch_data import HIGHEST_DEGREE, Rows, check_options, measured_rows
+from engine.vibration_drive.clutch_law import check_law, find_dip, stiffness, stored_energy, torque
+from engine.vibration_drive.clutch_report import (
+    ClutchError,
+    ClutchFit,
+    ClutchFitError,
+    ClutchLaw,
+    ClutchLawError,
+    DegreeReport,
+)
+from engine.vibration_drive.singular_values import singular_values
+
+__all__ = [
+    "HIGHEST_DEGREE",
+    "ClutchError",
+    "ClutchFit",
+    "ClutchFitError",
+    "ClutchLaw",
+    "ClutchLawError",
+    "DegreeReport",
+    "check_law",
+    "fit_clutch",
+    "stiffness",
+    "stored_energy",
+    "torque",
+]
+
+_EPS = float(np.finfo(np.float64).eps)
+
+
+def fit_clutch(
+    data: ArrayLike,
+    accuracy: float,
+    *,
+    max_degree: int = 7,
+    through_origin: bool = True,
+    angles_include_backlash: bool = False,
+    backlash: float = 0.0,
+) -> ClutchFit:
+    """Fit the polynomial of lowest degree whose residuals all stay within ``accuracy``.
+
+    Parameters
+    ----------
+    data : array_like, shape (m, 2)
+        Rows of angle (rad, 0 .. 1000) and torque (N*m), in any order; angles may repeat.
+    accuracy : float
+        Largest |residual| that is accepted, N*m, > 0.
+    max_degree : int
+        Highest degree to try, 1 .. 11. Degrees with more unknowns than different windups are not tried.
+    through_origin : bool
+        True: c_1 = 0, no torque at zero windup, degrees from 1. False: the source's full polynomial, degrees from 0.
+    angles_include_backlash : bool
+        True: the angles count from the start of contact, and ``backlash`` (rad) is taken off to get windups. Rows
+        within the backlash are left out of the fit; they must show no torque (beyond ``accuracy``). A row at zero
+        windup stays. False: the angles are windups, and ``backlash`` is not used.
+
+    Returns
+    -------
+    ClutchFit
+
+    Raises
+    ------
+    ClutchFitError
+        For wrong input, for an accuracy that no degree reaches (with every degree's residuals), and for a law that is
+        negative somewhere between zero and the largest measured windup.
+    """
+    check_options(accuracy, max_degree, through_origin, angles_include_backlash, backlash)
+    offset = float(backlash) if angles_include_backlash else 0.0
+    rows = measured_rows(data, offset, accuracy, through_origin)
+    first_power = 1 if through_origin else 0
+    highest = min(max_degree, rows.distinct - 1 + first_power)
+    reports: list[DegreeReport] = []
+    for degree in range(first_power, highest + 1):
+        law, report = _fit_degree(rows, np.arange(first_power, degree + 1))
+        reports.append(report)
+        if report.max_residual <= accuracy and report.rank == degree + 1 - first_power:
+            return _accepted(rows, law, tuple(reports), accuracy, first_power)
+    raise ClutchFitError(
+        _not_reached(rows, tuple(reports), accuracy, max_degree, first_power),
+        name="accuracy",
+        value=accuracy,
+        degrees=tuple(reports),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Solution:
+    """Least-squares solution over some powers.
+
+    ``triangle`` is the QR factor of the scaled matrix of powers, whose columns had the lengths ``norms``; ``values``
+    and ``right`` are its singular values and right vectors, ``scaled`` the solution in its columns.
+    """
+
+    values: NDArray[np.float64]
+    right: NDArray[np.float64]
+    triangle: NDArray[np.float64]
+    scaled: NDArray[np.float64]
+    norms: NDArray[np.float64]
+    rank: int
+
+
+def _solve(rows: Rows, powers: NDArray[np.int64]) -> _Solution:
+    """QR of the columns (u/u_end)^k at unit length, SVD of the triangle, singular values at rounding level cut off."""
+    columns = (rows.windup[rows.fitted, None] / rows.limit) ** powers
+    norms = np.asarray(np.linalg.norm(columns, axis=0), dtype=np.float64)
+    q, triangle = np.linalg.qr(columns / norms)
+    left, values, right = np.linalg.svd(triangle)
+    rank = int(np.count_nonzero(values > max(columns.shape) * _EPS * values[0]))
+    projected = left.T @ (q.T @ rows.torque[rows.fitted])
+    scaled = right[:rank].T @ (projected[:rank] / values[:rank])
+    return _Solution(values, right, triangle, scaled, norms, rank)
+
+
+def _law(solution: _Solution, powers: NDArray[np.int64], limit: float) -> NDArray[np.float64]:
+    """Coefficients c_1 .. c_(highest power + 1) in rad, zeros at powers that were left out."""
+    law = np.zeros(int(powers[-1]) + 1)
+    law[powers] = solution.scaled / solution.norms / limit**powers
+    return law
+
+
+def _fit_degree(rows: Rows, powers: NDArray[np.int64]) -> tuple[NDArray[np.float64], DegreeReport]:
+    solution = _solve(rows, powers)
+    law = _law(solution, powers, rows.limit)
+    residuals = rows.residuals(law)
+    # Singular values of the unscaled matrix of powers; their squares are the eigenvalues of (7)'s matrix.
+    sigma = singular_values(solution.triangle * (solution.norms * rows.limit**powers))
+    report = DegreeReport(
+        degree=int(powers[-1]),
+        rms=_rms(residuals),
+        max_residual=float(np.abs(residuals).max()),
+        rank=solution.rank,
+        condition_number=float((sigma[0] / sigma[-1]) ** 2) if sigma[-1] > 0.0 else math.inf,
+        eigenvalues=tuple(float(value) for value in sigma**2),
+    )
+    return law, report
+
+
+def _without_rounding_terms(rows: Rows, law: NDArray[np.float64], powers: NDArray[np.int64]) -> NDArray[np.float64]:
+    """The law refitted without the lower terms that are zero to within the rounding of their own solution.
+
+    Otherwise exact data would leave a c_1 of 1e-16 N*m, with which the clutch could lock (state LOCKED), or a slope of
+    -1e-13 N*m/rad at zero, which would make the law negative. The highest term always stays.
+    """
+    solution = _solve(rows, powers)
+    sensitivity = np.linalg.norm(solution.right.T / solution.values, axis=1)
+    size = np.linalg.norm(rows.torque[rows.fitted]) + np.linalg.norm(solution.scaled)
+    kept = np.abs(solution.scaled) > 8.0 * _EPS * size * sensitivity
+    kept[-1] = True
+    if kept.all():
+        return law
+    return _law(_solve(rows, powers[kept]), powers[kept], rows.limit)
+
+
+def _accepted(
+    rows: Rows, law: NDArray[np.float64], reports: tuple[DegreeReport, ...], accuracy: float, first_power: int
+) -> ClutchFit:
+    """The fit of the last degree tried, unless its law is negative in the measured range."""
+    last = reports[-1]
+    simpler = _without_rounding_terms(rows, law, np.arange(first_power, last.degree + 1))
+    if np.abs(rows.residuals(simpler)).max() <= accuracy:
+        law = simpler
+    coefficients = tuple(float(value) for value in law)
+    dip = find_dip(coefficients, rows.limit)
+    if dip is not None:
+        raise ClutchFitError(
+            f"the fitted law of degree {last.degree} is negative {dip.place} (for instance {dip.value:.6g} N*m at "
+            f"{dip.at:.6g} rad) and would pull the shaft back. Measure more rows there, "
+            + ("" if first_power else "fit through the origin, ")
+            + "choose another accuracy (a lower or higher degree then serves), or check the backlash and the signs of "
+            "the torques",
+            name="data",
+            value=list(coefficients),
+            degrees=reports,
+        )
+    try:
+        checked = check_law(coefficients, rows.limit)
+    except ClutchLawError as error:
+        raise ClutchFitError(f"the fitted law cannot be used: {error}", name="data", degrees=reports) from error
+    residuals = rows.residuals(law)
+    backlash_rows = tuple(int(row) for row in np.flatnonzero(~rows.fitted))
+    return ClutchFit(
+        coefficients=coefficients,
+        windup_limit=rows.limit,
+        degree=last.degree,
+        accuracy=float(accuracy),
+        degrees_tried=reports,
+        residuals=tuple(float(value) for value in residuals),
+        rms=_rms(residuals),
+        max_residual=float(np.abs(residuals).max()),
+        rank=last.rank,
+        condition_number=last.condition_number,
+        eigenvalues=last.eigenvalues,
+        rows_in_backlash=backlash_rows,
+        monotone=checked.monotone,
+        negative=False,
+        warnings=_data_warnings(rows, last, backlash_rows) + checked.warnings,
+    )
+
+
+def _data_warnings(rows: Rows, report: DegreeReport, backlash_rows: tuple[int, ...]) -> tuple[str, ...]:
+    warnings = []
+    if backlash_rows:
+        warnings.append(
+            f"{len(backlash_rows)} of {rows.windup.size} rows lie within the backlash and were left out of the fit; "
+            "their residuals compare them with no torque"
+        )
+    if report.rank == rows.distinct:
+        warnings.append(
+            f"degree {report.degree} has as many unknowns as the data has different windups, so the small residuals "
+            "prove nothing; measure more rows"
+        )
+    return tuple(warnings)
+
+
+def _not_reached(
+    rows: Rows, reports: tuple[DegreeReport, ...], accuracy: float, max_degree: int, first_power: int
+) -> str:
+    """The sentence for data that no tried degree fits well enough."""
+    tried = ", ".join(
+        f"{report.max_residual:.4g} N*m at degree {report.degree}"
+        + ("" if report.rank == report.degree + 1 - first_power else " (not determined by these angles)")
+        for report in reports
+    )
+    best = min(reports, key=lambda report: report.max_residual)
+    law, _ = _fit_degree(rows, np.arange(first_power, best.degree + 1))
+    row = int(np.argmax(np.abs(rows.residuals(law))))
+    reached = f"the accuracy of {accuracy:g} N*m is not reached up to degree {reports[-1].degree}"
+    text = f"{reached}; largest residuals: {tried}."
+    if reports[-1].degree < max_degree:
+        text += (
+            f" Higher degrees have more unknowns than the data has different windups ({rows.distinct}); measure more."
+        )
+    text += (
+        f" The best, degree {best.degree}, is farthest off at row {row} (windup {rows.windup[row]:.6g} rad, torque "
+        f"{rows.torque[row]:.6g} N*m). Check that row, or allow a larger residual"
+    )
+    if first_power and rows.windup[row] == 0.0:
+        text += ", or fit without through_origin, since this row shows torque at zero windup"
+    elif reports[-1].degree == max_degree < HIGHEST_DEGREE:
+        text += f", or raise max_degree (up to {HIGHEST_DEGREE})"
+    return text + "."
+
+
+def _rms(residuals: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(residuals**2)))
