@@ -1,0 +1,64 @@
+# Two commands for a fresh machine: `make demo` and `make test`. Both set everything up, and do it only once.
+
+PYTHONS ?= python3 python3.13 python3.12 python3.11
+VENV := .venv
+BIN := $(VENV)/bin
+RUNTIME := $(VENV)/.sprag-runtime
+DEV := $(VENV)/.sprag-dev
+SOURCES := pyproject.toml constraints.txt
+PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input --quiet
+
+.PHONY: help demo test check serve clean
+
+help:
+	@echo "make demo [EXIT=1]   set up, run the example study over HTTP, show its curve, then serve (or stop)"
+	@echo "make test            set up and run every check and test"
+	@echo "make serve           set up and run the service"
+	@echo "make clean           remove the environment and what was built"
+
+demo: $(RUNTIME)
+	@$(BIN)/sprag demo $(if $(filter-out 0 no false,$(EXIT)),--exit)
+
+serve: $(RUNTIME)
+	@$(BIN)/sprag serve
+
+test: check
+	$(BIN)/python -m pytest
+
+check: $(DEV)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+# The first Python in PYTHONS that is new enough makes the environment; a broken environment is made anew.
+define MAKE_ENVIRONMENT
+if ! $(BIN)/python -m pip --version >/dev/null 2>&1; then \
+  for candidate in $(PYTHONS); do \
+    if $$candidate -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then python=$$candidate; break; fi; \
+  done; \
+  if [ -z "$$python" ]; then \
+    echo "Sprag needs Python 3.11 or newer, and none of these is: $(PYTHONS)." >&2; exit 1; \
+  fi; \
+  if ! $$python -c 'import venv, ensurepip' 2>/dev/null; then \
+    echo "$$python has no venv module; on Debian and Ubuntu the package python3-venv brings it." >&2; exit 1; \
+  fi; \
+  echo "Making the environment $(VENV) ..."; \
+  $$python -m venv --clear $(VENV) || exit 1; \
+fi
+endef
+
+$(RUNTIME): $(SOURCES)
+	@$(MAKE_ENVIRONMENT)
+	@echo "Installing Sprag ..."
+	@$(PIP) install -c constraints.txt -e .
+	@touch $@
+
+$(DEV): $(SOURCES)
+	@$(MAKE_ENVIRONMENT)
+	@echo "Installing Sprag and its tools ..."
+	@$(PIP) install -c constraints.txt -e '.[dev]'
+	@touch $(RUNTIME) $@
+
+clean:
+	rm -rf $(VENV) build dist demo *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -1,0 +1,195 @@
+"""The service over HTTP, as a Python program uses it: plain JSON data in and out, two kinds of failure.
+
+``UnreachableError`` means nobody answered at the address; ``RefusedError`` carries the service's problem document.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import uuid
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+from urllib.parse import quote
+
+import httpx
+
+DEFAULT_SERVER = "http://127.0.0.1:8000"
+_API = "/api/v1"
+#: Seconds to wait for an answer; curves of a large study are read from disk first.
+_TIMEOUT = httpx.Timeout(60.0, connect=10.0)
+
+Query = Sequence[tuple[str, str]]
+
+
+class ServiceError(Exception):
+    """The service did not do what it was asked to."""
+
+
+class UnreachableError(ServiceError):
+    """Nobody answered, or what answered is not the service. ``address`` is what was asked."""
+
+    def __init__(self, address: str, reason: str) -> None:
+        super().__init__(f"{address}: {reason}")
+        self.address = address
+        self.reason = reason
+
+
+class RefusedError(ServiceError):
+    """The service answered with an error.
+
+    Attributes
+    ----------
+    status : int
+        HTTP status.
+    problem : dict
+        The problem document (RFC 9457): title, detail, and for wrong input ``errors``.
+    """
+
+    def __init__(self, status: int, problem: Mapping[str, Any]) -> None:
+        self.status = status
+        self.problem = dict(problem)
+        super().__init__(str(self.problem.get("detail") or self.problem.get("title") or f"HTTP status {status}"))
+
+    @property
+    def errors(self) -> list[dict[str, Any]]:
+        """The problems of the input, each with pointer, message, value and allowed range where known."""
+        found = self.problem.get("errors")
+        return [dict(error) for error in found if isinstance(error, Mapping)] if isinstance(found, list) else []
+
+
+class ServiceClient:
+    """A connection to a running service. Use it as a context manager.
+
+    Parameters
+    ----------
+    server : str
+        Address such as "http://127.0.0.1:8000".
+    token : str, optional
+        Sent as a bearer token.
+
+    Raises
+    ------
+    ValueError
+        When ``server`` is no http address.
+    """
+
+    def __init__(self, server: str = DEFAULT_SERVER, token: str | None = None) -> None:
+        self.server = server.rstrip("/")
+        try:
+            url = httpx.URL(self.server)
+        except httpx.InvalidURL as error:
+            raise ValueError(f"{server!r} is no address: {error}") from error
+        if url.scheme not in ("http", "https") or not url.host:
+            raise ValueError(f"{server!r} is no address of a service, such as {DEFAULT_SERVER}")
+        headers = {"Authorization": f"Bearer {token}"} if token else {}
+        # A proxy of the environment never leads to this machine itself.
+        self._http = httpx.Client(
+            base_url=self.server, headers=headers, timeout=_TIMEOUT, trust_env=not _is_loopback(url.host)
+        )
+
+    def __enter__(self) -> ServiceClient:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._http.close()
+
+    def create_study(self, spec: object, key: str | None = None) -> dict[str, Any]:
+        """Submit a study; the same ``key`` submits it once, however often it is sent."""
+        headers = {"Idempotency-Key": key or uuid.uuid4().hex}
+        return self._json("POST", "/studies", json=spec, headers=headers)
+
+    def preview(self, spec: object) -> dict[str, Any]:
+        """Number of cases, estimated time and size of a study that is not submitted."""
+        return self._json("POST", "/studies:preview", json=spec)
+
+    def study(self, study_id: str) -> dict[str, Any]:
+        """One study with its state, progress and time left."""
+        return self._json("GET", _study(study_id))
+
+    def studies(self, query: Query = ()) -> dict[str, Any]:
+        """A page of studies, newest first."""
+        return self._json("GET", "/studies", params=list(query))
+
+    def act(self, study_id: str, verb: str) -> dict[str, Any]:
+        """Ask for a change of a study: "cancel", "pause" or "resume"."""
+        return self._json("POST", f"{_study(study_id)}:{verb}")
+
+    def curves(self, study_id: str, query: Query) -> dict[str, Any]:
+        """Curves of results against one axis."""
+        return self._json("GET", f"{_study(study_id)}/curves", params=list(query))
+
+    def cases(self, study_id: str, query: Query = ()) -> dict[str, Any]:
+        """A page of case rows."""
+        return self._json("GET", f"{_study(study_id)}/cases", params=list(query))
+
+    def download(self, path: str, query: Query = ()) -> Iterator[bytes]:
+        """The bytes of a document under the API, such as ``/studies/ID/results`` with ``format=csv``, as they come."""
+        try:
+            with self._http.stream("GET", _API + path, params=list(query)) as response:
+                if response.is_error:
+                    response.read()
+                    raise _refusal(response)
+                yield from response.iter_bytes()
+        except httpx.HTTPError as error:
+            raise UnreachableError(self.server, _reason(error)) from error
+
+    def results(self, study_id: str, form: str) -> Iterator[bytes]:
+        """All rows of a study in the named format."""
+        return self.download(f"{_study(study_id)}/results", [("format", form)])
+
+    def picture(self, study_id: str, query: Query, form: str) -> Iterator[bytes]:
+        """The picture of curves as "svg", "png" or "pdf"."""
+        return self.download(f"{_study(study_id)}/curves", [*query, ("format", form)])
+
+    def ready(self) -> bool:
+        """Whether the service is up and its database usable."""
+        try:
+            return self._http.get("/readyz").is_success
+        except httpx.HTTPError:
+            return False
+
+    def _json(self, method: str, path: str, **arguments: Any) -> dict[str, Any]:
+        try:
+            response = self._http.request(method, _API + path, **arguments)
+        except httpx.HTTPError as error:
+            raise UnreachableError(self.server, _reason(error)) from error
+        if response.is_error:
+            raise _refusal(response)
+        try:
+            data = response.json()
+        except ValueError:
+            data = None
+        if not isinstance(data, dict):
+            raise UnreachableError(self.server, "what answers there is not Sprag")
+        return data
+
+
+def _study(study_id: str) -> str:
+    return f"/studies/{quote(study_id, safe='')}"
+
+
+def _refusal(response: httpx.Response) -> ServiceError:
+    try:
+        problem = response.json()
+    except ValueError:
+        problem = None
+    if not isinstance(problem, dict):
+        problem = {"title": f"HTTP status {response.status_code} {response.reason_phrase}"}
+    return RefusedError(response.status_code, problem)
+
+
+def _reason(error: httpx.HTTPError) -> str:
+    if isinstance(error, httpx.ConnectError):
+        return "nobody answers there"
+    if isinstance(error, httpx.TimeoutException):
+        return "no answer in time"
+    return str(error) or type(error).__name__
+
+
+def _is_loopback(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
