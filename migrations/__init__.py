@@ -1,1 +1,1 @@
-"""See docs/ and README.md."""
+"""Revisions of the database, run by `sprag db upgrade`."""

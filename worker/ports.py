@@ -76,7 +76,10 @@ class Store(Protocol):
         """Claim waiting chunks of studies that are queued or running; gives those that were got."""
 
     def commit(self, epoch: int, chunk: Chunk, result: ChunkResult) -> bool:
-        """Insert the rows of a claimed chunk and mark it done. False, and no change, when the claim is no longer ours."""
+        """Insert the rows of a claimed chunk and mark it done. False, and no change, when it is not claimed by us."""
+
+    def release(self, epoch: int) -> None:
+        """Return every claim of this epoch to waiting: the dispatcher ends."""
 
     def put_back(self, epoch: int, chunk: Chunk, detail: str) -> None:
         """Return a claimed chunk to waiting, with ``chunk.failures`` as its new count and what happened to it."""

@@ -5,7 +5,9 @@ from worker.ports import StoreError
 __all__ = [
     "DatabaseBusyError",
     "DatabaseError",
+    "DatabaseFullError",
     "IdempotencyConflict",
+    "PageTokenError",
     "SchemaError",
     "StoreError",
     "StudyBusy",
@@ -25,6 +27,10 @@ class DatabaseBusyError(DatabaseError):
     """Another process kept the database for longer than the busy timeout."""
 
 
+class DatabaseFullError(DatabaseError):
+    """The disk has no room, or does not take what is written."""
+
+
 class StudyNotFound(StoreError):  # noqa: N818 - the name callers read
     """There is no study of that id."""
 
@@ -39,3 +45,7 @@ class StudyBusy(StoreError):  # noqa: N818
 
 class IdempotencyConflict(StoreError):  # noqa: N818
     """The idempotency key was already used with another body."""
+
+
+class PageTokenError(StoreError):
+    """A page token that no list has given out."""

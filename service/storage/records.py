@@ -22,8 +22,8 @@ class StudyRecord:
     """A study without its heavy parts (`Store.spec`, `Store.study`).
 
     ``number`` counts studies in order of submission; ``id`` is the public name. ``done`` counts cases with an ending,
-    ``ok`` those that ended ok. ``reason`` says why the study is held or failed. ``revision`` rises with every change of the
-    record or its rows: together with ``id`` it makes an ETag.
+    ``ok`` those that ended ok. ``reason`` says why the study is held or failed. ``revision`` rises with every change of
+    the record or its rows: together with ``id`` it makes an ETag.
     """
 
     number: int
@@ -58,8 +58,8 @@ class StudyPage:
 class Progress:
     """How far a study is, computed when asked.
 
-    ``rate`` is in cases/s over the recent chunks, ``seconds_left`` a (low, high) interval; both None before the first
-    chunk and when nothing is being run.
+    ``rate`` is in cases/s over the recent chunks, None before the first; ``seconds_left`` is a (low, high) interval,
+    None where the rate is or when the study is held or ended.
     """
 
     state: StudyState

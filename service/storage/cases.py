@@ -1,0 +1,128 @@
+"""Reading results: pages, streams and columns of cases."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sqlalchemy as sa
+
+from service.storage.part import Part
+from service.storage.records import CaseColumns, CaseRow, RowBlock
+from service.storage.tables import STUDIES, results_table
+from worker import kernels
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+#: Cases named one by one in a statement.
+CASES_AT_ONCE = 5_000
+#: Rows of one block of a stream.
+BLOCK_ROWS = 2_000
+
+
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """Where the rows of a study are."""
+
+    number: int
+    table: sa.Table
+    infos: tuple[kernels.ResultInfo, ...]
+
+
+class Cases(Part):
+    """Rows of finished cases."""
+
+    def _rows(self, connection: sa.Connection, study_id: str) -> _Rows:
+        row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.model, STUDIES.c.pendulums)
+        return _Rows(
+            row.number, results_table(row.model, row.pendulums), kernels.result_infos(row.model, row.pendulums)
+        )
+
+    def case_rows(
+        self, study_id: str, after_case: int = -1, limit: int = BLOCK_ROWS, ending: str | None = None
+    ) -> RowBlock:
+        """At most ``limit`` finished cases with numbers above ``after_case``, in order; raises StudyNotFound.
+
+        With ``ending`` only the cases that ended so.
+        """
+        with self.session.read() as connection:
+            rows = self._rows(connection, study_id)
+            c = rows.table.c
+            query = sa.select(c.case_number, c.ending, c.flags, *(c[info.column] for info in rows.infos)).where(
+                c.study == rows.number, c.case_number > after_case
+            )
+            if ending is not None:
+                query = query.where(c.ending == ending)
+            found = connection.execute(query.order_by(c.case_number).limit(limit)).all()
+        return _block(rows.infos, found)
+
+    def iter_rows(self, study_id: str, block: int = BLOCK_ROWS) -> Iterator[RowBlock]:
+        """Every finished case in order, ``block`` cases at a time, each block read in its own short transaction."""
+        after = -1
+        while len(found := self.case_rows(study_id, after, block)):
+            yield found
+            after = int(found.cases[-1])
+
+    def case_row(self, study_id: str, case: int) -> CaseRow | None:
+        """One case, None while it is not finished; raises StudyNotFound."""
+        found = self.case_rows(study_id, case - 1, 1)
+        return next(found.rows()) if len(found) and found.cases[0] == case else None
+
+    def rows_for_cases(self, study_id: str, cases: ArrayLike, names: Sequence[str]) -> CaseColumns:
+        """Results ``names`` of the given case numbers (shape (m,), any order), aligned with them.
+
+        Raises StudyNotFound, and KeyError for a name that is no result of the study.
+        """
+        wanted: NDArray[np.int64] = np.asarray(cases, dtype=np.int64).reshape(-1)
+        unique, position = np.unique(wanted, return_inverse=True)
+        endings = np.full(unique.size, None, dtype=object)
+        values = np.full((unique.size, len(names)), np.nan)
+        with self.session.read() as connection:
+            rows = self._rows(connection, study_id)
+            columns = {info.name: info.column for info in rows.infos}
+            c = rows.table.c
+            query = sa.select(c.case_number, c.ending, *(c[columns[name]] for name in names)).where(
+                c.study == rows.number
+            )
+            for condition in _conditions(c.case_number, unique):
+                found = connection.execute(query.where(condition)).all()
+                if found:
+                    numbers, ended, *results = zip(*found, strict=True)
+                    at = np.searchsorted(unique, np.array(numbers, dtype=np.int64))
+                    endings[at] = np.array(ended, dtype=object)
+                    for index, column in enumerate(results):
+                        values[at, index] = np.array(column, dtype=np.float64)
+        return CaseColumns(
+            wanted,
+            endings[position].tolist(),
+            {name: values[position, index] for index, name in enumerate(names)},
+        )
+
+
+def _conditions(column: sa.ColumnElement[Any], cases: NDArray[np.int64]) -> Iterator[sa.ColumnElement[bool]]:
+    """Conditions that together select exactly ``cases`` (ascending, each once)."""
+    if not cases.size:
+        return
+    low, high = int(cases[0]), int(cases[-1])
+    if high - low + 1 == cases.size:
+        yield column.between(low, high)
+        return
+    for start in range(0, cases.size, CASES_AT_ONCE):
+        yield column.in_(cases[start : start + CASES_AT_ONCE].tolist())
+
+
+def _block(infos: tuple[kernels.ResultInfo, ...], found: Sequence[Sequence[Any]]) -> RowBlock:
+    if not found:
+        return RowBlock(infos, np.empty(0, dtype=np.int64), [], [], np.empty((0, len(infos))))
+    values = np.array([row[3:] for row in found], dtype=np.float64)
+    return RowBlock(
+        infos,
+        np.array([row[0] for row in found], dtype=np.int64),
+        [row[1] for row in found],
+        [row[2] for row in found],
+        values,
+    )

@@ -1,0 +1,128 @@
+"""The database as a whole: its revision, upgrade, check and backup."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import sqlalchemy as sa
+
+from service.storage.errors import DatabaseError, SchemaError
+from service.storage.records import CheckReport
+from service.storage.session import sqlite_version, sqlite_warning
+from service.storage.tables import HEAD_REVISION
+
+if TYPE_CHECKING:
+    from service.storage.session import Session
+
+
+def revision(session: Session) -> str | None:
+    """Revision of the database; None when it is empty. Raises SchemaError when it holds something else."""
+    with session.read() as connection:
+        names = set(sa.inspect(connection).get_table_names())
+        if "alembic_version" in names:
+            found: str | None = connection.execute(
+                sa.text("SELECT version_num FROM alembic_version")
+            ).scalar_one_or_none()
+            return found
+    if names:
+        raise SchemaError(f"{session.path} is a database of another program; name another file")
+    return None
+
+
+def require_current(session: Session) -> None:
+    """Make an empty database ready; raise SchemaError when it has another revision than this program."""
+    found = revision(session)
+    if found is None:
+        upgrade(session)
+    elif found != HEAD_REVISION:
+        raise SchemaError(_other_revision(session, found))
+
+
+def _other_revision(session: Session, found: str) -> str:
+    if found in known_revisions():
+        return (
+            f"the database {session.path} has revision {found}, this program needs {HEAD_REVISION}: "
+            "run `sprag db upgrade`"
+        )
+    return (
+        f"the database {session.path} has revision {found}, which is newer than this program knows ({HEAD_REVISION}): "
+        "install the newer Sprag and run its `sprag db upgrade`"
+    )
+
+
+def known_revisions() -> list[str]:
+    """Revisions this program has a migration for, oldest first."""
+    from alembic.script import ScriptDirectory
+
+    scripts = ScriptDirectory(str(_migrations()))
+    return [script.revision for script in scripts.walk_revisions()][::-1]
+
+
+def _migrations() -> Path:
+    import migrations
+
+    return Path(migrations.__path__[0])
+
+
+def upgrade(session: Session) -> tuple[str | None, str]:
+    """Bring the database to this program's revision, in one transaction; gives (revision before, revision now).
+
+    Raises SchemaError when the database is of a newer program.
+    """
+    from alembic import command
+    from alembic.config import Config
+
+    before = revision(session)
+    if before is not None and before not in known_revisions():
+        raise SchemaError(_other_revision(session, before))
+    config = Config()
+    config.set_main_option("script_location", str(_migrations()).replace("%", "%%"))
+    with session.write() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, "head")
+    return before, HEAD_REVISION
+
+
+def check(session: Session) -> CheckReport:
+    """Look the database over: its revision, its pages, its references, the library that reads it."""
+    problems: list[str] = []
+    found = None
+    try:
+        found = revision(session)
+        if found is None:
+            problems.append("the database is empty: run `sprag db upgrade`")
+        elif found != HEAD_REVISION:
+            problems.append(_other_revision(session, found))
+        with session.read() as connection:
+            pages = connection.exec_driver_sql("PRAGMA integrity_check").scalars().all()
+            problems += [f"integrity: {line}" for line in pages if line != "ok"]
+            references = connection.exec_driver_sql("PRAGMA foreign_key_check").all()
+            problems += [f"a row of {row[0]} refers to a study that is not there" for row in references]
+    except DatabaseError as error:
+        problems.append(str(error))
+    if warning := sqlite_warning():
+        problems.append(warning)
+    version = ".".join(map(str, sqlite_version()))
+    return CheckReport(str(session.path), "SQLite", version, found, HEAD_REVISION, tuple(problems))
+
+
+def backup(session: Session, path: Path) -> None:
+    """Write a consistent copy of the database to ``path`` while others go on working.
+
+    Raises DatabaseError when there is a file already or it cannot be written.
+    """
+    if path.exists():
+        raise DatabaseError(f"{path} exists already; a backup never replaces a file")
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with session.plain() as connection:
+            connection.exec_driver_sql("VACUUM INTO ?", (str(part),))
+        with part.open("rb") as written:
+            os.fsync(written.fileno())
+        os.replace(part, path)
+    except OSError as error:
+        raise DatabaseError(f"the backup {path} cannot be written: {error.strerror}") from None
+    finally:
+        part.unlink(missing_ok=True)

@@ -1,0 +1,80 @@
+"""What every part of the store stands on: the session, the clock, and a study's row."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+import sqlalchemy as sa
+
+from service.storage.errors import StudyNotFound
+from service.storage.tables import STUDIES
+from worker.states import StudyEvent, StudyState, follow
+
+if TYPE_CHECKING:
+    from service.storage.session import Session
+    from worker.ports import Clock
+
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+class SystemClock:
+    """The machine's clocks."""
+
+    def now(self) -> datetime:
+        """The present moment, aware, UTC."""
+        return datetime.now(UTC)
+
+    def monotonic(self) -> float:
+        """Seconds on a clock that never goes back."""
+        return monotonic()
+
+
+def moment(micros: int) -> datetime:
+    """Microseconds since 1970 as an aware time."""
+    return EPOCH + timedelta(microseconds=micros)
+
+
+def optional_moment(micros: int | None) -> datetime | None:
+    """The same, None for None."""
+    return None if micros is None else moment(micros)
+
+
+class Part:
+    """A part of the store."""
+
+    def __init__(self, session: Session, clock: Clock) -> None:
+        self.session = session
+        self.clock = clock
+
+    def _now(self) -> int:
+        """The present moment in microseconds since 1970."""
+        return (self.clock.now() - EPOCH) // timedelta(microseconds=1)
+
+    def _row(self, connection: sa.Connection, study_id: str, *columns: sa.ColumnElement[Any]) -> sa.Row[Any]:
+        """Columns of the study of that id; raises StudyNotFound."""
+        found = connection.execute(
+            sa.select(*columns).where(STUDIES.c.id == study_id, STUDIES.c.deleted_at.is_(None))
+        ).one_or_none()
+        if found is None:
+            raise StudyNotFound(study_id)
+        return found
+
+    def _move(self, connection: sa.Connection, number: int, event: StudyEvent, reason: str | None = None) -> StudyState:
+        """Take the study through ``event``; raises TransitionError where the table of states has no such step."""
+        before = StudyState(
+            connection.execute(
+                sa.select(STUDIES.c.state).where(STUDIES.c.number == number).with_for_update()
+            ).scalar_one()
+        )
+        after = follow(before, event)
+        if after is before:
+            return after
+        values: dict[str, Any] = {"state": after.value, "revision": STUDIES.c.revision + 1, "reason": reason}
+        if after is StudyState.RUNNING:
+            values["started_at"] = sa.func.coalesce(STUDIES.c.started_at, self._now())
+        if after.terminal:
+            values["finished_at"] = self._now()
+        connection.execute(sa.update(STUDIES).where(STUDIES.c.number == number).values(values))
+        return after

@@ -1,0 +1,196 @@
+"""Opening the database: driver, pragmas, transactions, and one sentence for whatever fails."""
+
+from __future__ import annotations
+
+import os
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import sqlalchemy as sa
+from sqlalchemy.engine import URL, make_url
+
+from service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+#: Seconds a connection waits for another writer before it gives up.
+BUSY_SECONDS = 30.0
+#: Older libraries can corrupt a write-ahead log that several connections share.
+SAFE_SQLITE = (3, 51, 3)
+#: Rows have some 45 to 150 numbers; larger pages than SQLite's 4 KiB hold several of them and keep the trees flat.
+PAGE_BYTES = 16_384
+POOL_CONNECTIONS = 8
+NETWORK_FILE_SYSTEMS = frozenset({"afs", "ceph", "cifs", "fuse.sshfs", "glusterfs", "nfs", "nfs4", "smb3", "smbfs"})
+
+_BEGIN = "sprag_begin"
+
+
+def sqlite_driver() -> Any:
+    """The DB-API module for SQLite: pysqlite3, which brings its own library, else Python's own."""
+    try:
+        from pysqlite3 import dbapi2
+    except ImportError:
+        from sqlite3 import dbapi2
+    return dbapi2
+
+
+def sqlite_version() -> tuple[int, ...]:
+    """Version of the SQLite library in use."""
+    version: tuple[int, ...] = tuple(sqlite_driver().sqlite_version_info)
+    return version
+
+
+def sqlite_warning() -> str | None:
+    """A sentence when the SQLite library is older than the one that is safe, else None."""
+    version = sqlite_version()
+    if version >= SAFE_SQLITE:
+        return None
+    found, wanted = (".".join(map(str, numbers)) for numbers in (version, SAFE_SQLITE))
+    return f"SQLite {found} is in use; versions before {wanted} can corrupt a database under load: install pysqlite3."
+
+
+def file_system_of(path: Path, mounts: str | None = None) -> str:
+    """Type of the file system that holds ``path``, as Linux's table of mounts names it; "" where that is not known."""
+    if mounts is None:
+        try:
+            mounts = Path("/proc/self/mounts").read_text(encoding="utf-8", errors="surrogateescape")
+        except OSError:
+            return ""
+    target, best, kind = str(path), -1, ""
+    for line in mounts.splitlines():
+        fields = line.split(" ")
+        if len(fields) < 3:
+            continue
+        mount = fields[1].replace("\\040", " ").rstrip("/")
+        if (target == mount or target.startswith(mount + "/")) and len(mount) >= best:
+            best, kind = len(mount), fields[2]
+    return kind
+
+
+class Session:
+    """Connections to one database.
+
+    ``url`` is a SQLAlchemy URL of an SQLite file. Raises DatabaseError, with one sentence, when it cannot be used.
+    """
+
+    def __init__(self, url: str) -> None:
+        try:
+            self.url: URL = make_url(url)
+        except sa.exc.ArgumentError:
+            raise DatabaseError(
+                f"{url!r} is no database URL; one looks like sqlite:////path/to/sprag.sqlite3"
+            ) from None
+        if self.url.get_backend_name() != "sqlite":
+            raise DatabaseError(f"databases of kind {self.url.get_backend_name()!r} are not supported; use sqlite")
+        if self.url.database in (None, "", ":memory:"):
+            raise DatabaseError("the database must be a file: several processes work on it")
+        self.path = Path(str(self.url.database)).absolute()
+        self._check_place()
+        self._engine = sa.create_engine(
+            self.url,
+            module=sqlite_driver(),
+            connect_args={"timeout": BUSY_SECONDS, "isolation_level": None},
+            pool_size=POOL_CONNECTIONS,
+            max_overflow=64,
+        )
+        sa.event.listen(self._engine, "connect", _set_pragmas)
+        sa.event.listen(self._engine, "begin", _begin)
+        self._writer = self._engine.execution_options(**{_BEGIN: "BEGIN IMMEDIATE"})
+
+    def _check_place(self) -> None:
+        folder = self.path.parent
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise DatabaseError(f"the folder {folder} cannot be made: {error.strerror}") from None
+        if self.path.is_dir():
+            raise DatabaseError(f"{self.path} is a folder, not a database file")
+        if not os.access(folder, os.W_OK):
+            raise DatabaseError(f"the folder {folder} is read-only; the database needs to write beside its file")
+        kind = file_system_of(self.path.resolve())
+        if kind in NETWORK_FILE_SYSTEMS:
+            raise DatabaseError(
+                f"{self.path} lies on a network file system ({kind}), which cannot hold a database safely: "
+                "use a local disk"
+            )
+
+    @property
+    def dialect(self) -> sa.engine.Dialect:
+        """The SQL dialect in use."""
+        return self._engine.dialect
+
+    @contextmanager
+    def read(self) -> Iterator[sa.Connection]:
+        """A short read transaction: everything read inside is of one moment."""
+        with self._transaction(self._engine) as connection:
+            yield connection
+
+    @contextmanager
+    def write(self) -> Iterator[sa.Connection]:
+        """A write transaction, with the write lock from its first moment; commits at the end, or changes nothing."""
+        with self._transaction(self._writer) as connection:
+            yield connection
+
+    @contextmanager
+    def _transaction(self, engine: sa.Engine) -> Iterator[sa.Connection]:
+        try:
+            with engine.begin() as connection:
+                yield connection
+        except sa.exc.DBAPIError as error:
+            raise explained(error, self.path) from error
+
+    @contextmanager
+    def plain(self) -> Iterator[sa.Connection]:
+        """A connection outside any transaction, for statements that do not work inside one."""
+        try:
+            with self._engine.connect().execution_options(**{_BEGIN: ""}) as connection:
+                yield connection
+        except sa.exc.DBAPIError as error:
+            raise explained(error, self.path) from error
+
+    def close(self) -> None:
+        """Close every connection."""
+        self._engine.dispose()
+
+
+def explained(error: sa.exc.DBAPIError, path: Path) -> Exception:
+    """The error with one sentence for a user where its cause is outside the program, else the error itself."""
+    text = str(error.orig)
+    known = {
+        "database is locked": DatabaseBusyError(
+            f"another process kept the database {path} busy for too long; try again"
+        ),
+        "database or disk is full": DatabaseFullError(f"the disk that holds {path} is full"),
+        "disk I/O error": DatabaseFullError(f"the disk that holds {path} reports an error on reading or writing"),
+        "readonly database": DatabaseError(f"the database {path} is read-only; make the file and its folder writable"),
+        "unable to open database file": DatabaseError(
+            f"the database {path} cannot be opened; check the folder's rights"
+        ),
+        "file is not a database": DatabaseError(f"{path} is not a Sprag database; name another file"),
+        "malformed": DatabaseError(
+            f"the database {path} is damaged; run `sprag db check`, then go on with the latest `sprag db backup`"
+        ),
+    }
+    return next((explanation for phrase, explanation in known.items() if phrase in text), error)
+
+
+def _set_pragmas(connection: Any, _record: object) -> None:
+    cursor = connection.cursor()
+    for pragma in (
+        f"busy_timeout = {int(BUSY_SECONDS * 1000)}",
+        f"page_size = {PAGE_BYTES}",
+        "journal_mode = WAL",
+        "synchronous = FULL",
+        "foreign_keys = ON",
+    ):
+        cursor.execute(f"PRAGMA {pragma}")
+    cursor.close()
+
+
+def _begin(connection: sa.Connection) -> None:
+    # The driver never begins by itself (isolation_level None). A transaction that began as a reader could not become
+    # a writer once another process has written in between, so writers take the lock at once.
+    if statement := connection.get_execution_options().get(_BEGIN, "BEGIN"):
+        connection.exec_driver_sql(statement)

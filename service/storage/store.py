@@ -1,0 +1,65 @@
+"""The store: everything the service and the dispatcher do with the database."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Self
+
+from service.storage import maintenance
+from service.storage.cases import Cases
+from service.storage.part import SystemClock
+from service.storage.session import Session
+from service.storage.studies import Studies
+from service.storage.work import Work
+from worker.chunking import Chunking
+
+if TYPE_CHECKING:
+    from pathlib import Path
+    from types import TracebackType
+
+    from service.storage.records import CheckReport
+    from worker.ports import Clock
+
+
+class Store(Studies, Cases, Work):
+    """One database. Safe to use from several threads; close it at the end (it is a context manager)."""
+
+    @classmethod
+    def open(cls, url: str, *, chunking: Chunking | None = None, clock: Clock | None = None) -> Store:
+        """Open the database at ``url`` (SQLAlchemy URL of an SQLite file), making a new one ready.
+
+        Raises
+        ------
+        DatabaseError
+            When it cannot be used; SchemaError when it has another revision than this program.
+        """
+        store = cls(Session(url), clock or SystemClock(), chunking or Chunking())
+        try:
+            maintenance.require_current(store.session)
+        except BaseException:
+            store.close()
+            raise
+        return store
+
+    def ping(self) -> None:
+        """Raise DatabaseError when the database does not answer or has another revision."""
+        maintenance.require_current(self.session)
+
+    def check(self) -> CheckReport:
+        """Look the database over; can take minutes on a large one."""
+        return maintenance.check(self.session)
+
+    def backup(self, path: Path) -> None:
+        """Write a consistent copy to ``path`` while others go on working; raises DatabaseError."""
+        maintenance.backup(self.session, path)
+
+    def close(self) -> None:
+        """Close every connection."""
+        self.session.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

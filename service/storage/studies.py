@@ -1,0 +1,255 @@
+"""The service's side of studies: create, read, list, wishes, delete."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from collections import OrderedDict
+from threading import Lock
+from typing import TYPE_CHECKING, Any
+
+import sqlalchemy as sa
+
+from service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy
+from service.storage.part import Part, moment, optional_moment
+from service.storage.progress import RECENT_CHUNKS, FinishedChunk, estimate
+from service.storage.records import Progress, StudyPage, StudyRecord
+from service.storage.tables import CHUNKS, ENDINGS, IDEMPOTENCY_KEYS, RECORD_COLUMNS, STUDIES, results_table
+from worker import kernels
+from worker.chunking import Chunking, spans
+from worker.states import StudyEvent, StudyState
+from worker.study import Study
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from service.storage.session import Session
+    from worker.ports import Clock
+
+MAX_PAGE = 1000
+#: Rows deleted in one transaction: other writers wait for it.
+DELETE_ROWS = 20_000
+#: Studies kept in memory after they were read.
+KEPT_STUDIES = 32
+
+
+class Studies(Part):
+    """Studies as the service sees them."""
+
+    def __init__(self, session: Session, clock: Clock, chunking: Chunking) -> None:
+        super().__init__(session, clock)
+        self.chunking = chunking
+        self._studies: OrderedDict[str, Study] = OrderedDict()
+        self._lock = Lock()
+
+    def create_study(
+        self,
+        spec: Mapping[str, Any],
+        study: Study,
+        *,
+        idempotency_key: str | None = None,
+        body_hash: str = "",
+        warnings: Sequence[str] = (),
+    ) -> StudyRecord:
+        """Accept a study: the study and its chunks in one transaction.
+
+        ``spec`` is the user's own, kept verbatim. A key that was used before with the same ``body_hash`` gives the
+        study of that time; with another one raises IdempotencyConflict.
+        """
+        size = self.chunking.cases_of(study)
+        values = {
+            "id": f"st_{secrets.token_hex(8)}",
+            "name": study.name,
+            "model": study.model,
+            "pendulums": kernels.pendulums(study),
+            "state": StudyState.QUEUED.value,
+            "cases": study.cases,
+            "done": 0,
+            "ok": 0,
+            "chunk_cases": size,
+            "engine_version": kernels.ENGINE_VERSION,
+            "physics_hash": study.physics_hash(kernels.ENGINE_VERSION),
+            "spec": json.dumps(spec, allow_nan=False),
+            "study": json.dumps(study.to_json(), allow_nan=False),
+            "warnings": json.dumps(list(warnings)),
+            "revision": 1,
+            "created_at": self._now(),
+        }
+        with self.session.write() as connection:
+            if idempotency_key is not None:
+                earlier = _study_of_key(connection, idempotency_key, body_hash)
+                if earlier is not None:
+                    return earlier
+            number = connection.execute(sa.insert(STUDIES).values(values).returning(STUDIES.c.number)).scalar_one()
+            connection.execute(
+                sa.insert(CHUNKS),
+                [
+                    {"study": number, "first": first, "count": count, "state": "waiting", "failures": 0}
+                    for first, count in spans(study.cases, size)
+                ],
+            )
+            if idempotency_key is not None:
+                connection.execute(
+                    sa.insert(IDEMPOTENCY_KEYS).values(
+                        key=idempotency_key, body_hash=body_hash, study=number, created_at=values["created_at"]
+                    )
+                )
+            return _record(connection.execute(sa.select(*RECORD_COLUMNS).where(STUDIES.c.number == number)).one())
+
+    def get_study(self, study_id: str) -> StudyRecord:
+        """The study of that id; raises StudyNotFound."""
+        with self.session.read() as connection:
+            return _record(self._row(connection, study_id, *RECORD_COLUMNS))
+
+    def spec(self, study_id: str) -> dict[str, Any]:
+        """The user's own spec, as it was given; raises StudyNotFound."""
+        with self.session.read() as connection:
+            spec: dict[str, Any] = json.loads(self._row(connection, study_id, STUDIES.c.spec).spec)
+        return spec
+
+    def study(self, study_id: str) -> Study:
+        """The study in SI numbers; raises StudyNotFound. Studies never change, so some are kept in memory."""
+        with self._lock:
+            if study_id in self._studies:
+                self._studies.move_to_end(study_id)
+                return self._studies[study_id]
+        with self.session.read() as connection:
+            text = self._row(connection, study_id, STUDIES.c.study).study
+        study = Study.from_json(json.loads(text))
+        with self._lock:
+            self._studies[study_id] = study
+            while len(self._studies) > KEPT_STUDIES:
+                self._studies.popitem(last=False)
+        return study
+
+    def list_studies(
+        self, page_size: int = 50, page_token: str | None = None, state: StudyState | None = None
+    ) -> StudyPage:
+        """A page of studies, newest first. ``page_token`` is the last page's; raises PageTokenError when it is not."""
+        size = min(max(page_size, 1), MAX_PAGE)
+        query = sa.select(*RECORD_COLUMNS).where(STUDIES.c.deleted_at.is_(None))
+        if page_token is not None:
+            query = query.where(STUDIES.c.number < _number_of(page_token))
+        if state is not None:
+            query = query.where(STUDIES.c.state == state.value)
+        with self.session.read() as connection:
+            rows = connection.execute(query.order_by(STUDIES.c.number.desc()).limit(size + 1)).all()
+        records = tuple(_record(row) for row in rows[:size])
+        return StudyPage(records, str(records[-1].number) if len(rows) > size else None)
+
+    def progress(self, study_id: str) -> Progress:
+        """How far the study is; raises StudyNotFound."""
+        c = STUDIES.c
+        with self.session.read() as connection:
+            row = self._row(connection, study_id, c.number, c.state, c.cases, c.done, c.ok)
+            endings = connection.execute(
+                sa.select(ENDINGS.c.ending, ENDINGS.c.cases)
+                .where(ENDINGS.c.study == row.number)
+                .order_by(ENDINGS.c.cases.desc(), ENDINGS.c.ending)
+            ).all()
+            recent = connection.execute(
+                sa.select(CHUNKS.c.claimed_at, CHUNKS.c.finished_at, CHUNKS.c["count"])
+                .where(CHUNKS.c.study == row.number, CHUNKS.c.state == "done")
+                .order_by(CHUNKS.c.finished_at.desc())
+                .limit(RECENT_CHUNKS)
+            ).all()
+        state = StudyState(row.state)
+        rate, left = estimate(
+            row.cases - row.done, [FinishedChunk(begin / 1e6, end / 1e6, count) for begin, end, count in recent]
+        )
+        going = state in {StudyState.QUEUED, StudyState.RUNNING}
+        return Progress(state, row.cases, row.done, row.ok, dict(endings), rate, left if going else None)
+
+    def pause_study(self, study_id: str) -> StudyRecord:
+        """Hold the study; raises StudyNotFound, TransitionError when it has ended."""
+        return self._wish(study_id, StudyEvent.PAUSE)
+
+    def resume_study(self, study_id: str) -> StudyRecord:
+        """Let a held study go on; raises StudyNotFound, TransitionError when it has ended."""
+        return self._wish(study_id, StudyEvent.RESUME)
+
+    def cancel_study(self, study_id: str) -> StudyRecord:
+        """Ask for the study's end; raises StudyNotFound, TransitionError when it is finished or failed."""
+        return self._wish(study_id, StudyEvent.CANCEL)
+
+    def _wish(self, study_id: str, event: StudyEvent) -> StudyRecord:
+        with self.session.write() as connection:
+            number = self._row(connection, study_id, STUDIES.c.number).number
+            self._move(connection, number, event)
+            return _record(self._row(connection, study_id, *RECORD_COLUMNS))
+
+    def delete_study(self, study_id: str) -> None:
+        """Delete an ended study with its rows; raises StudyNotFound, StudyBusy when it has not ended."""
+        with self.session.write() as connection:
+            row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.state)
+            state = StudyState(row.state)
+            if not state.terminal:
+                raise StudyBusy(f"the study {study_id} is {state.value}: cancel it before it is deleted")
+            for table in (ENDINGS, IDEMPOTENCY_KEYS):
+                connection.execute(sa.delete(table).where(table.c.study == row.number))
+            connection.execute(sa.update(STUDIES).where(STUDIES.c.number == row.number).values(deleted_at=self._now()))
+        self.purge()
+
+    def purge(self) -> None:
+        """Remove what is left of deleted studies, in short transactions."""
+        c = STUDIES.c
+        with self.session.read() as connection:
+            gone = connection.execute(
+                sa.select(c.number, c.model, c.pendulums, c.cases).where(c.deleted_at.is_not(None))
+            ).all()
+        for number, model, pendulums, cases in gone:
+            for table, column in (
+                (rows := results_table(model, pendulums), rows.c.case_number),
+                (CHUNKS, CHUNKS.c["first"]),
+            ):
+                for first in range(0, cases, DELETE_ROWS):
+                    with self.session.write() as connection:
+                        connection.execute(
+                            sa.delete(table).where(
+                                table.c.study == number, column >= first, column < first + DELETE_ROWS
+                            )
+                        )
+            with self.session.write() as connection:
+                connection.execute(sa.delete(STUDIES).where(c.number == number))
+
+
+def _study_of_key(connection: sa.Connection, key: str, body_hash: str) -> StudyRecord | None:
+    row = connection.execute(
+        sa.select(IDEMPOTENCY_KEYS.c.body_hash, *RECORD_COLUMNS)
+        .join_from(IDEMPOTENCY_KEYS, STUDIES)
+        .where(IDEMPOTENCY_KEYS.c.key == key)
+    ).one_or_none()
+    if row is None:
+        return None
+    if row.body_hash != body_hash:
+        raise IdempotencyConflict(f"the idempotency key {key!r} was already used with another body")
+    return _record(row)
+
+
+def _number_of(token: str) -> int:
+    if not (token.isascii() and token.isdigit() and len(token) < 19):
+        raise PageTokenError(f"{token[:40]!r} is no page token of this list")
+    return int(token)
+
+
+def _record(row: sa.Row[Any]) -> StudyRecord:
+    return StudyRecord(
+        number=row.number,
+        id=row.id,
+        name=row.name,
+        model=row.model,
+        pendulums=row.pendulums,
+        state=StudyState(row.state),
+        reason=row.reason,
+        cases=row.cases,
+        done=row.done,
+        ok=row.ok,
+        chunk_cases=row.chunk_cases,
+        engine_version=row.engine_version,
+        physics_hash=row.physics_hash,
+        warnings=tuple(json.loads(row.warnings)),
+        revision=row.revision,
+        created_at=moment(row.created_at),
+        started_at=optional_moment(row.started_at),
+        finished_at=optional_moment(row.finished_at),
+    )

@@ -1,0 +1,134 @@
+"""The tables. Times are microseconds since 1970-01-01 UTC; JSON is text, stored exactly as it was given."""
+
+from functools import cache
+
+import sqlalchemy as sa
+
+from worker import kernels
+
+#: Revision of the schema below; the last file in migrations/versions.
+HEAD_REVISION = "0001"
+
+METADATA = sa.MetaData(
+    naming_convention={
+        "pk": "pk_%(table_name)s",
+        "fk": "fk_%(table_name)s_%(column_0_name)s",
+        "ix": "ix_%(table_name)s_%(column_0_name)s",
+        "uq": "uq_%(table_name)s_%(column_0_name)s",
+    }
+)
+
+STUDIES = sa.Table(
+    "studies",
+    METADATA,
+    sa.Column("number", sa.Integer, primary_key=True, autoincrement=True),
+    sa.Column("id", sa.String(40), nullable=False, unique=True),
+    sa.Column("name", sa.Text, nullable=False),
+    sa.Column("model", sa.String(40), nullable=False),
+    sa.Column("pendulums", sa.Integer, nullable=False),
+    sa.Column("state", sa.String(12), nullable=False, index=True),
+    sa.Column("reason", sa.Text),
+    sa.Column("cases", sa.Integer, nullable=False),
+    sa.Column("done", sa.Integer, nullable=False),
+    sa.Column("ok", sa.Integer, nullable=False),
+    sa.Column("chunk_cases", sa.Integer, nullable=False),
+    sa.Column("engine_version", sa.String(40), nullable=False),
+    sa.Column("physics_hash", sa.String(64), nullable=False),
+    sa.Column("spec", sa.Text, nullable=False),
+    sa.Column("study", sa.Text, nullable=False),
+    sa.Column("warnings", sa.Text, nullable=False),
+    sa.Column("revision", sa.Integer, nullable=False),
+    sa.Column("created_at", sa.BigInteger, nullable=False),
+    sa.Column("started_at", sa.BigInteger),
+    sa.Column("finished_at", sa.BigInteger),
+    # Set at once when a study is deleted; its rows then go in short transactions, and this row goes last.
+    sa.Column("deleted_at", sa.BigInteger),
+    sqlite_autoincrement=True,
+)
+
+#: The columns of a `StudyRecord`: without the texts that can be long.
+RECORD_COLUMNS = tuple(column for column in STUDIES.c if column.name not in {"spec", "study", "deleted_at"})
+
+CHUNKS = sa.Table(
+    "chunks",
+    METADATA,
+    sa.Column("study", sa.Integer, sa.ForeignKey("studies.number"), primary_key=True),
+    sa.Column("first", sa.Integer, primary_key=True),
+    sa.Column("count", sa.Integer, nullable=False),
+    sa.Column("state", sa.String(8), nullable=False),
+    sa.Column("epoch", sa.Integer),
+    sa.Column("failures", sa.Integer, nullable=False),
+    sa.Column("detail", sa.Text),
+    sa.Column("claimed_at", sa.BigInteger),
+    sa.Column("finished_at", sa.BigInteger),
+    sa.Index("ix_chunks_study_state_finished_at", "study", "state", "finished_at"),
+    sqlite_with_rowid=False,
+)
+
+#: How many cases of a study ended how, kept with every commit so that nothing has to be counted when asked.
+ENDINGS = sa.Table(
+    "endings",
+    METADATA,
+    sa.Column("study", sa.Integer, sa.ForeignKey("studies.number"), primary_key=True),
+    sa.Column("ending", sa.String(40), primary_key=True),
+    sa.Column("cases", sa.Integer, nullable=False),
+    sqlite_with_rowid=False,
+)
+
+IDEMPOTENCY_KEYS = sa.Table(
+    "idempotency_keys",
+    METADATA,
+    sa.Column("key", sa.String(255), primary_key=True),
+    sa.Column("body_hash", sa.String(64), nullable=False),
+    sa.Column("study", sa.Integer, sa.ForeignKey("studies.number"), nullable=False, index=True),
+    sa.Column("created_at", sa.BigInteger, nullable=False),
+)
+
+#: One row: the latest epoch and who has it.
+DISPATCHER = sa.Table(
+    "dispatcher",
+    METADATA,
+    sa.Column("id", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("epoch", sa.Integer, nullable=False),
+    sa.Column("owner", sa.Text, nullable=False),
+    sa.Column("started_at", sa.BigInteger, nullable=False),
+    sa.Column("heartbeat_at", sa.BigInteger, nullable=False),
+)
+
+#: Columns of a table of results before the results themselves.
+KEY_COLUMNS = ("study", "case_number", "ending", "flags")
+
+
+def results_name(model: str, pendulums: int) -> str:
+    """Name of the table with the results of ``model`` with that many pendulums."""
+    return f"{model.replace('-', '_')}_{pendulums}"
+
+
+@cache
+def results_table(model: str, pendulums: int) -> sa.Table:
+    """The table with the results of ``model`` with that many pendulums: a row for each finished case."""
+    name = results_name(model, pendulums)
+    if name in METADATA.tables:
+        return METADATA.tables[name]
+    results = (
+        sa.Column(info.column, sa.Integer if info.kind == "count" else sa.Double)
+        for info in kernels.result_infos(model, pendulums)
+    )
+    return sa.Table(
+        name,
+        METADATA,
+        sa.Column("study", sa.Integer, sa.ForeignKey("studies.number"), primary_key=True),
+        sa.Column("case_number", sa.Integer, primary_key=True),
+        sa.Column("ending", sa.String(40), nullable=False),
+        sa.Column("flags", sa.Text, nullable=False),
+        *results,
+        sqlite_with_rowid=False,
+    )
+
+
+def all_tables() -> sa.MetaData:
+    """The metadata with the results tables of every model and shape in it."""
+    for model in kernels.models():
+        for pendulums in kernels.result_shapes(model):
+            results_table(model, pendulums)
+    return METADATA

@@ -1,0 +1,279 @@
+"""The dispatcher's side of the store: epochs, claims, rows. Implements `worker.ports.Store`."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sqlalchemy as sa
+
+from service.storage.part import Part, moment
+from service.storage.records import DispatcherRecord
+from service.storage.tables import CHUNKS, DISPATCHER, ENDINGS, KEY_COLUMNS, STUDIES, results_table
+from worker import kernels
+from worker.kernels import ChunkResult
+from worker.ports import ActiveStudy, Chunk, EpochLostError
+from worker.states import TERMINAL, StudyEvent, StudyState
+from worker.study import Study
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+_WAITING = {"state": "waiting", "epoch": None, "claimed_at": None}
+_TERMINAL = [state.value for state in TERMINAL]
+
+
+class Work(Part):
+    """Claims and results."""
+
+    def take_over(self, owner: str) -> int:
+        """Raise the epoch, return every claim of an older one to waiting, and give the new epoch."""
+        now = self._now()
+        with self.session.write() as connection:
+            last = connection.execute(sa.select(DISPATCHER.c.epoch).with_for_update()).scalar_one_or_none()
+            epoch = (last or 0) + 1
+            values = {"epoch": epoch, "owner": owner, "started_at": now, "heartbeat_at": now}
+            if last is None:
+                connection.execute(sa.insert(DISPATCHER).values(id=1, **values))
+            else:
+                connection.execute(sa.update(DISPATCHER).values(values))
+            connection.execute(sa.update(CHUNKS).where(CHUNKS.c.state == "claimed").values(_WAITING))
+        return epoch
+
+    def dispatcher(self) -> DispatcherRecord | None:
+        """The dispatcher that took over last; None when there never was one."""
+        with self.session.read() as connection:
+            row = connection.execute(sa.select(DISPATCHER)).one_or_none()
+        if row is None:
+            return None
+        return DispatcherRecord(row.epoch, row.owner, moment(row.started_at), moment(row.heartbeat_at))
+
+    def _own(self, connection: sa.Connection, epoch: int) -> None:
+        latest = connection.execute(sa.select(DISPATCHER.c.epoch).with_for_update()).scalar_one_or_none()
+        if latest != epoch:
+            raise EpochLostError(f"another dispatcher has taken over (epoch {latest}, this one has {epoch})")
+
+    def heartbeat(self, epoch: int) -> None:
+        """Note that the dispatcher is alive."""
+        with self.session.write() as connection:
+            self._own(connection, epoch)
+            connection.execute(sa.update(DISPATCHER).values(heartbeat_at=self._now()))
+
+    def release(self, epoch: int) -> None:
+        """Return every claim of this epoch to waiting."""
+        with self.session.write() as connection:
+            self._own(connection, epoch)
+            connection.execute(sa.update(CHUNKS).where(CHUNKS.c.state == "claimed").values(_WAITING))
+
+    def active_studies(self) -> list[ActiveStudy]:
+        """Studies that have not ended, in order of submission."""
+        c = STUDIES.c
+        with self.session.read() as connection:
+            rows = connection.execute(
+                sa.select(c.number, c.id, c.state).where(c.state.not_in(_TERMINAL)).order_by(c.number)
+            ).all()
+        return [ActiveStudy(row.number, row.id, StudyState(row.state)) for row in rows]
+
+    def study_of(self, number: int) -> Study:
+        """The study to compute."""
+        with self.session.read() as connection:
+            text = connection.execute(sa.select(STUDIES.c.study).where(STUDIES.c.number == number)).scalar_one()
+        return Study.from_json(json.loads(text))
+
+    def open_chunks(self, number: int) -> list[Chunk]:
+        """Chunks of a study that are not done, in order of their cases."""
+        c = CHUNKS.c
+        with self.session.read() as connection:
+            rows = connection.execute(
+                sa.select(c["first"], c["count"], c.failures)
+                .where(c.study == number, c.state != "done")
+                .order_by(c["first"])
+            ).all()
+        return [Chunk(number, first, count, failures) for first, count, failures in rows]
+
+    def claim(self, epoch: int, chunks: Sequence[Chunk]) -> list[Chunk]:
+        """Claim waiting chunks of studies that are queued or running; gives those that were got."""
+        got: list[Chunk] = []
+        with self.session.write() as connection:
+            self._own(connection, epoch)
+            states = {
+                number: StudyState(state)
+                for number, state in connection.execute(
+                    sa.select(STUDIES.c.number, STUDIES.c.state).where(
+                        STUDIES.c.number.in_({chunk.study for chunk in chunks})
+                    )
+                ).all()
+            }
+            for chunk in chunks:
+                state = states.get(chunk.study)
+                if state is StudyState.QUEUED:
+                    states[chunk.study] = state = self._move(connection, chunk.study, StudyEvent.START)
+                if state is not StudyState.RUNNING:
+                    continue
+                claimed = connection.execute(
+                    sa.update(CHUNKS)
+                    .where(_is(chunk), CHUNKS.c.state == "waiting")
+                    .values(state="claimed", epoch=epoch, claimed_at=self._now())
+                )
+                if claimed.rowcount:
+                    got.append(chunk)
+        return got
+
+    def _claimed(self, connection: sa.Connection, epoch: int, chunk: Chunk) -> bool:
+        """Whether the chunk is claimed in this epoch; raises EpochLostError when the epoch is not ours any more."""
+        self._own(connection, epoch)
+        found = connection.execute(
+            sa.select(CHUNKS.c["first"]).where(_is(chunk), CHUNKS.c.state == "claimed", CHUNKS.c.epoch == epoch)
+        ).one_or_none()
+        return found is not None
+
+    def commit(self, epoch: int, chunk: Chunk, result: ChunkResult) -> bool:
+        """Insert the rows of a claimed chunk and mark it done. False, and no change, when it is not claimed by us."""
+        if (result.first, result.count) != (chunk.first, chunk.count):
+            raise ValueError(f"a result of {result.count} cases from {result.first} is not that of {chunk}")
+        with self.session.write() as connection:
+            if not self._claimed(connection, epoch, chunk):
+                return False
+            self._store(connection, chunk, result, None)
+        return True
+
+    def _store(self, connection: sa.Connection, chunk: Chunk, result: ChunkResult, detail: str | None) -> None:
+        model, pendulums = connection.execute(
+            sa.select(STUDIES.c.model, STUDIES.c.pendulums).where(STUDIES.c.number == chunk.study)
+        ).one()
+        statement = _insert(model, pendulums, self.session.dialect.name)
+        connection.exec_driver_sql(statement, _tuples(chunk, result, kernels.result_infos(model, pendulums)))
+        connection.execute(
+            sa.update(CHUNKS)
+            .where(_is(chunk))
+            .values(state="done", finished_at=self._now(), detail=detail, failures=chunk.failures)
+        )
+        endings = Counter(result.endings)
+        for ending, cases in endings.items():
+            this = (ENDINGS.c.study == chunk.study) & (ENDINGS.c.ending == ending)
+            more = connection.execute(sa.update(ENDINGS).where(this).values(cases=ENDINGS.c.cases + cases))
+            if not more.rowcount:
+                connection.execute(sa.insert(ENDINGS).values(study=chunk.study, ending=ending, cases=cases))
+        connection.execute(
+            sa.update(STUDIES)
+            .where(STUDIES.c.number == chunk.study)
+            .values(
+                done=STUDIES.c.done + chunk.count,
+                ok=STUDIES.c.ok + endings[kernels.OK],
+                revision=STUDIES.c.revision + 1,
+            )
+        )
+
+    def put_back(self, epoch: int, chunk: Chunk, detail: str) -> None:
+        """Return a claimed chunk to waiting, with ``chunk.failures`` as its new count and what happened to it."""
+        with self.session.write() as connection:
+            if self._claimed(connection, epoch, chunk):
+                connection.execute(
+                    sa.update(CHUNKS).where(_is(chunk)).values(failures=chunk.failures, detail=detail, **_WAITING)
+                )
+
+    def split(self, epoch: int, chunk: Chunk, parts: Sequence[Chunk], detail: str) -> None:
+        """Replace a claimed chunk by waiting parts that cover the same cases."""
+        with self.session.write() as connection:
+            if not self._claimed(connection, epoch, chunk):
+                return
+            connection.execute(sa.delete(CHUNKS).where(_is(chunk)))
+            connection.execute(
+                sa.insert(CHUNKS),
+                [
+                    {
+                        "study": part.study,
+                        "first": part.first,
+                        "count": part.count,
+                        "state": "waiting",
+                        "failures": part.failures,
+                        "detail": detail,
+                    }
+                    for part in parts
+                ],
+            )
+
+    def quarantine(self, epoch: int, chunk: Chunk, ending: str, detail: str) -> None:
+        """Give every case of a claimed chunk ``ending`` without results and mark the chunk done."""
+        with self.session.write() as connection:
+            if not self._claimed(connection, epoch, chunk):
+                return
+            model, pendulums = connection.execute(
+                sa.select(STUDIES.c.model, STUDIES.c.pendulums).where(STUDIES.c.number == chunk.study)
+            ).one()
+            nothing = np.full((chunk.count, len(kernels.result_infos(model, pendulums))), np.nan)
+            result = ChunkResult(chunk.first, [ending] * chunk.count, [""] * chunk.count, nothing)
+            self._store(connection, chunk, result, detail)
+
+    def fault(self, epoch: int, number: int, reason: str) -> None:
+        """Hold the study with a reason and return its claims to waiting, without blame for the cases."""
+        with self.session.write() as connection:
+            self._own(connection, epoch)
+            connection.execute(
+                sa.update(CHUNKS)
+                .where(CHUNKS.c.study == number, CHUNKS.c.state != "done")
+                .values(failures=0, **_WAITING)
+            )
+            state = connection.execute(sa.select(STUDIES.c.state).where(STUDIES.c.number == number)).scalar_one()
+            if StudyState(state) in {StudyState.QUEUED, StudyState.RUNNING}:
+                self._move(connection, number, StudyEvent.FAULT, reason)
+
+    def settle(self, epoch: int, number: int) -> StudyState:
+        """Bring a study without open claims to its end: cancelled when that was asked for, else finished or failed."""
+        open_chunks = (CHUNKS.c.study == number) & (CHUNKS.c.state != "done")
+        with self.session.write() as connection:
+            self._own(connection, epoch)
+            state, cases, ok = connection.execute(
+                sa.select(STUDIES.c.state, STUDIES.c.cases, STUDIES.c.ok).where(STUDIES.c.number == number)
+            ).one()
+            left = connection.execute(sa.select(sa.func.count()).select_from(CHUNKS).where(open_chunks)).scalar_one()
+            if StudyState(state).terminal or (left and StudyState(state) is not StudyState.CANCELLING):
+                return StudyState(state)
+            if left:
+                connection.execute(sa.delete(CHUNKS).where(open_chunks))
+                return self._move(connection, number, StudyEvent.CANCEL_DONE)
+            if ok:
+                return self._move(connection, number, StudyEvent.ALL_DONE)
+            return self._move(connection, number, StudyEvent.NONE_OK, _why_failed(connection, number, cases))
+
+
+def _why_failed(connection: sa.Connection, number: int, cases: int) -> str:
+    ending = connection.execute(
+        sa.select(ENDINGS.c.ending).where(ENDINGS.c.study == number).order_by(ENDINGS.c.cases.desc()).limit(1)
+    ).scalar_one()
+    sentence = kernels.ENDING_SENTENCES.get(ending, "")
+    return f"none of the {cases} cases ended ok; most of them: {ending}. {sentence}"
+
+
+def _is(chunk: Chunk) -> sa.ColumnElement[bool]:
+    return (CHUNKS.c.study == chunk.study) & (CHUNKS.c["first"] == chunk.first) & (CHUNKS.c["count"] == chunk.count)
+
+
+@lru_cache(maxsize=64)
+def _insert(model: str, pendulums: int, dialect: str) -> str:
+    """The INSERT statement of a results table with positional parameters; the rows go past SQLAlchemy for speed."""
+    table = results_table(model, pendulums)
+    names = [*KEY_COLUMNS, *(info.column for info in kernels.result_infos(model, pendulums))]
+    mark = "?" if dialect == "sqlite" else "%s"
+    return f"INSERT INTO {table.name} ({', '.join(names)}) VALUES ({', '.join([mark] * len(names))})"  # noqa: S608
+
+
+def _tuples(chunk: Chunk, result: ChunkResult, infos: Sequence[kernels.ResultInfo]) -> list[tuple[Any, ...]]:
+    """Rows for `_insert`: NaN and infinities become NULL, counts whole numbers."""
+    columns: list[list[Any]] = []
+    for index, info in enumerate(infos):
+        column = result.values[:, index]
+        finite = np.isfinite(column)
+        if info.kind == "count":
+            cells: list[Any] = np.where(finite, column, 0.0).astype(np.int64).tolist()
+        else:
+            cells = column.tolist()
+        if not finite.all():
+            cells = [cell if known else None for cell, known in zip(cells, finite.tolist(), strict=True)]
+        columns.append(cells)
+    count = chunk.count
+    numbers = range(chunk.first, chunk.first + count)
+    return list(zip([chunk.study] * count, numbers, result.endings, result.flags, *columns, strict=True))

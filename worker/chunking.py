@@ -1,0 +1,53 @@
+"""How a study is cut into chunks, the unit of claim and commit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from worker import kernels
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from worker.study import Study
+
+#: Work of one chunk on one core, in s: what a crash can cost, against what a commit costs.
+CHUNK_SECONDS = 1.0
+#: The engine runs cases side by side; fewer than these waste it.
+MIN_CASES = 16
+#: Chunks for each process that a study is cut into if it has the cases, so that all processes end about together.
+CHUNKS_PER_PROCESS = 4
+#: Chunks of one study are held in memory and listed in the database.
+MAX_CHUNKS = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class Chunking:
+    """Settings: ``cases`` of one chunk (0: about `CHUNK_SECONDS` of work) and ``processes`` of the pool."""
+
+    cases: int = 0
+    processes: int = 1
+
+    def cases_of(self, study: Study) -> int:
+        """Cases of one chunk of ``study``."""
+        if self.cases:
+            return chunk_cases(study.cases, 0.0, self.processes, fixed=self.cases)
+        return chunk_cases(study.cases, kernels.estimate_seconds_per_case(study), self.processes)
+
+
+def chunk_cases(cases: int, seconds_per_case: float, processes: int, fixed: int = 0) -> int:
+    """Cases of one chunk of a study of ``cases`` cases: ``fixed``, or else by the time of one case (s)."""
+    least = math.ceil(cases / MAX_CHUNKS)
+    if fixed:
+        return min(max(fixed, least), cases)
+    by_time = CHUNK_SECONDS / seconds_per_case if seconds_per_case > 0.0 else float(cases)
+    to_feed = math.ceil(cases / (CHUNKS_PER_PROCESS * processes))
+    return min(max(int(min(by_time, to_feed)), MIN_CASES, least), cases)
+
+
+def spans(cases: int, size: int) -> Iterator[tuple[int, int]]:
+    """First case and number of cases of every chunk of ``size``; the last may be shorter."""
+    for first in range(0, cases, size):
+        yield first, min(size, cases - first)
