@@ -1,0 +1,236 @@
+"""First root and largest value of a polynomial on [0, 1], found so that a pair of roots cannot be missed.
+
+A polynomial in Bernstein form lies between its smallest and its largest coefficient, and the number of its roots in the
+interval is at most the number of sign changes of its coefficients (Descartes' rule in Bernstein form; see Farouki, "The
+Bernstein polynomial basis: a centennial retrospective", 2012, sections 4 and 5). No change: no root. One change: exactly
+one root, which a guarded Newton iteration refines. More: halve the interval (de Casteljau) and look again, left half first.
+"""
+
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.jit import compiled
+
+Floats = NDArray[np.float64]
+
+#: Highest degree the tables and work arrays below hold.
+MAX_DEGREE = 24
+#: Halvings after which an undecided interval counts as its ends say: about the spacing of doubles near 1.
+MAX_DEPTH = 52
+#: Answer of ``first_root`` when there is none; larger than any root.
+NO_ROOT = 2.0
+
+_BINOMIAL = np.array([[float(comb(j, k)) for k in range(MAX_DEGREE + 1)] for j in range(MAX_DEGREE + 1)])
+_INVERSE_BINOMIAL = np.array([[1.0 / max(1, comb(j, k)) for k in range(MAX_DEGREE + 1)] for j in range(MAX_DEGREE + 1)])
+
+#: Columns of the work stack behind the coefficients: where an interval starts and how wide it is.
+_LOW = MAX_DEGREE + 1
+_WIDTH = MAX_DEGREE + 2
+
+
+def work_stack() -> Floats:
+    """Work array for ``first_root`` and ``largest``; one per thread, reused by every call."""
+    return np.zeros((MAX_DEPTH + 2, MAX_DEGREE + 3))
+
+
+@compiled
+def evaluate(g: Floats, degree: int, x: float) -> float:
+    """Value of ``sum g[k] x^k`` for k = 0..degree."""
+    value = g[degree]
+    for k in range(degree - 1, -1, -1):
+        value = value * x + g[k]
+    return value
+
+
+@compiled
+def slope(g: Floats, degree: int, x: float) -> float:
+    """Derivative of ``sum g[k] x^k`` at ``x``."""
+    value = 0.0
+    for k in range(degree, 0, -1):
+        value = value * x + k * g[k]
+    return value
+
+
+@compiled
+def curvature(g: Floats, degree: int, x: float) -> float:
+    """Second derivative of ``sum g[k] x^k`` at ``x``."""
+    value = 0.0
+    for k in range(degree, 1, -1):
+        value = value * x + k * (k - 1) * g[k]
+    return value
+
+
+@compiled
+def _start(g: Floats, degree: int, stack: Floats) -> None:
+    """Put the interval [0, 1] on the stack: the Bernstein coefficients of the monomial coefficients ``g``."""
+    b = stack[0]
+    for j in range(degree + 1):
+        b[j] = 0.0
+    for k in range(degree + 1):
+        scaled = g[k] * _INVERSE_BINOMIAL[degree, k]
+        for j in range(k, degree + 1):
+            b[j] += _BINOMIAL[j, k] * scaled
+    b[_LOW] = 0.0
+    b[_WIDTH] = 1.0
+
+
+@compiled
+def _halve(stack: Floats, top: int, degree: int) -> None:
+    """De Casteljau at 1/2: the right half stays in place, the left half goes on top of the stack."""
+    right = stack[top]
+    left = stack[top + 1]
+    for j in range(degree + 1):
+        left[j] = right[j]
+    for r in range(1, degree + 1):
+        right[degree - r + 1] = left[degree]
+        for j in range(degree, r - 1, -1):
+            left[j] = 0.5 * (left[j - 1] + left[j])
+    right[0] = left[degree]
+    half = 0.5 * right[_WIDTH]
+    left[_LOW] = right[_LOW]
+    left[_WIDTH] = half
+    right[_LOW] += half
+    right[_WIDTH] = half
+
+
+@compiled
+def _refine_root(g: Floats, degree: int, low: float, high: float) -> float:
+    """The single sign change of ``g`` between ``low`` (positive there) and ``high`` (not positive): Newton kept inside."""
+    x = 0.5 * (low + high)
+    for _ in range(80):
+        value = evaluate(g, degree, x)
+        if value > 0.0:
+            low = x
+        else:
+            high = x
+        step = slope(g, degree, x)
+        new = x - value / step if step != 0.0 else low
+        if not (low < new < high):
+            new = 0.5 * (low + high)
+        if abs(new - x) <= 2e-16 * abs(x) or new in (low, high):
+            return new
+        x = new
+    return x
+
+
+@compiled
+def first_root(g: Floats, degree: int, stack: Floats) -> float:
+    """Smallest x in [0, 1] at which ``g``, positive before, stops being positive.
+
+    Parameters
+    ----------
+    g : array, shape (>= degree + 1,)
+        Monomial coefficients. Leading coefficients that are exactly zero are a root at 0 that has already been dealt with:
+        they are divided out. If the first other coefficient is negative the answer is 0.
+    degree : int
+        At most ``MAX_DEGREE``.
+    stack : array
+        From ``work_stack``; overwritten.
+
+    Returns
+    -------
+    float
+        The root, or ``NO_ROOT``.
+    """
+    first = 0
+    while first <= degree and g[first] == 0.0:
+        first += 1
+    if first > degree:
+        return NO_ROOT
+    if not g[first] > 0.0:
+        return 0.0
+    p = g[first:]
+    n = degree - first
+    # The sum of moduli is the cheapest proof that nothing happens.
+    rest = 0.0
+    for k in range(1, n + 1):
+        rest += abs(p[k])
+    if rest < p[0]:
+        return NO_ROOT
+    _start(p, n, stack)
+    top = 0
+    while top >= 0:
+        b = stack[top]
+        if not b[0] > 0.0:
+            return b[_LOW]
+        changes = 0
+        positive = True
+        for j in range(1, n + 1):
+            if (b[j] > 0.0) != positive:
+                changes += 1
+                positive = not positive
+        if changes == 0:
+            top -= 1
+        elif changes == 1:
+            return _refine_root(p, n, b[_LOW], b[_LOW] + b[_WIDTH])
+        elif b[_WIDTH] < 1e-15:
+            if not positive:
+                return b[_LOW]
+            top -= 1
+        else:
+            _halve(stack, top, n)
+            top += 1
+    return NO_ROOT
+
+
+@compiled
+def _refine_peak(g: Floats, degree: int, low: float, high: float) -> float:
+    """The zero of the derivative of ``g`` between ``low`` (rising there) and ``high`` (falling): Newton kept inside."""
+    x = 0.5 * (low + high)
+    for _ in range(80):
+        rate = slope(g, degree, x)
+        if rate > 0.0:
+            low = x
+        else:
+            high = x
+        bend = curvature(g, degree, x)
+        new = x - rate / bend if bend != 0.0 else low
+        if not (low < new < high):
+            new = 0.5 * (low + high)
+        # A peak is flat: its value is exact to rounding long before its place is.
+        if abs(new - x) <= 1e-11 or new in (low, high):
+            return new
+        x = new
+    return x
+
+
+@compiled
+def largest(g: Floats, degree: int, known: float, stack: Floats) -> float:
+    """Larger of ``known`` and the largest value of ``sum g[k] x^k`` on [0, 1].
+
+    ``g`` has shape (>= degree + 1,); ``stack`` comes from ``work_stack`` and is overwritten.
+    """
+    total = g[0]
+    bound = g[0]
+    for k in range(1, degree + 1):
+        total += g[k]
+        bound += abs(g[k])
+    best = max(known, g[0], total)
+    if bound <= best:
+        return best
+    _start(g, degree, stack)
+    top = 0
+    while top >= 0:
+        b = stack[top]
+        best = max(best, b[0], b[degree])
+        bound = b[0]
+        changes = 0
+        starts_rising = b[1] > b[0]
+        rising = starts_rising
+        for j in range(1, degree + 1):
+            bound = max(bound, b[j])
+            if b[j] != b[j - 1] and (b[j] > b[j - 1]) != rising:
+                changes += 1
+                rising = not rising
+        if bound <= best or changes == 0 or (changes == 1 and not starts_rising) or b[_WIDTH] < 1e-9:
+            top -= 1
+        elif changes == 1:
+            x = _refine_peak(g, degree, b[_LOW], b[_LOW] + b[_WIDTH])
+            best = max(best, evaluate(g, degree, x))
+            top -= 1
+        else:
+            _halve(stack, top, degree)
+            top += 1
+    return best

@@ -1,0 +1,122 @@
+"""Building blocks of generated straight-line code: one lane's arithmetic, unrolled over the orders of the series.
+
+LLVM turns a loop over lanes into SIMD code when its body is straight-line arithmetic on one flat array with literal rows;
+loops over orders, calls or a second array prevent it (docs/adr/0002). So the recurrences are written once in
+Python, here and in the model's ``equations``, and unrolled into the source text of a kernel.
+"""
+
+from collections.abc import Sequence
+
+Names = Sequence[str]
+
+
+class LaneCode:
+    """Source lines of the body of ``for lane in range(lanes)`` over the flat workspace ``W``."""
+
+    def __init__(self, lanes: int) -> None:
+        self.lanes = lanes
+        self.lines: list[str] = []
+
+    def row(self, row: int) -> str:
+        """The element of workspace row ``row`` that belongs to this lane."""
+        return f"W[{row * self.lanes} + lane]"
+
+    def let(self, name: str, expression: str) -> str:
+        """Define a local variable and return its name."""
+        self.lines.append(f"{name} = {expression}")
+        return name
+
+    def load(self, name: str, row: int) -> str:
+        """Define a local variable from a workspace row."""
+        return self.let(name, self.row(row))
+
+    def store(self, row: int, expression: str) -> None:
+        """Write an expression into a workspace row."""
+        self.lines.append(f"{self.row(row)} = {expression}")
+
+    def series(self, name: str, row: int, count: int) -> list[str]:
+        """Load ``count`` consecutive rows as the coefficients of a series."""
+        return [self.load(f"{name}{k}", row + k) for k in range(count)]
+
+    def function(self, name: str, arguments: str, docstring: str) -> str:
+        """The finished function: the lane loop around the lines."""
+        body = "\n".join(f"        {line}" for line in self.lines)
+        return f'@compiled\ndef {name}({arguments}):\n    """{docstring}"""\n    for lane in range({self.lanes}):\n{body}\n'
+
+
+def product(a: Names, b: Names, k: int) -> str:
+    """Coefficient k of the product of two series (Cauchy)."""
+    return " + ".join(f"{a[j]}*{b[k - j]}" for j in range(k + 1))
+
+
+def horner(coefficients: Names, x: str) -> str:
+    """Value of a series at ``x``."""
+    text = coefficients[-1]
+    for name in reversed(coefficients[:-1]):
+        text = f"{name} + {x}*({text})"
+    return text
+
+
+def integral(coefficients: Names, x: str) -> str:
+    """Integral of a series from 0 to ``x``."""
+    terms = [name if k == 0 else f"{name}*{1.0 / (k + 1)!r}" for k, name in enumerate(coefficients)]
+    return f"{x}*({horner(terms, x)})"
+
+
+def modulus_bound(coefficients: Names, x: str) -> str:
+    """Bound of ``|series(y) - series(0)|`` for 0 <= y <= x: the sum of moduli."""
+    return f"{x}*({horner([f'abs({name})' for name in coefficients[1:]], x)})"
+
+
+def smaller(a: str, b: str) -> str:
+    """Selection that vectorises; a NaN in ``a`` gives ``b``."""
+    return f"{a} if {a} < {b} else {b}"
+
+
+# Cody-Waite splitting of pi/2: the first two parts have 33 bits, so that a multiple below 2^20 of them is exact.
+_HALF_PI = ("1.57079632673412561417e+00", "6.07710050630396597660e-11", "2.02226624879595063154e-21")
+_ROUND = "6755399441055744.0"  # 1.5 * 2^52: adding and subtracting it rounds to the nearest integer
+# Minimax coefficients of sin and cos on [-pi/4, pi/4] (the classic ones of fdlibm's kernels, error below 2^-58).
+_SIN = (
+    "-1.66666666666666324348e-01",
+    "8.33333333332248946124e-03",
+    "-1.98412698298579493134e-04",
+    "2.75573137070700676789e-06",
+    "-2.50507602534068634195e-08",
+    "1.58969099521155010221e-10",
+)
+_COS = (
+    "4.16666666666666019037e-02",
+    "-1.38888888888741095749e-03",
+    "2.48015872894767294178e-05",
+    "-2.75573143513906633035e-07",
+    "2.08757232129817482790e-09",
+    "-1.13596475577881948265e-11",
+)
+
+
+def sincos(code: LaneCode, x: str, tag: str) -> tuple[str, str]:
+    """Sine and cosine of ``|x|`` up to 1e6 within an ulp or so, without calls or branches."""
+    q = code.let(f"q_{tag}", f"({x}*0.6366197723675814 + {_ROUND}) - {_ROUND}")
+    r = code.let(f"r_{tag}", f"(({x} - {q}*{_HALF_PI[0]}) - {q}*{_HALF_PI[1]}) - {q}*{_HALF_PI[2]}")
+    z = code.let(f"z_{tag}", f"{r}*{r}")
+    s = code.let(f"sk_{tag}", f"{r} + {r}*({z}*({horner(_SIN, z)}))")
+    c = code.let(f"ck_{tag}", f"1.0 - (0.5*{z} - {z}*{z}*({horner(_COS, z)}))")
+    # The quadrant, -2..2.
+    j = code.let(f"j_{tag}", f"{q} - 4.0*(({q}*0.25 + {_ROUND}) - {_ROUND})")
+    a = code.let(f"ja_{tag}", f"abs({j})")
+    sine = code.let(f"sv_{tag}", f"{c} if {a} == 1.0 else {s}")
+    cosine = code.let(f"cv_{tag}", f"{s} if {a} == 1.0 else {c}")
+    sine = code.let(f"s_{tag}", f"-{sine} if ({a} == 2.0 or {j} == -1.0) else {sine}")
+    cosine = code.let(f"c_{tag}", f"-{cosine} if ({a} == 2.0 or {j} == 1.0) else {cosine}")
+    return sine, cosine
+
+
+def log2(x: str) -> str:
+    """Base-2 logarithm of a positive double within 0.09, from its bits."""
+    return f"(np.float64({x}).view(np.int64) * 2.220446049250313e-16 - 1023.0)"
+
+
+def exp2(x: str) -> str:
+    """Power of two within 6 %, inverse of ``log2``: only for choosing a step size."""
+    return f"np.int64(({x} + 1023.0) * 4503599627370496.0).view(np.float64)"

@@ -1,0 +1,1 @@
+"""The vibration drive: pendulums on a vibrating axis that turn an output shaft through freewheel clutches (MODEL.md Part A)."""

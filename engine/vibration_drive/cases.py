@@ -1,0 +1,117 @@
+"""From columns of parameters to the matrix of cases that compiled code reads."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from engine.run import Run
+from engine.vibration_drive.parameters import MAX_COEFFICIENTS, MAX_PENDULUMS, PARAMETERS
+
+Floats = NDArray[np.float64]
+
+#: Columns of a case: excitation and shaft; then stops as pairs (whole periods, fraction); then each pendulum's columns,
+#: followed by its clutch coefficients.
+SHAFT_COLUMNS = 10
+STOPS = 4
+PENDULUM_COLUMNS = 9
+#: Fewest clutch coefficients of a kernel: the straight line beyond the data needs two.
+MIN_COEFFICIENTS = 2
+#: A stop this near a whole period is meant to be one.
+_WHOLE = 1e-12
+
+_DEFAULTS = {parameter.path: parameter.default for parameter in PARAMETERS}
+
+
+def pendulum_count(columns: Mapping[str, ArrayLike]) -> int:
+    """Number of pendulums that the paths speak of."""
+    indices = [int(path.split(".")[1]) for path in columns if path.startswith("pendulums.")]
+    if not indices or max(indices) >= MAX_PENDULUMS:
+        raise ValueError(f"a drive has 1 to {MAX_PENDULUMS} pendulums, numbered from 0")
+    return max(indices) + 1
+
+
+def _law_prefix(columns: Mapping[str, ArrayLike], pendulum: int) -> str:
+    own = f"pendulums.{pendulum}.clutch."
+    return own if any(path.startswith(own) for path in columns) else "clutch."
+
+
+def coefficient_count(columns: Mapping[str, ArrayLike]) -> int:
+    """Number of clutch coefficients a kernel for these cases needs (the most of any pendulum)."""
+    marker = "clutch.coefficients."
+    orders = [int(path.rsplit(".", 1)[1]) + 1 for path in columns if marker in path]
+    if not orders or max(orders) > MAX_COEFFICIENTS:
+        raise ValueError(f"a clutch law has 1 to {MAX_COEFFICIENTS} coefficients")
+    return max(MIN_COEFFICIENTS, *orders)
+
+
+def _stop(time: Floats) -> tuple[Floats, Floats]:
+    """Split times in periods into whole periods and a fraction in (0, 1]; time 0 is (0, 0)."""
+    nearest = np.rint(time)
+    time = np.where(np.abs(time - nearest) <= _WHOLE * np.maximum(1.0, nearest), nearest, time)
+    whole = np.ceil(time) - 1.0
+    start = time <= 0.0
+    return np.where(start, 0.0, whole), np.where(start, 0.0, time - whole)
+
+
+def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Floats:
+    """Matrix of cases for the kernel.
+
+    Parameters
+    ----------
+    columns : mapping
+        SPEC paths to scalars or arrays of shape (cases,), in SI units (frequency in Hz).
+    run : Run
+    cases : int
+
+    Returns
+    -------
+    array, shape (cases, columns)
+        nu, period, d nu^2, b nu^2, chi, g, M_c, J_e, 1/rate, initial speed; four stops; per pendulum M l/J, c a^2/J,
+        lambda/J, 1/J, J, delta, u_end, initial angle, initial speed, clutch coefficients.
+    """
+    n, count = pendulum_count(columns), coefficient_count(columns)
+
+    def column(path: str, default: float | None = None) -> Floats:
+        value = columns.get(path, default)
+        if value is None:
+            raise ValueError(f"parameter {path} is missing")
+        return np.broadcast_to(np.asarray(value, dtype=np.float64), (cases,))
+
+    def parameter(path: str) -> Floats:
+        return column(path, _DEFAULTS[".".join("N" if part.isdigit() else part for part in path.split("."))])
+
+    frequency = parameter("excitation.frequency")
+    nu = 2.0 * math.pi * frequency
+    rate = nu
+    pendulums: list[Floats] = []
+    for i in range(n):
+        own = {
+            name: parameter(f"pendulums.{i}.{name}")
+            for name in (
+                "inertia", "mass", "arm", "spring_rate", "spring_arm", "damping", "backlash", "initial_angle", "initial_speed",
+            )
+        }  # fmt: skip
+        inertia = own["inertia"]
+        spring = own["spring_rate"] * own["spring_arm"] ** 2 / inertia
+        rate = np.maximum(rate, np.sqrt(spring))
+        law = _law_prefix(columns, i)
+        pendulums += [
+            own["mass"] * own["arm"] / inertia, spring, own["damping"] / inertia, 1.0 / inertia, inertia,
+            own["backlash"], column(f"{law}windup_limit", math.inf), own["initial_angle"], own["initial_speed"],
+        ]  # fmt: skip
+        pendulums += [column(f"{law}coefficients.{k}", 0.0) for k in range(count)]
+    start = np.array([run.window_in_periods(f)[0] for f in frequency])
+    end = np.array([run.window_in_periods(f)[1] for f in frequency])
+    end_of_run = np.array([run.duration.in_periods(f) for f in frequency])
+    whole = np.floor(end - start + 1e-9)
+    # Without a whole period in the window its "start of whole periods" is its end, and there is no efficiency.
+    times = (start, np.where(whole > 0, np.maximum(start, end - whole), end), end, end_of_run)
+    shaft = [
+        nu, 1.0 / frequency, parameter("excitation.amplitude_x") * nu**2, parameter("excitation.amplitude_y") * nu**2,
+        parameter("excitation.phase"), parameter("gravity"), parameter("shaft.load"), parameter("shaft.inertia"), 1.0 / rate,
+        parameter("shaft.initial_speed"),
+    ]  # fmt: skip
+    stops = [part for time in times for part in _stop(time)]
+    return np.ascontiguousarray(np.column_stack([*shaft, *stops, *pendulums]))

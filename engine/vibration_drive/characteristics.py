@@ -1,0 +1,175 @@
+"""From the sums, marks and extrema of a run to the named characteristics of MODEL.md A4."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS
+from engine.vibration_drive.lanes import OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS
+from engine.vibration_drive.layout import Layout
+from engine.vibration_drive.results import result_infos
+
+Floats = NDArray[np.float64]
+
+
+def _shaft_width(lay: Layout) -> int:
+    return lay.energy_lost - lay.sum_held + 1
+
+
+def _pendulum_width(lay: Layout) -> int:
+    return lay.p_u_max - lay.p_sum_phi + 1
+
+
+def sum_columns(lay: Layout) -> int:
+    """Columns of the matrix of sums that the kernel fills for each case."""
+    return OUT_SUMS + _shaft_width(lay) + lay.n * _pendulum_width(lay)
+
+
+def _ratio(numerator: Floats, denominator: Floats) -> Floats:
+    """Quotient; NaN where the denominator is not positive."""
+    out = np.full(np.broadcast(numerator, denominator).shape, np.nan)
+    return np.divide(numerator, denominator, out=out, where=denominator > 0.0)
+
+
+class _Cases:
+    """Named columns of the case matrix and of the sums."""
+
+    def __init__(self, lay: Layout, matrix: Floats, sums: Floats) -> None:
+        self.lay, self.matrix, self.sums = lay, matrix, sums
+        self.period, self.load, self.inertia = matrix[:, 1], matrix[:, 6], matrix[:, 7]
+        stops = matrix[:, SHAFT_COLUMNS : SHAFT_COLUMNS + 2 * STOPS]
+        start, whole, end = (stops[:, 2 * k] + stops[:, 2 * k + 1] for k in range(3))
+        self.periods = end - start
+        self.whole_periods = end - whole
+        self.length = self.periods * self.period
+
+    def shaft(self, name: str) -> Floats:
+        row: int = getattr(self.lay, name)
+        column: Floats = self.sums[:, OUT_SUMS + row - self.lay.sum_held]
+        return column
+
+    def pendulum(self, i: int, name: str) -> Floats:
+        row: int = getattr(self.lay, f"p_{name}")
+        first = OUT_SUMS + _shaft_width(self.lay) + i * _pendulum_width(self.lay)
+        column: Floats = self.sums[:, first + row - self.lay.p_sum_phi]
+        return column
+
+    def parameter(self, i: int, column: int) -> Floats:
+        first = SHAFT_COLUMNS + 2 * STOPS + i * (PENDULUM_COLUMNS + self.lay.coefficients)
+        values: Floats = self.matrix[:, first + column]
+        return values
+
+
+def characteristics(lay: Layout, matrix: Floats, sums: Floats) -> Floats:
+    """Characteristics of every case.
+
+    Parameters
+    ----------
+    lay : Layout
+    matrix : array, shape (cases, columns)
+        From ``cases.case_matrix``.
+    sums : array, shape (cases, sum_columns(lay))
+        As the kernel filled them; NaN for a case without results.
+
+    Returns
+    -------
+    array, shape (cases, results)
+        In the order of ``result_infos(lay.n)``; NaN where a value could not be computed (MODEL.md A4).
+    """
+    cases = _Cases(lay, matrix, sums)
+    out: dict[str, Floats] = {}
+    for i in range(lay.n):
+        _pendulum(cases, i, out)
+    _shaft(cases, out)
+    _balances(cases, out)
+    return np.column_stack([out[info.name] for info in result_infos(lay.n)])
+
+
+def _pendulum(cases: _Cases, i: int, out: dict[str, Floats]) -> None:
+    def put(name: str, values: Floats) -> None:
+        out[f"pendulums.{i}.{name}"] = values
+
+    inertia = cases.parameter(i, 4)
+    put("angle.mean", cases.pendulum(i, "sum_phi") / cases.length)
+    put("angle.max", cases.pendulum(i, "phi_max"))
+    put("angle.min", cases.pendulum(i, "phi_min"))
+    put("angle.amplitude", 0.5 * (cases.pendulum(i, "phi_max") - cases.pendulum(i, "phi_min")))
+    put("speed.max", cases.pendulum(i, "speed_max"))
+    put("speed.min", cases.pendulum(i, "speed_min"))
+    put("acceleration.max", cases.pendulum(i, "acc_max"))
+    put("acceleration.min", cases.pendulum(i, "acc_min"))
+    put("torque.mean", cases.pendulum(i, "sum_torque") / cases.length)
+    put("torque.max", cases.pendulum(i, "torque_max"))
+    put("windup.max", cases.pendulum(i, "u_max"))
+    put("fraction.engaged", cases.pendulum(i, "time_engaged") / cases.length)
+    put("fraction.beyond_data", cases.pendulum(i, "time_beyond") / cases.length)
+    put("engagements", cases.pendulum(i, "engagements"))
+    put("power.input", cases.parameter(i, 0) * inertia * cases.pendulum(i, "work_input") / cases.length)
+    put("power.loss", cases.parameter(i, 2) * inertia * cases.pendulum(i, "work_loss") / cases.length)
+
+
+def _over_pendulums(cases: _Cases, out: dict[str, Floats], name: str) -> Floats:
+    total = np.zeros(len(cases.matrix))
+    for i in range(cases.lay.n):
+        total = total + out[f"pendulums.{i}.{name}"]
+    return total
+
+
+def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
+    turn = cases.shaft("turn_2") - cases.shaft("turn_0")
+    mean = turn / cases.length
+    out["shaft.speed.mean"] = mean
+    out["shaft.speed.max"] = cases.shaft("speed_max")
+    out["shaft.speed.min"] = cases.shaft("speed_min")
+    out["shaft.irregularity"] = _ratio(cases.shaft("speed_max") - cases.shaft("speed_min"), mean)
+    out["shaft.turn"] = turn
+    out["shaft.acceleration.max"] = cases.shaft("acc_max")
+    out["torque.mean"] = _over_pendulums(cases, out, "torque.mean")
+    out["torque.max"] = cases.shaft("sum_max")
+    out["power.useful.mean"] = cases.load * mean
+    out["power.useful.max"] = cases.load * cases.shaft("speed_max")
+    out["power.clutch.mean"] = cases.shaft("work_clutch") / cases.length
+    out["power.clutch.max"] = cases.shaft("power_max")
+    out["power.input.mean"] = _over_pendulums(cases, out, "power.input")
+    out["power.loss.mean"] = _over_pendulums(cases, out, "power.loss")
+    useful = cases.load * (cases.shaft("turn_2") - cases.shaft("turn_1"))
+    supplied = out["power.input.mean"] * cases.length - cases.shaft("input_1")
+    out["efficiency"] = np.where(cases.whole_periods > 0.5, _ratio(useful, supplied), np.nan)
+    rotating = cases.shaft("time_rotating") / cases.length
+    out["fraction.rotating"] = rotating
+    out["fraction.held"] = 1.0 - rotating
+    out["fraction.driven"] = cases.shaft("time_driven") / cases.length
+    out["clutches.driving_max"] = cases.shaft("driving_max")
+    out["clutches.engagements_per_period"] = _over_pendulums(cases, out, "engagements") / cases.periods
+    out["runup.time"] = cases.sums[:, OUT_RUNUP]
+    out["reset.energy_lost"] = cases.shaft("energy_lost")
+    out["run.events"] = cases.sums[:, OUT_EVENTS]
+    out["run.steps"] = cases.sums[:, OUT_STEPS]
+
+
+def _balances(cases: _Cases, out: dict[str, Floats]) -> None:
+    """Residuals of both balances of MODEL.md A4, each over the largest of its own terms.
+
+    The energy balance's terms include the largest kinetic energy in the window, so that a machine that only swings, with
+    next to no work done, is not judged against zero.
+    """
+    length = cases.length
+    turn = cases.shaft("turn_2") - cases.shaft("turn_0")
+    supplied = out["power.input.mean"] * length
+    stored = cases.shaft("energy_2") - cases.shaft("energy_0")
+    lost = out["power.loss.mean"] * length
+    useful = cases.load * turn
+    kinetic = 0.5 * cases.inertia * cases.shaft("speed_max") ** 2
+    for i in range(cases.lay.n):
+        fastest = np.maximum(cases.pendulum(i, "speed_max"), -cases.pendulum(i, "speed_min"))
+        kinetic = kinetic + 0.5 * cases.parameter(i, 4) * fastest**2
+    size = np.max(np.abs([supplied, stored, lost, useful, kinetic]), axis=0)
+    residual = supplied - stored - lost - useful - cases.shaft("energy_lost")
+    out["balance.energy"] = np.where(size > 0.0, _ratio(np.abs(residual), size), np.where(np.isnan(size), np.nan, 0.0))
+
+    impulse = out["torque.mean"] * length
+    against = cases.load * cases.shaft("time_rotating")
+    gained = cases.inertia * (cases.shaft("speed_2") - cases.shaft("speed_0"))
+    held = cases.shaft("sum_held")
+    size = np.max(np.abs([impulse, against, gained, held]), axis=0)
+    residual = impulse - against - gained - held
+    out["balance.momentum"] = np.where(size > 0.0, _ratio(np.abs(residual), size), np.where(np.isnan(size), np.nan, 0.0))

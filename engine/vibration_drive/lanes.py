@@ -1,0 +1,286 @@
+"""Life of one lane between two steps: taking a case in, stops, budgets, handing the case's sums out."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.endings import ENDING_CODES, Ending
+from engine.jit import compiled
+from engine.vibration_drive import events as ev
+from engine.vibration_drive.automaton import Clutch, Shaft
+from engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS
+from engine.vibration_drive.events import locate, set_clutch, set_shaft, transit
+from engine.vibration_drive.layout import Layout
+from engine.vibration_drive.window import energy, sample, update_extrema, watch_extrema
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Angle (rad) and speed (rad/s) beyond which a case has diverged.
+ANGLE_BOUND = 1e6
+SPEED_BOUND = 1e9
+#: Smallest step, in excitation periods: below it a step no longer moves the phase.
+STEP_FLOOR = 1e-13
+#: Transitions without any time passing that count as chatter.
+MOST_AT_ONCE = 64
+#: Share of the final period-mean speed that ends the run-up.
+RUNUP_SHARE = 0.95
+
+_FREE = int(Clutch.FREE)
+_HELD, _ROTATING = int(Shaft.HELD), int(Shaft.ROTATING)
+_OK = ENDING_CODES.index(Ending.OK)
+_ACCURACY = ENDING_CODES.index(Ending.ACCURACY_NOT_REACHED)
+_CHATTER = ENDING_CODES.index(Ending.CHATTER)
+_STEP_BUDGET = ENDING_CODES.index(Ending.STEP_BUDGET)
+_DIVERGED = ENDING_CODES.index(Ending.DIVERGED)
+_RUNNING = -1
+
+(_NU, _PERIOD, _ACC_X, _ACC_Y, _CHI, _GRAVITY, _LOAD, _INERTIA, _INVERSE_RATE, _SPEED) = range(10)
+_STOPS = SHAFT_COLUMNS
+_FIRST_PENDULUM = SHAFT_COLUMNS + 2 * STOPS
+_P_COPIED = PENDULUM_COLUMNS - 2
+
+# Whole-run values of a case, in the first columns of its row of sums.
+OUT_ENDING, OUT_STEPS, OUT_EVENTS, OUT_RUNUP, OUT_SUMS = 0, 1, 2, 3, 4
+
+
+@compiled
+def load_case(W: Floats, I: Ints, lay: Layout, lane: int, case: int, cases: Floats, literal: int) -> None:  # noqa: E741
+    """Put a case into a lane at t = 0 (MODEL.md A2, "Start"). ``cases`` has the columns of ``cases.case_matrix``."""
+    lanes = lay.lanes
+    row = cases[case]
+    for k in range(lay.rows):
+        W[k * lanes + lane] = 0.0
+    for k in range(ev.LANE_INTEGERS):
+        I[lane, k] = 0
+    I[lane, ev.CASE] = case
+    I[lane, ev.LITERAL] = literal
+    I[lane, ev.EVENT_PENDULUM] = ev.NO_EVENT
+    W[lay.nu * lanes + lane] = row[_NU]
+    W[lay.period * lanes + lane] = row[_PERIOD]
+    W[lay.acc_x * lanes + lane] = row[_ACC_X]
+    W[lay.acc_y * lanes + lane] = row[_ACC_Y]
+    W[lay.cos_chi * lanes + lane] = math.cos(row[_CHI])
+    W[lay.sin_chi * lanes + lane] = math.sin(row[_CHI])
+    W[lay.gravity * lanes + lane] = row[_GRAVITY]
+    W[lay.load * lanes + lane] = row[_LOAD]
+    W[lay.inertia * lanes + lane] = row[_INERTIA]
+    W[lay.inverse_rate * lanes + lane] = row[_INVERSE_RATE]
+    W[lay.speed * lanes + lane] = row[_SPEED]
+    for i in range(lay.n):
+        base = lay.pendulums + i * lay.stride
+        column = _FIRST_PENDULUM + i * (PENDULUM_COLUMNS + lay.coefficients)
+        for k in range(_P_COPIED):
+            W[(base + lay.p_ml + k) * lanes + lane] = row[column + k]
+        W[(base + lay.p_phi) * lanes + lane] = row[column + _P_COPIED]
+        W[(base + lay.p_speed) * lanes + lane] = row[column + _P_COPIED + 1]
+        for k in range(lay.coefficients):
+            W[(base + lay.p_law + k) * lanes + lane] = row[column + PENDULUM_COLUMNS + k]
+        W[(base + lay.p_u) * lanes + lane] = -W[(base + lay.p_backlash) * lanes + lane]
+        set_clutch(W, I, lay, lane, i, _FREE)
+    set_shaft(W, I, lay, lane, _HELD if row[_SPEED] == 0.0 and row[_LOAD] > 0.0 else _ROTATING)
+    watch_extrema(W, lay, lane, False)
+
+
+@compiled
+def _zero_sums(W: Floats, lay: Layout, lane: int) -> None:
+    for row in range(lay.sum_held, lay.work_clutch + 1):
+        W[row * lay.lanes + lane] = 0.0
+    W[lay.energy_lost * lay.lanes + lane] = 0.0
+    W[lay.driving_max * lay.lanes + lane] = 0.0
+    for i in range(lay.n):
+        base = lay.pendulums + i * lay.stride
+        for row in range(lay.p_sum_phi, lay.p_engagements + 1):
+            W[(base + row) * lay.lanes + lane] = 0.0
+        W[lay.driving_max * lay.lanes + lane] += W[(base + lay.p_engaged) * lay.lanes + lane]
+
+
+@compiled
+def _input_work(W: Floats, lay: Layout, lane: int) -> float:
+    total = 0.0
+    for i in range(lay.n):
+        base = lay.pendulums + i * lay.stride
+        moment = W[(base + lay.p_ml) * lay.lanes + lane] * W[(base + lay.p_inertia) * lay.lanes + lane]
+        total += moment * W[(base + lay.p_work_input) * lay.lanes + lane]
+    return total
+
+
+@compiled
+def _pass_stop(W: Floats, I: Ints, lay: Layout, lane: int, stop: int, sums: Floats) -> None:  # noqa: E741
+    """Do what a stop asks: 0 starts the window, 1 its whole periods, 2 ends it (3, the end of the run, asks nothing)."""
+    lanes = lay.lanes
+    if stop == 0:
+        _zero_sums(W, lay, lane)
+        watch_extrema(W, lay, lane, True)
+        W[lay.turn_0 * lanes + lane] = W[lay.turn * lanes + lane]
+        W[lay.speed_0 * lanes + lane] = W[lay.speed * lanes + lane]
+        W[lay.energy_0 * lanes + lane] = energy(W, I, lay, lane)
+    elif stop == 1:
+        W[lay.turn_1 * lanes + lane] = W[lay.turn * lanes + lane]
+        W[lay.input_1 * lanes + lane] = _input_work(W, lay, lane)
+    elif stop == 2:
+        W[lay.turn_2 * lanes + lane] = W[lay.turn * lanes + lane]
+        W[lay.speed_2 * lanes + lane] = W[lay.speed * lanes + lane]
+        W[lay.energy_2 * lanes + lane] = energy(W, I, lay, lane)
+        column = OUT_SUMS
+        for row in range(lay.sum_held, lay.energy_lost + 1):
+            sums[column] = W[row * lanes + lane]
+            column += 1
+        for i in range(lay.n):
+            base = lay.pendulums + i * lay.stride
+            for row in range(lay.p_sum_phi, lay.p_u_max + 1):
+                sums[column] = W[(base + row) * lanes + lane]
+                column += 1
+        watch_extrema(W, lay, lane, False)
+
+
+@compiled
+def next_stop(W: Floats, I: Ints, lay: Layout, lane: int, cases: Floats, sums: Floats) -> bool:  # noqa: E741
+    """Pass every stop that is due, set the next one (at the latest the period's end); False when the run is over.
+
+    Stops are pairs (whole periods, fraction), so that a window given in periods is met exactly.
+    """
+    row = cases[I[lane, ev.CASE]]
+    while I[lane, ev.NEXT_STOP] < STOPS:
+        stop = I[lane, ev.NEXT_STOP]
+        whole = row[_STOPS + 2 * stop]
+        fraction = row[_STOPS + 2 * stop + 1]
+        if whole > I[lane, ev.PERIOD]:
+            break
+        if whole == I[lane, ev.PERIOD] and fraction > W[lay.f * lay.lanes + lane]:
+            W[lay.f_stop * lay.lanes + lane] = fraction
+            return True
+        _pass_stop(W, I, lay, lane, stop, sums)
+        I[lane, ev.NEXT_STOP] = stop + 1
+    W[lay.f_stop * lay.lanes + lane] = 1.0
+    return I[lane, ev.NEXT_STOP] < STOPS
+
+
+@compiled
+def runup_periods(turns: Floats, periods: int) -> float:
+    """Periods until the period-mean speed first reaches its share of the final one; NaN where the shaft does not turn.
+
+    The period-mean speed at a time is the mean over the period that ends there, taken at whole periods and linearly between;
+    it is 0 at the start. ``turns[k]`` is the shaft's turn after k periods.
+    """
+    if periods < 1:
+        return math.nan
+    wanted = RUNUP_SHARE * (turns[periods] - turns[periods - 1])
+    if not wanted > 0.0:
+        return math.nan
+    before = 0.0
+    for k in range(1, periods + 1):
+        mean = turns[k] - turns[k - 1]
+        if mean >= wanted:
+            return k - 1 + (wanted - before) / (mean - before)
+        before = mean
+    return math.nan
+
+
+@compiled
+def _finish(W: Floats, I: Ints, lay: Layout, lane: int, ending: int, cases: Floats, turns: Floats, sums: Floats) -> None:  # noqa: E741
+    case = I[lane, ev.CASE]
+    out = sums[case]
+    out[OUT_ENDING] = ending
+    out[OUT_STEPS] = I[lane, ev.STEPS]
+    out[OUT_EVENTS] = I[lane, ev.EVENTS]
+    out[OUT_RUNUP] = math.nan
+    if ending != _OK:
+        out[OUT_SUMS:] = math.nan
+    elif cases[case, _SPEED] == 0.0:
+        out[OUT_RUNUP] = cases[case, _PERIOD] * runup_periods(turns[lane], I[lane, ev.PERIOD])
+
+
+@compiled
+def _take_event(W: Floats, I: Ints, lay: Layout, lane: int, h: float, most_events: int) -> int:  # noqa: E741
+    """Carry out the event at the step's end and count it; the ending it causes, if any."""
+    I[lane, ev.EVENTS_AT_ONCE] = 0 if h > 0.0 else I[lane, ev.EVENTS_AT_ONCE] + 1
+    transit(W, I, lay, lane)
+    if I[lane, ev.PERIOD] > 0 or W[lay.f * lay.lanes + lane] > 0.0:
+        I[lane, ev.EVENTS] += 1
+        I[lane, ev.EVENTS_IN_PERIOD] += 1
+    if I[lane, ev.EVENTS_IN_PERIOD] > most_events or I[lane, ev.EVENTS_AT_ONCE] > MOST_AT_ONCE:
+        return _CHATTER
+    return _RUNNING
+
+
+@compiled
+def _lost(W: Floats, I: Ints, lay: Layout, lane: int, most_steps: int) -> int:  # noqa: E741
+    """The abnormal ending a lane has reached after a step, or ``_RUNNING``."""
+    lanes = lay.lanes
+    if not abs(W[lay.speed * lanes + lane]) < SPEED_BOUND:
+        return _DIVERGED
+    for i in range(lay.n):
+        base = lay.pendulums + i * lay.stride
+        if not (
+            abs(W[(base + lay.p_phi) * lanes + lane]) < ANGLE_BOUND
+            and abs(W[(base + lay.p_speed) * lanes + lane]) < SPEED_BOUND
+        ):
+            return _DIVERGED
+    if W[lay.h_free * lanes + lane] < STEP_FLOOR * W[lay.period * lanes + lane]:
+        return _ACCURACY
+    return _STEP_BUDGET if I[lane, ev.STEPS] >= most_steps else _RUNNING
+
+
+@compiled
+def settle(
+    W: Floats, I: Ints, lay: Layout, lane: int, cases: Floats, turns: Floats, sums: Floats, most_steps: int, most_events: int
+) -> bool:  # noqa: E741
+    """After ``advance``: events, stops, budgets of one lane. True while its case goes on."""
+    lanes = lay.lanes
+    h = W[lay.h * lanes + lane]
+    I[lane, ev.STEPS] += 1
+    ending = _lost(W, I, lay, lane, most_steps)
+    event = I[lane, ev.EVENT_PENDULUM] != ev.NO_EVENT
+    if h > 0.0:
+        I[lane, ev.SKIP_SHAFT] = 0
+        for i in range(lay.n):
+            I[lane, ev.SKIP_W + i] = 0
+            I[lane, ev.SKIP_U + i] = 0
+    at_stop = W[lay.at_stop * lanes + lane] == 1.0
+    if at_stop and h > 0.0:
+        # The stop is met exactly, whatever the sum of the steps rounds to.
+        W[lay.f * lanes + lane] = W[lay.f_stop * lanes + lane]
+    if ending == _RUNNING and event:
+        ending = _take_event(W, I, lay, lane, h, most_events)
+        I[lane, ev.EVENT_PENDULUM] = ev.NO_EVENT
+    if ending == _RUNNING and at_stop and h > 0.0:
+        if W[lay.f * lanes + lane] == 1.0:
+            W[lay.f * lanes + lane] = 0.0
+            I[lane, ev.PERIOD] += 1
+            I[lane, ev.EVENTS_IN_PERIOD] = 0
+            if I[lane, ev.PERIOD] < turns.shape[1]:
+                turns[lane, I[lane, ev.PERIOD]] = W[lay.turn * lanes + lane]
+        if not next_stop(W, I, lay, lane, cases, sums[I[lane, ev.CASE]]):
+            ending = _OK
+    if ending == _RUNNING:
+        return True
+    _finish(W, I, lay, lane, ending, cases, turns, sums)
+    return False
+
+
+@compiled
+def look(W: Floats, I: Ints, lay: Layout, lane: int, g: Floats, stack: Floats) -> None:  # noqa: E741
+    """Before ``advance``: the scalar second look at one lane's step, for events and extrema that the bounds could not exclude."""
+    if not W[lay.margin * lay.lanes + lane] > 0.0:
+        locate(W, I, lay, lane, g, stack)
+    if not W[lay.excess * lay.lanes + lane] <= 0.0:
+        update_extrema(W, lay, lane, g, stack)
+
+
+@compiled
+def record(
+    W: Floats, I: Ints, lay: Layout, lane: int, times: Floats, done: int, g: Floats, samples: Floats, states: Ints
+) -> int:  # noqa: E741
+    """Write the samples that fall into the lane's step, given sample times in excitation periods; how many are done then."""
+    f = W[lay.f * lay.lanes + lane]
+    length = W[lay.h * lay.lanes + lane] / W[lay.period * lay.lanes + lane]
+    while done < times.shape[0]:
+        ahead = (times[done] - I[lane, ev.PERIOD]) - f
+        if ahead > length or length == 0.0:
+            break
+        x = max(0.0, ahead / length)
+        sample(W, I, lay, lane, x, g, samples[done], states[done])
+        done += 1
+    return done

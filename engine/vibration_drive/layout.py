@@ -1,0 +1,132 @@
+"""Rows of the lane workspace: the agreement between the generated kernel and the event code.
+
+The workspace is one flat float64 array; quantity ``row`` of lane ``lane`` is at ``row * lanes + lane``. Rows of pendulum i
+start at ``pendulums + i * stride``; fields that begin with ``p_`` are offsets into that block.
+"""
+
+from typing import NamedTuple
+
+class Layout(NamedTuple):
+    """Sizes and row numbers; plain integers, so that compiled code takes it as an argument."""
+
+    n: int
+    coefficients: int
+    order: int
+    lanes: int
+    rows: int
+    pendulums: int
+    stride: int
+    # shaft: time within the excitation period, as a fraction of it; where the next step must stop; the period in s
+    f: int
+    f_stop: int
+    period: int
+    # parameters; acc_x, acc_y are the amplitudes of the base's acceleration, inverse_rate scales accelerations to speeds
+    nu: int
+    acc_x: int
+    acc_y: int
+    cos_chi: int
+    sin_chi: int
+    gravity: int
+    load: int
+    inertia: int
+    inverse_rate: int
+    # mode: 1/(inertia that turns with the shaft), 0 where it is held; flags; bands of the guards
+    mobility: int
+    rotating: int
+    driven: int
+    sum_high: int
+    speed_low: int
+    # step: size, size wanted by the tolerance, whether it ends at f_stop, distance to the nearest guard, excess over extrema
+    h: int
+    h_free: int
+    at_stop: int
+    margin: int
+    excess: int
+    # state (with speed[0])
+    turn: int
+    # sums over the window
+    sum_held: int
+    time_rotating: int
+    time_driven: int
+    work_clutch: int
+    # extrema over the window
+    speed_max: int
+    speed_min: int
+    acc_max: int
+    sum_max: int
+    power_max: int
+    # marks: values at the window's start (0), at the start of its whole periods (1), at its end (2)
+    turn_0: int
+    turn_1: int
+    turn_2: int
+    speed_0: int
+    speed_2: int
+    energy_0: int
+    energy_2: int
+    input_1: int
+    driving_max: int
+    energy_lost: int
+    # series of the shaft: speed and sum of the clutch torques, order + 1 coefficients each
+    speed: int
+    sum: int
+    # one pendulum
+    p_ml: int
+    p_spring: int
+    p_damping: int
+    p_inverse_inertia: int
+    p_inertia: int
+    p_backlash: int
+    p_limit: int
+    # mode flags, and the bands in which relative speed, windup and torque must stay
+    p_locked: int
+    p_engaged: int
+    p_beyond: int
+    p_w_low: int
+    p_w_high: int
+    p_u_low: int
+    p_u_high: int
+    p_t_low: int
+    p_t_high: int
+    # state (with p_speed[0])
+    p_phi: int
+    p_u: int
+    # sums, extrema
+    p_sum_phi: int
+    p_sum_torque: int
+    p_work_input: int
+    p_work_loss: int
+    p_time_engaged: int
+    p_time_beyond: int
+    p_engagements: int
+    p_phi_max: int
+    p_phi_min: int
+    p_speed_max: int
+    p_speed_min: int
+    p_acc_max: int
+    p_acc_min: int
+    p_torque_max: int
+    p_u_max: int
+    # the clutch law and the law in force (zero where free, straight where beyond the data)
+    p_law: int
+    p_force: int
+    # series: speed and torque (order + 1), drive by the base (order)
+    p_speed: int
+    p_torque: int
+    p_drive: int
+
+
+def make_layout(n: int, coefficients: int, order: int, lanes: int) -> Layout:
+    """Lay out the rows for ``n`` pendulums, that many clutch coefficients, series of that order, and that many lanes."""
+    sizes = dict.fromkeys(("speed", "sum", "p_speed", "p_torque"), order + 1)
+    sizes |= {"p_drive": order, "p_law": coefficients, "p_force": coefficients}
+    names = Layout._fields[Layout._fields.index("stride") + 1 :]
+    fields: dict[str, int] = {}
+    shaft_rows = stride = 0
+    for name in names:
+        if name.startswith("p_"):
+            fields[name] = stride
+            stride += sizes.get(name, 1)
+        else:
+            fields[name] = shaft_rows
+            shaft_rows += sizes.get(name, 1)
+    return Layout(n, coefficients, order, lanes, shaft_rows + n * stride, shaft_rows, stride, **fields)

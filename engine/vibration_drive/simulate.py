@@ -1,0 +1,219 @@
+"""Running cases of the vibration drive: a batch of parameters in, characteristics and endings out; one case's trajectory."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from engine.endings import ENDING_CODES, Ending
+from engine.run import Run
+from engine.taylor.roots import MAX_DEGREE, work_stack
+from engine.vibration_drive.automaton import Clutch, Shaft
+from engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count
+from engine.vibration_drive.characteristics import characteristics, sum_columns
+from engine.vibration_drive.events import LANE_INTEGERS
+from engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
+from engine.vibration_drive.lanes import OUT_ENDING
+from engine.vibration_drive.parameters import PARAMETERS
+
+Floats = NDArray[np.float64]
+
+#: Numbers sampled per pendulum and for the shaft by ``window.sample``.
+_SHAFT_SAMPLES, _PENDULUM_SAMPLES = 4, 6
+_CLUTCH_NAMES = {int(state): state.name.lower() for state in Clutch}
+_SHAFT_NAMES = {int(state): state.name.lower() for state in Shaft}
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """Results of a batch.
+
+    Attributes
+    ----------
+    values : array, shape (cases, results)
+        Characteristics in the order of ``result_infos(pendulums)``; NaN where a value could not be computed.
+    endings : int8 array, shape (cases,)
+        Index into ``engine.endings.ENDING_CODES``.
+    """
+
+    values: Floats
+    endings: NDArray[np.int8]
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """Instantaneous values of one case.
+
+    Attributes
+    ----------
+    times : array, shape (m,)
+        Times in s that were reached (all asked for, unless the case ended early).
+    names, units : tuples
+        Name and SI unit of each column.
+    values : array, shape (m, columns)
+    states : dict
+        State of "shaft" ("held", "rotating") and of "pendulums.N" (states of its clutch), one string a time.
+    ending : Ending
+    """
+
+    times: Floats
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: Floats
+    states: dict[str, list[str]]
+    ending: Ending
+
+
+def _integrate(
+    columns: Mapping[str, ArrayLike], run: Run, cases: int, times: Floats
+) -> tuple[Kernel, Floats, Floats, Floats, NDArray[np.int64], int]:
+    matrix = case_matrix(columns, run, cases)
+    n, count = pendulum_count(columns), coefficient_count(columns)
+    module = kernel(n, count, order_for(run.tolerance), lane_count())
+    lay = module.LAYOUT
+    sums = np.full((cases, sum_columns(lay)), np.nan)
+    frequency = np.broadcast_to(np.asarray(columns["excitation.frequency"], dtype=np.float64), (cases,))
+    periods = int(max((run.duration.in_periods(f) for f in frequency), default=0.0)) + 2
+    samples = np.empty((len(times), _SHAFT_SAMPLES + n * _PENDULUM_SAMPLES))
+    states = np.zeros((len(times), 1 + n), dtype=np.int64)
+    done = module.integrate(
+        matrix, math.log2(run.tolerance), int(run.reset == "literal"), run.max_steps, run.max_events_per_period,
+        np.zeros(lay.rows * lay.lanes), np.zeros((lay.lanes, LANE_INTEGERS), dtype=np.int64),
+        np.zeros(MAX_DEGREE + 1), work_stack(), np.zeros((lay.lanes, periods)), sums, times, samples, states,
+    )  # fmt: skip
+    return module, matrix, sums, samples, states, done
+
+
+def simulate(columns: Mapping[str, ArrayLike], run: Run, *, cases: int) -> Batch:
+    """Run a batch of cases.
+
+    Every case's result is the same to the last bit whatever batch, order or process it is computed in.
+
+    Parameters
+    ----------
+    columns : mapping
+        SPEC paths to scalars or arrays of shape (cases,), in SI units, frequency in Hz. The clutch is given as
+        ``clutch.coefficients.0`` (c_1) and so on, with an optional ``clutch.windup_limit``, for all pendulums, or as
+        ``pendulums.N.clutch...`` for one. Missing paths take the default of ``PARAMETERS``.
+    run : Run
+    cases : int
+        Number of cases, at least 0.
+
+    Returns
+    -------
+    Batch
+
+    Raises
+    ------
+    ValueError
+        If a required parameter is missing or the number of pendulums or coefficients is out of range.
+    """
+    if cases == 0:
+        count = len(characteristics_names(pendulum_count(columns)))
+        return Batch(np.empty((0, count)), np.empty(0, dtype=np.int8))
+    module, matrix, sums, *_ = _integrate(columns, run, cases, np.empty(0))
+    return Batch(characteristics(module.LAYOUT, matrix, sums), sums[:, OUT_ENDING].astype(np.int8))
+
+
+def characteristics_names(pendulums: int) -> tuple[str, ...]:
+    """Names of the result columns of a drive with that many pendulums."""
+    from engine.vibration_drive.results import result_infos
+
+    return tuple(info.name for info in result_infos(pendulums))
+
+
+def _trajectory_columns(n: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    pairs = [
+        ("base.displacement_x", "m"), ("base.displacement_y", "m"),
+        ("shaft.angle", "rad"), ("shaft.speed", "rad/s"), ("shaft.acceleration", "rad/s^2"), ("torque", "N*m"),
+        ("power.useful", "W"), ("power.clutch", "W"), ("power.input", "W"), ("power.loss", "W"),
+    ]  # fmt: skip
+    for i in range(n):
+        pairs += [
+            (f"pendulums.{i}.{name}", unit)
+            for name, unit in (
+                ("angle", "rad"), ("speed", "rad/s"), ("acceleration", "rad/s^2"), ("torque", "N*m"), ("windup", "rad"),
+                ("power.input", "W"), ("power.loss", "W"),
+            )
+        ]  # fmt: skip
+    return tuple(name for name, _ in pairs), tuple(unit for _, unit in pairs)
+
+
+def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike) -> Trajectory:
+    """Run one case and sample it.
+
+    Parameters
+    ----------
+    columns : mapping
+        As for ``simulate``, scalars only.
+    run : Run
+    times : array, shape (m,)
+        Times in s from the start, ascending, within the run. At a transition the value before it is given.
+
+    Returns
+    -------
+    Trajectory
+        The values come from the local polynomials of the integration: they are as accurate as its steps, at any sampling.
+
+    Raises
+    ------
+    ValueError
+        If the times are not ascending or not within the run.
+    """
+    asked = np.ascontiguousarray(times, dtype=np.float64)
+    values = {path: float(np.asarray(value)) for path, value in columns.items()}
+    frequency = values["excitation.frequency"]
+    end = run.duration.in_periods(frequency) / frequency
+    if asked.size and (np.any(np.diff(asked) < 0) or asked[0] < 0 or asked[-1] > end * (1 + 1e-12)):
+        raise ValueError(f"times must ascend within 0 .. {end:g} s")
+    periods = np.minimum(asked * frequency, run.duration.in_periods(frequency))
+    _, _, sums, samples, states, done = _integrate(values, run, 1, periods)
+    n = pendulum_count(values)
+    names, units = _trajectory_columns(n)
+    times_done, samples, states = asked[:done], samples[:done], states[:done]
+    defaults = {parameter.path: parameter.default for parameter in PARAMETERS}
+    value = {**{k: v for k, v in defaults.items() if v is not None}, **values}
+    nu = 2.0 * math.pi * frequency
+    out = {
+        "base.displacement_x": value["excitation.amplitude_x"] * np.cos(nu * times_done),
+        "base.displacement_y": value["excitation.amplitude_y"] * np.sin(nu * times_done + value["excitation.phase"]),
+    }
+    for column, name in enumerate(("shaft.angle", "shaft.speed", "shaft.acceleration", "torque")):
+        out[name] = samples[:, column]
+    out["power.useful"] = value["shaft.load"] * out["shaft.speed"]
+    out["power.clutch"] = out["torque"] * out["shaft.speed"]
+    for i in range(n):
+        block = samples[:, _SHAFT_SAMPLES + _PENDULUM_SAMPLES * i :]
+        for column, name in enumerate(("angle", "speed", "acceleration", "torque")):
+            out[f"pendulums.{i}.{name}"] = block[:, column]
+        engaged = states[:, 1 + i] >= Clutch.ENGAGED
+        out[f"pendulums.{i}.windup"] = np.where(engaged, block[:, 4], 0.0)
+        moment = value[f"pendulums.{i}.mass"] * value[f"pendulums.{i}.arm"]
+        damping = values.get(f"pendulums.{i}.damping", 0.0)
+        out[f"pendulums.{i}.power.input"] = moment * block[:, 5] * block[:, 1]
+        out[f"pendulums.{i}.power.loss"] = damping * block[:, 1] ** 2
+    out["power.input"] = sum((out[f"pendulums.{i}.power.input"] for i in range(n)), np.zeros(done))
+    out["power.loss"] = sum((out[f"pendulums.{i}.power.loss"] for i in range(n)), np.zeros(done))
+    named = {"shaft": [_SHAFT_NAMES[int(s)] for s in states[:, 0]]}
+    for i in range(n):
+        named[f"pendulums.{i}"] = [_CLUTCH_NAMES[int(s)] for s in states[:, 1 + i]]
+    ending = ENDING_CODES[int(sums[0, OUT_ENDING])]
+    return Trajectory(times_done, names, units, np.column_stack([out[name] for name in names]), named, ending)
+
+
+def warm_up(pendulums: int, coefficients: int, tolerance: float) -> None:
+    """Generate and compile the kernel of a shape, so that other processes load it from the cache."""
+    columns: dict[str, float] = {"excitation.frequency": 1.0, "shaft.inertia": 1.0}
+    for i in range(pendulums):
+        columns |= {f"pendulums.{i}.inertia": 1.0, f"pendulums.{i}.mass": 0.0, f"pendulums.{i}.arm": 0.0}
+    columns |= {f"clutch.coefficients.{k}": 1.0 for k in range(max(1, coefficients))}
+    simulate(columns, Run(tolerance=tolerance), cases=1)
+
+
+def estimate_seconds(pendulums: int, coefficients: int, tolerance: float, periods: float) -> float:
+    """Rough time of one case on one core, in s: about 24 steps a period at order 12, events included."""
+    order = order_for(tolerance)
+    step = 5e-7 * (0.4 + 0.6 * pendulums) * (order / 12.0) ** 2 * (0.8 + 0.05 * coefficients)
+    return 1e-5 + periods * 24.0 * step
