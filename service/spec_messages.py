@@ -69,16 +69,18 @@ class Report:
     def __init__(self) -> None:
         self.problems: list[Problem] = []
         self.warnings: list[str] = []
-        self._left_out = 0
 
     def problem(
         self, pointer: str, message: str, value: object = None, *, allowed: str | None = None, unit: str | None = None
     ) -> None:
-        """Notes a problem; beyond `MAX_PROBLEMS` only their number is kept."""
-        if len(self.problems) >= MAX_PROBLEMS:
-            self._left_out += 1
-            return
-        self.problems.append(Problem(pointer, message, shorten(value), allowed, unit))
+        """Notes a problem, unless there are `MAX_PROBLEMS` already."""
+        if not self.full:
+            self.problems.append(Problem(pointer, message, shorten(value), allowed, unit))
+
+    @property
+    def full(self) -> bool:
+        """Whether there are so many problems that looking for more would only take time."""
+        return len(self.problems) >= MAX_PROBLEMS
 
     def warn(self, message: str) -> None:
         """Notes something that is allowed but probably not meant; the same sentence only once."""
@@ -89,7 +91,7 @@ class Report:
         """Notes every key of ``found`` that is not ``known``, with the nearest known one."""
         known = tuple(known)
         for key in found:
-            if key not in known:
+            if key not in known and not self.full:
                 self.problem(
                     join(pointer, key),
                     f"unknown field{did_you_mean(key, known)}",
@@ -101,9 +103,8 @@ class Report:
         """Raises `SpecError` with everything noted so far, if anything was."""
         if not self.problems:
             return
-        if self._left_out:
-            self.problems.append(Problem("", f"and {self._left_out} more problems"))
-        raise SpecError(self.problems)
+        more = [Problem("", f"only the first {MAX_PROBLEMS} problems are listed")] if self.full else []
+        raise SpecError([*self.problems, *more])
 
 
 def join(pointer: str, *keys: str | int) -> str:

@@ -194,10 +194,10 @@ def _factor(text: str, unit: str) -> Fraction:
         factor, dimensions = _measure(text)
     except QuantityError as error:
         raise QuantityError(f"{error}; {expected}") from None
-    wanted_factor, wanted = _measure(unit)
-    angle, wanted_angle = dimensions.pop("radian", 0), wanted.pop("radian", 0)
-    if dimensions == wanted:
-        if angle == wanted_angle:
+    wanted_factor, wanted = _wanted(unit)
+    angle = dimensions.pop("radian", 0)
+    if {**dimensions, "radian": 0} == {**wanted, "radian": 0}:
+        if angle == wanted.get("radian", 0):
             return factor / wanted_factor
         if unit == "Hz" and angle == 1:
             return factor / wanted_factor / Fraction(_TWO_PI)
@@ -228,6 +228,11 @@ def _measure(text: str) -> tuple[Fraction, dict[str, int]]:
     if tokens:
         raise QuantityError(f"has a unit that cannot be read: '{text}'")
     return factor, {name: power for name, power in powers.items() if power}
+
+
+@lru_cache(maxsize=64)
+def _wanted(unit: str) -> tuple[Fraction, dict[str, int]]:
+    return _measure(unit)
 
 
 def _product(tokens: list[str], text: str) -> tuple[Fraction, Counter[str]]:

@@ -1,0 +1,120 @@
+"""What a spec may say but probably does not mean: unstable pendulums, impossible inertias, slips of units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.spec_axes import varied_values
+from service.spec_messages import Report
+from worker.study import Axis, Study
+
+#: Combinations of the axes involved that are looked at one by one; of more, only the ends of the axes.
+_MOST_COMBINATIONS: Final = 100_000
+
+#: Last part of a path -> (largest plausible magnitude, its unit, what else may have been meant).
+_PLAUSIBLE: Final[dict[str, tuple[float, str, str]]] = {
+    "excitation.frequency": (1e3, "Hz", "was it in rpm or rad/s?"),
+    "excitation.amplitude_x": (0.1, "m", "was it in mm?"),
+    "excitation.amplitude_y": (0.1, "m", "was it in mm?"),
+    "excitation.phase": (2.0 * math.pi, "rad", "was it in degrees?"),
+    "inertia": (100.0, "kg*m^2", "was it in g*cm^2 or kg*mm^2?"),
+    "mass": (1e3, "kg", "was it in g?"),
+    "arm": (1.0, "m", "was it in mm?"),
+    "spring_arm": (1.0, "m", "was it in mm?"),
+    "spring_rate": (1e8, "N/m", "was it in another unit?"),
+    "damping": (100.0, "N*m*s/rad", "was it in another unit?"),
+    "backlash": (0.5, "rad", "was it in degrees?"),
+    "initial_angle": (math.pi, "rad", "was it in degrees?"),
+    "initial_speed": (1e3, "rad/s", "was it in rpm?"),
+    "load": (1e4, "N*m", "was it in N*mm?"),
+}
+
+
+def warn_vibration_drive(report: Report, study: Study) -> None:
+    """Notes what is implausible about a vibration drive anywhere on the axes of ``study``."""
+    for path in dict.fromkeys((*study.base, *study.axis_paths)):
+        _plausible(report, study, path)
+    if not any(any(_values(study, f"excitation.amplitude_{axis}")) for axis in "xy"):
+        report.warn("/base/excitation: both amplitudes are 0, so the base does not move")
+    if min(_values(study, "excitation.frequency")) < 0.1:
+        report.warn("/base/excitation/frequency: below 0.1 Hz, which is slow for a vibration drive")
+    pendulums = sum(path.startswith("pendulums.") and path.endswith(".mass") for path in study.base)
+    for index in range(pendulums):
+        _stability(report, study, index)
+        _inertia(report, study, index)
+
+
+def _values(study: Study, path: str) -> tuple[float, ...]:
+    return varied_values(path, study.axes, study.base)
+
+
+def _plausible(report: Report, study: Study, path: str) -> None:
+    entry = _PLAUSIBLE.get(path) or _PLAUSIBLE.get(path.rsplit(".", 1)[-1])
+    if entry is None:
+        return
+    limit, unit, question = entry
+    largest = max(_values(study, path), key=abs)
+    if abs(largest) > limit:
+        report.warn(f"{path}: {largest:g} {unit} is more than {limit:.4g} {unit}; {question}")
+
+
+def _stability(report: Report, study: Study, index: int) -> None:
+    """c a^2 against M g l: below it the upright (for l > 0) position is unstable without vibration (MODEL.md A1)."""
+    names = ("spring_rate", "spring_arm", "mass", "arm")
+    c, a, mass, arm, g, weight = _columns(study, [*(f"pendulums.{index}.{name}" for name in names), "gravity"])
+    spring, gravity = np.broadcast_arrays(c * a**2, mass * g * arm)
+    unstable = spring < gravity
+    if unstable.any():
+        worst = int(np.argmin(np.where(unstable, spring - gravity, np.inf)))
+        report.warn(
+            f"/base/pendulums/{index}: c a^2 < M g l: the spring's {spring.flat[worst]:.4g} N*m/rad do not hold the "
+            f"pendulum up against gravity's {gravity.flat[worst]:.4g} N*m/rad; without vibration it falls to one side"
+            + _share(unstable, weight)
+        )
+
+
+def _inertia(report: Report, study: Study, index: int) -> None:
+    """J >= M l^2 holds for every rigid body about an axis at distance l from its centre of mass (parallel axes)."""
+    names = ("inertia", "mass", "arm")
+    inertia, mass, arm, weight = _columns(study, [f"pendulums.{index}.{name}" for name in names])
+    have, need = np.broadcast_arrays(inertia, mass * arm**2)
+    wrong = have < need * (1.0 - 1e-9)
+    if wrong.any():
+        worst = int(np.argmax(np.where(wrong, need - have, -np.inf)))
+        report.warn(
+            f"/base/pendulums/{index}: J < M l^2: an inertia of {have.flat[worst]:.4g} kg*m^2 about the axis is less "
+            f"than the {need.flat[worst]:.4g} kg*m^2 of the mass at its arm alone, which no rigid body has"
+            + _share(wrong, weight)
+        )
+
+
+def _share(found: NDArray[np.bool_], weight: NDArray[np.float64]) -> str:
+    """How many cases it concerns, where every combination was looked at."""
+    cases = float(weight)
+    if found.size == 1 or not cases:
+        return "" if found.size == 1 else " (in the worst case of the axes)"
+    return f" (in {int(found.sum() * cases):,} of {int(found.size * cases):,} cases)"
+
+
+def _columns(study: Study, paths: Sequence[str]) -> list[NDArray[np.float64]]:
+    """Values of ``paths`` in every combination of the axes that vary any of them, broadcastable against each other.
+
+    The last array is the number of cases that share a combination; 0 when only the axes' ends were combined.
+    """
+    axes = tuple(axis for axis in study.axes if set(axis.paths) & set(paths))
+    involved = replace(study, axes=axes)
+    cases_each = study.cases // involved.cases
+    if involved.cases > _MOST_COMBINATIONS:
+        cases_each = 0
+        if study.combine == "grid":
+            ends = tuple(Axis(axis.paths, tuple(dict.fromkeys((min(axis.values), max(axis.values))))) for axis in axes)
+            involved = replace(study, axes=ends)
+    varied = involved.columns(range(involved.cases))
+    columns = [np.asarray(varied.get(path, study.base[path]), dtype=np.float64) for path in paths]
+    return [*columns, np.asarray(float(cases_each))]
