@@ -11,12 +11,21 @@ import math
 import re
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from engine import ENGINE_VERSION, Ending, Run, Span
 from engine.run import Reset, Unit
+from engine.vibration_drive.clutch import (
+    ClutchFit,
+    ClutchFitError,
+    ClutchLaw,
+    ClutchLawError,
+    DegreeReport,
+    check_law,
+    fit_clutch,
+)
 from engine.vibration_drive.parameters import (
     CLUTCH_COEFFICIENT,
     CLUTCH_WINDUP_LIMIT,
@@ -29,19 +38,12 @@ from engine.vibration_drive.results import ResultInfo
 from engine.vibration_drive.results import result_infos as _vibration_drive_results
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from engine.vibration_drive.clutch import (
-        ClutchFit,
-        ClutchFitError,
-        ClutchLaw,
-        ClutchLawError,
-        check_law,
-        fit_clutch,
-    )
-    from engine.vibration_drive.simulate import Trajectory
+    from engine.vibration_drive.simulate import Trajectory as Trajectory
     from worker.study import Study
 
 __all__ = [
@@ -55,20 +57,25 @@ __all__ = [
     "MODELS",
     "OK",
     "ChunkResult",
+    "ChunkTask",
     "ClutchFit",
     "ClutchFitError",
     "ClutchLaw",
     "ClutchLawError",
+    "DegreeReport",
+    "KernelShape",
     "Parameter",
     "ResultInfo",
     "Run",
     "Span",
-    "Trajectory",
     "WorkerEnding",
+    "cache_folder",
     "check_law",
+    "chunk_task",
     "coefficients",
     "estimate_seconds_per_case",
     "fit_clutch",
+    "load",
     "models",
     "parameter_catalogue",
     "pendulums",
@@ -76,7 +83,9 @@ __all__ = [
     "result_shapes",
     "run_chunk",
     "run_of",
+    "run_task",
     "run_trajectory",
+    "shape_of",
     "study_results",
     "warm_up",
 ]
@@ -112,7 +121,6 @@ ENDING_SENTENCES: dict[str, str] = {
     WorkerEnding.CANCELLED.value: "The study was cancelled before this case was run.",
 }
 
-_CLUTCH_NAMES = frozenset({"ClutchFit", "ClutchFitError", "ClutchLaw", "ClutchLawError", "check_law", "fit_clutch"})
 _PENDULUM = re.compile(r"pendulums\.(\d+)\.")
 _COEFFICIENT = re.compile(r"(?:^|\.)clutch\.coefficients\.(\d+)$")
 
@@ -142,19 +150,6 @@ class ChunkResult:
     def count(self) -> int:
         """Number of cases."""
         return len(self.endings)
-
-
-def __getattr__(name: str) -> Any:
-    """Names of the engine that would load more than a catalogue needs, fetched when first asked for."""
-    if name in _CLUTCH_NAMES:
-        from engine.vibration_drive import clutch
-
-        return getattr(clutch, name)
-    if name == "Trajectory":
-        from engine.vibration_drive.simulate import Trajectory
-
-        return Trajectory
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def models() -> tuple[str, ...]:
@@ -228,28 +223,65 @@ def run_of(study: Study) -> Run:
     )
 
 
-def _columns(study: Study, cases: range) -> Mapping[str, float | NDArray[np.float64]]:
-    return {**study.base, **study.columns(cases)}
+@dataclass(frozen=True, slots=True)
+class KernelShape:
+    """What decides which compiled kernel a case needs."""
+
+    model: str
+    pendulums: int
+    coefficients: int
+    tolerance: float
 
 
-def run_chunk(study: Study, first: int, count: int) -> ChunkResult:
-    """Run the cases ``first`` .. ``first + count - 1`` of ``study``.
+@dataclass(frozen=True, slots=True)
+class ChunkTask:
+    """Consecutive cases as they travel to a process: their own columns only, however large the study is.
+
+    ``columns`` maps flat SPEC paths to SI numbers, or to arrays of shape (count,) where they vary.
+    """
+
+    first: int
+    count: int
+    shape: KernelShape
+    run: Run
+    columns: dict[str, float | NDArray[np.float64]]
+
+
+def shape_of(study: Study) -> KernelShape:
+    """The kernel that the cases of ``study`` need."""
+    return KernelShape(study.model, pendulums(study), coefficients(study), run_of(study).tolerance)
+
+
+def chunk_task(study: Study, first: int, count: int) -> ChunkTask:
+    """The cases ``first`` .. ``first + count - 1`` of ``study``, ready for `run_task`."""
+    columns: dict[str, float | NDArray[np.float64]] = {**study.base, **study.columns(range(first, first + count))}
+    return ChunkTask(first, count, shape_of(study), run_of(study), columns)
+
+
+def run_task(task: ChunkTask) -> ChunkResult:
+    """Run the cases of a task.
 
     A physical failure is an ending in the result, never an exception; what is raised here is a fault of the program.
     """
     from engine.endings import ENDING_CODES
     from engine.vibration_drive.simulate import simulate
 
-    batch = simulate(_columns(study, range(first, first + count)), run_of(study), cases=count)
+    batch = simulate(task.columns, task.run, cases=task.count)
     names = [ending.value for ending in ENDING_CODES]
-    beyond = [index for index, info in enumerate(study_results(study)) if info.name.endswith(".fraction.beyond_data")]
-    outside = (batch.values[:, beyond] > 0.0).any(axis=1)
+    infos = result_infos(task.shape.model, task.shape.pendulums)
+    beyond = [index for index, info in enumerate(infos) if info.name.endswith(".fraction.beyond_data")]
+    outside = np.any(batch.values[:, beyond] > 0.0, axis=1)
     return ChunkResult(
-        first=first,
+        first=task.first,
         endings=[names[code] for code in batch.endings.tolist()],
         flags=[WINDUP_OUT_OF_DATA if flag else "" for flag in outside.tolist()],
         values=np.ascontiguousarray(batch.values, dtype=np.float64),
     )
+
+
+def run_chunk(study: Study, first: int, count: int) -> ChunkResult:
+    """Run the cases ``first`` .. ``first + count - 1`` of ``study`` here."""
+    return run_task(chunk_task(study, first, count))
 
 
 def run_trajectory(study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
@@ -283,12 +315,24 @@ def estimate_seconds_per_case(study: Study) -> float:
     """Rough time of one case of ``study`` on one core, in s."""
     from engine.vibration_drive.simulate import estimate_seconds
 
-    run = run_of(study)
-    return estimate_seconds(pendulums(study), coefficients(study), run.tolerance, _mean_periods(study))
+    shape = shape_of(study)
+    return estimate_seconds(shape.pendulums, shape.coefficients, shape.tolerance, _mean_periods(study))
+
+
+def load(shape: KernelShape) -> None:
+    """Compile the kernel of that shape into the on-disk cache, or load it from there."""
+    from engine.vibration_drive.simulate import warm_up as engine_warm_up
+
+    engine_warm_up(shape.pendulums, shape.coefficients, shape.tolerance)
 
 
 def warm_up(study: Study) -> None:
     """Compile the kernel that ``study`` needs into the on-disk cache, or load it from there."""
-    from engine.vibration_drive.simulate import warm_up as engine_warm_up
+    load(shape_of(study))
 
-    engine_warm_up(pendulums(study), coefficients(study), run_of(study).tolerance)
+
+def cache_folder() -> Path:
+    """Folder of the compiled kernels, made if need be."""
+    from engine.vibration_drive.kernel import cache_folder as engine_cache_folder
+
+    return engine_cache_folder()
