@@ -76,13 +76,13 @@ def parse_spec(data: object) -> ParsedSpec:
     report = Report()
     found = read_object(report, "", data, FIELDS)
     if found is None:
-        raise SpecError(report.problems)
+        raise report.error()
     _read_version(report, found)
     name = _read_name(report, found.get("name", UNNAMED))
     # A spec of an unknown model cannot be read any further.
     model = _read_model(report, found)
     if model is None:
-        raise SpecError(report.problems)
+        raise report.error()
     machine = read_base(report, found.get("base"), model)
     combine = read_combine(report, found.get("combine", "grid"))
     axes = read_axes(report, found.get("axes", []), combine, machine)

@@ -101,10 +101,13 @@ class Report:
 
     def raise_if_any(self) -> None:
         """Raises `SpecError` with everything noted so far, if anything was."""
-        if not self.problems:
-            return
+        if self.problems:
+            raise self.error()
+
+    def error(self) -> SpecError:
+        """The error with everything noted so far."""
         more = [Problem("", f"only the first {MAX_PROBLEMS} problems are listed")] if self.full else []
-        raise SpecError([*self.problems, *more])
+        return SpecError([*self.problems, *more])
 
 
 def join(pointer: str, *keys: str | int) -> str:

@@ -1,0 +1,242 @@
+"""The spec as a JSON Schema (2020-12), made from the engine's catalogue: for the API's description and for forms.
+
+The schema says what a field is called, its unit, range, default and meaning. What depends on several fields (windows
+inside the run, sizes of grids, clutch laws) only `service.spec.parse_spec` checks.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+from service.spec import UNNAMED, VERSION
+from service.spec_fields import placed
+from service.spec_run import DEFAULTS, RESETS
+from service.units import example
+from worker import kernels
+from worker.kernels import CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, MAX_PENDULUMS, Parameter
+from worker.limits import (
+    MAX_AXES,
+    MAX_AXIS_VALUES,
+    MAX_CLUTCH_ROWS,
+    MAX_NAME_LENGTH,
+    MAX_QUANTITY_LENGTH,
+    MAX_TIED_PATHS,
+    MAX_TOLERANCE,
+    MIN_TOLERANCE,
+)
+
+Schema = dict[str, Any]
+
+_TEXT: Final[Schema] = {"type": "string", "minLength": 1, "maxLength": MAX_QUANTITY_LENGTH}
+
+
+def spec_schema() -> Schema:
+    """JSON Schema of a whole spec, self-contained (no references), unknown fields refused."""
+    return _object(
+        {
+            "sprag": {"const": VERSION, "description": "version of the spec"},
+            "model": {"enum": list(kernels.models()), "description": "what is simulated"},
+            "name": {
+                "type": "string",
+                "minLength": 1,
+                "maxLength": MAX_NAME_LENGTH,
+                "default": UNNAMED,
+                "description": "what people call the study",
+            },
+            "base": base_schema(kernels.models()[0]),
+            "run": run_schema(),
+            "axes": {
+                "type": "array",
+                "maxItems": MAX_AXES,
+                "items": axis_schema(),
+                "default": [],
+                "description": "what varies from case to case",
+            },
+            "combine": {
+                "enum": ["grid", "zip"],
+                "default": "grid",
+                "description": "every combination of the axes (the first varies slowest), or the axes side by side",
+            },
+        },
+        required=("sprag", "model", "base"),
+        description="a study: a machine, a run, and what varies",
+    )
+
+
+def base_schema(model: str) -> Schema:
+    """Schema of `base` for ``model``, from its catalogue of parameters; ValueError for an unknown model."""
+    catalogue = [entry for entry in kernels.parameter_catalogue(model) if not entry.path.startswith("clutch.")]
+    properties: Schema = {}
+    required: list[str] = []
+    for section in dict.fromkeys(entry.path.split(".")[0] for entry in catalogue):
+        entries = [entry for entry in catalogue if entry.path.split(".")[0] == section]
+        if entries[0].path == section:
+            properties[section] = quantity_schema(entries[0])
+            continue
+        schema = _section(entries, with_clutch=section == "pendulums")
+        if section == "pendulums":
+            schema = {"type": "array", "minItems": 1, "maxItems": MAX_PENDULUMS, "items": schema}
+        properties[section] = schema
+        if any(entry.default is None for entry in entries):
+            required.append(section)
+    properties["clutch"] = clutch_schema()
+    return _object(properties, required=required, description="the machine that every case begins from")
+
+
+def clutch_schema() -> Schema:
+    """Schema of a clutch: a law, or measured data with the accuracy of its fit."""
+    pair = {"type": "array", "minItems": 2, "maxItems": 2, "description": "angle (rad) and torque (N*m)"}
+    law = {
+        "coefficients": {
+            "type": "array",
+            "minItems": 1,
+            "maxItems": MAX_COEFFICIENTS,
+            "items": {"type": ["number", "string"]},
+            "description": "c_1 .. c_p of the torque over the windup, c_1 first: N*m, N*m/rad, N*m/rad^2, ..",
+        },
+        "windup_limit": quantity_schema(CLUTCH_WINDUP_LIMIT),
+    }
+    measured = {
+        "data": {
+            "type": "array",
+            "minItems": 2,
+            "maxItems": MAX_CLUTCH_ROWS,
+            "items": {**pair, "items": {"type": ["number", "string"]}},
+            "description": "measured rows [angle, torque]",
+        },
+        "accuracy": quantity_schema(
+            Parameter("accuracy", "", "N*m", 0.0, 1e9, True, None, "largest residual of the fit that is accepted")
+        ),
+        "max_degree": {
+            "type": "integer",
+            "minimum": 1,
+            "maximum": MAX_COEFFICIENTS - 1,
+            "default": 7,
+            "description": "highest degree of the polynomial that is tried",
+        },
+        "through_origin": {"type": "boolean", "default": True, "description": "no torque at zero windup (c_1 = 0)"},
+        "angles_include_backlash": {
+            "type": "boolean",
+            "default": False,
+            "description": "the angles count from the first contact, so that the backlash is taken off them",
+        },
+    }
+    return {
+        "description": "torque of the freewheel clutch over its windup",
+        "oneOf": [_object(law, required=("coefficients",)), _object(measured, required=("data", "accuracy"))],
+    }
+
+
+def run_schema() -> Schema:
+    """Schema of `run`."""
+    time = {"type": ["number", "string"], "examples": ["60 periods", "2 s", 2.0], "minimum": 0}
+    return _object(
+        {
+            "duration": {
+                **time,
+                "default": "60 periods",
+                "description": "end of the run: a number is seconds, a text says periods or a unit of time",
+            },
+            "window": {
+                "type": "array",
+                "minItems": 2,
+                "maxItems": 2,
+                "items": time,
+                "description": "part of the run that is evaluated, [start, end]; by default the last third",
+            },
+            "tolerance": {
+                "type": "number",
+                "minimum": MIN_TOLERANCE,
+                "maximum": MAX_TOLERANCE,
+                "default": DEFAULTS["tolerance"],
+                "description": "local relative error of the integration",
+            },
+            "reset": {
+                "enum": list(RESETS),
+                "default": DEFAULTS["reset"],
+                "description": "whether an upward crossing while torque is transmitted restarts the windup (literal)",
+            },
+        },
+        description="how long each case runs, what is evaluated, how accurately",
+    )
+
+
+def axis_schema() -> Schema:
+    """Schema of one axis."""
+    path = {"type": "string", "examples": ["excitation.frequency", "pendulums.0.spring_rate", "clutch.coefficients.1"]}
+    end = {"type": ["number", "string"]}
+
+    def three(third: Schema, description: str) -> Schema:
+        return {
+            "type": "array",
+            "prefixItems": [end, end, third],
+            "minItems": 3,
+            "maxItems": 3,
+            "description": description,
+        }
+
+    count = {"type": "integer", "minimum": 1, "maximum": MAX_AXIS_VALUES}
+    ways: Schema = {
+        "values": {
+            "type": "array",
+            "minItems": 1,
+            "maxItems": MAX_AXIS_VALUES,
+            "items": end,
+            "description": "the values themselves",
+        },
+        "linspace": three(count, "[from, to, count], evenly divided, both ends included"),
+        "geomspace": three(count, "[from, to, count], each value the same multiple of the one before"),
+        "range": three(end, "[from, to, step], the end included when a whole number of steps leads there"),
+    }
+    paths = {"type": "array", "items": path, "minItems": 1, "maxItems": MAX_TIED_PATHS, "uniqueItems": True}
+    return {
+        **_object(
+            {
+                "path": {"anyOf": [path, paths], "description": "what varies; several paths take the same values"},
+                **ways,
+            },
+            required=("path",),
+        ),
+        "oneOf": [{"required": [name]} for name in ways],
+    }
+
+
+def quantity_schema(parameter: Parameter) -> Schema:
+    """Schema of one quantity: a number in the parameter's SI unit and range, or a text with its unit."""
+    schema: Schema = {
+        "anyOf": [{"type": "number", **_bounds(parameter)}, _TEXT],
+        "description": f"{parameter.help} ({parameter.symbol}), {parameter.unit}",
+        "examples": [text.strip('"') for text in example(parameter.unit).replace(" or ", ", ").split(", ")],
+        "x-unit": parameter.unit,
+        "x-range": parameter.range_text(),
+    }
+    if parameter.default is not None and math.isfinite(parameter.default):
+        schema["default"] = parameter.default
+    return schema
+
+
+def _section(entries: list[Parameter], *, with_clutch: bool) -> Schema:
+    names = {entry.path.split(".")[-1]: placed(entry, entry.path) for entry in entries}
+    properties = {name: quantity_schema(entry) for name, entry in names.items()}
+    if with_clutch:
+        properties["clutch"] = clutch_schema()
+    return _object(properties, required=[name for name, entry in names.items() if entry.default is None])
+
+
+def _bounds(parameter: Parameter) -> Schema:
+    bounds: Schema = {}
+    if math.isfinite(parameter.low):
+        bounds["exclusiveMinimum" if parameter.low_open else "minimum"] = parameter.low
+    if math.isfinite(parameter.high):
+        bounds["maximum"] = parameter.high
+    return bounds
+
+
+def _object(properties: Schema, required: tuple[str, ...] | list[str] = (), description: str = "") -> Schema:
+    schema: Schema = {"type": "object", "properties": properties, "additionalProperties": False}
+    if required:
+        schema["required"] = list(required)
+    if description:
+        schema["description"] = description
+    return schema
