@@ -34,3 +34,11 @@ MAX_TOLERANCE: Final = 1e-4
 MAX_CLUTCH_ROWS: Final = 10_000
 #: Different clutch laws of one study that are checked one by one.
 MAX_CLUTCH_LAWS: Final = 10_000
+
+#: Numbers in one answer of curves or of a map; more is what exports are for.
+MAX_CURVE_VALUES: Final = 1_000_000
+#: Studies or cases on one page.
+MAX_PAGE_SIZE: Final = 1_000
+#: Instants of one trajectory.
+MIN_TRAJECTORY_POINTS: Final = 2
+MAX_TRAJECTORY_POINTS: Final = 20_000

@@ -1,0 +1,124 @@
+"""Cases of a study: pages, one case, and its instantaneous values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from fastapi import APIRouter, Depends, Path, Query, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from service import trajectories
+from service.api import models as m
+from service.api.context import Context, Ctx, StudyId
+from service.api.document import files, problems
+from service.api.requests import strict_query
+from service.api.respond import choose_format, json_response
+from service.api.views import study_address
+from service.curves import PENDING
+from service.errors import ApiError, parameter_error, shown
+from service.exports import MEDIA_TYPES, row_json, rows_json
+from service.storage.records import CaseRow
+from worker import kernels
+from worker.limits import MAX_PAGE_SIZE, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
+
+if TYPE_CHECKING:
+    from worker.kernels import Trajectory
+    from worker.study import Study
+
+router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
+
+CaseNumber = Annotated[int, Path(ge=0, description="number of the case, from 0", examples=[0])]
+_CASE_PROBLEMS = ("invalid-parameter", "study-not-found", "case-not-found")
+
+
+@router.get("", response_model=m.CasePage, responses=problems("invalid-parameter", "study-not-found"))
+def list_cases(
+    context: Ctx,
+    study_id: StudyId,
+    page_size: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="most cases on the page")] = 100,
+    page_token: Annotated[str | None, Query(max_length=20, description="`next_page_token` of the page before")] = None,
+    ending: Annotated[str | None, Query(description="only cases with this ending", examples=["ok"])] = None,
+) -> Response:
+    """Finished cases, in order of their numbers."""
+    if ending is not None and ending not in kernels.ENDING_SENTENCES:
+        raise parameter_error("ending", "there is no such ending", shown(ending), ", ".join(kernels.ENDING_SENTENCES))
+    after = _after(page_token)
+    # One more than the page, which tells whether there is another.
+    block = context.store.case_rows(study_id, after_case=after, limit=page_size + 1, ending=ending)
+    rows = list(rows_json(context.store.study(study_id), block))
+    token = str(rows[page_size - 1]["case"]) if len(rows) > page_size else None
+    return json_response({"cases": rows[:page_size], "next_page_token": token})
+
+
+def _after(page_token: str | None) -> int:
+    if page_token is None:
+        return -1
+    if not (page_token.isascii() and page_token.isdigit()):
+        raise parameter_error("page_token", "not a token of this list", page_token, "`next_page_token` of a page")
+    return int(page_token)
+
+
+@router.get("/{case:case}", response_model=m.CaseDetail, responses=problems(*_CASE_PROBLEMS))
+def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
+    """One case; its ending is `pending` while it has not been run."""
+    study = _study_with(context, study_id, case)
+    row = context.store.case_row(study_id, case)
+    parameters = study.case_parameters(case)
+    if row is None:
+        names = [info.name for info in kernels.study_results(study)]
+        row = CaseRow(case, PENDING, (), dict.fromkeys(names))
+    own = f"{study_address(study_id)}/cases/{case}"
+    return json_response(
+        {
+            **row_json(row, parameters),
+            "ending_meaning": kernels.ENDING_SENTENCES.get(row.ending, "The case has not been run yet."),
+            "flag_meanings": {flag: kernels.FLAG_SENTENCES.get(flag, "") for flag in row.flags},
+            "links": {"self": own, "study": study_address(study_id), "trajectory": f"{own}/trajectory"},
+        }
+    )
+
+
+@router.get(
+    "/{case:case}/trajectory",
+    response_model=m.Trajectory,
+    responses={
+        **files("Instantaneous values, as JSON or CSV.", MEDIA_TYPES.values()),
+        **problems(*_CASE_PROBLEMS, "not-computed", "timed-out", "unavailable"),
+    },
+)
+async def get_trajectory(
+    context: Ctx,
+    request: Request,
+    study_id: StudyId,
+    case: CaseNumber,
+    start: Annotated[
+        str | None, Query(alias="from", description="first time, in s or with a unit; by default 0", examples=["0"])
+    ] = None,
+    end: Annotated[
+        str | None, Query(alias="to", description="last time; by default the end of the run", examples=["0.1 s"])
+    ] = None,
+    points: Annotated[
+        int,
+        Query(ge=MIN_TRAJECTORY_POINTS, le=MAX_TRAJECTORY_POINTS, description="equally spaced times", examples=[50]),
+    ] = 1000,
+    form: Annotated[str | None, Query(alias="format", description="json or csv", examples=["json"])] = None,
+) -> Response:
+    """Every variable, torque, power and state of one case over time. The case is run again for it."""
+    chosen = choose_format(request, form, {"json": MEDIA_TYPES["json"], "csv": MEDIA_TYPES["csv"]})
+    study = await run_in_threadpool(_study_with, context, study_id, case)
+    first, last = trajectories.span(study, case, start, end)
+    made: Trajectory = await context.computer.run(kernels.run_trajectory, study, case, first, last, points)
+    if chosen == "csv":
+        content = await run_in_threadpool(trajectories.trajectory_csv, made)
+        name = f'attachment; filename="{study_id}-case-{case}.csv"'
+        return Response(content, media_type=MEDIA_TYPES["csv"], headers={"Content-Disposition": name})
+    data = trajectories.trajectory_json(made, case, study.case_parameters(case))
+    return await run_in_threadpool(json_response, data)
+
+
+def _study_with(context: Context, study_id: str, case: int) -> Study:
+    study = context.store.study(study_id)
+    if case >= study.cases:
+        raise ApiError("case-not-found", f"The cases of this study are 0 .. {study.cases - 1}.")
+    return study

@@ -1,0 +1,54 @@
+"""What the operations work with: settings, store and computer of the running service."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, cast
+
+from fastapi import Depends, Path, Request
+from starlette.convertors import Convertor, register_url_convertor
+
+from service.computer import Computes
+from service.settings import Settings
+from service.storage.store import Store
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """Settings, store and computer of one service."""
+
+    settings: Settings
+    store: Store
+    computer: Computes
+
+
+class StudyIdConvertor(Convertor[str]):
+    """Part of an address that can be the id of a study; without a colon, which begins a verb."""
+
+    regex = "[A-Za-z0-9_-]{1,64}"
+
+    def convert(self, value: str) -> str:
+        """The id as it stands in the address."""
+        return value
+
+    def to_string(self, value: str) -> str:
+        """The id as it stands in the address."""
+        return value
+
+
+class CaseConvertor(StudyIdConvertor):
+    """Part of an address that can be the number of a case: not longer than any number of a case is."""
+
+    regex = "[0-9]{1,12}"
+
+
+register_url_convertor("study", StudyIdConvertor())
+register_url_convertor("case", CaseConvertor())
+
+
+async def _context(request: Request) -> Context:
+    return cast("Context", request.app.state.context)
+
+
+Ctx = Annotated[Context, Depends(_context)]
+StudyId = Annotated[str, Path(description="id of the study", examples=["st_0123456789abcdef"])]

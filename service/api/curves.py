@@ -1,0 +1,198 @@
+"""Curves, maps and all rows of a study."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any
+
+from fastapi import APIRouter, Depends, Query, Request
+from starlette.responses import Response
+
+from service import exports, plots
+from service.api import models as m
+from service.api.context import Ctx, StudyId
+from service.api.document import files, problems
+from service.api.document import not_modified as documented_304
+from service.api.requests import strict_query
+from service.api.respond import choose_format, entity_tag, json_response, not_modified, streamed, tagged
+from service.curves import CurveQuery, Curves, draw, draw_map, select
+from service.errors import parameter_error, shown
+from worker import kernels
+
+if TYPE_CHECKING:
+    from service.storage.records import StudyRecord
+
+router = APIRouter(prefix="/studies/{study_id:study}", tags=["results"], dependencies=[Depends(strict_query)])
+
+_PICTURES: dict[str, str] = {str(picture): media for picture, media in plots.MEDIA_TYPES.items()}
+_JSON = {"json": "application/json"}
+_CURVE_FORMATS = _JSON | {"csv": exports.MEDIA_TYPES["csv"]} | _PICTURES
+_MAP_FORMATS = _JSON | _PICTURES
+_PROBLEMS = ("invalid-parameter", "invalid-selection", "study-not-found")
+#: matplotlib puts its styles into the picture, which the pages' policy forbids; a picture can do nothing else.
+_PICTURE_POLICY = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
+
+XPath = Annotated[str, Query(description="path of the axis along the curve", examples=["shaft.load"])]
+Fixed = Annotated[
+    list[str] | None,
+    Query(
+        description="`path=value`: the value at which another axis is held, SI or with a unit; may be repeated",
+        examples=[["excitation.frequency=16 Hz"]],
+    ),
+]
+Form = Annotated[str | None, Query(alias="format", description="format of the answer", examples=["json"])]
+
+
+@router.get(
+    "/curves",
+    response_model=m.Curves,
+    responses={
+        **files("Curves, as JSON, a table or a picture.", _CURVE_FORMATS.values()),
+        **problems(*_PROBLEMS),
+        **documented_304(),
+    },
+)
+def get_curves(
+    context: Ctx,
+    request: Request,
+    study_id: StudyId,
+    x: XPath,
+    y: Annotated[
+        list[str], Query(description="result to draw; may be repeated", examples=[["shaft.speed.mean"]], min_length=1)
+    ],
+    by: Annotated[
+        list[str] | None,
+        Query(
+            description="axis with one curve for each of its values; may be repeated",
+            examples=[["excitation.frequency"]],
+        ),
+    ] = None,
+    at: Fixed = None,
+    form: Form = None,
+) -> Response:
+    """Results against one axis. An axis of several values that is neither x nor in `by` needs its value in `at`."""
+    chosen = choose_format(request, form, _CURVE_FORMATS)
+    query = CurveQuery(x, tuple(y), tuple(by or ()), _pairs(at))
+
+    def make(record: StudyRecord) -> Response:
+        study = context.store.study(study_id)
+        selection = select(study, kernels.study_results(study), query)
+        curves = draw(selection, partial(context.store.rows_for_cases, study_id))
+        if chosen == "json":
+            return json_response({"study": study_id, **curves.to_json()})
+        if chosen == "csv":
+            return _attachment(_curves_csv(curves), _CURVE_FORMATS["csv"], f"{study_id}-curves.csv")
+        picture = _picture(chosen)
+        return picture_response(plots.draw_curves(curves, record.name or record.model, picture), picture)
+
+    return _conditional(context, request, study_id, chosen, make)
+
+
+@router.get(
+    "/map",
+    response_model=m.Map,
+    responses={
+        **files("A map, as JSON or a picture.", _MAP_FORMATS.values()),
+        **problems(*_PROBLEMS),
+        **documented_304(),
+    },
+)
+def get_map(
+    context: Ctx,
+    request: Request,
+    study_id: StudyId,
+    x: XPath,
+    y: Annotated[str, Query(description="path of the other axis", examples=["excitation.frequency"])],
+    z: Annotated[str, Query(description="the result", examples=["shaft.speed.mean"])],
+    at: Fixed = None,
+    form: Form = None,
+) -> Response:
+    """One result over two axes."""
+    chosen = choose_format(request, form, _MAP_FORMATS)
+
+    def make(record: StudyRecord) -> Response:
+        study = context.store.study(study_id)
+        fetch = partial(context.store.rows_for_cases, study_id)
+        drawn = draw_map(study, kernels.study_results(study), x, y, z, _pairs(at), fetch)
+        if chosen == "json":
+            return json_response({"study": study_id, **drawn.to_json()})
+        picture = _picture(chosen)
+        return picture_response(plots.draw_map(drawn, record.name or record.model, picture), picture)
+
+    return _conditional(context, request, study_id, chosen, make)
+
+
+@router.get(
+    "/results",
+    response_class=Response,
+    responses={
+        **files("All finished cases, as a table or as JSON.", exports.MEDIA_TYPES.values()),
+        **problems("invalid-parameter", "study-not-found"),
+        **documented_304(),
+    },
+)
+def get_results(context: Ctx, request: Request, study_id: StudyId, form: Form = None) -> Response:
+    """Every finished case with all its results, in order of the cases."""
+    chosen = choose_format(request, form, _JSON | exports.MEDIA_TYPES)
+
+    def make(record: StudyRecord) -> Response:
+        study = context.store.study(study_id)
+        about = {"study": study_id, "name": record.name, "model": record.model, "engine_version": record.engine_version}
+        blocks = context.store.iter_rows(study_id)
+        source = exports.Source(study, kernels.study_results(study), blocks, about)
+        form: exports.Format = "csv" if chosen == "csv" else "json"
+        return streamed(exports.export(source, form), exports.MEDIA_TYPES[form], f"{study_id}.{form}")
+
+    return _conditional(context, request, study_id, chosen, make)
+
+
+def _conditional(
+    context: Ctx, request: Request, study_id: str, form: str, make: Callable[[StudyRecord], Response]
+) -> Response:
+    """The answer that ``make`` gives, or 304 when the client has it: it depends on the study's rows and the query."""
+    record = context.store.get_study(study_id)
+    tag = entity_tag(record.id, record.revision, request.url.path, request.url.query, form)
+    return not_modified(request, tag) or tagged(make(record), tag)
+
+
+def _pairs(at: list[str] | None) -> tuple[tuple[str, str], ...]:
+    pairs = []
+    for item in at or ():
+        path, separator, value = item.partition("=")
+        if not separator or not path.strip() or not value.strip():
+            raise parameter_error("at", "must be path=value", shown(item), "for instance shaft.load=0.1 N*m")
+        pairs.append((path.strip(), value.strip()))
+    return tuple(pairs)
+
+
+def _picture(form: str) -> plots.Picture:
+    return next(picture for picture in plots.PICTURES if picture == form)
+
+
+def picture_response(content: bytes, picture: plots.Picture) -> Response:
+    """A picture, with a policy under which it can do nothing but be looked at."""
+    headers = {"Content-Security-Policy": _PICTURE_POLICY} if picture == "svg" else {}
+    return Response(content, media_type=plots.MEDIA_TYPES[picture], headers=headers)
+
+
+def _attachment(content: bytes, media_type: str, filename: str) -> Response:
+    headers = {"Content-Disposition": f'attachment; filename="{filename}"'}
+    return Response(content, media_type=media_type, headers=headers)
+
+
+def _curves_csv(curves: Curves) -> bytes:
+    """Every point of every curve as one row: fixed parameters, x, results, ending."""
+    first = curves.curves[0].line
+    paths = [*first.by, *first.at]
+    names = [info.name for info in curves.selection.results]
+    columns: list[list[Any]] = [[] for _ in range(len(paths) + 2 + len(names) + 1)]
+    for curve in curves.curves:
+        held = {**curve.line.by, **curve.line.at}
+        points = len(curve.endings)
+        parts: list[list[Any]] = [[held[path]] * points for path in paths]
+        parts += [curve.line.cases.tolist(), list(curve.line.x)]
+        parts += [curve.y[name].tolist() for name in names]
+        for column, part in zip(columns, [*parts, curve.endings], strict=True):
+            column.extend(part)
+    return exports.table_csv([*paths, "case", curves.selection.x, *names, "ending"], columns)

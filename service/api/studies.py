@@ -1,0 +1,141 @@
+"""Studies: submit, preview, list, look at, hold, cancel, delete."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Header, Query, Request
+from starlette.responses import Response
+
+from service.api import examples, views
+from service.api import models as m
+from service.api.context import Ctx, StudyId
+from service.api.document import body, problems
+from service.api.document import not_modified as documented_304
+from service.api.requests import Body, read_body, strict_query
+from service.api.respond import entity_tag, json_response, not_modified, tagged
+from service.preview import preview_json
+from service.spec import ParsedSpec, load_spec, parse_spec
+from worker.limits import MAX_PAGE_SIZE
+from worker.states import StudyState
+
+router = APIRouter(tags=["studies"], dependencies=[Depends(strict_query)])
+
+_SPEC_BODY = body({"a grid of two axes": examples.SPEC}, {"$ref": "#/components/schemas/Spec"}, toml=examples.SPEC_TOML)
+_BODY_PROBLEMS = ("invalid-parameter", "invalid-spec", "body-too-large", "unsupported-media-type")
+
+SpecBody = Annotated[Body, Depends(read_body)]
+IdempotencyKey = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key",
+        min_length=1,
+        max_length=200,
+        pattern=r"^[!-~]+$",
+        description="the same key with the same body submits the study once, however often it is sent",
+        examples=["0b6e9a52-feeder"],
+    ),
+]
+
+
+def _parsed(received: Body) -> ParsedSpec:
+    return parse_spec(load_spec(received.content, received.format))
+
+
+@router.post(
+    "/studies",
+    status_code=202,
+    response_model=m.StudySummary,
+    responses=problems(*_BODY_PROBLEMS, "idempotency-conflict", "storage-full"),
+    openapi_extra=_SPEC_BODY,
+)
+def create_study(context: Ctx, received: SpecBody, idempotency_key: IdempotencyKey = None) -> Response:
+    """Submit a study. It is queued, and its cases are run in the order of their numbers."""
+    parsed = _parsed(received)
+    canonical = json.dumps(parsed.spec, sort_keys=True).encode("ascii")
+    record = context.store.create_study(
+        parsed.spec,
+        parsed.study,
+        warnings=parsed.warnings,
+        idempotency_key=idempotency_key,
+        body_hash=hashlib.sha256(canonical).hexdigest(),
+    )
+    return json_response(views.summary(record), 202, {"Location": views.study_address(record.id)})
+
+
+@router.post(
+    "/studies:preview", response_model=m.Preview, responses=problems(*_BODY_PROBLEMS), openapi_extra=_SPEC_BODY
+)
+def preview_study(context: Ctx, received: SpecBody) -> Response:
+    """What a study would be: cases, time, size, warnings and fitted clutch laws. Nothing is submitted."""
+    return json_response(preview_json(_parsed(received), context.settings.pool_processes))
+
+
+@router.get("/studies", response_model=m.StudyPage, responses=problems("invalid-parameter"))
+def list_studies(
+    context: Ctx,
+    page_size: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="most studies on the page")] = 50,
+    page_token: Annotated[str | None, Query(max_length=200, description="`next_page_token` of the page before")] = None,
+    state: Annotated[StudyState | None, Query(description="only studies in this state", examples=["finished"])] = None,
+) -> Response:
+    """Studies, newest first."""
+    page = context.store.list_studies(page_size=page_size, page_token=page_token, state=state)
+    return json_response(
+        {"studies": [views.summary(record) for record in page.studies], "next_page_token": page.next_token}
+    )
+
+
+@router.get(
+    "/studies/{study_id:study}",
+    response_model=m.StudyDetail,
+    responses=problems("invalid-parameter", "study-not-found") | documented_304(),
+)
+def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
+    """A study: its state, how far it is, how long it will take, and its spec."""
+    record = context.store.get_study(study_id)
+    tag = entity_tag(record.id, record.revision)
+    if record.state.terminal and (unchanged := not_modified(request, tag)):
+        return unchanged
+    study = context.store.study(study_id)
+    data = views.detail(record, context.store.progress(study_id), study, context.store.spec(study_id))
+    response = json_response(data)
+    # While it runs, the time left changes with no change of the study.
+    return tagged(response, tag) if record.state.terminal else response
+
+
+@router.delete(
+    "/studies/{study_id:study}",
+    status_code=204,
+    response_class=Response,
+    responses=problems("invalid-parameter", "study-not-found", "wrong-state"),
+)
+def delete_study(context: Ctx, study_id: StudyId) -> Response:
+    """Delete a study that has ended, with all its results."""
+    context.store.delete_study(study_id)
+    return Response(status_code=204)
+
+
+def _verb(name: str, sentence: str) -> None:
+    def act(context: Ctx, study_id: StudyId) -> Response:
+        wish = {
+            "cancel": context.store.cancel_study,
+            "pause": context.store.pause_study,
+            "resume": context.store.resume_study,
+        }[name]
+        return json_response(views.summary(wish(study_id)), 202)
+
+    router.post(
+        f"/studies/{{study_id:study}}:{name}",
+        status_code=202,
+        name=f"{name}_study",
+        description=sentence,
+        response_model=m.StudySummary,
+        responses=problems("invalid-parameter", "study-not-found", "wrong-state"),
+    )(act)
+
+
+_verb("cancel", "Stop a study for good: the cases that are done are kept, the others are not run.")
+_verb("pause", "Hold a study: no new cases are started until it is resumed.")
+_verb("resume", "Go on with a study that is held.")

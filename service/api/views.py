@@ -1,0 +1,68 @@
+"""Studies and cases as the interface shows them: plain data from the store's records."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from service.api.document import API_PREFIX
+from service.api.respond import timestamp
+from service.catalogue import axes_json
+
+if TYPE_CHECKING:
+    from service.storage.records import Progress, StudyRecord
+    from worker.study import Study
+
+
+def study_address(study_id: str) -> str:
+    """Address of a study in the API."""
+    return f"{API_PREFIX}/studies/{study_id}"
+
+
+def study_links(study_id: str) -> dict[str, str]:
+    """Addresses of what belongs to a study."""
+    own = study_address(study_id)
+    parts = {name: f"{own}/{name}" for name in ("cases", "results", "curves", "map")}
+    return {"self": own, **parts, "cancel": f"{own}:cancel", "page": f"/studies/{study_id}"}
+
+
+def summary(record: StudyRecord) -> dict[str, Any]:
+    """A study without its spec."""
+    return {
+        "id": record.id,
+        "name": record.name,
+        "model": record.model,
+        "state": record.state.value,
+        "state_meaning": record.state.sentence,
+        "reason": record.reason,
+        "cases": record.cases,
+        "progress": {"total": record.cases, "done": record.done, "ok": record.ok},
+        "warnings": list(record.warnings),
+        "created_at": timestamp(record.created_at),
+        "started_at": timestamp(record.started_at),
+        "finished_at": timestamp(record.finished_at),
+        "engine_version": record.engine_version,
+        "links": study_links(record.id),
+    }
+
+
+def detail(record: StudyRecord, progress: Progress, study: Study, spec: dict[str, Any]) -> dict[str, Any]:
+    """A study with everything."""
+    left = progress.seconds_left
+    return {
+        **summary(record),
+        # State and counts are read together, so that a finished study never shows fewer cases than it has.
+        "state": progress.state.value,
+        "state_meaning": progress.state.sentence,
+        "progress": {
+            "total": progress.total,
+            "done": progress.done,
+            "ok": progress.ok,
+            "endings": progress.endings,
+            "rate": progress.rate,
+            "seconds_left": None if left is None else {"low": left[0], "high": left[1]},
+        },
+        "combine": study.combine,
+        "axes": axes_json(study),
+        "physics_hash": record.physics_hash,
+        "spec": spec,
+    }

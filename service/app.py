@@ -1,0 +1,110 @@
+"""The HTTP application: API, pages, errors, and the guard around them all."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.metadata import version
+from typing import Any
+
+from fastapi import APIRouter, FastAPI
+from starlette.types import ASGIApp
+
+from service import handlers
+from service.api import cases, catalogues, clutch_fits, curves, health, studies
+from service.api.context import Context
+from service.api.document import API_PREFIX, build_openapi
+from service.computer import Computes, ProcessComputer
+from service.guard import Guard
+from service.settings import Settings
+from service.spec_schema import spec_schema
+from service.storage.store import Store
+from service.web import pages
+from worker.chunking import Chunking
+
+DESCRIPTION = """\
+Design studies of vibration drives with freewheel clutches: a study spec in, curves of mechanical characteristics out.
+
+Numbers are SI (frequencies in Hz, angles in rad); in a spec a text carries its own unit, such as `"1500 rpm"`.
+What could not be computed is `null`, never 0. Every error is a problem document (RFC 9457).
+"""
+
+TAGS = [
+    {"name": "studies", "description": "Submit, preview, follow and cancel studies."},
+    {"name": "results", "description": "Curves, maps and all rows of a study."},
+    {"name": "cases", "description": "Single cases and their instantaneous values."},
+    {"name": "clutch", "description": "Clutch laws from measured data."},
+    {"name": "models", "description": "Parameters, results and endings."},
+    {"name": "health", "description": "Whether the service is up."},
+]
+
+
+class Application(FastAPI):
+    """FastAPI whose outermost layer, outside even its own error pages, is the guard."""
+
+    def __init__(self, settings: Settings, **options: Any) -> None:
+        super().__init__(**options)
+        self._settings = settings
+
+    def build_middleware_stack(self) -> ASGIApp:
+        """The framework's layers inside the guard."""
+        return Guard(super().build_middleware_stack(), self._settings)
+
+    def openapi(self) -> dict[str, Any]:
+        """The OpenAPI document, made once."""
+        if self.openapi_schema is None:
+            schemas = {"Spec": spec_schema(), "ClutchFitRequest": clutch_fits.SCHEMA}
+            self.openapi_schema = build_openapi(self, schemas)
+        return self.openapi_schema
+
+
+def create_app(
+    settings: Settings | None = None, *, store: Store | None = None, computer: Computes | None = None
+) -> FastAPI:
+    """The application for ``settings`` (by default from the environment).
+
+    A store or a computer that is handed in stays open when the application ends. Raises UnsafeSettingsError for an
+    address that others can reach without a token, and DatabaseError when the database cannot be used.
+    """
+    settings = settings or Settings()
+    settings.require_safe()
+    own_store = store is None
+    used_store = store or Store.open(settings.database_url, chunking=chunking(settings))
+    used_computer = computer or ProcessComputer(settings.trajectory_timeout)
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        yield
+        if computer is None:
+            used_computer.close()
+        if own_store:
+            used_store.close()
+
+    app = Application(
+        settings,
+        title="Sprag",
+        summary="Parameter studies of vibration drives with freewheel clutches",
+        description=DESCRIPTION,
+        version=version("sprag"),
+        openapi_tags=TAGS,
+        openapi_url=None,
+        docs_url=None,
+        redoc_url=None,
+        redirect_slashes=False,
+        lifespan=lifespan,
+        generate_unique_id_function=lambda route: route.name,
+    )
+    app.state.context = Context(settings, used_store, used_computer)
+    api = APIRouter(prefix=API_PREFIX)
+    for module in (studies, curves, cases, clutch_fits, catalogues):
+        api.include_router(module.router)
+    app.include_router(api)
+    app.include_router(health.router)
+    app.include_router(pages.router)
+    handlers.install(app)
+    return app
+
+
+def chunking(settings: Settings) -> Chunking:
+    """How studies are cut into chunks under ``settings``."""
+    return Chunking(settings.chunk_cases, settings.pool_processes)

@@ -1,0 +1,135 @@
+"""From whatever is raised while a request is answered to the one shape of error."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable
+from typing import Any, cast
+
+from fastapi import FastAPI
+from fastapi.exceptions import RequestValidationError
+from fastapi.routing import iter_route_contexts
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+
+from service.errors import ApiError, ErrorItem, parameter_error, problem_response, shown, spec_items
+from service.selection import SelectionError
+from service.spec_messages import SpecError
+from service.storage import errors as storage
+from worker.states import TransitionError
+
+_log = logging.getLogger("sprag.service")
+
+#: Fault of the store -> kind of problem; the first that matches, so the special ones come first.
+_STORE_PROBLEMS: tuple[tuple[type[storage.StoreError], str], ...] = (
+    (storage.StudyNotFound, "study-not-found"),
+    (storage.IdempotencyConflict, "idempotency-conflict"),
+    (storage.StudyBusy, "wrong-state"),
+    (storage.DatabaseFullError, "storage-full"),
+    (storage.StoreError, "unavailable"),
+)
+
+
+def as_api_error(error: Exception) -> ApiError | None:
+    """What a client is told about an exception; None when it is a fault of the program."""
+    if isinstance(error, ApiError):
+        return error
+    if isinstance(error, SpecError):
+        return ApiError("invalid-spec", str(error), spec_items(error.problems))
+    if isinstance(error, SelectionError):
+        return ApiError("invalid-selection", str(error), error.errors)
+    if isinstance(error, TransitionError):
+        return ApiError("wrong-state", _sentence(error))
+    if isinstance(error, storage.PageTokenError):
+        return parameter_error("page_token", str(error), allowed="`next_page_token` of a page")
+    if isinstance(error, storage.StoreError):
+        kind = next(problem for fault, problem in _STORE_PROBLEMS if isinstance(error, fault))
+        return ApiError(kind, _sentence(error))
+    return None
+
+
+def _sentence(error: Exception) -> str:
+    text = str(error)
+    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+
+
+def _known(request: Request, error: Exception) -> Response:
+    found = as_api_error(error)
+    assert found is not None
+    if found.type.status >= 500:
+        _log.warning("%s %s: %s", request.method, request.url.path, found.detail)
+    return problem_response(found)
+
+
+def _unknown(request: Request, error: Exception) -> Response:
+    _log.error("%s %s failed", request.method, request.url.path, exc_info=error)
+    return problem_response(ApiError("internal", "The service failed to answer; the fault is in its log."))
+
+
+def _http(request: Request, error: Exception) -> Response:
+    raised = cast("HTTPException", error)
+    if raised.status_code == 404:
+        return problem_response(ApiError("not-found", f"There is nothing at {shown(request.url.path)}."))
+    if raised.status_code == 405:
+        methods = ", ".join(sorted(_methods_at(request.app, request.url.path)))
+        detail = f"{request.method} is not possible here; possible: {methods}."
+        return problem_response(ApiError("method-not-allowed", detail, headers={"Allow": methods}))
+    if raised.status_code < 500:
+        return problem_response(ApiError("bad-request", str(raised.detail)))
+    return _unknown(request, error)
+
+
+def _methods_at(app: FastAPI, path: str) -> set[str]:
+    """Every method that some route takes at ``path``; the framework itself names those of one route only."""
+    found: set[str] = set()
+    for route in iter_route_contexts(app.routes):
+        pattern = getattr(route, "path_regex", None)
+        if pattern is not None and pattern.match(path):
+            found |= route.methods or set()
+    return found
+
+
+def _invalid(_request: Request, error: Exception) -> Response:
+    raised = cast("RequestValidationError", error)
+    items = tuple(_parameter_item(fault) for fault in raised.errors())
+    detail = "; ".join(f"{item.parameter}: {item.message}" for item in items)
+    return problem_response(ApiError("invalid-parameter", detail, items))
+
+
+def _parameter_item(fault: dict[str, Any]) -> ErrorItem:
+    _place, *name = fault["loc"]
+    bounds = fault.get("ctx", {})
+    value = fault.get("input")
+    return ErrorItem(
+        str(fault["msg"]).lower(),
+        parameter=str(name[0]) if name else _place,
+        value=shown(value) if isinstance(value, str) else None,
+        allowed=_allowed(bounds),
+    )
+
+
+def _allowed(bounds: dict[str, Any]) -> str | None:
+    signs = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<", "expected": "one of", "pattern": "a text like"}
+    parts = [f"{signs[name]} {value}" for name, value in bounds.items() if name in signs]
+    return " and ".join(parts) or None
+
+
+def install(app: FastAPI) -> None:
+    """Give ``app`` its error handlers."""
+    handled: Iterable[tuple[type[Exception], Callable[[Request, Exception], Response]]] = (
+        *((kind, _known) for kind in (ApiError, SpecError, SelectionError, TransitionError, storage.StoreError)),
+        (HTTPException, _http),
+        (RequestValidationError, _invalid),
+        (Exception, _unknown),
+    )
+    for kind, handler in handled:
+        app.add_exception_handler(kind, _asynchronous(handler))
+
+
+def _asynchronous(handler: Callable[[Request, Exception], Response]) -> Any:
+    # Plain functions would be sent to a thread; these only build a small document.
+    async def handle(request: Request, error: Exception) -> Response:
+        return handler(request, error)
+
+    return handle

@@ -1,0 +1,42 @@
+"""The curve shown first for a study: speed against load where it has them, whatever is nearest to it elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+from service.curves import CurveQuery
+
+if TYPE_CHECKING:
+    from worker.kernels import ResultInfo
+    from worker.study import Study
+
+#: Axes a designer draws along, and then those told apart by colour, first choice first.
+_ALONG: Final = ("shaft.load", "excitation.frequency")
+_APART: Final = ("excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y", "shaft.load")
+_RESULTS: Final = ("shaft.speed.mean", "shaft.speed.max")
+_MOST_CURVES: Final = 8
+
+
+def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
+    """What to draw for ``study``; None when nothing varies. Axes not drawn are held at the value in their middle."""
+    varying = [axis for axis in study.axes if len(axis) > 1]
+    if not varying:
+        return None
+    names = [info.name for info in infos]
+    y = tuple(name for name in _RESULTS if name in names) or (names[0],)
+    x = next((path for path in _ALONG for axis in varying if path in axis.paths), varying[0].paths[0])
+    if study.combine == "zip":
+        return CurveQuery(x, y)
+    others = [axis for axis in varying if x not in axis.paths]
+    few = [axis for axis in others if len(axis) <= _MOST_CURVES]
+    by = next((path for path in _APART for axis in few if path in axis.paths), few[0].paths[0] if few else None)
+    held = [axis for axis in others if by not in axis.paths]
+    at = tuple((axis.paths[0], repr(sorted(axis.values)[len(axis) // 2])) for axis in held)
+    return CurveQuery(x, y if by is None else y[:1], () if by is None else (by,), at)
+
+
+def query_pairs(query: CurveQuery, **more: str) -> list[tuple[str, str]]:
+    """The same as the query parameters of the curves' address."""
+    pairs = [("x", query.x), *(("y", name) for name in query.y), *(("by", path) for path in query.by)]
+    return [*pairs, *(("at", f"{path}={value}") for path, value in query.at), *more.items()]

@@ -1,0 +1,45 @@
+"""What a study would cost, said before it is submitted."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from service.catalogue import axes_json
+from service.fits import fit_json
+from worker import kernels
+
+if TYPE_CHECKING:
+    from service.spec import ParsedSpec
+
+_FIRST_CASES = 5
+#: Bytes of a row beside its results: key, case number, ending, flags and SQLite's own header.
+_ROW_BYTES = 48
+_NUMBER_BYTES = 10
+
+
+def preview_json(parsed: ParsedSpec, processes: int) -> dict[str, Any]:
+    """What ``parsed`` would be as a study run on that many processes, as JSON data.
+
+    ``estimated_seconds`` (wall time) and ``estimated_bytes`` (in the database) are rough.
+    """
+    study = parsed.study
+    results = len(kernels.study_results(study))
+    # A study of fewer cases than processes still takes the time of one case.
+    rounds = max(study.cases / processes, 1.0)
+    first = range(min(_FIRST_CASES, study.cases))
+    return {
+        "model": study.model,
+        "name": study.name,
+        "cases": study.cases,
+        "shape": list(study.shape),
+        "combine": study.combine,
+        "axes": axes_json(study),
+        "results": results,
+        "estimated_seconds": rounds * kernels.estimate_seconds_per_case(study),
+        "estimated_bytes": study.cases * (_ROW_BYTES + _NUMBER_BYTES * results),
+        "warnings": list(parsed.warnings),
+        "fits": {pointer: fit_json(fit) for pointer, fit in parsed.fits.items()},
+        "first_cases": [
+            {"case": case, "parameters": values} for case, values in zip(first, study.values_with(first), strict=True)
+        ],
+    }
