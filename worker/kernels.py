@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from engine.vibration_drive.simulate import Trajectory as Trajectory
+    from engine.vibration_drive.simulate import Trajectory
     from worker.study import Study
 
 __all__ = [
@@ -68,6 +68,7 @@ __all__ = [
     "ResultInfo",
     "Run",
     "Span",
+    "Trajectory",
     "WorkerEnding",
     "cache_folder",
     "check_law",

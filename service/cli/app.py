@@ -1,0 +1,143 @@
+"""All commands together, and the one place where a failure becomes an exit code."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import NoReturn
+
+import typer
+
+from service.cli import database, demo, doctor, fit, local, processes, remote
+from service.cli.console import CommandFailureError, ExitCode, say
+
+#: Set to anything to see where a fault of the program lies.
+DEBUG_VARIABLE = "SPRAG_DEBUG"
+
+app = typer.Typer(
+    name="sprag",
+    help="Design studies of vibration drives with freewheel clutches.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+
+for _title, _commands in {
+    "Run here": {
+        "run": local.run,
+        "validate": local.validate,
+        "preview": local.preview,
+        "trajectory": local.trajectory,
+        "fit": fit.fit,
+        "presets": local.presets,
+    },
+    "Run a service": {
+        "demo": demo.demo,
+        "serve": processes.serve,
+        "worker": processes.worker,
+        "token": processes.token,
+        "doctor": doctor.doctor,
+    },
+    "Use a running service": {
+        "submit": remote.submit,
+        "watch": remote.watch,
+        "list": remote.list_studies,
+        "pause": remote.pause,
+        "resume": remote.resume,
+        "cancel": remote.cancel,
+        "curve": remote.curve,
+        "export": remote.export,
+    },
+}.items():
+    for _name, _command in _commands.items():
+        app.command(_name, rich_help_panel=_title)(_command)
+app.add_typer(database.app, name="db", rich_help_panel="Run a service")
+
+
+def main() -> NoReturn:
+    """Run the command of the process' arguments and end the process with its exit code."""
+    sys.exit(execute(sys.argv[1:]))
+
+
+def execute(arguments: Sequence[str]) -> int:
+    """Run one command; the exit code. Every failure has been said on standard error when this returns."""
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal of another character set shows an escape rather than ending the command.
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        code = _invoke(arguments)
+        sys.stdout.flush()
+    except (BrokenPipeError, _PipeClosedError):
+        _drop_output()
+        code = ExitCode.PIPE_CLOSED
+    return int(code)
+
+
+class _PipeClosedError(Exception):
+    """The reader of standard output went away."""
+
+
+def _invoke(arguments: Sequence[str]) -> int:
+    from worker.ports import StoreError
+
+    as_json = "--json" in arguments
+    try:
+        return int(app(list(arguments), prog_name="sprag", standalone_mode=False) or ExitCode.DONE)
+    except CommandFailureError as failure:
+        return _report(failure, as_json)
+    except StoreError as error:
+        return _report(_trouble(str(error)), as_json)
+    except typer.TyperException as error:
+        return _usage(error, as_json)
+    except (KeyboardInterrupt, typer.Abort):
+        say("interrupted")
+        return ExitCode.INTERRUPTED
+    except BrokenPipeError:
+        raise
+    except SystemExit as stop:
+        # typer turns a broken pipe into exit 1, which here would mean that some cases failed.
+        raise _PipeClosedError from stop
+    except Exception as error:
+        if os.environ.get(DEBUG_VARIABLE):
+            traceback.print_exc()
+        sentence = f"This is a fault of Sprag: {type(error).__name__}: {error}. {DEBUG_VARIABLE}=1 shows where it lies."
+        return _report(_trouble(sentence), as_json)
+
+
+def _trouble(message: str) -> CommandFailureError:
+    return CommandFailureError(message)
+
+
+def _usage(error: typer.TyperException, as_json: bool) -> int:
+    """The command line itself is wrong."""
+    context = getattr(error, "ctx", None)
+    message = error.format_message()
+    if as_json:
+        say(json.dumps({"error": message, "exit_code": int(ExitCode.WRONG_INPUT)}, ensure_ascii=False))
+    elif message:
+        say(f"sprag: {message}")
+        if context is not None:
+            say(f"`{context.command_path} --help` shows how it is called.")
+    return ExitCode.WRONG_INPUT
+
+
+def _report(failure: CommandFailureError, as_json: bool) -> int:
+    if as_json:
+        say(json.dumps(failure.document(), ensure_ascii=False))
+    else:
+        say(*(f"sprag: {line}" if index == 0 else line for index, line in enumerate(failure.lines())))
+    return failure.code
+
+
+def _drop_output() -> None:
+    """Send what is still buffered for a closed pipe nowhere, so that the interpreter's end is silent."""
+    with suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)

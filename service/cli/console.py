@@ -1,0 +1,168 @@
+"""What a command writes and where: data on standard output, progress and messages on standard error.
+
+Colours and bars appear only on a terminal. With ``--json`` the data are JSON and a failure is one JSON object on
+standard error, so that a program never has to read prose.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any
+
+from service.spec_messages import Problem
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+#: Width of tables that do not go to a terminal: wide enough that no number is cut.
+_PLAIN_WIDTH = 160
+
+
+class ExitCode(IntEnum):
+    """Exit codes of every command."""
+
+    DONE = 0
+    NOT_ALL_OK = 1
+    WRONG_INPUT = 2
+    TROUBLE = 3
+    INTERRUPTED = 130
+    PIPE_CLOSED = 141
+
+
+class CommandFailureError(Exception):
+    """A command cannot do what it was asked to; carries the exit code and everything that is to be said about it."""
+
+    code = ExitCode.TROUBLE
+
+    def __init__(self, message: str, *, problems: Iterable[Problem] = ()) -> None:
+        super().__init__(message)
+        self.message = message
+        self.problems = tuple(problems)
+
+    def lines(self) -> Iterator[str]:
+        """The message and every problem, one a line, for people."""
+        yield self.message
+        for problem in self.problems:
+            yield f"  {problem}"
+
+    def document(self) -> dict[str, object]:
+        """The same as plain JSON data."""
+        document: dict[str, object] = {"error": self.message, "exit_code": int(self.code)}
+        if self.problems:
+            document["problems"] = [asdict(problem) for problem in self.problems]
+        return document
+
+
+class WrongInputError(CommandFailureError):
+    """The input is wrong: exit code 2."""
+
+    code = ExitCode.WRONG_INPUT
+
+
+class TroubleError(CommandFailureError):
+    """The service or the storage is in trouble: exit code 3."""
+
+    code = ExitCode.TROUBLE
+
+
+def write_json(data: object) -> None:
+    """One JSON document on standard output, in one piece and ended by a newline."""
+    sys.stdout.write(json.dumps(data, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def write_text(text: str) -> None:
+    """Text on standard output as it is."""
+    sys.stdout.write(text)
+
+
+def say(*lines: str) -> None:
+    """Messages for people, on standard error, a line each; never wrapped, never read as markup."""
+    for line in lines:
+        sys.stderr.write(line + "\n")
+
+
+def console() -> Console:
+    """The console of standard output for people: colours on a terminal only."""
+    from rich.console import Console
+
+    return Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH, soft_wrap=False, highlight=False)
+
+
+def table(title: str, columns: Iterable[tuple[str, bool]], rows: Iterable[Sequence[object]]) -> Table:
+    """A table for people.
+
+    ``columns`` are pairs (heading, whether it holds numbers). None becomes a dash: a value that could not be computed.
+    """
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    made = Table(title=title or None, title_justify="left", box=SIMPLE_HEAD, header_style="bold")
+    for heading, numeric in columns:
+        made.add_column(Text(heading), justify="right" if numeric else "left")
+    for row in rows:
+        made.add_row(*(Text(cell_text(cell)) for cell in row))
+    return made
+
+
+def show_table(title: str, columns: Iterable[tuple[str, bool]], rows: Iterable[Sequence[object]]) -> None:
+    """Print a table on standard output."""
+    console().print(table(title, columns, rows))
+
+
+def cell_text(cell: object) -> str:
+    """A cell as people read it: six significant digits, a dash for nothing."""
+    if cell is None:
+        return "-"
+    if isinstance(cell, bool):
+        return "yes" if cell else "no"
+    if isinstance(cell, float):
+        return f"{cell:.6g}" if math.isfinite(cell) else "-"
+    return str(cell)
+
+
+def duration_text(seconds: float) -> str:
+    """A time as people say it: "0.4 s", "12 s", "3 min 20 s", "2 h 05 min"."""
+    if seconds < 10:
+        return f"{seconds:.1f} s"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+
+
+@contextmanager
+def progress_bar(description: str) -> Iterator[Callable[[int, int, str], None]]:
+    """A bar on standard error while something runs; nothing at all where standard error is no terminal.
+
+    Yields a function of (done, total, remark).
+    """
+    if not sys.stderr.isatty():
+        yield lambda _done, _total, _remark: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns: tuple[Any, ...] = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[remark]}", markup=False),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(description, total=None, remark="")
+
+        def update(done: int, total: int, remark: str) -> None:
+            progress.update(task, completed=done, total=total, remark=remark)
+
+        yield update

@@ -1,0 +1,92 @@
+"""``sprag db``: upgrade, check and back up the database."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from service.cli.console import TroubleError, WrongInputError, say, write_json
+from service.cli.options import Database, JsonFlag
+from service.cli.settings import read_settings
+
+if TYPE_CHECKING:
+    from service.storage.session import Session
+
+app = typer.Typer(help="Upgrade, check and back up the database.", no_args_is_help=True, rich_markup_mode="rich")
+
+
+@app.command()
+def upgrade(db: Database = None, as_json: JsonFlag = False) -> None:
+    """Bring the database to the revision this program needs; a new one is made ready."""
+    from service.storage.maintenance import upgrade as bring_up
+
+    with _opened(db, existing=False) as session:
+        before, after = bring_up(session)
+    if as_json:
+        write_json({"database": str(session.path), "before": before, "after": after})
+    elif before == after:
+        print(f"{session.path}: already at revision {after}")
+    else:
+        print(f"{session.path}: from revision {before or 'none'} to {after}")
+
+
+@app.command()
+def check(db: Database = None, as_json: JsonFlag = False) -> None:
+    """Look the whole database over; takes minutes on a large one. Exit code 3 when something is wrong."""
+    from service.storage.maintenance import check as look_over
+
+    with _opened(db) as session:
+        report = look_over(session)
+    if as_json:
+        write_json({**asdict(report), "sound": not report.problems})
+    else:
+        print(f"{report.location}: {report.backend} {report.backend_version}, revision {report.revision or 'none'}")
+        print("\n".join(f"  {problem}" for problem in report.problems) or "  sound")
+    if report.problems:
+        raise typer.Exit(TroubleError.code)
+
+
+@app.command()
+def backup(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="File to write; it must not exist.")],
+    db: Database = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Write a consistent copy of the database, while others go on working with it."""
+    from service.storage.maintenance import backup as write_copy
+
+    target = Path(file)
+    if target.exists():
+        raise WrongInputError(f"{file}: exists already; a backup never replaces a file")
+    with _opened(db) as session:
+        write_copy(session, target)
+    size = target.stat().st_size
+    if as_json:
+        write_json({"database": str(session.path), "backup": str(target), "bytes": size})
+    else:
+        say(f"{file}: {size} bytes")
+
+
+@contextmanager
+def _opened(db: str | None, *, existing: bool = True) -> Iterator[Session]:
+    """Connections to the database; with ``existing``, a mistyped name makes no new one."""
+    from sqlalchemy.engine import make_url
+    from sqlalchemy.exc import ArgumentError
+
+    from service.storage.session import Session
+
+    location = read_settings(database=db).database_url
+    with suppress(ArgumentError):  # which the session tells better
+        path = make_url(location).database
+        if existing and path and not Path(path).exists():
+            raise WrongInputError(f"{path}: there is no such database")
+    session = Session(location)
+    try:
+        yield session
+    finally:
+        session.close()

@@ -1,0 +1,125 @@
+"""``sprag doctor``: whether this installation can be trusted with a study."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import typer
+
+from service.cli.console import TroubleError, console, write_json
+from service.cli.options import Database, JsonFlag
+from service.cli.settings import read_settings
+
+_LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sqlalchemy", "pebble", "fastapi", "uvicorn")
+#: A study of a million cases of one pendulum takes about half of it.
+_LEAST_FREE_BYTES = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that was looked at. ``ok`` False means that something has to be done about it."""
+
+    subject: str
+    ok: bool
+    detail: str
+
+
+def doctor(db: Database = None, as_json: JsonFlag = False) -> None:
+    """Look at versions, database, disk, kernel cache and the engine's known values. Exit code 3 when something is wrong."""
+    findings = list(examine(db))
+    sound = all(finding.ok for finding in findings)
+    if as_json:
+        write_json({"sound": sound, "findings": [asdict(finding) for finding in findings]})
+    else:
+        screen = console()
+        for finding in findings:
+            mark, style = ("ok", "green") if finding.ok else ("WRONG", "bold red")
+            screen.print(f"{mark:>5}", style=style, end="  ")
+            screen.print(f"{finding.subject}: {finding.detail}", markup=False, soft_wrap=True)
+    if not sound:
+        raise typer.Exit(TroubleError.code)
+
+
+def examine(db: str | None) -> Iterator[Finding]:
+    """Everything that is looked at, one finding each; a check that itself fails is a finding too."""
+    for subject, look in _checks(db).items():
+        try:
+            ok, detail = look()
+        except Exception as error:  # whatever is broken, the other checks still go on
+            ok, detail = False, f"{type(error).__name__}: {error}"
+        yield Finding(subject, ok, detail)
+
+
+def _checks(db: str | None) -> dict[str, Callable[[], tuple[bool, str]]]:
+    location = Path(read_settings(database=db).database_url.removeprefix("sqlite:///"))
+    return {
+        "versions": _versions,
+        "SQLite": _sqlite,
+        "database": lambda: _database(location),
+        "disk": lambda: _disk(location),
+        "kernel cache": _cache,
+        "engine": _known_values,
+    }
+
+
+def _versions() -> tuple[bool, str]:
+    libraries = ", ".join(f"{name} {version(name)}" for name in _LIBRARIES)
+    text = f"Sprag {version('sprag')}, Python {platform.python_version()} on {platform.system()} {platform.machine()}"
+    return sys.version_info >= (3, 11), f"{text}, {libraries}"
+
+
+def _sqlite() -> tuple[bool, str]:
+    from service.storage.session import sqlite_version, sqlite_warning
+
+    warning = sqlite_warning()
+    return warning is None, warning or ".".join(map(str, sqlite_version()))
+
+
+def _database(location: Path) -> tuple[bool, str]:
+    from service.storage.maintenance import revision
+    from service.storage.session import Session
+    from service.storage.tables import HEAD_REVISION
+
+    if not location.exists():
+        return True, f"{location} (not made yet)"
+    session = Session(f"sqlite:///{location}")
+    try:
+        found = revision(session)
+    finally:
+        session.close()
+    if found not in (None, HEAD_REVISION):
+        return False, f"{location} has revision {found}, this program needs {HEAD_REVISION}: run `sprag db upgrade`"
+    return True, f"{location}, revision {found or 'none yet'}"
+
+
+def _disk(location: Path) -> tuple[bool, str]:
+    folder = next(parent for parent in location.absolute().parents if parent.exists())
+    free = shutil.disk_usage(folder).free
+    return free >= _LEAST_FREE_BYTES, f"{free / 1e9:.3g} GB free at {folder}"
+
+
+def _cache() -> tuple[bool, str]:
+    from worker.kernels import cache_folder
+
+    folder = cache_folder()
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.NamedTemporaryFile(dir=folder, prefix=".doctor-") as probe:
+        probe.write(b"x")
+    return os.access(folder, os.W_OK | os.X_OK), str(folder)
+
+
+def _known_values() -> tuple[bool, str]:
+    from service.self_test import check_known_values
+
+    wrong, largest = check_known_values()
+    if wrong:
+        return False, "; ".join(wrong)
+    return True, f"a closed form and a reference case agree within {largest:.1e}"

@@ -1,0 +1,168 @@
+"""Files that commands read and write; what is wrong with them is said in one sentence."""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Literal
+
+from service.cli.console import CommandFailureError, TroubleError, WrongInputError
+from service.spec_messages import SpecError
+from worker.limits import MAX_BODY_BYTES
+
+if TYPE_CHECKING:
+    from service.spec import ParsedSpec
+
+#: Largest measured-data file that is read: far more rows than any clutch test has.
+MAX_DATA_BYTES = 16 * 1024 * 1024
+#: Errors of the storage rather than of the name that was given.
+_STORAGE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS}
+
+
+def file_failure(path: Path | str, error: OSError) -> CommandFailureError:
+    """The failure that an operating system's error on ``path`` means."""
+    reason = (error.strerror or str(error)).lower()
+    kind = TroubleError if error.errno in _STORAGE_ERRORS else WrongInputError
+    return kind(f"{path}: {reason}")
+
+
+def read_bytes(path: str, limit: int) -> bytes:
+    """The whole file, or standard input for "-", of at most ``limit`` bytes.
+
+    Raises WrongInputError when there is no such file, it is a directory, cannot be read or is too large.
+    """
+    try:
+        if path == "-":
+            data = sys.stdin.buffer.read(limit + 1)
+        else:
+            with Path(path).open("rb") as file:
+                data = file.read(limit + 1)
+    except OSError as error:
+        raise file_failure(path, error) from error
+    except ValueError as error:  # a zero byte in the name
+        raise WrongInputError(f"{path!r} is no file name") from error
+    if len(data) > limit:
+        raise WrongInputError(f"{path}: larger than the allowed {limit} bytes")
+    return data
+
+
+def decode(path: str, data: bytes) -> str:
+    """The text of a UTF-8 file, with or without a byte order mark.
+
+    Raises WrongInputError when it is no text.
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise WrongInputError(f"{path}: no UTF-8 text (byte {error.start} is {data[error.start]:#04x})") from error
+    if "\0" in text:
+        raise WrongInputError(f"{path}: a binary file, no text")
+    return text
+
+
+def _format(path: str, data: bytes) -> Literal["json", "toml"]:
+    """By the ending of the name; where that tells nothing, by the first character."""
+    suffix = Path(path).suffix.lower()
+    if suffix in (".json", ".toml"):
+        return "json" if suffix == ".json" else "toml"
+    return "json" if data.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] in (b"{", b"[", b"") else "toml"
+
+
+def read_spec(path: str) -> object:
+    """The plain data of the spec in a JSON or TOML file, or standard input for "-".
+
+    Raises WrongInputError with every problem found.
+    """
+    from service.spec_text import load_spec
+
+    data = read_bytes(path, MAX_BODY_BYTES)
+    try:
+        return load_spec(data, _format(path, data))
+    except SpecError as error:
+        raise spec_failure(path, error) from error
+
+
+def read_study(path: str) -> ParsedSpec:
+    """The checked study of a spec file.
+
+    Raises WrongInputError with every problem found.
+    """
+    from service.spec import parse_spec
+
+    data = read_spec(path)
+    try:
+        return parse_spec(data)
+    except SpecError as error:
+        raise spec_failure(path, error) from error
+
+
+def spec_failure(path: str, error: SpecError) -> WrongInputError:
+    """The failure a SpecError means: its problems, one a line."""
+    return WrongInputError(f"{path}: the spec is not valid", problems=error.problems)
+
+
+@contextmanager
+def output(path: str | None) -> Iterator[IO[bytes]]:
+    """A binary file to write a result to: standard output for None and "-", else a file that appears only when whole.
+
+    Raises WrongInputError or TroubleError when it cannot be written.
+    """
+    if path is None or path == "-":
+        sys.stdout.flush()
+        yield sys.stdout.buffer
+        sys.stdout.buffer.flush()
+        return
+    target = Path(path)
+    if target.is_dir():
+        raise WrongInputError(f"{path}: is a directory")
+    if target.exists() and not target.is_file():  # a device or a pipe: written through, never replaced
+        yield from _written_through(target)
+        return
+    yield from _replaced(target)
+
+
+def _written_through(target: Path) -> Iterator[IO[bytes]]:
+    try:
+        with target.open("wb") as file:
+            yield file
+    except OSError as error:
+        raise file_failure(target, error) from error
+
+
+def _replaced(target: Path) -> Iterator[IO[bytes]]:
+    try:
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:100]}.", suffix=".part")
+    except (OSError, ValueError) as error:
+        failure = error if isinstance(error, OSError) else OSError(errno.EINVAL, "no file name")
+        raise file_failure(target, failure) from error
+    try:
+        with os.fdopen(handle, "wb") as file:
+            yield file
+        os.chmod(name, 0o666 & ~_umask())
+        os.replace(name, target)
+    except OSError as error:
+        raise file_failure(target, error) from error
+    finally:
+        with suppress(FileNotFoundError):
+            os.unlink(name)
+
+
+def _umask() -> int:
+    mask = os.umask(0o077)
+    os.umask(mask)
+    return mask
+
+
+def write_pieces(path: str | None, pieces: Iterable[bytes]) -> int:
+    """Write the pieces to ``path`` (see `output`); the number of bytes."""
+    written = 0
+    with output(path) as file:
+        for piece in pieces:
+            file.write(piece)
+            written += len(piece)
+    return written

@@ -1,0 +1,148 @@
+"""``sprag fit``: the clutch polynomial of measured data, with its report (MODEL.md A3)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from service.cli.console import WrongInputError, say, show_table, write_json, write_text
+from service.cli.files import MAX_DATA_BYTES, decode, read_bytes
+from service.cli.options import JsonFlag
+from service.spec_messages import Problem, shorten
+
+if TYPE_CHECKING:
+    from service.measured import MeasuredData
+    from worker.kernels import ClutchFit, DegreeReport
+
+_DEGREE_COLUMNS = (
+    ("degree", True),
+    ("RMS [N*m]", True),
+    ("largest residual [N*m]", True),
+    ("rank", True),
+    ("condition number", True),
+)
+_ROW_COLUMNS = (("line", True), ("angle [rad]", True), ("torque [N*m]", True), ("residual [N*m]", True))
+
+
+def fit(
+    data: Annotated[
+        str, typer.Argument(metavar="DATA.csv", help="Measured rows of angle and torque; - reads standard input.")
+    ],
+    accuracy: Annotated[str, typer.Option(help='Largest residual allowed, in N*m or with a unit ("50 N*mm").')],
+    max_degree: Annotated[int, typer.Option(help="Highest degree of the polynomial to try.")] = 7,
+    full: Annotated[bool, typer.Option("--full", help="Full polynomial: torque at zero windup allowed.")] = False,
+    angles_include_backlash: Annotated[
+        bool,
+        typer.Option("--angles-include-backlash", help="The measured angles count from the start of the lost motion."),
+    ] = False,
+    backlash: Annotated[str, typer.Option(help='Lost motion in the angles, in rad or with a unit ("0.3 deg").')] = "0",
+    as_json: JsonFlag = False,
+) -> None:
+    """Fit the clutch polynomial of lowest degree that reaches the accuracy, and report on it.
+
+    Reads a text file of two columns, angle and torque, with or without a header that names the units.
+    """
+    measured = _measured(data)
+    made = _fitted(
+        measured,
+        accuracy=_quantity("--accuracy", accuracy, "N*m"),
+        backlash=_quantity("--backlash", backlash, "rad"),
+        max_degree=max_degree,
+        through_origin=not full,
+        angles_include_backlash=angles_include_backlash,
+    )
+    if as_json:
+        from service.fits import fit_json
+
+        write_json(fit_json(made))
+    else:
+        _report(measured, made)
+
+
+def _quantity(option: str, text: str, unit: str) -> float:
+    """The SI number of an option: a plain number in ``unit`` or a text with its own unit."""
+    from service.units import QuantityError, parse_quantity
+
+    try:
+        value: float | str = float(text)
+    except ValueError:
+        value = text
+    try:
+        return parse_quantity(value, unit)
+    except QuantityError as error:
+        raise WrongInputError("an option is wrong", problems=[Problem(option, str(error), text, unit=unit)]) from error
+
+
+def _measured(path: str) -> MeasuredData:
+    from service.measured import MeasuredDataError, parse_measured
+    from service.units import parse_quantity
+
+    try:
+        return parse_measured(decode(path, read_bytes(path, MAX_DATA_BYTES)), parse_quantity)
+    except MeasuredDataError as error:
+        raise WrongInputError(f"{path}: no measured clutch data", problems=error.problems) from error
+
+
+def _fitted(measured: MeasuredData, *, accuracy: float, **options: Any) -> ClutchFit:
+    from worker.kernels import ClutchFitError, fit_clutch
+
+    try:
+        return fit_clutch(measured.rows, accuracy, **options)
+    except ClutchFitError as error:
+        if error.degrees:
+            raise WrongInputError(error.message, problems=_tried(error.degrees, accuracy)) from error
+        where = _place(error.name, measured)
+        problem = Problem(where, error.message, shorten(error.value), allowed=error.allowed)
+        raise WrongInputError("no law can be fitted", problems=[problem]) from error
+
+
+def _place(name: str, measured: MeasuredData) -> str:
+    """What the user calls the field: a line of the file, or an option."""
+    row = re.match(r"data\.(\d+)", name)
+    if row is not None:
+        return f"line {measured.lines[int(row[1])]}"
+    return name if name in ("", "data") else "--" + name.replace("_", "-")
+
+
+def _tried(degrees: Iterable[DegreeReport], accuracy: float) -> list[Problem]:
+    """Best residual of each degree that was tried, as problems."""
+    return [
+        Problem(
+            f"degree {report.degree}",
+            "largest residual in N*m",
+            float(f"{report.max_residual:.6g}"),
+            allowed=f"<= {accuracy:g}",
+        )
+        for report in degrees
+    ]
+
+
+def law_text(coefficients: tuple[float, ...]) -> str:
+    """The law as people write it: ``T(u) = 200 u + 20000 u^3`` (N*m, u in rad)."""
+    powers = ["", " u", *(f" u^{power}" for power in range(2, len(coefficients)))]
+    terms = [(c, power) for c, power in zip(coefficients, powers, strict=False) if c != 0]
+    if not terms:
+        return "T(u) = 0"
+    text = f"{terms[0][0]:.6g}{terms[0][1]}"
+    for coefficient, power in terms[1:]:
+        text += f" {'-' if coefficient < 0 else '+'} {abs(coefficient):.6g}{power}"
+    return f"T(u) = {text}"
+
+
+def _report(measured: MeasuredData, made: ClutchFit) -> None:
+    degrees = [(r.degree, r.rms, r.max_residual, r.rank, r.condition_number) for r in made.degrees_tried]
+    show_table("Degrees tried", _DEGREE_COLUMNS, degrees)
+    rows = zip(measured.lines, measured.rows.tolist(), made.residuals, strict=True)
+    show_table("Residuals", _ROW_COLUMNS, [(line, angle, torque, residual) for line, (angle, torque), residual in rows])
+    eigenvalues = ", ".join(f"{value:.6g}" for value in made.eigenvalues)
+    write_text(
+        f"{law_text(made.coefficients)}   (N*m, windup u in rad, measured to u = {made.windup_limit:.6g} rad)\n"
+        f"degree {made.degree}, RMS {made.rms:.6g} N*m, largest residual {made.max_residual:.6g} N*m, "
+        f"{'monotone' if made.monotone else 'not monotone'}\n"
+        f"normal matrix: condition number {made.condition_number:.6g}, eigenvalues {eigenvalues}\n"
+        f'for a spec: "clutch": {{"coefficients": {list(made.coefficients)!r}}}\n'
+    )
+    say(*(f"warning: {warning}" for warning in made.warnings))

@@ -1,0 +1,162 @@
+"""Commands that need no service: run, validate, preview, trajectory, presets."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from service.cli.console import (
+    ExitCode,
+    WrongInputError,
+    duration_text,
+    say,
+    show_table,
+    write_json,
+    write_text,
+)
+from service.cli.files import read_study, write_pieces
+from service.cli.options import ChunkCases, Database, JsonFlag, OutputFile, Processes, SpecFile
+from service.cli.remote import TableFormat, table_format
+from service.spec_messages import Problem
+from worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
+
+if TYPE_CHECKING:
+    from service.spec import ParsedSpec
+    from worker.kernels import Trajectory
+    from worker.study import Study
+
+
+def validate(spec: SpecFile, as_json: JsonFlag = False) -> None:
+    """Check a spec: everything that is wrong, and what is allowed but odd."""
+    try:
+        parsed = read_study(spec)
+    except WrongInputError as failure:
+        if not as_json or not failure.problems:
+            raise
+        write_json({"valid": False, **failure.document()})
+        raise typer.Exit(ExitCode.WRONG_INPUT) from failure
+    if as_json:
+        write_json(
+            {
+                "valid": True,
+                "model": parsed.study.model,
+                "name": parsed.study.name,
+                "cases": parsed.study.cases,
+                "warnings": list(parsed.warnings),
+            }
+        )
+        return
+    print(f"{spec}: valid, {parsed.study.cases} cases")
+    _say_warnings(parsed)
+
+
+def _say_warnings(parsed: ParsedSpec) -> None:
+    say(*(f"warning: {warning}" for warning in parsed.warnings))
+
+
+def preview(spec: SpecFile, processes: Processes = None, as_json: JsonFlag = False) -> None:
+    """Tell what a study would be: number of cases, time, size, first cases. Nothing is run."""
+    from service.preview import preview_json
+    from service.settings import Settings
+
+    parsed = read_study(spec)
+    made = preview_json(parsed, processes or Settings().pool_processes)
+    if as_json:
+        write_json(made)
+        return
+    write_text(
+        f"{made['name'] or made['model']}: {made['cases']} cases ({' x '.join(map(str, made['shape'])) or 'no axes'}), "
+        f"{made['results']} results each\n"
+        f"about {duration_text(made['estimated_seconds'])} and {made['estimated_bytes'] / 1e6:.3g} MB\n"
+    )
+    columns = (("axis", False), ("unit", False), ("values", True), ("first", True), ("last", True))
+    rows = [
+        (", ".join(axis["paths"]), axis["unit"], axis["values"], axis["first"], axis["last"]) for axis in made["axes"]
+    ]
+    if rows:
+        show_table("Axes", columns, rows)
+    _say_warnings(parsed)
+
+
+def trajectory(
+    spec: SpecFile,
+    case: Annotated[int, typer.Option("--case", min=0, metavar="N", help="Number of the case, from 0.")] = 0,
+    file: OutputFile = None,
+    form: Annotated[TableFormat | None, typer.Option("--format", help="Default: as FILE ends, else csv.")] = None,
+    start: Annotated[str | None, typer.Option("--from", metavar="TIME", help="First time, in s; default: 0.")] = None,
+    end: Annotated[str | None, typer.Option("--to", metavar="TIME", help="Last time, in s; default: the end.")] = None,
+    points: Annotated[
+        int, typer.Option(min=MIN_TRAJECTORY_POINTS, max=MAX_TRAJECTORY_POINTS, help="Equally spaced times.")
+    ] = 1000,
+    as_json: JsonFlag = False,
+) -> None:
+    """Write the instantaneous values of one case: angles, speeds, torques, powers, states."""
+    study = read_study(spec).study
+    made = _trajectory(study, case, start, end, points)
+    write_pieces(file, [_trajectory_bytes(made, study, case, table_format(form, file, as_json))])
+    say(f"case {case}: {made.ending}, {points} times")
+
+
+def _trajectory(study: Study, case: int, start: str | None, end: str | None, points: int) -> Trajectory:
+    from service.errors import ApiError
+    from service.trajectories import span
+    from worker.kernels import run_trajectory
+
+    if case >= study.cases:
+        problem = Problem("--case", "there is no such case", case, allowed=f"0 .. {study.cases - 1}")
+        raise WrongInputError("an option is wrong", problems=[problem])
+    try:
+        first, last = span(study, case, start, end)
+    except ApiError as error:
+        problems = [
+            Problem(f"--{item.parameter}", item.message, item.value, allowed=item.allowed) for item in error.errors
+        ]
+        raise WrongInputError("an option is wrong", problems=problems) from error
+    return run_trajectory(study, case, first, last, points)
+
+
+def _trajectory_bytes(made: Trajectory, study: Study, case: int, form: str) -> bytes:
+    from service.errors import to_bytes
+    from service.trajectories import trajectory_csv, trajectory_json
+
+    if form == "csv":
+        return trajectory_csv(made)
+    return to_bytes(trajectory_json(made, case, study.case_parameters(case))) + b"\n"
+
+
+def presets(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Study to print; without it: their names.")] = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """List the studies that come with the program, or print the spec of one."""
+    from service.presets import preset_names, preset_text
+    from service.spec_messages import did_you_mean
+
+    names = preset_names()
+    if name is None:
+        if as_json:
+            write_json({"presets": list(names)})
+        else:
+            write_text("".join(f"{item}\n" for item in names))
+        return
+    if name not in names:
+        problem = Problem("NAME", f"there is no such preset{did_you_mean(name, names)}", name, allowed=", ".join(names))
+        raise WrongInputError("an argument is wrong", problems=[problem])
+    file, text = preset_text(name)
+    if as_json:
+        write_json({"name": name, "file": file, "text": text})
+    else:
+        write_text(text)
+
+
+def run(
+    spec: SpecFile,
+    file: OutputFile = None,
+    form: Annotated[TableFormat | None, typer.Option("--format", help="Default: as FILE ends, else csv.")] = None,
+    db: Database = None,
+    processes: Processes = None,
+    chunk: ChunkCases = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Run a study here, without a service: rows on standard output or in FILE, progress on standard error."""

@@ -1,0 +1,53 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from service.client import DEFAULT_SERVER
+
+JsonFlag = Annotated[
+    bool, typer.Option("--json", help="Data as JSON on standard output, failures as JSON on standard error.")
+]
+SpecFile = Annotated[str, typer.Argument(metavar="SPEC", help="Study spec, JSON or TOML; - reads standard input.")]
+OutputFile = Annotated[
+    str | None, typer.Option("-o", "--output", metavar="FILE", help="File to write; default: standard output.")
+]
+StudyId = Annotated[str, typer.Argument(metavar="ID", help="Id of the study.")]
+Server = Annotated[
+    str, typer.Option("--server", envvar="SPRAG_SERVER", metavar="URL", help="Address of the running service.")
+]
+Token = Annotated[
+    str | None,
+    typer.Option("--token", envvar="SPRAG_TOKEN", metavar="SECRET", help="Token of the service.", show_default=False),
+]
+Database = Annotated[
+    str | None,
+    typer.Option(
+        "--db", metavar="URL", help="Database: path of an SQLite file or SQLAlchemy URL; default: as `sprag serve`."
+    ),
+]
+Processes = Annotated[
+    int | None, typer.Option("--processes", min=1, max=1024, help="Processes of the pool; default: one for each core.")
+]
+ChunkCases = Annotated[
+    int | None,
+    typer.Option(
+        "--chunk", min=1, max=1_000_000, help="Cases a process takes at a time; default: about a second of work."
+    ),
+]
+
+__all__ = [
+    "DEFAULT_SERVER",
+    "ChunkCases",
+    "Database",
+    "JsonFlag",
+    "OutputFile",
+    "Processes",
+    "Server",
+    "SpecFile",
+    "StudyId",
+    "Token",
+]

@@ -1,0 +1,50 @@
+"""Commands that start processes: serve, worker; and the token that a service open to others needs."""
+
+from __future__ import annotations
+
+import secrets
+from typing import Annotated
+
+import typer
+
+from service.cli.console import WrongInputError, write_json
+from service.cli.options import ChunkCases, Database, JsonFlag, Processes
+from service.cli.settings import read_settings
+
+Host = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Address to listen on; default: this machine only.")]
+Port = Annotated[int | None, typer.Option(min=0, max=65535, help="Port to listen on; 0: any free one.")]
+
+
+def serve(
+    host: Host = None,
+    port: Port = None,
+    db: Database = None,
+    processes: Processes = None,
+    chunk: ChunkCases = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Start the service and its worker; Ctrl-C ends both."""
+    from service.serve import serve as run_service
+    from service.settings import UnsafeSettingsError
+
+    settings = read_settings(host=host, port=port, database=db, processes=processes, chunk_cases=chunk)
+    try:
+        settings.require_safe()
+    except UnsafeSettingsError as error:
+        raise WrongInputError(str(error)) from error
+    run_service(settings)
+
+
+def worker(
+    db: Database = None, processes: Processes = None, chunk: ChunkCases = None, as_json: JsonFlag = False
+) -> None:
+    """Run the studies of a database without a service; Ctrl-C ends it."""
+
+
+def token(as_json: JsonFlag = False) -> None:
+    """Make a token for a service that other machines can reach (SPRAG_TOKEN)."""
+    made = secrets.token_urlsafe(32)
+    if as_json:
+        write_json({"token": made})
+    else:
+        print(made)

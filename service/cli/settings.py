@@ -1,0 +1,32 @@
+"""The settings of a command: its options, else the environment, else the defaults."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from service.cli.console import WrongInputError
+from service.spec_messages import Problem, shorten
+
+if TYPE_CHECKING:
+    from service.settings import Settings
+
+
+def read_settings(**options: object) -> Settings:
+    """The settings, with every option that was given put over them.
+
+    Raises WrongInputError with every setting that is wrong, named as the environment variable or the option.
+    """
+    from pydantic import ValidationError
+
+    from service.settings import ENV_PREFIX, Settings
+
+    given = {name: value for name, value in options.items() if value is not None}
+    try:
+        return Settings(**given)  # type: ignore[arg-type]
+    except ValidationError as error:
+        problems = []
+        for item in error.errors(include_url=False):
+            name = str(item["loc"][0]) if item["loc"] else ""
+            value = None if name == "token" else shorten(item.get("input"))
+            problems.append(Problem(ENV_PREFIX + name.upper(), item["msg"], value))
+        raise WrongInputError("a setting is wrong", problems=problems) from error

@@ -1,0 +1,52 @@
+"""What tests of several parts share: the command line, run inside the test's own process."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@dataclass(frozen=True)
+class Finished:
+    """How a command ended."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def data(self) -> Any:
+        """Standard output as JSON."""
+        return json.loads(self.out)
+
+
+@pytest.fixture
+def sprag(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Finished]:
+    """Runs a command, such as ``sprag("fit", path, "--accuracy", "0.05")``, in this process."""
+    from service.cli.app import execute
+
+    monkeypatch.delenv("SPRAG_DEBUG", raising=False)
+    monkeypatch.delenv("SPRAG_SERVER", raising=False)
+
+    def run(*arguments: object) -> Finished:
+        capsys.readouterr()
+        code = execute([str(argument) for argument in arguments])
+        captured = capsys.readouterr()
+        assert "Traceback" not in captured.err
+        assert "fault of Sprag" not in captured.err
+        return Finished(code, captured.out, captured.err)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def examples() -> Path:
+    """Folder of the example studies."""
+    return ROOT / "examples"
