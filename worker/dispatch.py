@@ -26,7 +26,7 @@ FAULT_CRASHES = 3
 
 @dataclass(frozen=True, slots=True)
 class Offered:
-    """A study may be run; ``chunks`` are those not done. For a study already known it only ends a pause."""
+    """A study may be run; ``chunks`` are those not done. For a study that is being worked on it only ends a pause."""
 
     study: int
     chunks: Sequence[Chunk] = ()
@@ -207,9 +207,11 @@ class Dispatch:
         return self._settled(event.study, known)
 
     def _paused(self, event: Paused) -> list[Instruction]:
-        if known := self._open.get(event.study):
-            known.held = True
-        return []
+        known = self._open.get(event.study)
+        if known is None:
+            return []
+        known.held = True
+        return self._settled(event.study, known)
 
     def _cancelled(self, event: Cancelled) -> list[Instruction]:
         known = self._open.setdefault(event.study, _Open(deque()))
@@ -280,10 +282,11 @@ class Dispatch:
         return None if number is None or known is None or chunk is None else (number, known, chunk)
 
     def _settled(self, number: int, known: _Open) -> list[Instruction]:
-        if known.waiting or known.running:
+        """Let go of a study with nothing in flight: for good when nothing waits, till it is offered again when held."""
+        if known.running or (known.waiting and not known.held):
             return []
         del self._open[number]
-        return [Settle(number)]
+        return [] if known.waiting else [Settle(number)]
 
     def _fill(self) -> list[Instruction]:
         """Start waiting chunks while there is room: of the study with the fewest in flight, the oldest of equals."""

@@ -51,6 +51,10 @@ class EpochLostError(StoreError):
     """Another dispatcher has taken over: this one must give up by itself and commit nothing more."""
 
 
+class ExecutorError(Exception):
+    """The executor cannot run anything any more; the message is one plain sentence for a user."""
+
+
 class Store(Protocol):
     """The dispatcher's side of the database. Every write is one short transaction that first checks the epoch.
 

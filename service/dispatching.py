@@ -1,0 +1,125 @@
+"""A dispatcher on a database: alone (`sprag worker`) or as a child process of the service (`sprag serve`)."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import socket
+import time
+from dataclasses import dataclass
+from multiprocessing import get_context
+from typing import TYPE_CHECKING
+
+from service.storage.lock import DispatcherLock
+from service.storage.part import SystemClock
+from service.storage.store import Store
+from worker.dispatcher import Dispatcher
+from worker.ports import EpochLostError, ExecutorError, StoreError
+from worker.processes import end_with_parent
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from multiprocessing.context import SpawnProcess
+    from types import FrameType
+
+    from worker.ports import Executor
+
+_LOG = logging.getLogger(__name__)
+
+#: Seconds between two tries of a standby to take the lock.
+STANDBY_SECONDS = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerSettings:
+    """What a dispatcher needs to know: database (SQLAlchemy URL), processes of the pool, seconds allowed to a chunk."""
+
+    database_url: str
+    processes: int
+    chunk_timeout: float
+
+
+class StopFlag:
+    """Set by a signal or another thread, asked by the dispatcher's loop."""
+
+    def __init__(self) -> None:
+        self._set = False
+
+    def set(self) -> None:
+        """Ask for the end."""
+        self._set = True
+
+    def __call__(self) -> bool:
+        return self._set
+
+
+def owner_name() -> str:
+    """This process as people can find it."""
+    return f"{socket.gethostname()}:{os.getpid()}"
+
+
+def pool(settings: WorkerSettings) -> Executor:
+    """The process pool of these settings; its processes start with the first chunk."""
+    from worker.executors.process_pool import ProcessPoolExecutor
+
+    return ProcessPoolExecutor(settings.processes, chunk_timeout=settings.chunk_timeout)
+
+
+def run_dispatcher(
+    settings: WorkerSettings,
+    stopping: Callable[[], bool],
+    *,
+    say: Callable[[str], None] = _LOG.info,
+    executor: Callable[[WorkerSettings], Executor] = pool,
+) -> None:
+    """Run every study of the database until ``stopping()``. Waits as a standby while another dispatcher is at work.
+
+    Raises StoreError (EpochLostError when another dispatcher took over) and ExecutorError, each with one sentence.
+    """
+    with Store.open(settings.database_url) as store:
+        lock = DispatcherLock(store.session.path)
+        if not lock.take():
+            say(f"another worker (process {lock.holder()}) is at work on {store.session.path}; waiting for its end")
+            while not lock.take():
+                if stopping():
+                    return
+                time.sleep(STANDBY_SECONDS)
+        try:
+            store.purge()
+            say(f"worker with {settings.processes} processes at work on {store.session.path}")
+            Dispatcher(store, executor(settings), SystemClock(), owner=owner_name()).run(stopping)
+        finally:
+            lock.release()
+
+
+def stop_on_signals() -> StopFlag:
+    """A flag that SIGTERM and SIGINT set, so that the loop ends in order; for the main thread of a process."""
+    flag = StopFlag()
+
+    def ask(_number: int, _frame: FrameType | None) -> None:
+        flag.set()
+
+    signal.signal(signal.SIGTERM, ask)
+    signal.signal(signal.SIGINT, ask)
+    return flag
+
+
+def start_dispatcher_process(settings: WorkerSettings) -> SpawnProcess:
+    """Start a dispatcher as a child of this process, which it does not outlive; ``terminate()`` ends it in order."""
+    process = get_context("spawn").Process(
+        target=_child, args=(settings, os.getpid()), name="sprag-dispatcher", daemon=False
+    )
+    process.start()
+    return process
+
+
+def _child(settings: WorkerSettings, parent: int) -> None:
+    flag = stop_on_signals()
+    end_with_parent(parent, signal.SIGTERM)
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    try:
+        run_dispatcher(settings, flag)
+    except (EpochLostError, StoreError, ExecutorError) as error:
+        _LOG.error("the worker ends: %s", error)
+        raise SystemExit(3) from None

@@ -1,0 +1,110 @@
+"""Running one study to its end in this process, without a server: `sprag run`."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from service.dispatching import STANDBY_SECONDS, WorkerSettings, owner_name, pool
+from service.storage.lock import DispatcherLock
+from service.storage.part import SystemClock
+from service.storage.store import Store
+from worker.chunking import Chunking
+from worker.dispatcher import Dispatcher
+from worker.executors.inline import InlineExecutor
+from worker.ports import StoreError
+from worker.states import StudyState
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from service.storage.records import Progress, StudyRecord
+    from worker.ports import Executor
+    from worker.study import Study
+
+#: Seconds between two reports of progress.
+REPORT_SECONDS = 0.25
+
+
+class StudyHeldError(StoreError):
+    """The study was held before its end; the message says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class LocalRun:
+    """A study that was run to its end, and the store that holds its rows while the context lasts."""
+
+    store: Store
+    record: StudyRecord
+
+
+@contextmanager
+def run_here(
+    spec: Mapping[str, Any],
+    study: Study,
+    *,
+    processes: int,
+    database_url: str | None = None,
+    chunk_cases: int = 0,
+    chunk_timeout: float = 600.0,
+    warnings: Sequence[str] = (),
+    on_progress: Callable[[Progress], None] | None = None,
+    executor: Executor | None = None,
+) -> Iterator[LocalRun]:
+    """Run ``study`` to its end on ``processes`` processes and give its rows.
+
+    Without ``database_url`` the database is a temporary one and gone with the context. When another dispatcher is at
+    work on the database given, that one runs the study and this process waits. ``processes`` 0 runs the cases in this
+    process, which suits a few; 1 and more start a pool. Raises StoreError and ExecutorError, each with one sentence.
+    """
+    with tempfile.TemporaryDirectory(prefix="sprag-") as folder:
+        url = database_url or f"sqlite:///{Path(folder) / 'run.sqlite3'}"
+        with Store.open(url, chunking=Chunking(chunk_cases, max(processes, 1))) as store:
+            record = store.create_study(spec, study, warnings=warnings)
+            settings = WorkerSettings(url, processes, chunk_timeout)
+            watch = _Watch(store, record.id, on_progress)
+            lock = DispatcherLock(store.session.path)
+            while not watch.ended():
+                if lock.take():
+                    try:
+                        runner = executor or (pool(settings) if processes else InlineExecutor())
+                        Dispatcher(store, runner, SystemClock(), owner=owner_name(), only=record.number).run(
+                            watch.ended
+                        )
+                    finally:
+                        lock.release()
+                else:
+                    time.sleep(STANDBY_SECONDS)
+            yield LocalRun(store, watch.final())
+
+
+class _Watch:
+    """Looks at one study now and then: tells its progress, knows its end."""
+
+    def __init__(self, store: Store, study_id: str, report: Callable[[Progress], None] | None) -> None:
+        self._store = store
+        self._id = study_id
+        self._report = report
+        self._next_report = 0.0
+
+    def ended(self) -> bool:
+        """Whether nothing more will be run."""
+        now = time.monotonic()
+        if self._report is not None and now >= self._next_report:
+            self._report(self._store.progress(self._id))
+            self._next_report = now + REPORT_SECONDS
+        state = self._store.get_study(self._id).state
+        return state.terminal or state is StudyState.PAUSED
+
+    def final(self) -> StudyRecord:
+        """The study at its end; raises StudyHeldError when it was held instead."""
+        record = self._store.get_study(self._id)
+        if self._report is not None:
+            self._report(self._store.progress(self._id))
+        if not record.state.terminal:
+            raise StudyHeldError(f"the study was held: {record.reason or 'somebody paused it'}")
+        return record

@@ -1,0 +1,43 @@
+"""The lock that lets one dispatcher at a time work on a database: it goes with its process, however that ends."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from pathlib import Path
+
+
+class DispatcherLock:
+    """An advisory lock on a file beside the database at ``database``."""
+
+    def __init__(self, database: Path) -> None:
+        self.path = database.with_name(f"{database.name}.lock")
+        self._file: int | None = None
+
+    def take(self) -> bool:
+        """Take the lock if it is free; True when it is ours."""
+        if self._file is not None:
+            return True
+        file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(file)
+            return False
+        os.ftruncate(file, 0)
+        os.write(file, f"{os.getpid()}\n".encode())
+        self._file = file
+        return True
+
+    def holder(self) -> str:
+        """Process id of whoever took the lock last, "" where nobody did."""
+        try:
+            return self.path.read_text(encoding="ascii").strip()
+        except OSError:
+            return ""
+
+    def release(self) -> None:
+        """Give the lock up."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None

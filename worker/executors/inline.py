@@ -1,0 +1,58 @@
+"""Chunks run one after the other in this process: for tests and for studies too small to start a pool for."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from typing import TYPE_CHECKING
+
+from worker import kernels
+from worker.ports import Chunk, Fate, Outcome
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from worker.study import Study
+
+
+class InlineExecutor:
+    """An `Executor` without processes. A chunk cannot be stopped or timed out once it runs."""
+
+    def __init__(self, run: Callable[[kernels.ChunkTask], kernels.ChunkResult] = kernels.run_task) -> None:
+        self._run = run
+        self._waiting: deque[tuple[int, kernels.ChunkTask]] = deque()
+        self._stopped: list[Outcome] = []
+
+    @property
+    def capacity(self) -> int:
+        """One: more in flight would only wait."""
+        return 1
+
+    def submit(self, ticket: int, study: Study, chunk: Chunk) -> None:
+        """Note the chunk; `wait` runs it."""
+        self._waiting.append((ticket, kernels.chunk_task(study, chunk.first, chunk.count)))
+
+    def wait(self, timeout: float) -> list[Outcome]:
+        """Run the oldest chunk to its end, however long it takes."""
+        if self._stopped:
+            found, self._stopped = self._stopped, []
+            return found
+        if not self._waiting:
+            time.sleep(timeout)
+            return []
+        ticket, task = self._waiting.popleft()
+        try:
+            return [Outcome(ticket, Fate.DONE, self._run(task))]
+        except Exception as error:  # a fault of the program, told like that of a process
+            return [Outcome(ticket, Fate.CRASHED, detail=f"{type(error).__name__}: {error}")]
+
+    def stop(self, ticket: int) -> None:
+        """Drop a chunk that has not run."""
+        kept = deque(item for item in self._waiting if item[0] != ticket)
+        if len(kept) < len(self._waiting):
+            self._waiting = kept
+            self._stopped.append(Outcome(ticket, Fate.STOPPED, detail="stopped"))
+
+    def close(self) -> None:
+        """Drop what has not run."""
+        self._waiting.clear()

@@ -1,0 +1,41 @@
+"""Habits of the processes this program starts: one thread each, and never longer alive than their parent."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+
+#: Libraries that would start threads of their own; the pool has a process for each core already.
+_THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
+_PR_SET_PDEATHSIG = 1
+
+
+def single_threaded_children() -> None:
+    """Processes started from now on compute with one thread, unless the user's environment says otherwise."""
+    for variable in _THREAD_VARIABLES:
+        os.environ.setdefault(variable, "1")
+
+
+def end_with_parent(parent: int, number: signal.Signals) -> None:
+    """Have the kernel send this process ``number`` when its parent (process id ``parent``) dies; only Linux can."""
+    if sys.platform != "linux":
+        return
+    import ctypes
+
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, int(number), 0, 0, 0)
+    if os.getppid() != parent:  # it died before the line above
+        os.kill(os.getpid(), number)
+
+
+def start_pool_process(parent: int) -> None:
+    """First thing a pool process does. Interrupts at the terminal are the parent's to handle; a stop is at once."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    end_with_parent(parent, signal.SIGKILL)
