@@ -29,7 +29,15 @@ _STOP_SECONDS = 15.0
 _AXIS = "shaft.load"
 _HELD = (("excitation.frequency", "25 Hz"), ("excitation.amplitude_x", "2 mm"))
 _SHOWN = ("shaft.speed.mean", "shaft.speed.max", "torque.mean", "power.useful.mean", "efficiency")
-_HEADINGS = ("load [N*m]", "mean speed [rad/s]", "max speed [rad/s]", "torque [N*m]", "power [W]", "efficiency", "ending")
+_HEADINGS = (
+    "load [N*m]",
+    "mean speed [rad/s]",
+    "max speed [rad/s]",
+    "torque [N*m]",
+    "power [W]",
+    "efficiency",
+    "ending",
+)
 _BAR = 24
 
 
@@ -128,5 +136,3 @@ def _show_curve(curves: dict[str, Any]) -> None:
     held = ", ".join(f"{path} {value}" for path, value in _HELD)
     headings = [(heading, heading != "ending") for heading in _HEADINGS]
     show_table(f"Mechanical characteristic at {held}", [*headings, ("mean speed", False)], rows)
-
-

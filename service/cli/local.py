@@ -126,7 +126,9 @@ def _trajectory_bytes(made: Trajectory, study: Study, case: int, form: str) -> b
 
 
 def presets(
-    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Study to print; without it: their names.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME]", help="Study to print; without it: their names.")
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """List the studies that come with the program, or print the spec of one."""
