@@ -24,7 +24,7 @@ from engine.taylor.straight import (
 from engine.vibration_drive.layout import Layout
 
 #: Share of the estimated convergence-limited step that is taken (Jorba and Zou 2005 take e^-2, which is far too careful here).
-STEP_SAFETY = 0.7
+STEP_SAFETY = 0.55
 #: Longest step, in excitation periods.
 LONGEST_STEP = 0.25
 

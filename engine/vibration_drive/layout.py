@@ -4,10 +4,12 @@ The workspace is one flat float64 array; quantity ``row`` of lane ``lane`` is at
 start at ``pendulums + i * stride``; fields that begin with ``p_`` are offsets into that block.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
+
+import numpy as np
 
 class Layout(NamedTuple):
-    """Sizes and row numbers; plain integers, so that compiled code takes it as an argument."""
+    """Sizes and row numbers. Compiled code gets them by ``as_record``."""
 
     n: int
     coefficients: int
@@ -130,3 +132,12 @@ def make_layout(n: int, coefficients: int, order: int, lanes: int) -> Layout:
             fields[name] = shaft_rows
             shaft_rows += sizes.get(name, 1)
     return Layout(n, coefficients, order, lanes, shaft_rows + n * stride, shaft_rows, stride, **fields)
+
+
+def as_record(layout: Layout) -> Layout:
+    """The layout as compiled code gets it: a numpy record with the same fields.
+
+    A record goes to a compiled function as one pointer, a tuple as a hundred numbers at every call.
+    """
+    dtype = np.dtype([(name, np.int64) for name in Layout._fields])
+    return cast(Layout, np.array([tuple(layout)], dtype=dtype)[0])
