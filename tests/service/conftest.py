@@ -1,0 +1,161 @@
+"""The service in the test's own process: a synchronous client, a database of its own, rows of made-up results."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+from anyio.from_thread import BlockingPortal, start_blocking_portal
+from fastapi import FastAPI
+
+from service.api.examples import SPEC
+from service.app import chunking, create_app
+from service.settings import Settings
+from service.storage.store import Store
+from worker import kernels
+from worker.kernels import ChunkResult
+from worker.study import Study
+
+API = "/api/v1"
+
+
+class PortalTransport(httpx.BaseTransport):
+    """Sends requests to an ASGI application that lives in the event loop of ``portal``."""
+
+    def __init__(self, app: Any, portal: BlockingPortal) -> None:
+        self._inner = httpx.ASGITransport(app, raise_app_exceptions=False, client=("127.0.0.1", 50000))
+        self._portal = portal
+
+    def handle_request(self, request: httpx.Request) -> httpx.Response:
+        """The application's answer, read to its end."""
+        request.read()
+        response = self._portal.call(self._inner.handle_async_request, request)
+        content = self._portal.call(response.aread)
+        return httpx.Response(response.status_code, headers=response.headers, content=content)
+
+
+class InThread:
+    """A computer that runs functions where it is called; what it ran is remembered."""
+
+    def __init__(self) -> None:
+        self.calls: list[tuple[Any, ...]] = []
+        self.answer: Callable[..., Any] | None = None
+
+    async def run(self, function: Any, *args: Any, **kwargs: Any) -> Any:
+        """The value of the function, or of ``answer`` in its place."""
+        self.calls.append((function, *args))
+        return (self.answer or function)(*args, **kwargs)
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+
+@dataclass
+class Service:
+    """A service and its insides."""
+
+    app: FastAPI
+    http: httpx.Client
+    store: Store
+    computer: InThread
+
+    def submit(self, spec: Any = None, **headers: str) -> str:
+        """Submit a study; its id."""
+        response = self.http.post(f"{API}/studies", json=SPEC if spec is None else spec, headers=headers)
+        assert response.status_code == 202, response.text
+        return str(response.json()["id"])
+
+    def fill(self, study_id: str, cases: range | None = None) -> ChunkResult:
+        """Commit made-up rows as a dispatcher would, for the chunks that begin in ``cases`` (by default all of them).
+
+        A study with nothing left is brought to its end. Gives the rows of the whole study.
+        """
+        record, study = self.store.get_study(study_id), self.store.study(study_id)
+        whole = made_up(study)
+        epoch = self.store.take_over("test")
+        wanted = range(study.cases) if cases is None else cases
+        chunks = [chunk for chunk in self.store.open_chunks(record.number) if chunk.first in wanted]
+        for chunk in self.store.claim(epoch, chunks):
+            part = slice(chunk.first, chunk.first + chunk.count)
+            result = ChunkResult(chunk.first, whole.endings[part], whole.flags[part], whole.values[part])
+            assert self.store.commit(epoch, chunk, result)
+        if not self.store.open_chunks(record.number):
+            self.store.settle(epoch, record.number)
+        return whole
+
+    def get(self, path: str, **params: Any) -> Any:
+        """JSON of an address under the API that must answer 200."""
+        response = self.http.get(API + path, params=params)
+        assert response.status_code == 200, response.text
+        return response.json()
+
+
+def made_up(study: Study) -> ChunkResult:
+    """Results of every case, random doubles of many sizes; every fifth case failed, every fourth has a flag."""
+    infos = kernels.study_results(study)
+    random = np.random.default_rng(7)
+    values = random.normal(size=(study.cases, len(infos))) * 10.0 ** random.integers(-12, 12, (study.cases, len(infos)))
+    for column, info in enumerate(infos):
+        if info.kind == "count":
+            values[:, column] = np.arange(study.cases) + column
+    endings = ["chatter" if case % 5 == 4 else "ok" for case in range(study.cases)]
+    flags = [kernels.WINDUP_OUT_OF_DATA if case % 4 == 3 else "" for case in range(study.cases)]
+    values[[ending != "ok" for ending in endings]] = np.nan
+    return ChunkResult(0, endings, flags, values)
+
+
+@pytest.fixture(scope="session")
+def portal() -> Iterator[BlockingPortal]:
+    """An event loop in a thread."""
+    with start_blocking_portal() as opened:
+        yield opened
+
+
+@pytest.fixture(scope="session")
+def empty_database(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """A database without studies, made once."""
+    path = tmp_path_factory.mktemp("empty") / "sprag.sqlite3"
+    with Store.open(f"sqlite:///{path}") as store:
+        store.backup(path.with_suffix(".copy"))
+    return path.with_suffix(".copy").read_bytes()
+
+
+@pytest.fixture
+def settings(tmp_path: Path, empty_database: bytes, monkeypatch: pytest.MonkeyPatch) -> Settings:
+    """Settings of a service of this test, whatever the environment says."""
+    for name in Settings.model_fields:
+        monkeypatch.delenv(f"SPRAG_{name.upper()}", raising=False)
+    database = tmp_path / "sprag.sqlite3"
+    database.write_bytes(empty_database)
+    return Settings(database=str(database), chunk_cases=2, processes=2)
+
+
+@pytest.fixture
+def connect(portal: BlockingPortal) -> Callable[..., httpx.Client]:
+    """Gives a client of an application."""
+
+    def client(app: Any, **options: Any) -> httpx.Client:
+        return httpx.Client(transport=PortalTransport(app, portal), **{"base_url": "http://localhost", **options})
+
+    return client
+
+
+@pytest.fixture
+def service(settings: Settings, connect: Callable[..., httpx.Client]) -> Iterator[Service]:
+    """A service with an empty database."""
+    computer = InThread()
+    with Store.open(settings.database_url, chunking=chunking(settings)) as store:
+        app = create_app(settings, store=store, computer=computer)
+        yield Service(app, connect(app), store, computer)
+
+
+@pytest.fixture
+def spec() -> dict[str, Any]:
+    """The documentation's example, free to be changed."""
+    return copy.deepcopy(SPEC)
