@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -12,6 +13,7 @@ from typing import Any, ParamSpec, Protocol, TypeVar
 from pebble import ProcessExpired, ProcessPool
 
 from service.errors import ApiError
+from worker.processes import start_pool_process
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -62,7 +64,12 @@ class ProcessComputer:
     def _schedule(self, function: Callable[..., R], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Future[R]:
         with self._lock:
             if self._pool is None or not self._pool.active:
-                self._pool = ProcessPool(max_workers=1, context=get_context("spawn"))
+                self._pool = ProcessPool(
+                    max_workers=1,
+                    initializer=start_pool_process,
+                    initargs=(os.getpid(),),
+                    context=get_context("spawn"),
+                )
             future: Future[R] = self._pool.schedule(function, args=args, kwargs=kwargs, timeout=self._timeout)
             return future
 

@@ -55,7 +55,7 @@ def draw_curves(curves: Curves, title: str, picture: Picture) -> bytes:
         for axes, (unit, infos) in zip(plots, groups.items(), strict=True):
             _paint_curves(axes, curves, infos, unit)
         plots[-1].set_xlabel(_label(curves.selection.x, curves.selection.x_unit))
-        figure.suptitle(_short(title))
+        figure.suptitle(_short(title), fontsize=11)
 
     return _render(paint, picture, (8.0, 1.2 + 3.6 * len(groups)))
 
@@ -72,7 +72,7 @@ def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
         axes.set_xlabel(_label(drawn.x, drawn.units[0]))
         axes.set_ylabel(_label(drawn.y, drawn.units[1]))
         figure.colorbar(mesh, label=_label(drawn.result.name, drawn.result.unit))
-        figure.suptitle(_short(title))
+        figure.suptitle(_short(title), fontsize=11)
 
     return _render(paint, picture, (8.0, 6.0))
 
@@ -116,9 +116,12 @@ def _label(name: str, unit: str) -> str:
 
 
 def _short(title: str) -> str:
-    # A font has no glyphs for control characters, and a title longer than the picture helps nobody.
-    printable = "".join(character if character.isprintable() else " " for character in title)
-    return printable if len(printable) <= 80 else printable[:79] + "…"
+    """``title`` as the font can write it, and not wider than a picture."""
+    from matplotlib.font_manager import findfont, get_font
+
+    glyphs = get_font(findfont(None)).get_charmap()
+    text = "".join(character if ord(character) in glyphs else "\N{WHITE SQUARE}" for character in title)
+    return text if len(text) <= 80 else text[:79] + "…"
 
 
 def _edges(values: tuple[float, ...]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

@@ -1,0 +1,175 @@
+"""`sprag serve`: the HTTP service, and beside it a dispatcher as a child process that is started again if it dies."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Protocol
+
+import uvicorn
+
+from service.app import create_app
+from service.dispatching import WorkerSettings, start_dispatcher_process
+from service.settings import Settings
+
+_LOG = logging.getLogger("sprag.service")
+
+#: Seconds that requests under way are given when the service ends, and then the dispatcher for its chunks.
+_GRACE_SECONDS = 5
+_STOP_SECONDS = 15.0
+#: Seconds before a dead dispatcher is started again: doubled each time, back to the first after a long life.
+_FIRST_DELAY = 0.5
+_LONGEST_DELAY = 30.0
+_LONG_LIFE = 60.0
+
+
+class AddressError(Exception):
+    """The service cannot listen on its address; the message is one plain sentence."""
+
+
+class Child(Protocol):
+    """What the supervisor needs of a process."""
+
+    @property
+    def exitcode(self) -> int | None:
+        """None while it lives."""
+
+    def join(self, timeout: float | None = None) -> None:
+        """Wait for its end."""
+
+    def terminate(self) -> None:
+        """Ask it to end."""
+
+    def kill(self) -> None:
+        """End it."""
+
+
+class Supervisor(threading.Thread):
+    """Keeps one child process alive.
+
+    The child is started by this thread, which lives as long as it is wanted: on Linux a child that is to die with its
+    parent dies with the very thread that started it.
+
+    Parameters
+    ----------
+    start : function
+        Starts the child.
+    delays : (first, longest)
+        Seconds before it is started again.
+    """
+
+    def __init__(
+        self, start: Callable[[], Child], delays: tuple[float, float] = (_FIRST_DELAY, _LONGEST_DELAY)
+    ) -> None:
+        super().__init__(name="sprag-supervisor", daemon=True)
+        self._start_child = start
+        self._first, self._longest = delays
+        self._ending = threading.Event()
+        self._child: Child | None = None
+
+    def run(self) -> None:
+        """Start the child, and again whenever it has died, until `stop`."""
+        delay = self._first
+        while not self._ending.is_set():
+            born = time.monotonic()
+            self._child = child = self._start_child()
+            while child.exitcode is None and not self._ending.is_set():
+                child.join(0.2)
+            if self._ending.is_set():
+                break
+            delay = self._first if time.monotonic() - born > _LONG_LIFE else delay
+            _LOG.error("The worker ended (exit code %s); it is started again in %g s.", child.exitcode, delay)
+            self._ending.wait(delay)
+            delay = min(2.0 * delay, self._longest)
+        self._end_child()
+
+    def _end_child(self) -> None:
+        child = self._child
+        if child is None or child.exitcode is not None:
+            return
+        child.terminate()
+        child.join(_STOP_SECONDS)
+        if child.exitcode is None:
+            _LOG.error("The worker does not end; it is killed.")
+            child.kill()
+            child.join()
+
+    def stop(self) -> None:
+        """End the child and this thread; returns when both are gone."""
+        self._ending.set()
+        self.join()
+
+
+def worker_settings(settings: Settings) -> WorkerSettings:
+    """The part of ``settings`` that a dispatcher needs."""
+    return WorkerSettings(settings.database_url, settings.pool_processes, settings.chunk_timeout)
+
+
+def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) -> None:
+    """Serve until SIGINT or SIGTERM; service and dispatcher have ended when this returns.
+
+    ``announce`` is called with the address once it is listened on (by default it is said on standard error). Raises
+    UnsafeSettingsError, DatabaseError and AddressError, each with one sentence, before anything is started.
+    """
+    logging.basicConfig(level=logging.INFO, format="%(message)s", stream=sys.stderr)
+    app = create_app(settings)  # makes the database ready before the dispatcher looks for it
+    listener = _listen(settings)
+    address = _address(settings, listener)
+    config = uvicorn.Config(
+        app,
+        log_config=None,
+        log_level=logging.WARNING,
+        access_log=False,
+        server_header=False,
+        proxy_headers=False,
+        timeout_graceful_shutdown=_GRACE_SECONDS,
+        lifespan="on",
+    )
+    supervisor = Supervisor(lambda: start_dispatcher_process(worker_settings(settings)))
+    with listener, _outlived_signals():
+        supervisor.start()
+        try:
+            (announce or _say)(address)
+            with suppress(KeyboardInterrupt):
+                uvicorn.Server(config).run(sockets=[listener])
+        finally:
+            supervisor.stop()
+
+
+def _say(address: str) -> None:
+    _LOG.info("Sprag serves at %s (Ctrl-C ends it).", address)
+
+
+def _listen(settings: Settings) -> socket.socket:
+    host = settings.host.strip("[]")
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        return socket.create_server((host, settings.port), family=family, backlog=2048)
+    except (OSError, OverflowError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise AddressError(f"The service cannot listen on {settings.host} port {settings.port}: {reason}.") from error
+
+
+def _address(settings: Settings, listener: socket.socket) -> str:
+    host = settings.host.strip("[]")
+    port = listener.getsockname()[1]
+    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+
+
+@contextmanager
+def _outlived_signals() -> Iterator[None]:
+    """Make SIGTERM end the server and not this process, which the server would send it to again at its own end."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, lambda _number, _frame: None)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
