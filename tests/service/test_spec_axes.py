@@ -1,0 +1,294 @@
+"""Axes of a spec: paths, values of every kind, sizes before expansion, grids and zips, clutch laws along them."""
+
+from __future__ import annotations
+
+import copy
+import re
+import tracemalloc
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.service.spec_sample import SPEC, parsed, problems
+from worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES
+
+PENDULUM = SPEC["base"]["pendulums"][0]
+
+
+def values_of(path: str | list[str], **way: Any) -> tuple[float, ...]:
+    """SI values of a single axis."""
+    (axis,) = parsed({"/axes": [{"path": path, **way}]}).study.axes
+    return axis.values
+
+
+def only_problem(*axes: Any, **changes: Any) -> tuple[str, str]:
+    """Pointer and whole text of the one problem of these axes."""
+    found = problems({"/axes": list(axes)} | {f"/{key}": value for key, value in changes.items()})
+    (problem,) = found.values()
+    return problem.pointer, str(problem)
+
+
+def load(**way: Any) -> dict[str, Any]:
+    return {"path": "shaft.load", **way}
+
+
+@pytest.mark.parametrize(
+    ("way", "expected"),
+    [
+        ({"values": [0.3, "100 N*mm", 0]}, [0.3, 0.1, 0.0]),
+        ({"values": [-0.0]}, [0.0]),
+        ({"linspace": [0, 1, 5]}, [0.0, 0.25, 0.5, 0.75, 1.0]),
+        ({"linspace": [1, 0, 3]}, [1.0, 0.5, 0.0]),
+        ({"linspace": [0.02, "0.3 N*m", 8]}, [0.02, 0.06, 0.1, 0.14, 0.18, 0.22, 0.26, 0.3]),
+        ({"linspace": [2, 2, 1]}, [2.0]),
+        ({"geomspace": [1, 1000, 4]}, [1.0, 10.0, 100.0, 1000.0]),
+        ({"geomspace": [8, 1, 4]}, [8.0, 4.0, 2.0, 1.0]),
+        ({"geomspace": [3, 3, 1]}, [3.0]),
+        ({"range": [0, 0.3, 0.1]}, [0.0, 0.1, 0.2, 0.3]),
+        ({"range": [0, 0.35, 0.1]}, [0.0, 0.1, 0.2, 0.3]),
+        ({"range": [0.3, 0, -0.1]}, [0.3, 0.2, 0.1, 0.0]),
+        ({"range": [1, 1, 5]}, [1.0]),
+        ({"range": [0, 0.1 + 0.2, 0.1]}, [0.0, 0.1, 0.2, 0.1 + 0.2]),
+        ({"range": [0, 0.29999999999999993, 0.1]}, [0.0, 0.1, 0.2, 0.29999999999999993]),
+        ({"range": ["0 N*m", "300 N*mm", "0.1 N*m"]}, [0.0, 0.1, 0.2, 0.3]),
+    ],
+)
+def test_values(way: dict[str, Any], expected: list[float]) -> None:
+    found = values_of("shaft.load", **way)
+    if "geomspace" in way:
+        assert found == pytest.approx(expected, rel=1e-14)
+        assert (found[0], found[-1]) == (expected[0], expected[-1])
+    else:
+        assert list(found) == expected
+    assert not any(np.signbit(found))
+
+
+def test_negative_geometric_ranges() -> None:
+    assert values_of("pendulums.0.arm", geomspace=["-1 mm", "-100 mm", 3]) == pytest.approx((-0.001, -0.01, -0.1))
+
+
+@given(
+    st.decimals("0", "1000", places=3), st.decimals("0.001", "1000", places=3), st.integers(1, 300)
+)  # fmt: skip
+def test_steps_are_decimals(start: Any, step: Any, count: int) -> None:
+    last = start + step * (count - 1)
+    expected = [float(Fraction(start) + index * Fraction(step)) for index in range(count)]
+    assert list(values_of("shaft.load", range=[f"{start} N*m", f"{last} N*m", f"{step} N*m"])) == expected
+    if count > 1:
+        assert list(values_of("shaft.load", linspace=[f"{start} N*m", f"{last} N*m", count])) == expected
+
+
+def test_frequencies_in_other_units() -> None:
+    assert values_of("excitation.frequency", range=["600 rpm", "1800 rpm", "600 rpm"]) == (10.0, 20.0, 30.0)
+    assert values_of("excitation.frequency", values=["1500 rpm", "26 Hz", "180 rad/s"])[:2] == (25.0, 26.0)
+
+
+def test_tied_paths_and_every_kind_of_path() -> None:
+    study = parsed(
+        {
+            "/base/pendulums": [PENDULUM, PENDULUM],
+            "/base/clutch/windup_limit": "5 deg",
+            "/axes": [
+                {"path": ["pendulums.0.spring_rate", "pendulums.1.spring_rate"], "values": [8000, 9000]},
+                {"path": "clutch.coefficients.1", "values": ["100 N*m/rad", 200]},
+                {"path": "clutch.windup_limit", "values": ["1 deg", 0.2]},
+                {"path": "gravity", "values": [0, 9.81]},
+            ],
+        }
+    ).study
+    assert study.cases == 16
+    assert study.axes[0].paths == ("pendulums.0.spring_rate", "pendulums.1.spring_rate")
+    own = [copy.deepcopy(PENDULUM) | {"clutch": {"coefficients": [0, 200]}} for _ in range(2)]
+    path = ["pendulums.0.clutch.coefficients.1", "pendulums.1.clutch.coefficients.1"]
+    changes = {"/base/pendulums": own, "/base/clutch": ..., "/axes": [{"path": path, "values": [100, 300]}]}
+    assert parsed(changes).study.case_parameters(1) == dict.fromkeys(path, 300.0)
+    unlimited = parsed({"/axes": [{"path": "clutch.windup_limit", "values": [0.1, 0.2]}]}).study
+    assert "clutch.windup_limit" not in unlimited.base
+
+
+@pytest.mark.parametrize(
+    ("path", "says"),
+    [
+        ("shaft.laod", "did you mean 'shaft.load'"),
+        ("base.shaft.load", "did you mean 'shaft.load'"),
+        ("excitation", "names no numeric parameter"),
+        ("name", "names no numeric parameter"),
+        ("run.duration", "names no numeric parameter"),
+        ("", "names no numeric parameter"),
+        ("pendulums.1.mass", "there is no pendulum 1: pendulums are numbered from 0 to 0"),
+        ("pendulums.999999999.mass", "there is no pendulum 999999999"),
+        ("pendulums.-1.mass", "names no numeric parameter"),
+        ("pendulums.N.mass", "did you mean 'pendulums.0.mass'"),
+        ("pendulums.0.massa", "did you mean 'pendulums.0.mass'"),
+        ("clutch.coefficients.4", "numbered from 0 (c_1) to 3 (c_4)"),
+        ("clutch.coefficients", "names no numeric parameter of the clutch"),
+        ("clutch.data.0.1", "names no numeric parameter of the clutch"),
+        ("pendulums.0.clutch.coefficients.1", "as in 'clutch.coefficients.1'"),
+        (3, "must be a path"),
+        (None, "is required"),
+        ([], "must name what varies"),
+        (["shaft.load", 3], "must be a path"),
+        (["shaft.load"] * 300, "must name what varies"),
+        (["shaft.load", "excitation.frequency"], "different units: N*m, Hz"),
+        (["shaft.load", "shaft.load"], "names the same path twice"),
+        (["clutch.coefficients.1", "clutch.coefficients.2"], "different units"),
+        ("x" * 10_000, "names no numeric parameter"),
+    ],
+)
+def test_paths_that_are_refused(path: object, says: str) -> None:
+    pointer, text = only_problem({"path": path, "values": [1, 2]})
+    assert pointer.startswith("/axes/0/path")
+    assert says in text
+
+
+def test_clutch_paths_follow_where_the_clutch_stands() -> None:
+    own = [copy.deepcopy(PENDULUM) | {"clutch": {"coefficients": [0, 200]}}]
+    changes = {"/base/pendulums": own, "/base/clutch": ..., "/axes": [{"path": "clutch.coefficients.1", "values": [1]}]}
+    assert "pendulums.0.clutch.coefficients.1" in problems(changes)["/axes/0/path"].message
+
+
+@pytest.mark.parametrize("path", ["clutch.coefficients.1", "clutch.windup_limit"])
+def test_a_fitted_clutch_is_not_varied(path: str) -> None:
+    data = {"data": [[0, 0], [0.01, 2], [0.02, 4]], "accuracy": 0.1}
+    found = problems({"/base/clutch": data, "/axes": [{"path": path, "values": [1]}]})
+    assert "measured data" in found["/axes/0/path"].message
+
+
+def test_a_path_stands_on_one_axis() -> None:
+    tied = {"path": ["gravity", "gravity"], "values": [1]}
+    pointer, text = only_problem(load(values=[1]), tied | {"path": "gravity"}, load(values=[2]))
+    assert pointer == "/axes/2/path"
+    assert "already stands on axis 0" in text
+
+
+@pytest.mark.parametrize(
+    ("way", "at", "says"),
+    [
+        ({}, "", "exactly one of"),
+        ({"values": [1], "linspace": [0, 1, 2]}, "", "2 are given: values, linspace"),
+        ({"values": []}, "/values", "has no values"),
+        ({"values": 3}, "/values", "must be a list"),
+        ({"values": {"0": 1}}, "/values", "must be a list"),
+        ({"values": [1, -2, 3]}, "/values/1", "out of range.*got -2.*>= 0 N\\*m"),
+        ({"values": [1, "2 m"]}, "/values/1", "expected N\\*m"),
+        ({"values": [1, None]}, "/values/1", "must be a number"),
+        ({"values": [1, True]}, "/values/1", "must be a number"),
+        ({"values": [1, [2]]}, "/values/1", "must be a number"),
+        ({"values": [1, float("nan")]}, "/values/1", "finite"),
+        ({"values": [1, 2, 1]}, "/values/2", "value 2 repeats value 0"),
+        ({"values": [1, "1000 N*mm"]}, "/values/1", "value 1 repeats value 0"),
+        ({"linspace": [0, 1]}, "/linspace", "list of three"),
+        ({"linspace": [0, 1, 2, 3]}, "/linspace", "list of three"),
+        ({"linspace": [0, 1, 0]}, "/linspace/2", "out of range"),
+        ({"linspace": [0, 1, -3]}, "/linspace/2", "out of range"),
+        ({"linspace": [0, 1, 2.0]}, "/linspace/2", "whole number"),
+        ({"linspace": [0, 1, "3"]}, "/linspace/2", "whole number"),
+        ({"linspace": [0, 1, True]}, "/linspace/2", "whole number"),
+        ({"linspace": [0, 1, 1]}, "/linspace/2", "two different ends"),
+        ({"linspace": [1, 1, 2]}, "/linspace", "value 1 repeats value 0"),
+        ({"linspace": [-1, 1, 3]}, "/linspace/0", "out of range"),
+        ({"linspace": [0, "1 Hz", 3]}, "/linspace/1", "expected N\\*m"),
+        ({"geomspace": [0, 1, 3]}, "/geomspace", "one sign"),
+        ({"geomspace": [1, 10, 1]}, "/geomspace/2", "two different ends"),
+        ({"range": [0, 1, 0]}, "/range/2", "step is 0"),
+        ({"range": [0, 1, -0.1]}, "/range/2", "leads away"),
+        ({"range": [1, 0, 0.1]}, "/range/2", "leads away"),
+        ({"range": [0, 1, "0.1 Hz"]}, "/range/2", "expected N\\*m"),
+        ({"range": [0, 1]}, "/range", "list of three"),
+    ],
+)
+def test_values_that_are_refused(way: dict[str, Any], at: str, says: str) -> None:
+    pointer, text = only_problem(load(**way))
+    assert pointer == "/axes/0" + at
+    assert re.search(says, text)
+
+
+def test_a_change_of_sign_in_a_geometric_range() -> None:
+    pointer, text = only_problem({"path": "pendulums.0.arm", "geomspace": [-1, 1, 3]})
+    assert (pointer, "one sign" in text) == ("/axes/0/geomspace", True)
+
+
+@pytest.mark.parametrize(
+    ("axes", "at", "says"),
+    [
+        ([load(linspace=[0, 1, 10**9])], "/axes/0/linspace/2", "got 1000000000; allowed: 1 to 1,000,000"),
+        ([load(linspace=[0, 1, 10**300])], "/axes/0/linspace/2", "allowed: 1 to 1,000,000"),
+        ([load(geomspace=[1, 2, 10**9])], "/axes/0/geomspace/2", "allowed: 1 to 1,000,000"),
+        ([load(range=[0, 1, "1e-9 N*m"])], "/axes/0/range", "asks for 1,000,000,001 values"),
+        ([load(range=[0, 1e9, 1e-300])], "/axes/0/range", "asks for about 10^309 values"),
+        (
+            [{"path": path, "linspace": [1, 2, 1000]} for path in ("shaft.load", "gravity", "excitation.phase")],
+            "/axes",
+            "the grid has 1,000,000,000 cases (1,000 x 1,000 x 1,000) (allowed: at most 10,000,000 cases)",
+        ),
+        (
+            [{"path": path, "linspace": [1, 2, MAX_AXIS_VALUES]} for path in ("shaft.load", "gravity")],
+            "/axes",
+            "2,000,000 values together",
+        ),
+        ([load(values=[1])] * (MAX_AXES + 1), "/axes", "list of 0 to 16 axes"),
+        ({"path": "shaft.load"}, "/axes", "must be a list"),
+        (None, "/axes", "must be a list"),
+        (["shaft.load"], "/axes/0", "must be an object"),
+    ],
+)
+def test_sizes_are_checked_before_expansion(axes: Any, at: str, says: str) -> None:
+    tracemalloc.start()
+    try:
+        (problem,) = problems({"/axes": axes}).values()
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert problem.pointer == at
+    assert says in str(problem)
+    assert peak < 2_000_000
+
+
+def test_the_largest_grid() -> None:
+    axes = [{"path": path, "linspace": [1, 2, 1000]} for path in ("shaft.load", "gravity")]
+    assert parsed({"/axes": [*axes, {"path": "excitation.phase", "linspace": [0, 1, 10]}]}).study.cases == MAX_CASES
+
+
+def test_zips() -> None:
+    zipped = [load(values=[1, 1, 2]), {"path": "gravity", "linspace": [9, 10, 3]}]
+    study = parsed({"/axes": zipped, "/combine": "zip"}).study
+    assert (study.cases, study.case_parameters(1)) == (3, {"shaft.load": 1.0, "gravity": 9.5})
+    unequal = problems({"/axes": [load(values=[1, 2]), {"path": "gravity", "values": [1]}], "/combine": "zip"})
+    assert "equally many values" in unequal["/axes"].message
+    twice = problems({"/axes": [load(values=[1, 2, 1]), {"path": "gravity", "values": [1, 2, 1]}], "/combine": "zip"})
+    assert "cases 0 and 2 are the same" in twice["/axes"].message
+
+
+@pytest.mark.parametrize("combine", ["Grid", "product", 3, None, ["grid"]])
+def test_combine(combine: object) -> None:
+    assert list(problems({"/combine": combine})) == ["/combine"]
+
+
+LAW_AXES = [
+    {"path": "clutch.coefficients.1", "values": [200, 100]},
+    {"path": "clutch.coefficients.3", "values": [20000, -20000]},
+]
+
+
+def test_a_law_negative_somewhere_on_a_grid() -> None:
+    found = problems({"/axes": [load(values=[1]), *LAW_AXES]})
+    assert list(found) == ["/axes/1"]
+    assert found["/axes/1"].value == [0.0, 100.0, 0.0, -20000.0]
+    assert "pull the shaft back" in found["/axes/1"].message
+    parsed({"/axes": LAW_AXES, "/base/clutch/windup_limit": 0.05})
+    wide = {"path": "clutch.windup_limit", "values": [0.01, 0.08]}
+    assert list(problems({"/axes": [*LAW_AXES, wide]})) == ["/axes/0"]
+    parsed({"/axes": [LAW_AXES[0]], "/base/clutch/coefficients": [0, -1, 0, 0]})  # the base's own law is never used
+
+
+def test_a_law_negative_somewhere_in_a_zip() -> None:
+    changes = {"/combine": "zip", "/base/clutch/windup_limit": 0.09}
+    parsed(changes | {"/axes": [LAW_AXES[0] | {"values": [100, 200]}, LAW_AXES[1]]})
+    found = problems(changes | {"/axes": LAW_AXES})
+    assert found["/axes/0"].value == [0.0, 100.0, 0.0, -20000.0]
+    many = [{"path": f"clutch.coefficients.{k}", "linspace": [-1, k, 20_000]} for k in (1, 3)]
+    assert "20,000 different clutch laws" in problems({"/axes": many, "/combine": "zip"})["/axes/0"].message

@@ -1,0 +1,111 @@
+"""What is allowed but said: unstable pendulums, impossible inertias, slips of units."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+
+from tests.service.spec_sample import parsed
+
+
+def warnings(changes: dict[str, Any]) -> list[str]:
+    return list(parsed({"/axes": []} | changes).warnings)
+
+
+def test_nothing_is_said_about_a_plausible_study() -> None:
+    assert warnings({}) == []
+    assert parsed({}).warnings == ()
+
+
+def test_a_spring_too_weak_is_said_with_its_numbers() -> None:
+    (warning,) = warnings({"/base/pendulums/0/spring_rate": 40})
+    assert warning.startswith("/base/pendulums/0: c a^2 < M g l")
+    assert "0.1 N*m/rad" in warning
+    assert "0.1471 N*m/rad" in warning
+    assert "cases" not in warning
+
+
+def test_a_hanging_or_weightless_pendulum_needs_no_spring() -> None:
+    assert warnings({"/base/pendulums/0/spring_rate": 0, "/base/pendulums/0/arm": "-30 mm"}) == []
+    assert warnings({"/base/pendulums/0/spring_rate": 0, "/base/gravity": 0}) == []
+
+
+@pytest.mark.parametrize(
+    ("axes", "combine", "says"),
+    [
+        ([{"path": "pendulums.0.spring_rate", "values": [9000, 40, 20]}], "grid", r"0\.05 N\*m/rad.*in 2 of 3 cases"),
+        (
+            [
+                {"path": "pendulums.0.spring_rate", "values": [40, 60]},
+                {"path": "shaft.load", "values": [0.1, 0.2, 0.3]},
+                {"path": "gravity", "values": [0, 5, 9.81]},
+            ],
+            "grid",
+            "in 3 of 18 cases",
+        ),
+        (
+            [{"path": "pendulums.0.spring_rate", "values": [40, 60]}, {"path": "gravity", "values": [5, 60]}],
+            "zip",
+            r"0\.15 N\*m/rad.*0\.9 N\*m/rad.*in 1 of 2 cases",
+        ),
+        (
+            [{"path": f"pendulums.0.{name}", "linspace": [0.01, 1, 700]} for name in ("spring_rate", "spring_arm")],
+            "grid",
+            "worst case of the axes",
+        ),
+    ],
+)
+def test_the_axes_are_looked_at(axes: list[Any], combine: str, says: str) -> None:
+    (warning,) = warnings({"/axes": axes, "/combine": combine})
+    assert re.search(says, warning)
+
+
+def test_an_inertia_that_no_body_has() -> None:
+    (warning,) = warnings({"/base/pendulums/0/inertia": "4e-4 kg*m^2"})
+    assert "J < M l^2" in warning
+    assert "0.0004 kg*m^2" in warning
+    assert "0.00045 kg*m^2" in warning
+    assert warnings({"/base/pendulums/0/inertia": "4.5e-4 kg*m^2"}) == []
+
+
+@pytest.mark.parametrize(
+    ("pointer", "value", "says"),
+    [
+        ("excitation/frequency", 1500, "excitation.frequency: 1500 Hz is more than 1000 Hz; was it in rpm"),
+        ("excitation/frequency", "0.01 Hz", "below 0.1 Hz"),
+        ("excitation/amplitude_y", 2, "excitation.amplitude_y: 2 m is more than 0.1 m; was it in mm?"),
+        ("excitation/phase", 90, "was it in degrees?"),
+        ("pendulums/0/backlash", 3, "was it in degrees?"),
+        ("pendulums/0/spring_arm", 50, "was it in mm?"),
+        ("pendulums/0/initial_angle", -20, "-20 rad"),
+        ("shaft/load", 1e5, "was it in N*mm?"),
+    ],
+)
+def test_slips_of_units(pointer: str, value: object, says: str) -> None:
+    (warning,) = warnings({f"/base/{pointer}": value})
+    assert says in warning
+
+
+def test_slips_on_an_axis_and_not_in_what_it_replaces() -> None:
+    axes = [{"path": "excitation.frequency", "values": [1500, 25]}]
+    assert "1500 Hz" in warnings({"/axes": axes, "/base/excitation/frequency": 3000})[0]
+    assert (
+        warnings({"/axes": [{"path": "excitation.frequency", "values": [25]}], "/base/excitation/frequency": 3e3}) == []
+    )
+
+
+def test_a_base_that_does_not_move() -> None:
+    still = {"/base/excitation/amplitude_x": 0, "/base/excitation/amplitude_y": 0}
+    assert warnings(still) == ["/base/excitation: both amplitudes are 0, so the base does not move"]
+    assert warnings(still | {"/axes": [{"path": "excitation.amplitude_x", "values": [0, 0.001]}]}) == []
+
+
+def test_the_clutch_law_and_the_fit_have_their_say() -> None:
+    (jump,) = warnings({"/base/clutch": {"coefficients": [0.5, 200]}})
+    assert jump.startswith("/base/clutch: c_1 = 0.5 N*m > 0")
+    (varied,) = warnings({"/axes": [{"path": "clutch.coefficients.0", "values": [0.25, 0.5]}]})
+    assert varied.startswith("/axes/0: c_1 = 0.25 N*m > 0")
+    (few,) = warnings({"/base/clutch": {"data": [[0.01, 2.0], [0.02, 5.0]], "accuracy": 0.1}})
+    assert few.startswith("/base/clutch: degree 2 has as many unknowns as the data has different windups")
