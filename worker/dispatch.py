@@ -1,9 +1,10 @@
 """What the dispatcher decides, without I/O: events in, instructions out.
 
 A chunk whose process dies or runs out of time is run once more, then split in two until the case is found; a case that
-fails alone twice is given its ending and left aside. Three chunks that share no case and crash with no success of the
-study between them show a fault of the engine, not of the cases: the study is held with the reason, nobody quarantined.
-Chunks that overlap count once, because one bad case explains the crash of every chunk around it.
+fails alone twice is given its ending and left aside, a crashed one only when a success or the end of the study shows
+that it was not the engine. Three chunks that share no case and crash with no success of the study between them show a
+fault of the engine, not of the cases: the study is held with the reason, nobody quarantined. Chunks that overlap count
+once, because one bad case explains the crash of every chunk around it.
 """
 
 from __future__ import annotations
@@ -141,6 +142,8 @@ class _Open:
     held: bool = False
     cancelled: bool = False
     crashed: list[Chunk] = field(default_factory=list)
+    #: Cases to be quarantined as crashed once a success, or the end of the study, shows that it was not the engine.
+    suspects: list[Quarantine] = field(default_factory=list)
 
 
 def disjoint(chunks: Iterable[Chunk]) -> int:
@@ -240,7 +243,8 @@ class Dispatch:
         found: list[Instruction]
         if event.fate is Fate.DONE:
             known.crashed.clear()
-            found = [Commit(event.ticket, chunk)]
+            found = [Commit(event.ticket, chunk), *known.suspects]
+            known.suspects.clear()
         elif known.cancelled:
             found = []
         elif event.fate is Fate.STOPPED:
@@ -262,8 +266,11 @@ class Dispatch:
         if failed.failures < MAX_FAILURES:
             known.waiting.appendleft(failed)
             return [PutBack(failed, event.detail)]
+        if chunk.count == 1 and crashed:
+            known.suspects.append(Quarantine(chunk, WorkerEnding.CRASHED, event.detail))
+            return []
         if chunk.count == 1:
-            return [Quarantine(chunk, WorkerEnding.CRASHED if crashed else WorkerEnding.TIMED_OUT, event.detail)]
+            return [Quarantine(chunk, WorkerEnding.TIMED_OUT, event.detail)]
         parts = halves(chunk)
         known.waiting.extendleft(reversed(parts))
         return [Split(chunk, parts, event.detail)]
@@ -286,7 +293,10 @@ class Dispatch:
         if known.running or (known.waiting and not known.held):
             return []
         del self._open[number]
-        return [] if known.waiting else [Settle(number)]
+        if known.waiting:
+            return [PutBack(suspect.chunk, suspect.detail) for suspect in known.suspects]
+        quarantined = [] if known.cancelled else known.suspects
+        return [*quarantined, Settle(number)]
 
     def _fill(self) -> list[Instruction]:
         """Start waiting chunks while there is room: of the study with the fewest in flight, the oldest of equals."""

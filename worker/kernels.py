@@ -276,7 +276,8 @@ def run_task(task: ChunkTask) -> ChunkResult:
         first=task.first,
         endings=[names[code] for code in batch.endings.tolist()],
         flags=[WINDUP_OUT_OF_DATA if flag else "" for flag in outside.tolist()],
-        values=np.ascontiguousarray(batch.values, dtype=np.float64),
+        # Adding zero makes a negative zero positive: databases do not keep its sign.
+        values=np.ascontiguousarray(batch.values, dtype=np.float64) + 0.0,
     )
 
 

@@ -1,0 +1,430 @@
+"""What every store must do: one suite, run against each database driver."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from service.storage import session
+from service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyNotFound
+from service.storage.records import StudyRecord
+from service.storage.store import Store
+from tests.worker import fakes
+from worker import kernels
+from worker.chunking import Chunking
+from worker.ports import Chunk, EpochLostError
+from worker.states import StudyState, TransitionError
+
+SPEC = {"sprag": 1, "name": "Füllung", "axes": [{"path": "shaft.load", "values": ["0.1 N*m"]}]}
+
+
+@pytest.fixture(params=["pysqlite3", "sqlite3"])
+def url(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    if request.param == "sqlite3":
+        monkeypatch.setattr(session, "sqlite_driver", lambda: sqlite3)
+    return f"sqlite:///{tmp_path / 'store.sqlite3'}"
+
+
+@pytest.fixture
+def clock() -> fakes.HandClock:
+    return fakes.HandClock()
+
+
+@pytest.fixture
+def store(url: str, clock: fakes.HandClock) -> Iterator[Store]:
+    with Store.open(url, chunking=Chunking(cases=10), clock=clock) as store:
+        yield store
+
+
+def create(store: Store, cases: int = 25, name: str = "a study", **options: str) -> StudyRecord:
+    return store.create_study(SPEC, fakes.study(cases, name), **options)
+
+
+def finish(store: Store, record: StudyRecord, ending: str = kernels.OK) -> int:
+    """Run a study to its end; gives the epoch."""
+    epoch = store.take_over("test")
+    for chunk in store.open_chunks(record.number):
+        assert store.claim(epoch, [chunk]) == [chunk]
+        assert store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count, ending))
+    store.settle(epoch, record.number)
+    return epoch
+
+
+# Studies
+
+
+def test_a_study_comes_back_as_it_was_given(store: Store) -> None:
+    study = fakes.study(25)
+    record = store.create_study(SPEC, study, warnings=["odd, but allowed"])
+    assert record == store.get_study(record.id)
+    assert store.spec(record.id) == SPEC
+    assert store.study(record.id) == study
+    assert (record.state, record.cases, record.done, record.ok) == (StudyState.QUEUED, 25, 0, 0)
+    assert (record.chunk_cases, record.pendulums, record.model) == (10, 1, "vibration-drive")
+    assert record.warnings == ("odd, but allowed",)
+    assert record.created_at.tzinfo is not None
+    assert record.physics_hash == study.physics_hash(kernels.ENGINE_VERSION)
+    assert store.open_chunks(record.number) == [Chunk(1, 0, 10), Chunk(1, 10, 10), Chunk(1, 20, 5)]
+
+
+def test_unknown_studies_are_not_found(store: Store) -> None:
+    for ask in (store.get_study, store.spec, store.study, store.progress, store.cancel_study, store.delete_study):
+        with pytest.raises(StudyNotFound, match="st_nothing"):
+            ask("st_nothing")
+    with pytest.raises(StudyNotFound):
+        store.case_rows("st_nothing")
+
+
+def test_ids_tell_nothing_and_numbers_are_never_used_again(store: Store) -> None:
+    first = create(store)
+    finish(store, first)
+    store.delete_study(first.id)
+    second = create(store)
+    assert second.number > first.number
+    assert second.id != first.id
+
+
+def test_the_same_key_gives_the_same_study(store: Store) -> None:
+    first = create(store, idempotency_key="k", body_hash="a")
+    again = create(store, idempotency_key="k", body_hash="a")
+    assert again == first
+    with pytest.raises(IdempotencyConflict, match="'k'"):
+        create(store, idempotency_key="k", body_hash="b")
+    assert create(store, idempotency_key="other", body_hash="b").id != first.id
+    assert len(store.list_studies().studies) == 2
+
+
+def test_one_key_from_many_threads_makes_one_study(store: Store) -> None:
+    with ThreadPoolExecutor(8) as threads:
+        made = list(threads.map(lambda _: create(store, idempotency_key="k", body_hash="a").id, range(16)))
+    assert len(set(made)) == 1
+    assert len(store.list_studies().studies) == 1
+
+
+def test_lists_go_page_by_page_newest_first(store: Store) -> None:
+    records = [create(store, 1, f"study {index}") for index in range(5)]
+    pages, token = [], None
+    while True:
+        page = store.list_studies(2, token)
+        pages.append([study.name for study in page.studies])
+        token = page.next_token
+        if token is None:
+            break
+    assert pages == [["study 4", "study 3"], ["study 2", "study 1"], ["study 0"]]
+    store.cancel_study(records[2].id)
+    assert [study.name for study in store.list_studies(state=StudyState.CANCELLING).studies] == ["study 2"]
+    assert store.list_studies(2, "1").studies == ()
+
+
+@pytest.mark.parametrize("token", ["", "x", "-1", "1.5", "９", "1" * 40])
+def test_a_token_of_no_page_is_refused(store: Store, token: str) -> None:
+    with pytest.raises(PageTokenError):
+        store.list_studies(2, token)
+
+
+def test_wishes_follow_the_table_of_states(store: Store) -> None:
+    record = create(store)
+    assert store.pause_study(record.id).state is StudyState.PAUSED
+    assert store.pause_study(record.id).state is StudyState.PAUSED
+    assert store.resume_study(record.id).state is StudyState.QUEUED
+    assert store.cancel_study(record.id).state is StudyState.CANCELLING
+    assert store.cancel_study(record.id).state is StudyState.CANCELLING
+    with pytest.raises(TransitionError):
+        store.resume_study(record.id)
+
+
+def test_every_change_raises_the_revision(store: Store) -> None:
+    record = create(store)
+    epoch = store.take_over("test")
+    revisions = [record.revision]
+    chunk = store.open_chunks(record.number)[0]
+    for change in (
+        lambda: store.claim(epoch, [chunk]),
+        lambda: store.commit(epoch, chunk, fakes.result(0, 10)),
+        lambda: store.pause_study(record.id),
+        lambda: store.resume_study(record.id),
+        lambda: store.cancel_study(record.id),
+        lambda: store.settle(epoch, record.number),
+    ):
+        change()
+        revisions.append(store.get_study(record.id).revision)
+    assert revisions == sorted(set(revisions))
+
+
+def test_only_ended_studies_are_deleted_and_then_wholly(store: Store) -> None:
+    record, other = create(store, idempotency_key="k", body_hash="a"), create(store)
+    with pytest.raises(StudyBusy, match="queued"):
+        store.delete_study(record.id)
+    finish(store, record)
+    finish(store, other)
+    store.delete_study(record.id)
+    with pytest.raises(StudyNotFound):
+        store.get_study(record.id)
+    assert [study.id for study in store.list_studies().studies] == [other.id]
+    assert len(store.case_rows(other.id)) == 25
+    assert create(store, idempotency_key="k", body_hash="b").id != record.id
+    assert store.check().problems == ((session.sqlite_warning(),) if session.sqlite_warning() else ())
+
+
+# Dispatching
+
+
+def test_claims_are_granted_once_and_only_while_the_study_may_run(store: Store) -> None:
+    record = create(store)
+    epoch = store.take_over("test")
+    chunks = store.open_chunks(record.number)
+    assert store.claim(epoch, chunks[:2]) == chunks[:2]
+    assert store.get_study(record.id).state is StudyState.RUNNING
+    assert store.claim(epoch, chunks) == chunks[2:]
+    store.put_back(epoch, chunks[0], "")
+    store.pause_study(record.id)
+    assert store.claim(epoch, chunks) == []
+    store.resume_study(record.id)
+    assert store.claim(epoch, chunks) == chunks[:1]
+    assert store.claim(epoch, [Chunk(99, 0, 10), Chunk(record.number, 5, 10)]) == []
+
+
+def test_rows_are_there_exactly_once(store: Store) -> None:
+    record = create(store)
+    epoch = store.take_over("test")
+    chunk = store.open_chunks(record.number)[0]
+    assert not store.commit(epoch, chunk, fakes.result(0, 10))
+    store.claim(epoch, [chunk])
+    assert store.commit(epoch, chunk, fakes.result(0, 10))
+    assert not store.commit(epoch, chunk, fakes.result(0, 10))
+    assert len(store.case_rows(record.id)) == 10
+    found = store.get_study(record.id)
+    assert (found.done, found.ok) == (10, 10)
+
+
+def test_a_new_epoch_takes_over_and_the_old_one_can_do_nothing(store: Store) -> None:
+    record = create(store)
+    old = store.take_over("old")
+    chunk = store.open_chunks(record.number)[0]
+    store.claim(old, [chunk])
+    new = store.take_over("new")
+    assert new > old
+    before = store.get_study(record.id)
+    for act in (
+        lambda: store.claim(old, [chunk]),
+        lambda: store.commit(old, chunk, fakes.result(0, 10)),
+        lambda: store.put_back(old, chunk, ""),
+        lambda: store.split(old, chunk, [], ""),
+        lambda: store.quarantine(old, chunk, "crashed", ""),
+        lambda: store.fault(old, record.number, ""),
+        lambda: store.settle(old, record.number),
+        lambda: store.heartbeat(old),
+        lambda: store.release(old),
+    ):
+        with pytest.raises(EpochLostError, match="another dispatcher"):
+            act()
+    assert store.get_study(record.id) == before
+    assert store.claim(new, [chunk]) == [chunk]
+    dispatcher = store.dispatcher()
+    assert dispatcher is not None
+    assert (dispatcher.owner, dispatcher.epoch) == ("new", new)
+
+
+def test_a_stale_result_of_a_returned_claim_is_dropped(store: Store) -> None:
+    record = create(store)
+    epoch = store.take_over("test")
+    chunk = store.open_chunks(record.number)[0]
+    store.claim(epoch, [chunk])
+    store.release(epoch)
+    assert not store.commit(epoch, chunk, fakes.result(0, 10))
+    assert len(store.case_rows(record.id)) == 0
+
+
+def test_a_result_of_other_cases_is_a_fault_of_the_program(store: Store) -> None:
+    record = create(store)
+    epoch = store.take_over("test")
+    chunk = store.open_chunks(record.number)[0]
+    store.claim(epoch, [chunk])
+    with pytest.raises(ValueError, match="is not that of"):
+        store.commit(epoch, chunk, fakes.result(0, 9))
+
+
+def test_failures_are_remembered_and_parts_replace_the_whole(store: Store) -> None:
+    record = create(store)
+    epoch = store.take_over("test")
+    chunk = store.open_chunks(record.number)[0]
+    store.claim(epoch, [chunk])
+    failed = Chunk(record.number, 0, 10, failures=1)
+    store.put_back(epoch, failed, "its process died")
+    assert store.open_chunks(record.number)[0] == failed
+    store.claim(epoch, [failed])
+    parts = [Chunk(record.number, 0, 5, 1), Chunk(record.number, 5, 5, 1)]
+    store.split(epoch, failed, parts, "its process died")
+    assert store.open_chunks(record.number)[:2] == parts
+
+
+def test_quarantine_is_an_ending_without_results(store: Store) -> None:
+    record = create(store, 1)
+    epoch = store.take_over("test")
+    (chunk,) = store.open_chunks(record.number)
+    store.claim(epoch, [chunk])
+    store.quarantine(epoch, chunk, "crashed", "its process died")
+    row = store.case_row(record.id, 0)
+    assert row is not None
+    assert row.ending == "crashed"
+    assert set(row.results.values()) == {None}
+    assert store.settle(epoch, record.number) is StudyState.FAILED
+    assert "crashed" in (store.get_study(record.id).reason or "")
+
+
+def test_a_fault_holds_the_study_without_blame(store: Store) -> None:
+    record = create(store)
+    epoch = store.take_over("test")
+    chunks = store.open_chunks(record.number)
+    store.claim(epoch, chunks)
+    store.put_back(epoch, Chunk(record.number, 0, 10, failures=1), "")
+    store.fault(epoch, record.number, "engine fault")
+    held = store.get_study(record.id)
+    assert (held.state, held.reason) == (StudyState.PAUSED, "engine fault")
+    assert store.open_chunks(record.number) == chunks
+    assert store.resume_study(record.id).reason is None
+    assert store.claim(epoch, chunks) == chunks
+
+
+@pytest.mark.parametrize(("ending", "state"), [("ok", StudyState.FINISHED), ("diverged", StudyState.FAILED)])
+def test_a_study_is_failed_when_no_case_is_ok(store: Store, ending: str, state: StudyState) -> None:
+    record = create(store)
+    finish(store, record, ending)
+    ended = store.get_study(record.id)
+    assert ended.state is state
+    assert ended.finished_at is not None
+    assert store.active_studies() == []
+
+
+def test_settling_waits_for_open_chunks_unless_cancelled(store: Store) -> None:
+    record = create(store)
+    epoch = store.take_over("test")
+    chunk = store.open_chunks(record.number)[0]
+    store.claim(epoch, [chunk])
+    assert store.settle(epoch, record.number) is StudyState.RUNNING
+    store.commit(epoch, chunk, fakes.result(0, 10))
+    store.cancel_study(record.id)
+    assert store.settle(epoch, record.number) is StudyState.CANCELLED
+    assert store.open_chunks(record.number) == []
+    assert store.settle(epoch, record.number) is StudyState.CANCELLED
+    assert len(store.case_rows(record.id)) == 10
+
+
+def test_a_cancelled_study_whose_last_chunk_came_through_is_finished(store: Store) -> None:
+    record = create(store, 5)
+    epoch = store.take_over("test")
+    (chunk,) = store.open_chunks(record.number)
+    store.claim(epoch, [chunk])
+    store.cancel_study(record.id)
+    assert store.commit(epoch, chunk, fakes.result(0, 5))
+    assert store.settle(epoch, record.number) is StudyState.FINISHED
+
+
+# Reading results
+
+
+def test_rows_come_back_bit_for_bit(store: Store) -> None:
+    record = create(store)
+    epoch = store.take_over("test")
+    odd = fakes.result(0, 10)
+    odd.values[:, :] = (
+        np.random.default_rng(1).standard_normal(odd.values.shape) * 10.0 ** np.arange(-300, 300, 60)[:, None]
+    )
+    counts = [index for index, info in enumerate(kernels.result_infos("vibration-drive", 1)) if info.kind == "count"]
+    odd.values[:, counts] = np.arange(10)[:, None]
+    odd.values[3, 0], odd.values[4, counts[0]] = np.nan, np.nan
+    odd.flags[2] = "windup_out_of_data"
+    chunk = store.open_chunks(record.number)[0]
+    store.claim(epoch, [chunk])
+    store.commit(epoch, chunk, odd)
+    block = store.case_rows(record.id)
+    np.testing.assert_array_equal(block.values, odd.values)
+    assert block.cases.tolist() == list(range(10))
+    rows = list(block.rows())
+    assert rows[3].results["shaft.speed.mean"] is None
+    assert rows[4].results["clutches.driving_max"] is None
+    assert rows[5].results["clutches.driving_max"] == 5
+    assert isinstance(rows[5].results["clutches.driving_max"], int)
+    assert rows[2].flags == ("windup_out_of_data",)
+    assert rows[1].flags == ()
+
+
+def test_infinities_are_no_numbers(store: Store) -> None:
+    record = create(store, 1)
+    epoch = store.take_over("test")
+    (chunk,) = store.open_chunks(record.number)
+    store.claim(epoch, [chunk])
+    result = fakes.result(0, 1, "diverged")
+    result.values[0, 0] = np.inf
+    store.commit(epoch, chunk, result)
+    row = store.case_row(record.id, 0)
+    assert row is not None
+    assert row.results["shaft.speed.mean"] is None
+
+
+def test_pages_and_streams_give_every_row_once_in_order(store: Store) -> None:
+    record = create(store)
+    finish(store, record)
+    assert store.case_rows(record.id, after_case=7, limit=3).cases.tolist() == [8, 9, 10]
+    assert np.concatenate([block.cases for block in store.iter_rows(record.id, 4)]).tolist() == list(range(25))
+    np.testing.assert_array_equal(
+        np.concatenate([block.values for block in store.iter_rows(record.id, 4)]), fakes.values(0, 25)
+    )
+    assert store.case_row(record.id, 25) is None
+
+
+def test_columns_are_aligned_with_the_cases_asked_for(store: Store) -> None:
+    record = create(store)
+    epoch = store.take_over("test")
+    for chunk in store.open_chunks(record.number)[:2]:
+        store.claim(epoch, [chunk])
+        store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+    names = ["shaft.speed.max", "shaft.speed.mean"]
+    for cases in ([19, 3, 3, 22, 0], list(range(5, 15)), [], [24]):
+        found = store.rows_for_cases(record.id, cases, names)
+        assert found.cases.tolist() == cases
+        assert found.endings == ["ok" if case < 20 else None for case in cases]
+        for name, column in (("shaft.speed.max", 1), ("shaft.speed.mean", 0)):
+            expected = [case * 1000.0 + column if case < 20 else np.nan for case in cases]
+            np.testing.assert_array_equal(found.values[name], expected)
+    with pytest.raises(KeyError):
+        store.rows_for_cases(record.id, [0], ["no.such"])
+
+
+def test_many_scattered_cases_are_read_in_several_statements(store: Store) -> None:
+    store.chunking = Chunking(cases=20_000)
+    record = create(store, 20_000)
+    finish(store, record)
+    cases = np.random.default_rng(2).permutation(20_000)[:12_000]
+    found = store.rows_for_cases(record.id, cases, ["shaft.speed.mean"])
+    np.testing.assert_array_equal(found.values["shaft.speed.mean"], cases * 1000.0)
+
+
+# Progress
+
+
+def test_progress_counts_and_tells_the_time_left(store: Store, clock: fakes.HandClock) -> None:
+    record = create(store, 100)
+    assert store.progress(record.id).rate is None
+    epoch = store.take_over("test")
+    for index, chunk in enumerate(store.open_chunks(record.number)[:4]):
+        store.claim(epoch, [chunk])
+        clock.seconds += 5.0
+        store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count, "diverged" if index == 1 else "ok"))
+    progress = store.progress(record.id)
+    assert (progress.total, progress.done, progress.ok) == (100, 40, 30)
+    assert progress.endings == {"ok": 30, "diverged": 10}
+    assert progress.rate == pytest.approx(2.0)
+    assert progress.seconds_left is not None
+    low, high = progress.seconds_left
+    assert low < 30.0 < high <= 40.0
+    store.pause_study(record.id)
+    assert store.progress(record.id).seconds_left is None
+    clock.seconds += 1000.0
+    store.resume_study(record.id)
+    assert store.progress(record.id).seconds_left == progress.seconds_left

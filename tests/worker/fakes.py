@@ -1,0 +1,90 @@
+"""Stand-ins for the engine and the clock. Importable by name, because spawned processes look them up."""
+
+from __future__ import annotations
+
+import os
+import signal
+from datetime import UTC, datetime, timedelta
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker import kernels
+from worker.kernels import ChunkResult, ChunkTask, KernelShape
+from worker.study import Axis, Study
+
+BASE = {
+    "excitation.frequency": 25.0,
+    "excitation.amplitude_x": 2e-3,
+    "excitation.amplitude_y": 2e-3,
+    "pendulums.0.inertia": 1e-3,
+    "pendulums.0.mass": 0.5,
+    "pendulums.0.arm": 0.03,
+    "pendulums.0.spring_rate": 9000.0,
+    "pendulums.0.spring_arm": 0.05,
+    "pendulums.0.damping": 0.01,
+    "pendulums.0.backlash": 0.005,
+    "shaft.inertia": 2e-3,
+    "shaft.load": 0.1,
+    "clutch.coefficients.0": 0.0,
+    "clutch.coefficients.1": 200.0,
+}
+RUN = {"duration": [3.0, "periods"], "window": None, "tolerance": 1e-9, "reset": "contact"}
+RESULTS = len(kernels.result_infos("vibration-drive", 1))
+
+
+def study(cases: int, name: str = "a study") -> Study:
+    """A study of that many cases over the load."""
+    loads = tuple((np.arange(cases) * 1e-3).tolist())
+    return Study("vibration-drive", name, dict(BASE), dict(RUN), (Axis(("shaft.load",), loads),))
+
+
+def values(first: int, count: int) -> NDArray[np.float64]:
+    """Numbers that tell which case they are of: shape (count, results)."""
+    cases = np.arange(first, first + count, dtype=np.float64)[:, None]
+    return np.ascontiguousarray(cases * 1000.0 + np.arange(RESULTS))
+
+
+def result(first: int, count: int, ending: str = kernels.OK) -> ChunkResult:
+    """The result of a chunk whose cases all end in the same way."""
+    return ChunkResult(first, [ending] * count, [""] * count, values(first, count))
+
+
+def run(
+    task: ChunkTask, *, crash: frozenset[int] = frozenset(), hang: frozenset[int] = frozenset(), failing: bool = False
+) -> ChunkResult:
+    """Run a chunk at once; cases in ``crash`` take the process with them, those in ``hang`` never come back."""
+    for case in range(task.first, task.first + task.count):
+        if case in crash:
+            os.kill(os.getpid(), signal.SIGKILL)
+        if case in hang:
+            signal.pause()
+    return result(task.first, task.count, kernels.Ending.DIVERGED if failing else kernels.OK)
+
+
+def raising(task: ChunkTask) -> ChunkResult:
+    """A fault of the program in every chunk."""
+    raise ZeroDivisionError("no such thing")
+
+
+def load(shape: KernelShape) -> None:
+    """No kernel is needed."""
+
+
+def faulty(**faults: frozenset[int]) -> partial[ChunkResult]:
+    """`run` with faults, to give to an executor."""
+    return partial(run, **faults)
+
+
+class HandClock:
+    """A clock that stands still until it is moved."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+
+    def now(self) -> datetime:
+        return datetime(2026, 1, 1, tzinfo=UTC) + timedelta(seconds=self.seconds)
+
+    def monotonic(self) -> float:
+        return self.seconds

@@ -1,0 +1,300 @@
+"""The state machine of dispatch: every case ends exactly once, and the right one gets the blame."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from worker.chunking import spans
+from worker.dispatch import (
+    Cancelled,
+    Commit,
+    Dispatch,
+    Ended,
+    Event,
+    Fault,
+    Instruction,
+    Offered,
+    Paused,
+    PutBack,
+    Quarantine,
+    Refused,
+    Run,
+    Settle,
+    Split,
+    Stop,
+    disjoint,
+    halves,
+)
+from worker.ports import Chunk, Fate
+
+
+class World:
+    """A store and an executor in a few dictionaries, in which chosen cases crash or hang."""
+
+    def __init__(self, capacity: int, crash: Collection[tuple[int, int]] = (), hang: Collection[tuple[int, int]] = ()):
+        self.machine = Dispatch(capacity)
+        self.crash, self.hang = set(crash), set(hang)
+        self.waiting: dict[int, set[Chunk]] = {}
+        self.claimed: dict[int, set[Chunk]] = {}
+        self.flying: dict[int, Chunk] = {}
+        self.rows: dict[tuple[int, int], str] = {}
+        self.settled: list[int] = []
+        self.faults: dict[int, str] = {}
+        self.stopping: set[int] = set()
+        self.refusing = False
+        self.most_flying = 0
+
+    def submit(self, study: int, cases: int, size: int) -> None:
+        self.waiting[study] = {Chunk(study, first, count) for first, count in spans(cases, size)}
+        self.claimed[study] = set()
+        self.offer(study)
+
+    def offer(self, study: int) -> None:
+        self.send(Offered(study, sorted(self.waiting[study], key=lambda chunk: chunk.first)))
+
+    def send(self, event: Event) -> None:
+        for instruction in self.machine.handle(event):
+            self.do(instruction)
+
+    def do(self, instruction: Instruction) -> None:
+        match instruction:
+            case Run(ticket, chunk):
+                assert chunk in self.waiting[chunk.study]
+                if self.refusing:
+                    self.send(Refused(ticket))
+                    return
+                self.move(chunk, self.waiting, self.claimed)
+                assert ticket not in self.flying
+                self.flying[ticket] = chunk
+                self.most_flying = max(self.most_flying, len(self.flying))
+            case Commit(_, chunk):
+                self.end(chunk, "ok")
+            case Quarantine(chunk, ending, _):
+                assert chunk.count == 1
+                self.end(chunk, ending.value)
+            case PutBack(chunk, _):
+                self.claimed[chunk.study] = {
+                    claimed for claimed in self.claimed[chunk.study] if claimed.first != chunk.first
+                }
+                self.waiting[chunk.study].add(chunk)
+            case Split(chunk, parts, _):
+                assert [case for part in parts for case in range(part.first, part.last + 1)] == list(
+                    range(chunk.first, chunk.last + 1)
+                )
+                self.claimed[chunk.study].remove(chunk)
+                self.waiting[chunk.study].update(parts)
+            case Stop(ticket):
+                self.stopping.add(ticket)
+            case Fault(study, reason):
+                self.faults[study] = reason
+                self.waiting[study] |= self.claimed[study]
+                self.claimed[study].clear()
+            case Settle(study):
+                assert not any(chunk.study == study for chunk in self.flying.values())
+                self.settled.append(study)
+
+    @staticmethod
+    def move(chunk: Chunk, source: dict[int, set[Chunk]], target: dict[int, set[Chunk]]) -> None:
+        source[chunk.study].remove(chunk)
+        target[chunk.study].add(chunk)
+
+    def end(self, chunk: Chunk, ending: str) -> None:
+        self.claimed[chunk.study].remove(chunk)
+        for case in range(chunk.first, chunk.last + 1):
+            assert (chunk.study, case) not in self.rows
+            self.rows[chunk.study, case] = ending
+
+    def fate(self, chunk: Chunk) -> Fate:
+        for case in range(chunk.first, chunk.last + 1):
+            if (chunk.study, case) in self.crash:
+                return Fate.CRASHED
+            if (chunk.study, case) in self.hang:
+                return Fate.TIMED_OUT
+        return Fate.DONE
+
+    def finish(self, ticket: int, fate: Fate | None = None) -> None:
+        chunk = self.flying.pop(ticket)
+        stopped = Fate.STOPPED if ticket in self.stopping else None
+        self.send(Ended(ticket, fate or stopped or self.fate(chunk), "so it went"))
+
+    def run(self, random: Random) -> None:
+        """Let chunks come to their ends in any order until nothing is in flight."""
+        while self.flying:
+            self.finish(random.choice(sorted(self.flying)))
+
+
+@given(
+    capacity=st.integers(1, 6),
+    sizes=st.lists(st.tuples(st.integers(1, 60), st.integers(1, 20)), min_size=1, max_size=3),
+    bad=st.sets(st.tuples(st.integers(0, 2), st.integers(0, 59)), max_size=2),
+    hanging=st.sets(st.tuples(st.integers(0, 2), st.integers(0, 59)), max_size=6),
+    random=st.randoms(use_true_random=False),
+)
+def test_every_case_ends_exactly_once_and_the_bad_ones_are_named(
+    capacity: int,
+    sizes: list[tuple[int, int]],
+    bad: set[tuple[int, int]],
+    hanging: set[tuple[int, int]],
+    random: Random,
+) -> None:
+    world = World(capacity, crash=bad, hang=hanging - bad)
+    for study, (cases, size) in enumerate(sizes):
+        world.submit(study, cases, size)
+    world.run(random)
+    expected = {}
+    for study, (cases, _) in enumerate(sizes):
+        for case in range(cases):
+            key = (study, case)
+            expected[key] = "crashed" if key in bad else "timed_out" if key in hanging else "ok"
+    assert world.rows == expected
+    assert sorted(world.settled) == list(range(len(sizes)))
+    assert not world.faults
+    assert world.most_flying <= capacity
+    assert world.machine.in_flight == 0
+    assert not world.machine.studies
+
+
+@given(
+    capacity=st.integers(1, 6),
+    cases=st.integers(1, 60),
+    size=st.integers(1, 20),
+    kills=st.integers(0, 12),
+    random=st.randoms(use_true_random=False),
+)
+def test_random_deaths_pauses_and_refusals_lose_and_double_nothing(
+    capacity: int, cases: int, size: int, kills: int, random: Random
+) -> None:
+    world = World(capacity)
+    world.submit(0, cases, size)
+    while not world.settled:
+        action = random.choice(["finish", "finish", "kill", "pause", "refuse", "offer", "stop"])
+        world.refusing = action == "refuse"
+        if action == "pause":
+            world.send(Paused(0))
+        elif action == "offer" or not world.flying:
+            world.offer(0)
+        elif action == "kill" and kills:
+            kills -= 1
+            world.finish(random.choice(sorted(world.flying)), Fate.CRASHED)
+        elif action == "stop":
+            world.finish(random.choice(sorted(world.flying)), Fate.STOPPED)
+        else:
+            world.finish(random.choice(sorted(world.flying)))
+        if 0 in world.faults:
+            world.faults.clear()
+            world.flying.clear()
+            world.refusing = False
+            world.machine = Dispatch(capacity)
+            world.offer(0)
+    world.refusing = False
+    assert sorted(world.rows) == [(0, case) for case in range(cases)]
+
+
+@given(capacity=st.integers(1, 8), cases=st.integers(3, 200), size=st.integers(1, 64), random=st.randoms())
+def test_when_everything_crashes_the_study_is_held_and_nobody_blamed(
+    capacity: int, cases: int, size: int, random: Random
+) -> None:
+    world = World(capacity, crash={(0, case) for case in range(cases)})
+    world.submit(0, cases, size)
+    world.run(random)
+    assert not world.rows
+    assert "engine fault" in world.faults[0]
+    assert not world.settled
+    assert 0 not in world.machine.studies
+    open_cases = sorted(case for chunk in world.waiting[0] for case in range(chunk.first, chunk.last + 1))
+    assert open_cases == list(range(cases))
+
+
+@given(
+    capacity=st.integers(1, 6),
+    sizes=st.lists(st.tuples(st.integers(1, 60), st.integers(1, 20)), min_size=2, max_size=3),
+    after=st.integers(0, 8),
+    random=st.randoms(use_true_random=False),
+)
+def test_cancelling_keeps_what_is_done_and_starts_nothing_more(
+    capacity: int, sizes: list[tuple[int, int]], after: int, random: Random
+) -> None:
+    world = World(capacity)
+    for study, (cases, size) in enumerate(sizes):
+        world.submit(study, cases, size)
+    for _ in range(after):
+        if world.flying:
+            world.finish(random.choice(sorted(world.flying)))
+    cancelled = 0 not in world.settled
+    kept = {key for key in world.rows if key[0] == 0}
+    if cancelled:
+        world.send(Cancelled(0))
+        world.send(Cancelled(0) if world.flying else Paused(0))
+    world.run(random)
+    assert world.settled.count(0) == 1
+    assert {key for key in world.rows if key[0] == 0} == kept
+    for study, (cases, _) in enumerate(sizes[1:], start=1):
+        assert sum(key[0] == study for key in world.rows) == cases
+
+
+def test_studies_share_the_capacity_the_oldest_first() -> None:
+    world = World(4)
+    world.submit(1, 100, 1)
+    assert [chunk.study for chunk in world.flying.values()] == [1, 1, 1, 1]
+    world.submit(2, 100, 1)
+    for _ in range(3):
+        world.finish(min(world.flying))
+    assert sorted(chunk.study for chunk in world.flying.values()) == [1, 1, 2, 2]
+    for _ in range(40):
+        world.finish(min(world.flying))
+        assert sorted(chunk.study for chunk in world.flying.values()) == [1, 1, 2, 2]
+
+
+def test_a_crashing_chunk_is_run_again_whole_before_it_is_split() -> None:
+    machine = Dispatch(1)
+    (first,) = machine.handle(Offered(0, [Chunk(0, 0, 8)]))
+    assert first == Run(1, Chunk(0, 0, 8))
+    assert machine.handle(Ended(1, Fate.CRASHED, "x")) == [
+        PutBack(Chunk(0, 0, 8, 1), "x"),
+        Run(2, Chunk(0, 0, 8, 1)),
+    ]
+    split, again = machine.handle(Ended(2, Fate.CRASHED, "x"))
+    assert split == Split(Chunk(0, 0, 8, 1), (Chunk(0, 0, 4, 1), Chunk(0, 4, 4, 1)), "x")
+    assert again == Run(3, Chunk(0, 0, 4, 1))
+
+
+def test_a_case_alone_has_two_lives_of_its_own() -> None:
+    assert halves(Chunk(0, 6, 2, 1)) == (Chunk(0, 6, 1), Chunk(0, 7, 1))
+    assert halves(Chunk(0, 6, 3, 1)) == (Chunk(0, 6, 1), Chunk(0, 7, 2, 1))
+
+
+def test_one_success_forgives_the_crashes_before_it() -> None:
+    world = World(1, crash={(0, 0), (0, 1), (0, 3), (0, 4)})
+    world.submit(0, 6, 1)
+    world.run(Random(0))
+    assert {case for (_, case), ending in world.rows.items() if ending == "crashed"} == {0, 1, 3, 4}
+
+
+def test_crashes_of_one_study_do_not_hide_behind_the_successes_of_another() -> None:
+    world = World(2, crash={(1, case) for case in range(50)})
+    world.submit(0, 50, 1)
+    world.submit(1, 50, 1)
+    world.run(Random(0))
+    assert list(world.faults) == [1]
+    assert world.settled == [0]
+
+
+@pytest.mark.parametrize(
+    ("ranges", "count"),
+    [([], 0), ([(0, 16), (0, 8), (4, 4)], 1), ([(0, 8), (8, 8)], 2), ([(0, 16), (0, 4), (4, 4), (9, 1)], 3)],
+)
+def test_overlapping_chunks_count_once(ranges: list[tuple[int, int]], count: int) -> None:
+    assert disjoint(Chunk(0, first, size) for first, size in ranges) == count
+
+
+def test_events_about_unknown_things_do_nothing() -> None:
+    machine = Dispatch(2)
+    for event in (Paused(7), Refused(3), Ended(5, Fate.DONE)):
+        assert machine.handle(event) == []
+    assert machine.handle(Offered(1)) == [Settle(1)]
+    assert machine.handle(Cancelled(9)) == [Settle(9)]
