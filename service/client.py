@@ -13,7 +13,6 @@ from urllib.parse import quote
 
 import httpx
 
-DEFAULT_SERVER = "http://127.0.0.1:8000"
 _API = "/api/v1"
 #: Seconds to wait for an answer; curves of a large study are read from disk first.
 _TIMEOUT = httpx.Timeout(60.0, connect=10.0)
@@ -73,14 +72,14 @@ class ServiceClient:
         When ``server`` is no http address.
     """
 
-    def __init__(self, server: str = DEFAULT_SERVER, token: str | None = None) -> None:
+    def __init__(self, server: str, token: str | None = None) -> None:
         self.server = server.rstrip("/")
         try:
             url = httpx.URL(self.server)
         except httpx.InvalidURL as error:
             raise ValueError(f"{server!r} is no address: {error}") from error
         if url.scheme not in ("http", "https") or not url.host:
-            raise ValueError(f"{server!r} is no address of a service, such as {DEFAULT_SERVER}")
+            raise ValueError(f"{server!r} is no address of a service, such as http://127.0.0.1:8000")
         headers = {"Authorization": f"Bearer {token}"} if token else {}
         # A proxy of the environment never leads to this machine itself.
         self._http = httpx.Client(
@@ -140,13 +139,6 @@ class ServiceClient:
     def picture(self, study_id: str, query: Query, form: str) -> Iterator[bytes]:
         """The picture of curves as "svg", "png" or "pdf"."""
         return self.download(f"{_study(study_id)}/curves", [*query, ("format", form)])
-
-    def ready(self) -> bool:
-        """Whether the service is up and its database usable."""
-        try:
-            return self._http.get("/readyz").is_success
-        except httpx.HTTPError:
-            return False
 
     def _json(self, method: str, path: str, **arguments: Any) -> dict[str, Any]:
         try:

@@ -1,5 +1,21 @@
 """The command line: ``sprag``. Its entry is `main`; each module holds the commands of one subject."""
 
-from service.cli.app import main
+import signal
+import sys
+from typing import NoReturn
+
+
+def main() -> NoReturn:
+    """Run the command of the process' arguments and end the process with its exit code."""
+    # A termination ends a command in order, as Ctrl-C does: files and processes are cleared away.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        from service.cli.app import execute
+
+        code = execute(sys.argv[1:])
+    except KeyboardInterrupt:  # while the program is still being loaded, or already done
+        code = 130
+    sys.exit(code)
+
 
 __all__ = ["main"]

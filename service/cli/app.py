@@ -6,14 +6,13 @@ import json
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import NoReturn
 
 import typer
 
 from service.cli import database, demo, doctor, fit, local, processes, remote
-from service.cli.console import CommandFailureError, ExitCode, say
+from service.cli.console import CommandFailureError, ExitCode, TroubleError, say
 
 #: Set to anything to see where a fault of the program lies.
 DEBUG_VARIABLE = "SPRAG_DEBUG"
@@ -27,7 +26,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 
-for _title, _commands in {
+_COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
     "Run here": {
         "run": local.run,
         "validate": local.validate,
@@ -53,15 +52,11 @@ for _title, _commands in {
         "curve": remote.curve,
         "export": remote.export,
     },
-}.items():
+}
+for _title, _commands in _COMMANDS.items():
     for _name, _command in _commands.items():
         app.command(_name, rich_help_panel=_title)(_command)
 app.add_typer(database.app, name="db", rich_help_panel="Run a service")
-
-
-def main() -> NoReturn:
-    """Run the command of the process' arguments and end the process with its exit code."""
-    sys.exit(execute(sys.argv[1:]))
 
 
 def execute(arguments: Sequence[str]) -> int:
@@ -76,6 +71,10 @@ def execute(arguments: Sequence[str]) -> int:
     except (BrokenPipeError, _PipeClosedError):
         _drop_output()
         code = ExitCode.PIPE_CLOSED
+    except OSError as error:  # a full disk, or no right to write where temporary files go
+        _drop_output()
+        failure = TroubleError(f"{error.filename or 'standard output'}: {(error.strerror or str(error)).lower()}")
+        code = _report(failure, "--json" in arguments)
     return int(code)
 
 
@@ -84,21 +83,23 @@ class _PipeClosedError(Exception):
 
 
 def _invoke(arguments: Sequence[str]) -> int:
-    from worker.ports import StoreError
+    from worker.ports import ExecutorError, StoreError
 
     as_json = "--json" in arguments
     try:
-        return int(app(list(arguments), prog_name="sprag", standalone_mode=False) or ExitCode.DONE)
+        code = app(list(arguments), prog_name="sprag", standalone_mode=False) or ExitCode.DONE
+        if code == ExitCode.INTERRUPTED:  # as typer returns Ctrl-C
+            say("interrupted")
+        return int(code)
     except CommandFailureError as failure:
         return _report(failure, as_json)
-    except StoreError as error:
-        return _report(_trouble(str(error)), as_json)
+    except (StoreError, ExecutorError) as error:
+        return _report(TroubleError(str(error)), as_json)
     except typer.TyperException as error:
         return _usage(error, as_json)
-    except (KeyboardInterrupt, typer.Abort):
-        say("interrupted")
+    except typer.Abort:
         return ExitCode.INTERRUPTED
-    except BrokenPipeError:
+    except OSError:
         raise
     except SystemExit as stop:
         # typer turns a broken pipe into exit 1, which here would mean that some cases failed.
@@ -107,11 +108,7 @@ def _invoke(arguments: Sequence[str]) -> int:
         if os.environ.get(DEBUG_VARIABLE):
             traceback.print_exc()
         sentence = f"This is a fault of Sprag: {type(error).__name__}: {error}. {DEBUG_VARIABLE}=1 shows where it lies."
-        return _report(_trouble(sentence), as_json)
-
-
-def _trouble(message: str) -> CommandFailureError:
-    return CommandFailureError(message)
+        return _report(TroubleError(sentence), as_json)
 
 
 def _usage(error: typer.TyperException, as_json: bool) -> int:

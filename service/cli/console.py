@@ -140,6 +140,17 @@ def duration_text(seconds: float) -> str:
     return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
 
 
+def progress_text(state: str, rate: float | None, seconds_left: tuple[float, float] | None) -> str:
+    """How a study is going, beside its bar: state, cases per second, time left."""
+    parts = [str(state)]
+    if rate:
+        parts.append(f"{rate:.3g} cases/s")
+    if seconds_left is not None:
+        low, high = map(duration_text, seconds_left)
+        parts.append(f"{low} left" if low == high else f"{low} to {high} left")
+    return ", ".join(parts)
+
+
 @contextmanager
 def progress_bar(description: str) -> Iterator[Callable[[int, int, str], None]]:
     """A bar on standard error while something runs; nothing at all where standard error is no terminal.

@@ -33,7 +33,7 @@ class Finding:
 
 
 def doctor(db: Database = None, as_json: JsonFlag = False) -> None:
-    """Look at versions, database, disk, kernel cache and the engine's known values. Exit code 3 when something is wrong."""
+    """Look at versions, database, disk, kernel cache and known values of the engine; exit code 3 when one is wrong."""
     findings = list(examine(db))
     sound = all(finding.ok for finding in findings)
     if as_json:

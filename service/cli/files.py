@@ -6,7 +6,7 @@ import errno
 import os
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Literal
@@ -36,16 +36,12 @@ def read_bytes(path: str, limit: int) -> bytes:
 
     Raises WrongInputError when there is no such file, it is a directory, cannot be read or is too large.
     """
-    try:
+    with _told(path):
         if path == "-":
             data = sys.stdin.buffer.read(limit + 1)
         else:
             with Path(path).open("rb") as file:
                 data = file.read(limit + 1)
-    except OSError as error:
-        raise file_failure(path, error) from error
-    except ValueError as error:  # a zero byte in the name
-        raise WrongInputError(f"{path!r} is no file name") from error
     if len(data) > limit:
         raise WrongInputError(f"{path}: larger than the allowed {limit} bytes")
     return data
@@ -106,50 +102,83 @@ def spec_failure(path: str, error: SpecError) -> WrongInputError:
     return WrongInputError(f"{path}: the spec is not valid", problems=error.problems)
 
 
-@contextmanager
-def output(path: str | None) -> Iterator[IO[bytes]]:
-    """A binary file to write a result to: standard output for None and "-", else a file that appears only when whole.
+Write = Callable[[bytes], None]
 
+
+@contextmanager
+def output(path: str | None) -> Iterator[Write]:
+    """A function that writes bytes to standard output (None and "-") or to a file that appears only when it is whole.
+
+    Whether the file can be written is found at the start, before anything is computed for it.
     Raises WrongInputError or TroubleError when it cannot be written.
     """
     if path is None or path == "-":
         sys.stdout.flush()
-        yield sys.stdout.buffer
-        sys.stdout.buffer.flush()
+        yield _writer(sys.stdout.buffer, "standard output")
+        with _told("standard output"):
+            sys.stdout.buffer.flush()
         return
     target = Path(path)
-    if target.is_dir():
-        raise WrongInputError(f"{path}: is a directory")
-    if target.exists() and not target.is_file():  # a device or a pipe: written through, never replaced
-        yield from _written_through(target)
-        return
-    yield from _replaced(target)
+    with _told(target):
+        if target.is_dir():
+            raise WrongInputError(f"{path}: is a directory")
+        through = target.exists() and not target.is_file()  # a device or a pipe is written to, never replaced
+    if through:
+        with _told(target):
+            file = target.open("wb")
+        with _closed(file, target):
+            yield _writer(file, target)
+    else:
+        yield from _replaced(target)
 
 
-def _written_through(target: Path) -> Iterator[IO[bytes]]:
-    try:
-        with target.open("wb") as file:
-            yield file
-    except OSError as error:
-        raise file_failure(target, error) from error
-
-
-def _replaced(target: Path) -> Iterator[IO[bytes]]:
-    try:
+def _replaced(target: Path) -> Iterator[Write]:
+    with _told(target):
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:100]}.", suffix=".part")
-    except (OSError, ValueError) as error:
-        failure = error if isinstance(error, OSError) else OSError(errno.EINVAL, "no file name")
-        raise file_failure(target, failure) from error
     try:
-        with os.fdopen(handle, "wb") as file:
-            yield file
-        os.chmod(name, 0o666 & ~_umask())
-        os.replace(name, target)
-    except OSError as error:
-        raise file_failure(target, error) from error
+        file = os.fdopen(handle, "wb")
+        with _closed(file, target):
+            yield _writer(file, target)
+        with _told(target):
+            os.chmod(name, 0o666 & ~_umask())
+            os.replace(name, target)
     finally:
         with suppress(FileNotFoundError):
             os.unlink(name)
+
+
+@contextmanager
+def _told(path: Path | str) -> Iterator[None]:
+    """Errors of the operating system become failures that name the file; a closed pipe is nobody's failure."""
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise file_failure(path, error) from error
+    except ValueError as error:  # a zero byte in the name
+        raise WrongInputError(f"{path!r} is no file name") from error
+
+
+@contextmanager
+def _closed(file: IO[bytes], path: Path) -> Iterator[None]:
+    """Close the file at the end, also telling what only closing finds; after a failure, close it without a word."""
+    try:
+        yield
+    except BaseException:
+        with suppress(OSError):
+            file.close()
+        raise
+    with _told(path):
+        file.close()
+
+
+def _writer(file: IO[bytes], path: Path | str) -> Write:
+    def write(piece: bytes) -> None:
+        with _told(path):
+            file.write(piece)
+
+    return write
 
 
 def _umask() -> int:
@@ -161,8 +190,8 @@ def _umask() -> int:
 def write_pieces(path: str | None, pieces: Iterable[bytes]) -> int:
     """Write the pieces to ``path`` (see `output`); the number of bytes."""
     written = 0
-    with output(path) as file:
+    with output(path) as write:
         for piece in pieces:
-            file.write(piece)
+            write(piece)
             written += len(piece)
     return written

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,21 +11,31 @@ from service.cli.console import (
     ExitCode,
     WrongInputError,
     duration_text,
+    progress_bar,
+    progress_text,
     say,
     show_table,
     write_json,
     write_text,
 )
-from service.cli.files import read_study, write_pieces
-from service.cli.options import ChunkCases, Database, JsonFlag, OutputFile, Processes, SpecFile
+from service.cli.files import output, read_study, write_pieces
+from service.cli.options import ChunkCases, JsonFlag, OutputFile, Processes, SpecFile
 from service.cli.remote import TableFormat, table_format
+from service.cli.settings import read_settings
 from service.spec_messages import Problem
 from worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from service.local import LocalRun
+    from service.settings import Settings
     from service.spec import ParsedSpec
     from worker.kernels import Trajectory
     from worker.study import Study
+
+#: A pool of processes starts in about two seconds.
+_NO_POOL_SECONDS = 1.0
 
 
 def validate(spec: SpecFile, as_json: JsonFlag = False) -> None:
@@ -58,10 +69,9 @@ def _say_warnings(parsed: ParsedSpec) -> None:
 def preview(spec: SpecFile, processes: Processes = None, as_json: JsonFlag = False) -> None:
     """Tell what a study would be: number of cases, time, size, first cases. Nothing is run."""
     from service.preview import preview_json
-    from service.settings import Settings
 
     parsed = read_study(spec)
-    made = preview_json(parsed, processes or Settings().pool_processes)
+    made = preview_json(parsed, read_settings(processes=processes).pool_processes)
     if as_json:
         write_json(made)
         return
@@ -156,9 +166,58 @@ def run(
     spec: SpecFile,
     file: OutputFile = None,
     form: Annotated[TableFormat | None, typer.Option("--format", help="Default: as FILE ends, else csv.")] = None,
-    db: Database = None,
+    db: Annotated[
+        str | None, typer.Option("--db", metavar="URL", help="Database to keep the study in; default: a passing one.")
+    ] = None,
     processes: Processes = None,
     chunk: ChunkCases = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Run a study here, without a service: rows on standard output or in FILE, progress on standard error."""
+    from service.local import run_here
+
+    parsed = read_study(spec)
+    settings = read_settings(database=db, processes=processes, chunk_cases=chunk)
+    _say_warnings(parsed)
+    start = time.monotonic()
+    with (
+        output(file) as write,
+        progress_bar(parsed.study.name or "study") as update,
+        run_here(
+            parsed.spec,
+            parsed.study,
+            processes=_pool_size(parsed.study, settings, processes),
+            database_url=settings.database_url if db is not None else None,
+            chunk_cases=settings.chunk_cases,
+            chunk_timeout=settings.chunk_timeout,
+            warnings=parsed.warnings,
+            on_progress=lambda now: update(now.done, now.total, progress_text(now.state, now.rate, now.seconds_left)),
+        ) as done,
+    ):
+        for piece in _rows(done, parsed.study, table_format(form, file, as_json)):
+            write(piece)
+        record = done.record
+    kept = f", kept as {record.id}" if db is not None else ""
+    say(f"{record.done} of {record.cases} cases done, {record.ok} ok, {time.monotonic() - start:.1f} s{kept}")
+    if record.ok != record.cases:
+        raise typer.Exit(ExitCode.NOT_ALL_OK)
+
+
+def _pool_size(study: Study, settings: Settings, asked: int | None) -> int:
+    """Processes to run on; 0, which is this process itself, where starting a pool would take longer than the study."""
+    from worker.kernels import estimate_seconds_per_case
+
+    if asked is None and study.cases * estimate_seconds_per_case(study) < _NO_POOL_SECONDS:
+        return 0
+    return settings.pool_processes
+
+
+def _rows(done: LocalRun, study: Study, form: str) -> Iterator[bytes]:
+    """The rows of a finished study, as the service exports them."""
+    from service.exports import Source, export
+    from worker.kernels import study_results
+
+    record = done.record
+    about = {"study": record.id, "name": record.name, "model": record.model, "engine_version": record.engine_version}
+    source = Source(study, study_results(study), done.store.iter_rows(record.id), about)
+    return export(source, "csv" if form == "csv" else "json")

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from service.client import DEFAULT_SERVER
+#: Where `sprag serve` listens unless told otherwise.
+DEFAULT_SERVER = "http://127.0.0.1:8000"
 
 JsonFlag = Annotated[
     bool, typer.Option("--json", help="Data as JSON on standard output, failures as JSON on standard error.")

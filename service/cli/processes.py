@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import secrets
+import sys
 from typing import Annotated
 
 import typer
 
-from service.cli.console import WrongInputError, write_json
+from service.cli.console import TroubleError, WrongInputError, say, write_json
 from service.cli.options import ChunkCases, Database, JsonFlag, Processes
 from service.cli.settings import read_settings
 
@@ -23,22 +24,38 @@ def serve(
     chunk: ChunkCases = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Start the service and its worker; Ctrl-C ends both."""
+    """Start the service and its worker; Ctrl-C ends both. With --json the address comes on standard output."""
+    from service.serve import AddressError
     from service.serve import serve as run_service
     from service.settings import UnsafeSettingsError
 
     settings = read_settings(host=host, port=port, database=db, processes=processes, chunk_cases=chunk)
+
+    def announce(address: str) -> None:
+        if as_json:
+            write_json({"address": address})
+            sys.stdout.flush()
+        else:
+            say(f"Sprag serves at {address} (Ctrl-C ends it).")
+
     try:
-        settings.require_safe()
+        run_service(settings, announce=announce)
     except UnsafeSettingsError as error:
         raise WrongInputError(str(error)) from error
-    run_service(settings)
+    except AddressError as error:
+        raise TroubleError(str(error)) from error
 
 
-def worker(
-    db: Database = None, processes: Processes = None, chunk: ChunkCases = None, as_json: JsonFlag = False
-) -> None:
+def worker(db: Database = None, processes: Processes = None) -> None:
     """Run the studies of a database without a service; Ctrl-C ends it."""
+    from service.dispatching import WorkerSettings, run_dispatcher, stop_on_signals
+
+    settings = read_settings(database=db, processes=processes)
+    run_dispatcher(
+        WorkerSettings(settings.database_url, settings.pool_processes, settings.chunk_timeout),
+        stop_on_signals(),
+        say=say,
+    )
 
 
 def token(as_json: JsonFlag = False) -> None:

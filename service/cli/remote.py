@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import StrEnum
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,18 +16,19 @@ from service.cli.console import (
     TroubleError,
     WrongInputError,
     cell_text,
-    duration_text,
     progress_bar,
+    progress_text,
     say,
     show_table,
     write_json,
 )
 from service.cli.files import read_spec, write_pieces
 from service.cli.options import DEFAULT_SERVER, JsonFlag, OutputFile, Server, SpecFile, StudyId, Token
-from service.client import RefusedError, ServiceClient, UnreachableError
 from service.spec_messages import Problem
-from worker.kernels import OK
 from worker.states import TERMINAL, StudyState
+
+if TYPE_CHECKING:
+    from service.client import RefusedError, ServiceClient
 
 #: Seconds between two looks at a study that is being watched.
 _POLL_SECONDS = 0.25
@@ -45,6 +46,8 @@ class TableFormat(StrEnum):
 @contextmanager
 def connection(server: str, token: str | None) -> Iterator[ServiceClient]:
     """A client of the service; its failures become failures of the command."""
+    from service.client import RefusedError, ServiceClient, UnreachableError
+
     try:
         client = ServiceClient(server, token)
     except ValueError as error:
@@ -118,7 +121,7 @@ def follow(client: ServiceClient, study_id: str) -> dict[str, Any]:
         while True:
             study = client.study(study_id)
             progress = study["progress"]
-            update(progress["done"], progress["total"], progress_text(study))
+            update(progress["done"], progress["total"], _remark(study))
             if study["state"] in _ENDED:
                 return study
             if study["state"] == StudyState.PAUSED and study.get("reason") != told:
@@ -127,17 +130,10 @@ def follow(client: ServiceClient, study_id: str) -> dict[str, Any]:
             time.sleep(_POLL_SECONDS)
 
 
-def progress_text(study: dict[str, Any]) -> str:
-    """Rate and time left of a study that runs, as people say it."""
+def _remark(study: dict[str, Any]) -> str:
     progress = study["progress"]
-    parts = [str(study["state"])]
-    if progress.get("rate"):
-        parts.append(f"{progress['rate']:.3g} cases/s")
-    left = progress.get("seconds_left")
-    if left:
-        low, high = (left["low"], left["high"]) if isinstance(left, dict) else left
-        parts.append(f"{duration_text(low)} to {duration_text(high)} left")
-    return ", ".join(parts)
+    left = progress["seconds_left"]
+    return progress_text(study["state"], progress["rate"], None if left is None else (left["low"], left["high"]))
 
 
 def _exit_as(study: dict[str, Any]) -> None:
@@ -152,6 +148,8 @@ def _show_study(study: dict[str, Any], as_json: bool) -> None:
         write_json(study)
         return
     print(study["id"])
+    from worker.kernels import OK
+
     progress = study["progress"]
     endings = ", ".join(f"{count} {name}" for name, count in progress.get("endings", {}).items() if name != OK)
     say(
@@ -283,6 +281,8 @@ def curve(
 
 def show_curves(found: dict[str, Any]) -> None:
     """One table for each curve: the axis, then every result against it."""
+    from worker.kernels import OK
+
     x = found["x"]
     columns = [(_heading(x["path"], x["unit"]), True)]
     columns += [(_heading(name, result["unit"]), True) for name, result in found["results"].items()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -74,6 +75,8 @@ def upgrade(session: Session) -> tuple[str | None, str]:
     from alembic import command
     from alembic.config import Config
 
+    # What it tells of its own progress is for those who write migrations, not for a user.
+    logging.getLogger("alembic").setLevel(logging.WARNING)
     before = revision(session)
     if before is not None and before not in known_revisions():
         raise SchemaError(_other_revision(session, before))

@@ -1,0 +1,85 @@
+"""Real processes of the program, as users start them."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "examples"
+COMMAND = [sys.executable, "-m", "service.cli"]
+#: Generous: the machine may be busy with other tests.
+SECONDS = 240
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a command ended."""
+
+    code: int
+    out: bytes
+    err: str
+
+    @property
+    def data(self) -> Any:
+        """Standard output as JSON."""
+        return json.loads(self.out)
+
+
+def environment(**more: str) -> dict[str, str]:
+    """The environment without the user's settings of the program, except where compiled kernels lie."""
+    kept = {k: v for k, v in os.environ.items() if not k.startswith("SPRAG_") or k == "SPRAG_KERNEL_CACHE"}
+    return {**kept, "PYTHONPATH": str(ROOT), **more}
+
+
+def sprag(*arguments: object, cwd: Path | None = None, stdin: bytes | None = None, **more: str) -> Ended:
+    """Run one command to its end."""
+    done = subprocess.run(
+        [*COMMAND, *map(str, arguments)],
+        cwd=cwd,
+        input=stdin,
+        stdin=subprocess.DEVNULL if stdin is None else None,
+        capture_output=True,
+        timeout=SECONDS,
+        env=environment(**more),
+        check=False,
+    )
+    err = done.stderr.decode()
+    assert "Traceback" not in err
+    return Ended(done.returncode, done.stdout, err)
+
+
+@dataclass(frozen=True)
+class Service:
+    """A running service."""
+
+    address: str
+    process: subprocess.Popen[bytes]
+
+
+@contextmanager
+def service(folder: Path, *options: object) -> Iterator[Service]:
+    """``sprag serve`` on a free port with a database in ``folder``; has ended, in order, when the block is left."""
+    command = [*COMMAND, "serve", "--json", "--port", "0", "--db", str(folder / "sprag.sqlite3"), *map(str, options)]
+    log = folder / "service.log"
+    with log.open("wb") as errors:
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, env=environment())
+    assert process.stdout is not None
+    with process.stdout as output:
+        line = output.readline()
+    try:
+        assert line, log.read_text()
+        yield Service(json.loads(line)["address"], process)
+    finally:
+        process.send_signal(signal.SIGTERM)
+        code = process.wait(SECONDS)
+    assert code == 0, log.read_text()
+    assert "Traceback" not in log.read_text()

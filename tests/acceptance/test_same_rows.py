@@ -1,0 +1,78 @@
+"""A study of 512 cases goes in over HTTP and comes out as curves that equal the rows of `sprag run`, bit for bit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.acceptance.processes import EXAMPLES, service, sprag
+
+SPEC = EXAMPLES / "one_pendulum.json"
+CASES = 512
+RESULTS = ("shaft.speed.mean", "shaft.speed.max", "torque.max", "power.useful.mean", "efficiency", "run.events")
+CUTS = [(processes, chunk) for processes in (1, 2) for chunk in (1, 7, 512)]
+
+
+@pytest.fixture(scope="module")
+def reference() -> list[dict[str, Any]]:
+    """The rows as `sprag run` gives them with its own choice of processes and chunks."""
+    done = sprag("run", SPEC, "--json")
+    assert done.code == 0, done.err
+    rows: list[dict[str, Any]] = done.data["rows"]
+    assert [row["case"] for row in rows] == list(range(CASES))
+    assert {row["ending"] for row in rows} == {"ok"}
+    return rows
+
+
+@pytest.mark.parametrize(("processes", "chunk"), CUTS)
+def test_run_gives_the_same_rows(reference: list[dict[str, Any]], processes: int, chunk: int) -> None:
+    done = sprag("run", SPEC, "--json", "--processes", processes, "--chunk", chunk)
+    assert done.code == 0, done.err
+    # Python reads and writes floats exactly, so equal lists are equal bits.
+    assert done.data["rows"] == reference
+
+
+@pytest.fixture(scope="module", params=CUTS, ids=lambda cut: f"{cut[0]} processes, chunks of {cut[1]}")
+def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
+    """A client at the address of the study, which a service with this cut has run."""
+    processes, chunk = request.param
+    with service(tmp_path_factory.mktemp("served"), "--processes", processes, "--chunk", chunk) as running:
+        done = sprag("submit", SPEC, "--wait", "--json", "--server", running.address)
+        assert done.code == 0, done.err
+        assert done.data["progress"]["endings"] == {"ok": CASES}
+        with httpx.Client(base_url=f"{running.address}/api/v1/studies/{done.data['id']}", timeout=60) as client:
+            yield client
+
+
+def test_http_gives_the_same_rows_and_curves(reference: list[dict[str, Any]], finished: httpx.Client) -> None:
+    assert finished.get("/results", params={"format": "json"}).json()["rows"] == reference
+
+    query = {"x": "shaft.load", "y": RESULTS, "by": ["excitation.frequency", "excitation.amplitude_x"]}
+    curves = finished.get("/curves", params=query).json()["curves"]
+    assert len(curves) == 16 * 4
+    seen = set()
+    for curve in curves:
+        for point, case in enumerate(curve["cases"]):
+            row = reference[case]
+            seen.add(case)
+            assert row["parameters"]["shaft.load"] == curve["x"][point]
+            assert {path: row["parameters"][path] for path in query["by"]} == curve["by"]
+            assert {name: curve["y"][name][point] for name in RESULTS} == {n: row["results"][n] for n in RESULTS}
+    assert seen == set(range(CASES))
+
+
+def test_csv_has_the_same_numbers(reference: list[dict[str, Any]], tmp_path: Path) -> None:
+    file = tmp_path / "rows.csv"
+    assert sprag("run", SPEC, "-o", file, "--processes", 2).code == 0
+    header, *lines = [line.split(",") for line in file.read_text().splitlines()]
+    assert len(lines) == CASES
+    for line, row in zip(lines, reference, strict=True):
+        cells = dict(zip(header, line, strict=True))
+        for name, value in {**row["parameters"], **row["results"]}.items():
+            assert (float(cells[name]) if cells[name] else None) == value
+    json.dumps(reference, allow_nan=False)
