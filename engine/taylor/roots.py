@@ -31,8 +31,8 @@ _WIDTH = MAX_DEGREE + 2
 
 
 def work_stack() -> Floats:
-    """Work array for ``first_root`` and ``largest``; one per thread, reused by every call."""
-    return np.zeros((MAX_DEPTH + 2, MAX_DEGREE + 3))
+    """Work array for ``first_root`` and ``largest``, reused by every call; its last row is the caller's own."""
+    return np.zeros((MAX_DEPTH + 3, MAX_DEGREE + 3))
 
 
 @compiled
@@ -45,21 +45,23 @@ def evaluate(g: Floats, degree: int, x: float) -> float:
 
 
 @compiled
-def slope(g: Floats, degree: int, x: float) -> float:
-    """Derivative of ``sum g[k] x^k`` at ``x``."""
-    value = 0.0
-    for k in range(degree, 0, -1):
-        value = value * x + k * g[k]
-    return value
+def _value_and_slope(g: Floats, degree: int, x: float) -> tuple[float, float]:
+    value = g[degree]
+    slope = 0.0
+    for k in range(degree - 1, -1, -1):
+        slope = slope * x + value
+        value = value * x + g[k]
+    return value, slope
 
 
 @compiled
-def curvature(g: Floats, degree: int, x: float) -> float:
-    """Second derivative of ``sum g[k] x^k`` at ``x``."""
-    value = 0.0
-    for k in range(degree, 1, -1):
-        value = value * x + k * (k - 1) * g[k]
-    return value
+def _slope_and_curvature(g: Floats, degree: int, x: float) -> tuple[float, float]:
+    slope = degree * g[degree]
+    curvature = 0.0
+    for k in range(degree - 1, 0, -1):
+        curvature = curvature * x + slope
+        slope = slope * x + k * g[k]
+    return slope, curvature
 
 
 @compiled
@@ -100,19 +102,58 @@ def _refine_root(g: Floats, degree: int, low: float, high: float) -> float:
     """The single sign change of ``g`` between ``low`` (positive there) and ``high`` (not positive): Newton kept inside."""
     x = 0.5 * (low + high)
     for _ in range(80):
-        value = evaluate(g, degree, x)
+        value, slope = _value_and_slope(g, degree, x)
         if value > 0.0:
             low = x
         else:
             high = x
-        step = slope(g, degree, x)
-        new = x - value / step if step != 0.0 else low
+        new = x - value / slope if slope != 0.0 else low
         if not (low < new < high):
             new = 0.5 * (low + high)
         if abs(new - x) <= 2e-16 * abs(x) or new in (low, high):
             return new
         x = new
     return x
+
+
+@compiled
+def _refine_peak(g: Floats, degree: int, low: float, high: float) -> float:
+    """The single zero of the derivative of ``g`` between ``low`` and ``high``, where its sign changes: Newton kept inside."""
+    rises = _slope_and_curvature(g, degree, low)[0] > 0.0
+    x = 0.5 * (low + high)
+    for _ in range(80):
+        slope, curvature = _slope_and_curvature(g, degree, x)
+        if (slope > 0.0) == rises:
+            low = x
+        else:
+            high = x
+        new = x - slope / curvature if curvature != 0.0 else low
+        if not (low < new < high):
+            new = 0.5 * (low + high)
+        # A peak is flat: its value is exact to rounding long before its place is.
+        if abs(new - x) <= 1e-10 or new in (low, high):
+            return new
+        x = new
+    return x
+
+
+@compiled
+def _bend(g: Floats, degree: int) -> int:
+    """Sign of the second derivative on all of [0, 1], or 0 if the sum of moduli cannot tell."""
+    rest = 0.0
+    for k in range(3, degree + 1):
+        rest += k * (k - 1) * abs(g[k])
+    if abs(2.0 * g[2]) <= rest:
+        return 0
+    return 1 if g[2] > 0.0 else -1
+
+
+@compiled
+def _end_slope(g: Floats, degree: int) -> float:
+    value = 0.0
+    for k in range(1, degree + 1):
+        value += k * g[k]
+    return value
 
 
 @compiled
@@ -145,10 +186,21 @@ def first_root(g: Floats, degree: int, stack: Floats) -> float:
     n = degree - first
     # The sum of moduli is the cheapest proof that nothing happens.
     rest = 0.0
+    end = p[0]
     for k in range(1, n + 1):
         rest += abs(p[k])
+        end += p[k]
     if rest < p[0]:
         return NO_ROOT
+    # A step of a high-order method is short: nearly always the second derivative keeps its sign, and the shape is plain.
+    bend = _bend(p, n) if n >= 2 else -1
+    if bend < 0 or (bend > 0 and (p[1] >= 0.0 or end <= 0.0)):
+        return _refine_root(p, n, 0.0, 1.0) if end <= 0.0 else NO_ROOT
+    if bend > 0:
+        if _end_slope(p, n) <= 0.0:
+            return NO_ROOT
+        x = _refine_peak(p, n, 0.0, 1.0)
+        return _refine_root(p, n, 0.0, x) if evaluate(p, n, x) <= 0.0 else NO_ROOT
     _start(p, n, stack)
     top = 0
     while top >= 0:
@@ -176,27 +228,6 @@ def first_root(g: Floats, degree: int, stack: Floats) -> float:
 
 
 @compiled
-def _refine_peak(g: Floats, degree: int, low: float, high: float) -> float:
-    """The zero of the derivative of ``g`` between ``low`` (rising there) and ``high`` (falling): Newton kept inside."""
-    x = 0.5 * (low + high)
-    for _ in range(80):
-        rate = slope(g, degree, x)
-        if rate > 0.0:
-            low = x
-        else:
-            high = x
-        bend = curvature(g, degree, x)
-        new = x - rate / bend if bend != 0.0 else low
-        if not (low < new < high):
-            new = 0.5 * (low + high)
-        # A peak is flat: its value is exact to rounding long before its place is.
-        if abs(new - x) <= 1e-11 or new in (low, high):
-            return new
-        x = new
-    return x
-
-
-@compiled
 def largest(g: Floats, degree: int, known: float, stack: Floats) -> float:
     """Larger of ``known`` and the largest value of ``sum g[k] x^k`` on [0, 1].
 
@@ -209,6 +240,11 @@ def largest(g: Floats, degree: int, known: float, stack: Floats) -> float:
         bound += abs(g[k])
     best = max(known, g[0], total)
     if bound <= best:
+        return best
+    bend = _bend(g, degree)
+    if bend != 0:
+        if bend < 0 and g[1] > 0.0 and _end_slope(g, degree) < 0.0:
+            best = max(best, evaluate(g, degree, _refine_peak(g, degree, 0.0, 1.0)))
         return best
     _start(g, degree, stack)
     top = 0

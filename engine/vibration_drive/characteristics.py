@@ -41,6 +41,8 @@ class _Cases:
         self.periods = end - start
         self.whole_periods = end - whole
         self.length = self.periods * self.period
+        # The steps' sum rather than the length, so that shares of it are exactly 0 or 1 where they should be.
+        self.time = self.shaft("time_held") + self.shaft("time_rotating")
 
     def shaft(self, name: str) -> Floats:
         row: int = getattr(self.lay, name)
@@ -100,8 +102,8 @@ def _pendulum(cases: _Cases, i: int, out: dict[str, Floats]) -> None:
     put("torque.mean", cases.pendulum(i, "sum_torque") / cases.length)
     put("torque.max", cases.pendulum(i, "torque_max"))
     put("windup.max", cases.pendulum(i, "u_max"))
-    put("fraction.engaged", cases.pendulum(i, "time_engaged") / cases.length)
-    put("fraction.beyond_data", cases.pendulum(i, "time_beyond") / cases.length)
+    put("fraction.engaged", cases.pendulum(i, "time_engaged") / cases.time)
+    put("fraction.beyond_data", cases.pendulum(i, "time_beyond") / cases.time)
     put("engagements", cases.pendulum(i, "engagements"))
     put("power.input", cases.parameter(i, 0) * inertia * cases.pendulum(i, "work_input") / cases.length)
     put("power.loss", cases.parameter(i, 2) * inertia * cases.pendulum(i, "work_loss") / cases.length)
@@ -134,10 +136,9 @@ def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
     useful = cases.load * (cases.shaft("turn_2") - cases.shaft("turn_1"))
     supplied = out["power.input.mean"] * cases.length - cases.shaft("input_1")
     out["efficiency"] = np.where(cases.whole_periods > 0.5, _ratio(useful, supplied), np.nan)
-    rotating = cases.shaft("time_rotating") / cases.length
-    out["fraction.rotating"] = rotating
-    out["fraction.held"] = 1.0 - rotating
-    out["fraction.driven"] = cases.shaft("time_driven") / cases.length
+    out["fraction.rotating"] = cases.shaft("time_rotating") / cases.time
+    out["fraction.held"] = cases.shaft("time_held") / cases.time
+    out["fraction.driven"] = cases.shaft("time_driven") / cases.time
     out["clutches.driving_max"] = cases.shaft("driving_max")
     out["clutches.engagements_per_period"] = _over_pendulums(cases, out, "engagements") / cases.periods
     out["runup.time"] = cases.sums[:, OUT_RUNUP]

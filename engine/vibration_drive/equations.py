@@ -15,9 +15,10 @@ from engine.taylor.straight import (
     exp2,
     horner,
     integral,
+    larger,
     log2,
-    modulus_bound,
     product,
+    range_bounds,
     sincos,
     smaller,
 )
@@ -27,6 +28,11 @@ from engine.vibration_drive.layout import Layout
 STEP_SAFETY = 0.55
 #: Longest step, in excitation periods.
 LONGEST_STEP = 0.25
+#: Smallest step, in excitation periods: below it a step no longer moves the phase.
+STEP_FLOOR = 1e-13
+#: Angle (rad) and speed (rad/s) beyond which a case has diverged.
+ANGLE_BOUND = 1e6
+SPEED_BOUND = 1e9
 
 
 class _Pendulum:
@@ -133,19 +139,42 @@ def step_source(layout: Layout) -> str:
                 p.phi.append(code.let(f"phi{i}_{k + 1}", f"{p.w[k]}*{1.0 / (k + 1)!r}"))
                 p.u.append(code.let(f"u{i}_{k + 1}", f"({p.w[k]} - {shaft[k]})*{1.0 / (k + 1)!r}"))
         total.append(code.let(f"S{k}", " + ".join(p.torque[k] for p in pendulums)))
-    _store_series(code, layout, pendulums, shaft, total)
     _step_size(code, layout, pendulums, shaft)
-    _guards_and_extrema(code, layout, pendulums, shaft, total)
-    return code.function("step", "W, log2_tolerance", "Series, step size, guard distances of every lane.")
+    _in_fractions(code, order, pendulums, shaft, total)
+    power = [code.let(f"P{k}", product(total, shaft, k)) for k in range(order + 1)]
+    _store_series(code, layout, pendulums, shaft, total, power)
+    _bounds(code, layout, pendulums, shaft, total, power)
+    return code.function("step", "W, log2_tolerance", "Series, step size, distances to guards and extrema of every lane.")
+
+
+def _in_fractions(
+    code: LaneCode, order: int, pendulums: list[_Pendulum], shaft: list[str], total: list[str]
+) -> None:
+    """Rescale every series from seconds to fractions of the step: coefficient k times h^k."""
+    power = "h"
+    for k in range(1, order + 1):
+        if k > 1:
+            power = code.let(f"h_{k}", f"{power}*h")
+        shaft[k] = code.let(f"Wx{k}", f"{shaft[k]}*{power}")
+        for p in pendulums:
+            i = p.index
+            p.w[k] = code.let(f"wx{i}_{k}", f"{p.w[k]}*{power}")
+            p.phi[k] = code.let(f"px{i}_{k}", f"{p.phi[k]}*{power}")
+            p.u[k] = code.let(f"ux{i}_{k}", f"{p.u[k]}*{power}")
+            p.torque[k] = code.let(f"Tx{i}_{k}", f"{p.torque[k]}*{power}")
+            if k < order:
+                p.drive[k] = code.let(f"Dx{i}_{k}", f"{p.drive[k]}*{power}")
+        total[k] = code.let(f"Sx{k}", " + ".join(p.torque[k] for p in pendulums))
 
 
 def _store_series(
-    code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft: list[str], total: list[str]
+    code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft: list[str], total: list[str], power: list[str]
 ) -> None:
     for k in range(layout.order + 1):
         if k > 0:
             code.store(layout.speed + k, shaft[k])
         code.store(layout.sum + k, total[k])
+        code.store(layout.power + k, power[k])
         for p in pendulums:
             if k > 0:
                 code.store(p.row(layout, "speed") + k, p.w[k])
@@ -181,110 +210,121 @@ def _step_size(code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft
     code.store(layout.at_stop, f"0.0 if h_wanted < {rest}*0.999999 else 1.0")
     code.let("h", f"h_wanted if h_wanted < {rest}*0.999999 else {rest}")
     code.store(layout.h, "h")
+    code.store(layout.x, "1.0")
 
 
-def _guards_and_extrema(
-    code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft: list[str], total: list[str]
+def _bounds(
+    code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft: list[str], total: list[str], power: list[str]
 ) -> None:
-    """Store the smallest distance that every guarded quantity keeps to its band, and the largest excess over a known extremum."""
-    margins: list[str] = []
-    excesses: list[str] = []
+    """Store how far every guarded quantity keeps from its band and how far others may exceed their known extrema."""
+    margin = code.let("margin", "1e300")
+    excess = code.let("excess", "-1e300")
+    code.let("inverse_h", "1.0/h")
 
-    def bound(name: str, names: list[str]) -> str:
-        return code.let(f"b_{name}", modulus_bound(names, "h"))
+    def guard(bounds: tuple[str, str], low_row: int | None, high_row: int | None) -> None:
+        for text, row in ((f"{bounds[0]} - {{}}", low_row), (f"{{}} - {bounds[1]}", high_row)):
+            if row is not None:
+                code.let("gap", text.format(code.row(row)))
+                code.let(margin, smaller("gap", margin))
 
-    def above(value: str, size: str, low: int) -> None:
-        margins.append(f"({value} - {size}) - {code.row(low)}")
+    def peak(bounds: tuple[str, str], block: int, high: int, low: int | None = None) -> None:
+        """``high`` and ``low`` are rows of known extrema; their excess goes ``block`` rows further."""
+        for text, row in ((f"{bounds[1]} - {{}}", high), (f"{{}} - {bounds[0]}", low)):
+            if row is not None:
+                code.let("gap", text.format(code.row(row)))
+                code.store(row + block, "gap")
+                code.let(excess, larger("gap", excess))
 
-    def below(value: str, size: str, high: int) -> None:
-        margins.append(f"{code.row(high)} - ({value} + {size})")
+    def rates(tag: str, names: list[str]) -> list[str]:
+        return [code.let(f"{tag}_{k}", f"{names[k + 1]}*inverse_h*{k + 1.0!r}") for k in range(layout.order)]
 
-    def peaks(value: str, size: str, high: int, low: int | None = None) -> None:
-        excesses.append(f"({value} + {size}) - {code.row(high)}")
-        if low is not None:
-            excesses.append(f"{code.row(low)} - ({value} - {size})")
-
-    size_shaft = bound("W", shaft)
-    size_sum = bound("S", total)
-    above(shaft[0], size_shaft, layout.speed_low)
-    below(total[0], size_sum, layout.sum_high)
-    peaks(shaft[0], size_shaft, layout.speed_max, layout.speed_min)
-    peaks(total[0], size_sum, layout.sum_max)
-    excesses.append(
-        f"(abs({total[0]}) + {size_sum})*(abs({shaft[0]}) + {size_shaft}) - {code.row(layout.power_max)}"
-    )
-    rates = [shaft[1], *(code.let(f"R{k}", f"{shaft[k + 1]}*{k + 1.0!r}") for k in range(1, layout.order))]
-    peaks(rates[0], bound("R", rates), layout.acc_max)
+    lay = layout
+    block = lay.x_speed_max - lay.speed_max
+    bounds = range_bounds(code, "W", shaft)
+    guard(bounds, lay.speed_low, None)
+    peak(bounds, block, lay.speed_max, lay.speed_min)
+    bounds = range_bounds(code, "S", total)
+    guard(bounds, None, lay.sum_high)
+    peak(bounds, block, lay.sum_max)
+    peak(range_bounds(code, "R", rates("R", shaft)), block, lay.acc_max)
+    peak(range_bounds(code, "P", power), block, lay.power_max)
+    block = lay.p_x_phi_max - lay.p_phi_max
     for p in pendulums:
-        i = p.index
-        row = {name: p.row(layout, name) for name in (
+        tag = str(p.index)
+        row = {name: p.row(lay, name) for name in (
             "w_low", "w_high", "u_low", "u_high", "t_low", "t_high", "phi_max", "phi_min",
             "speed_max", "speed_min", "acc_max", "acc_min", "torque_max", "u_max",
         )}  # fmt: skip
-        relative = [code.let(f"v{i}_{k}", f"{p.w[k]} - {shaft[k]}") for k in range(layout.order + 1)]
-        size_relative, size_u = bound(f"v{i}", relative), bound(f"u{i}", p.u)
-        size_torque, size_speed = bound(f"T{i}", p.torque), bound(f"w{i}", p.w)
-        above(relative[0], size_relative, row["w_low"])
-        below(relative[0], size_relative, row["w_high"])
-        above(p.u[0], size_u, row["u_low"])
-        below(p.u[0], size_u, row["u_high"])
-        above(p.torque[0], size_torque, row["t_low"])
-        below(p.torque[0], size_torque, row["t_high"])
-        peaks(p.phi[0], bound(f"phi{i}", p.phi), row["phi_max"], row["phi_min"])
-        peaks(p.w[0], size_speed, row["speed_max"], row["speed_min"])
-        peaks(p.torque[0], size_torque, row["torque_max"])
-        peaks(p.u[0], size_u, row["u_max"])
-        rates = [p.w[1], *(code.let(f"R{i}_{k}", f"{p.w[k + 1]}*{k + 1.0!r}") for k in range(1, layout.order))]
-        peaks(rates[0], bound(f"R{i}", rates), row["acc_max"], row["acc_min"])
-    code.let("margin", "1e300")
-    for number, text in enumerate(margins):
-        code.let(f"m{number}", text)
-        code.let("margin", smaller(f"m{number}", "margin"))
-    code.store(layout.margin, "margin")
-    code.let("excess", "-1e300")
-    for number, text in enumerate(excesses):
-        code.let(f"g{number}", text)
-        code.let("excess", f"g{number} if g{number} > excess else excess")
-    code.store(layout.excess, "excess")
+        relative = [code.let(f"v{tag}_{k}", f"{p.w[k]} - {shaft[k]}") for k in range(lay.order + 1)]
+        guard(range_bounds(code, f"v{tag}", relative), row["w_low"], row["w_high"])
+        bounds = range_bounds(code, f"u{tag}", p.u)
+        guard(bounds, row["u_low"], row["u_high"])
+        peak(bounds, block, row["u_max"])
+        bounds = range_bounds(code, f"T{tag}", p.torque)
+        guard(bounds, row["t_low"], row["t_high"])
+        peak(bounds, block, row["torque_max"])
+        peak(range_bounds(code, f"p{tag}", p.phi), block, row["phi_max"], row["phi_min"])
+        peak(range_bounds(code, f"w{tag}", p.w), block, row["speed_max"], row["speed_min"])
+        peak(range_bounds(code, f"R{tag}", rates(f"R{tag}", p.w)), block, row["acc_max"], row["acc_min"])
+    code.store(lay.margin, margin)
+    code.store(lay.excess, excess)
 
 
 def advance_source(layout: Layout) -> str:
-    """Source of ``advance(W)``: every lane's state and sums at the end of its step of size h."""
+    """Source of ``advance(W)``: every lane's state and sums at the end of the part x of its step, and whether it needs attention."""
     code = LaneCode(layout.lanes)
     order = layout.order
+    x = code.load("x", layout.x)
     h = code.load("h", layout.h)
+    taken = code.let("taken", f"{x}*{h}")
     shaft = code.series("W", layout.speed, order + 1)
     total = code.series("S", layout.sum, order + 1)
 
     def add(row: int, amount: str) -> None:
         code.store(row, f"{code.row(row)} + {amount}")
 
-    def powered(tag: str, a: list[str], b: list[str]) -> str:
-        return integral([code.let(f"{tag}{k}", product(a, b, k)) for k in range(order)], h)
+    def over(names: list[str]) -> str:
+        """Integral over the time taken."""
+        return f"{h}*({integral(names, x)})"
 
-    code.let("push", integral(total, h))
-    add(layout.sum_held, f"(1.0 - {code.row(layout.rotating)})*push")
-    add(layout.time_rotating, f"{code.row(layout.rotating)}*h")
-    add(layout.time_driven, f"{code.row(layout.driven)}*h")
-    add(layout.work_clutch, powered("P", total, shaft))
+    def of_product(tag: str, a: list[str], b: list[str]) -> str:
+        return over([code.let(f"{tag}{k}", product(a, b, k)) for k in range(order)])
+
+    rotating = code.load("rotating", layout.rotating)
+    add(layout.sum_held, f"(1.0 - {rotating})*({over(total)})")
+    add(layout.time_held, f"(1.0 - {rotating})*{taken}")
+    add(layout.time_rotating, f"{rotating}*{taken}")
+    add(layout.time_driven, f"{code.row(layout.driven)}*{taken}")
+    add(layout.work_clutch, over(code.series("P", layout.power, order + 1)))
+    bounded = []
     for i in range(layout.n):
         base = layout.pendulums + i * layout.stride
         w = code.series(f"w{i}_", base + layout.p_speed, order + 1)
         drive = code.series(f"D{i}_", base + layout.p_drive, order)
         torque = code.series(f"T{i}_", base + layout.p_torque, order + 1)
         phi0 = code.load(f"phi{i}", base + layout.p_phi)
-        angle = [phi0, *(code.let(f"phi{i}_{k + 1}", f"{w[k]}*{1.0 / (k + 1)!r}") for k in range(order))]
-        add(base + layout.p_sum_phi, integral(angle, h))
-        add(base + layout.p_sum_torque, integral(torque, h))
-        add(base + layout.p_work_input, powered(f"I{i}_", w, drive))
-        add(base + layout.p_work_loss, powered(f"Q{i}_", w, w))
-        add(base + layout.p_time_engaged, f"{code.row(base + layout.p_engaged)}*h")
-        add(base + layout.p_time_beyond, f"{code.row(base + layout.p_beyond)}*h")
-        code.store(base + layout.p_phi, horner(angle, h))
+        angle = [phi0, *(code.let(f"phi{i}_{k + 1}", f"{h}*{w[k]}*{1.0 / (k + 1)!r}") for k in range(order))]
+        add(base + layout.p_sum_phi, over(angle))
+        add(base + layout.p_sum_torque, over(torque))
+        add(base + layout.p_work_input, of_product(f"I{i}_", w, drive))
+        add(base + layout.p_work_loss, of_product(f"Q{i}_", w, w))
+        add(base + layout.p_time_engaged, f"{code.row(base + layout.p_engaged)}*{taken}")
+        add(base + layout.p_time_beyond, f"{code.row(base + layout.p_beyond)}*{taken}")
         relative = [code.let(f"v{i}_{k}", f"{w[k]} - W{k}") for k in range(order)]
-        add(base + layout.p_u, integral(relative, h))
-        code.store(base + layout.p_speed, horner(w, h))
-    add(layout.turn, integral(shaft, h))
-    code.store(layout.speed, horner(shaft, h))
-    add(layout.f, f"h/{code.row(layout.period)}")
+        add(base + layout.p_u, over(relative))
+        code.store(base + layout.p_phi, code.let(f"phi_end{i}", horner(angle, x)))
+        code.store(base + layout.p_speed, code.let(f"w_end{i}", horner(w, x)))
+        bounded += [f"abs(phi_end{i}) < {ANGLE_BOUND!r}", f"abs(w_end{i}) < {SPEED_BOUND!r}"]
+    add(layout.turn, over(shaft))
+    code.store(layout.speed, code.let("W_end", horner(shaft, x)))
+    bounded.append(f"abs(W_end) < {SPEED_BOUND!r}")
+    add(layout.f, f"{taken}/{code.row(layout.period)}")
+    code.store(layout.steps, f"{code.row(layout.steps)} + (1.0 if {taken} > 0.0 else 0.0)")
+    # An event makes x < 1 or coincides with a stop; a NaN fails every comparison.
+    code.let("quiet", f"1.0 if {code.row(layout.h_free)} > {STEP_FLOOR!r}*{code.row(layout.period)} else 0.0")
+    for number, condition in enumerate(bounded):
+        code.let(f"ok{number}", f"1.0 if {condition} else 0.0")
+        code.let("quiet", f"quiet*ok{number}")
+    code.let("usual", f"1.0 if {code.row(layout.margin)} > 0.0 else 0.0")
+    code.store(layout.attention, f"1.0 - quiet*(1.0 - {code.row(layout.at_stop)})*usual")
     return code.function("advance", "W", "State and sums of every lane at the end of its step.")

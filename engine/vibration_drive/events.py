@@ -33,7 +33,7 @@ NEXT_STOP = 14
 EVENTS = 15
 EVENTS_IN_PERIOD = 16
 EVENTS_AT_ONCE = 17
-STEPS = 18
+SKIP_STEP = 18  # the skips below hold while the lane has made this many steps
 LITERAL = 19
 # Coefficients that vanish analytically at a transition but not in rounding: leading orders the root finder passes over.
 SKIP_SHAFT = 20
@@ -82,32 +82,27 @@ def stored_energy(W: Floats, lay: Layout, lane: int, i: int, u: float) -> float:
 
 
 @compiled
-def _guard(W: Floats, lay: Layout, lane: int, i: int, band: int, h: float, skip: int, g: Floats) -> int:
-    """Write the polynomial (in fractions of the step) that is positive while a guard of pendulum ``i`` holds; return its degree.
-
-    The first ``skip`` coefficients are set to exactly zero, which the root finder divides out.
-    """
+def _guard(W: Floats, lay: Layout, lane: int, i: int, band: int, g: Floats) -> None:
+    """Write the polynomial (in fractions of the step) that is positive while a guard of pendulum ``i`` holds."""
     lanes = lay.lanes
     base = lay.pendulums + i * lay.stride
     edge = W[(base + lay.p_w_low + band) * lanes + lane]
     sign = 1.0 if band % 2 == 0 else -1.0
-    kind = band // 2
-    power = 1.0
-    for k in range(lay.order + 1):
-        if kind == 0:
-            q = W[(base + lay.p_speed + k) * lanes + lane] - W[(lay.speed + k) * lanes + lane]
-        elif kind == 1:
-            if k == 0:
-                q = W[(base + lay.p_u) * lanes + lane]
-            else:
-                q = (W[(base + lay.p_speed + k - 1) * lanes + lane] - W[(lay.speed + k - 1) * lanes + lane]) / k
-        else:
-            q = W[(base + lay.p_torque + k) * lanes + lane]
-        if k == 0:
-            q -= edge
-        g[k] = 0.0 if k < skip else sign * q * power
-        power *= h
-    return lay.order
+    own = (base + lay.p_speed) * lanes + lane
+    shaft = lay.speed * lanes + lane
+    if band // 2 == 0:
+        for k in range(lay.order + 1):
+            g[k] = sign * (W[own + k * lanes] - W[shaft + k * lanes])
+    elif band // 2 == 1:
+        g[0] = sign * W[(base + lay.p_u) * lanes + lane]
+        step = sign * W[lay.h * lanes + lane]
+        for k in range(lay.order):
+            g[k + 1] = step * (W[own + k * lanes] - W[shaft + k * lanes]) / (k + 1)
+    else:
+        torque = (base + lay.p_torque) * lanes + lane
+        for k in range(lay.order + 1):
+            g[k] = sign * W[torque + k * lanes]
+    g[0] -= sign * edge
 
 
 @compiled
@@ -118,20 +113,21 @@ def locate(W: Floats, I: Ints, lay: Layout, lane: int, g: Floats, stack: Floats)
     violated at the start of the next step and follow at once.
     """
     lanes = lay.lanes
-    h = W[lay.h * lanes + lane]
     best = 1.5
     pendulum = NO_EVENT
     target = 0
+    fresh = W[lay.steps * lanes + lane] == I[lane, SKIP_STEP]
     shaft = I[lane, SHAFT_STATE]
     if shaft == _HELD or W[lay.speed_low * lanes + lane] > -NEVER:
-        first = lay.sum if shaft == _HELD else lay.speed
+        first = (lay.sum if shaft == _HELD else lay.speed) * lanes + lane
         sign = -1.0 if shaft == _HELD else 1.0
-        power = sign
         for k in range(lay.order + 1):
-            g[k] = 0.0 if k < I[lane, SKIP_SHAFT] else W[(first + k) * lanes + lane] * power
-            power *= h
+            g[k] = sign * W[first + k * lanes]
         if shaft == _HELD:
             g[0] += W[lay.sum_high * lanes + lane]
+        elif fresh:
+            for k in range(I[lane, SKIP_SHAFT]):
+                g[k] = 0.0
         x = first_root(g, lay.order, stack)
         if x < best:
             best, pendulum, target = x, OF_SHAFT, (_ROTATING if shaft == _HELD else _HELD)
@@ -141,20 +137,18 @@ def locate(W: Floats, I: Ints, lay: Layout, lane: int, g: Floats, stack: Floats)
         for band in range(_BANDS):
             if CLUTCH_THRESHOLD[literal, state, band] == 0:
                 continue
-            skip = 0
-            if band // 2 == 0:
-                skip = I[lane, SKIP_W + i]
-            elif band // 2 == 1:
-                skip = I[lane, SKIP_U + i]
-            degree = _guard(W, lay, lane, i, band, h, skip, g)
-            x = first_root(g, degree, stack)
+            _guard(W, lay, lane, i, band, g)
+            if fresh and band // 2 < 2:
+                for k in range(I[lane, (SKIP_W if band // 2 == 0 else SKIP_U) + i]):
+                    g[k] = 0.0
+            x = first_root(g, lay.order, stack)
             if x < best:
                 best, pendulum, target = x, i, CLUTCH_TARGET[literal, state, band]
     I[lane, EVENT_PENDULUM] = pendulum
     if pendulum != NO_EVENT:
         I[lane, EVENT_TARGET] = target
         I[lane, EVENT_SMOOTH] = 1 if best > 0.0 else 0
-        W[lay.h * lanes + lane] = best * h
+        W[lay.x * lanes + lane] = best
         if best < 1.0:
             W[lay.at_stop * lanes + lane] = 0.0
 
@@ -311,6 +305,10 @@ def transit(W: Floats, I: Ints, lay: Layout, lane: int) -> None:  # noqa: E741
     i = I[lane, EVENT_PENDULUM]
     target = I[lane, EVENT_TARGET]
     smooth = I[lane, EVENT_SMOOTH] == 1
+    if W[lay.steps * lanes + lane] != I[lane, SKIP_STEP]:
+        I[lane, SKIP_STEP] = int(W[lay.steps * lanes + lane])
+        for k in range(SKIP_SHAFT, LANE_INTEGERS):
+            I[lane, k] = 0
     if i == OF_SHAFT:
         I[lane, SKIP_SHAFT] = 0
         W[lay.speed * lanes + lane] = 0.0

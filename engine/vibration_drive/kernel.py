@@ -63,15 +63,15 @@ def integrate(lay, cases, log2_tolerance, literal, most_steps, most_events, W, I
             return recorded
         step(W, log2_tolerance)
         for lane in range({lanes}):
-            if busy[lane]:
+            if busy[lane] and (not W[{margin} + lane] > 0.0 or not W[{excess} + lane] <= 0.0):
                 look(W, I, lay, lane, g, stack)
         if recorded < times.shape[0]:
             recorded = record(W, I, lay, 0, times, recorded, g, samples, states)
         advance(W)
         for lane in range({lanes}):
-            if busy[lane] and not settle(W, I, lay, lane, cases, turns, sums, most_steps, most_events):
-                busy[lane] = False
-                running -= 1
+            if busy[lane] and W[{attention} + lane] != 0.0:
+                busy[lane] = settle(W, I, lay, lane, cases, turns, sums, most_steps, most_events)
+                running -= not busy[lane]
 '''
 
 
@@ -132,6 +132,7 @@ def source(layout: Layout) -> str:
     """The text of the kernel module for a layout."""
     return _MODULE.format(
         n=layout.n, coefficients=layout.coefficients, order=layout.order, lanes=layout.lanes,
+        attention=layout.attention * layout.lanes, margin=layout.margin * layout.lanes, excess=layout.excess * layout.lanes,
         layout=layout, step=step_source(layout), advance=advance_source(layout),
     )  # fmt: skip
 

@@ -10,6 +10,7 @@ from engine.jit import compiled
 from engine.vibration_drive import events as ev
 from engine.vibration_drive.automaton import Clutch, Shaft
 from engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS
+from engine.vibration_drive.equations import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR
 from engine.vibration_drive.events import locate, set_clutch, set_shaft, transit
 from engine.vibration_drive.layout import Layout
 from engine.vibration_drive.window import energy, sample, update_extrema, watch_extrema
@@ -17,11 +18,6 @@ from engine.vibration_drive.window import energy, sample, update_extrema, watch_
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Angle (rad) and speed (rad/s) beyond which a case has diverged.
-ANGLE_BOUND = 1e6
-SPEED_BOUND = 1e9
-#: Smallest step, in excitation periods: below it a step no longer moves the phase.
-STEP_FLOOR = 1e-13
 #: Transitions without any time passing that count as chatter.
 MOST_AT_ONCE = 64
 #: Share of the final period-mean speed that ends the run-up.
@@ -183,7 +179,7 @@ def _finish(W: Floats, I: Ints, lay: Layout, lane: int, ending: int, cases: Floa
     case = I[lane, ev.CASE]
     out = sums[case]
     out[OUT_ENDING] = ending
-    out[OUT_STEPS] = I[lane, ev.STEPS]
+    out[OUT_STEPS] = W[lay.steps * lay.lanes + lane]
     out[OUT_EVENTS] = I[lane, ev.EVENTS]
     out[OUT_RUNUP] = math.nan
     if ending != _OK:
@@ -220,31 +216,24 @@ def _lost(W: Floats, I: Ints, lay: Layout, lane: int, most_steps: int) -> int:  
             return _DIVERGED
     if W[lay.h_free * lanes + lane] < STEP_FLOOR * W[lay.period * lanes + lane]:
         return _ACCURACY
-    return _STEP_BUDGET if I[lane, ev.STEPS] >= most_steps else _RUNNING
+    return _STEP_BUDGET if W[lay.steps * lanes + lane] >= most_steps else _RUNNING
 
 
 @compiled
 def settle(
     W: Floats, I: Ints, lay: Layout, lane: int, cases: Floats, turns: Floats, sums: Floats, most_steps: int, most_events: int
 ) -> bool:  # noqa: E741
-    """After ``advance``: events, stops, budgets of one lane. True while its case goes on."""
+    """After ``advance``: events, stops, budgets of a lane that needs attention. True while its case goes on."""
     lanes = lay.lanes
-    h = W[lay.h * lanes + lane]
-    I[lane, ev.STEPS] += 1
+    h = W[lay.x * lanes + lane] * W[lay.h * lanes + lane]
     ending = _lost(W, I, lay, lane, most_steps)
     event = I[lane, ev.EVENT_PENDULUM] != ev.NO_EVENT
-    if h > 0.0:
-        I[lane, ev.SKIP_SHAFT] = 0
-        for i in range(lay.n):
-            I[lane, ev.SKIP_W + i] = 0
-            I[lane, ev.SKIP_U + i] = 0
     at_stop = W[lay.at_stop * lanes + lane] == 1.0
     if at_stop and h > 0.0:
         # The stop is met exactly, whatever the sum of the steps rounds to.
         W[lay.f * lanes + lane] = W[lay.f_stop * lanes + lane]
     if ending == _RUNNING and event:
         ending = _take_event(W, I, lay, lane, h, most_events)
-        I[lane, ev.EVENT_PENDULUM] = ev.NO_EVENT
     if ending == _RUNNING and at_stop and h > 0.0:
         if W[lay.f * lanes + lane] == 1.0:
             W[lay.f * lanes + lane] = 0.0
@@ -263,6 +252,7 @@ def settle(
 @compiled
 def look(W: Floats, I: Ints, lay: Layout, lane: int, g: Floats, stack: Floats) -> None:  # noqa: E741
     """Before ``advance``: the scalar second look at one lane's step, for events and extrema that the bounds could not exclude."""
+    I[lane, ev.EVENT_PENDULUM] = ev.NO_EVENT
     if not W[lay.margin * lay.lanes + lane] > 0.0:
         locate(W, I, lay, lane, g, stack)
     if not W[lay.excess * lay.lanes + lane] <= 0.0:
@@ -275,12 +265,13 @@ def record(
 ) -> int:  # noqa: E741
     """Write the samples that fall into the lane's step, given sample times in excitation periods; how many are done then."""
     f = W[lay.f * lay.lanes + lane]
+    x_taken = W[lay.x * lay.lanes + lane]
     length = W[lay.h * lay.lanes + lane] / W[lay.period * lay.lanes + lane]
     while done < times.shape[0]:
         ahead = (times[done] - I[lane, ev.PERIOD]) - f
-        if ahead > length or length == 0.0:
-            break
         x = max(0.0, ahead / length)
+        if x > x_taken or x_taken == 0.0:
+            break
         sample(W, I, lay, lane, x, g, samples[done], states[done])
         done += 1
     return done

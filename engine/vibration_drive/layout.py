@@ -38,16 +38,22 @@ class Layout(NamedTuple):
     driven: int
     sum_high: int
     speed_low: int
-    # step: size, size wanted by the tolerance, whether it ends at f_stop, distance to the nearest guard, excess over extrema
+    # step: size planned, size wanted by the tolerance, part of the planned step taken (x = 1 without an event), whether it
+    # ends at f_stop, smallest distance of a guarded quantity to its band, largest excess over a known extremum, whether
+    # anything but the next step has to happen, number of steps so far
     h: int
     h_free: int
+    x: int
     at_stop: int
     margin: int
     excess: int
+    attention: int
+    steps: int
     # state (with speed[0])
     turn: int
     # sums over the window
     sum_held: int
+    time_held: int
     time_rotating: int
     time_driven: int
     work_clutch: int
@@ -68,9 +74,17 @@ class Layout(NamedTuple):
     input_1: int
     driving_max: int
     energy_lost: int
-    # series of the shaft: speed and sum of the clutch torques, order + 1 coefficients each
+    # excess of this step over each known extremum
+    x_speed_max: int
+    x_speed_min: int
+    x_acc_max: int
+    x_sum_max: int
+    x_power_max: int
+    # series of the shaft, order + 1 coefficients each, in fractions of the planned step: speed, sum of the clutch torques,
+    # power of the clutches
     speed: int
     sum: int
+    power: int
     # one pendulum
     p_ml: int
     p_spring: int
@@ -108,6 +122,14 @@ class Layout(NamedTuple):
     p_acc_min: int
     p_torque_max: int
     p_u_max: int
+    p_x_phi_max: int
+    p_x_phi_min: int
+    p_x_speed_max: int
+    p_x_speed_min: int
+    p_x_acc_max: int
+    p_x_acc_min: int
+    p_x_torque_max: int
+    p_x_u_max: int
     # the clutch law and the law in force (zero where free, straight where beyond the data)
     p_law: int
     p_force: int
@@ -119,7 +141,7 @@ class Layout(NamedTuple):
 
 def make_layout(n: int, coefficients: int, order: int, lanes: int) -> Layout:
     """Lay out the rows for ``n`` pendulums, that many clutch coefficients, series of that order, and that many lanes."""
-    sizes = dict.fromkeys(("speed", "sum", "p_speed", "p_torque"), order + 1)
+    sizes = dict.fromkeys(("speed", "sum", "power", "p_speed", "p_torque"), order + 1)
     sizes |= {"p_drive": order, "p_law": coefficients, "p_force": coefficients}
     names = Layout._fields[Layout._fields.index("stride") + 1 :]
     fields: dict[str, int] = {}

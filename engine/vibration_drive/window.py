@@ -18,88 +18,100 @@ _ENGAGED, _BEYOND = int(Clutch.ENGAGED), int(Clutch.BEYOND)
 
 
 @compiled
-def series(W: Floats, lay: Layout, lane: int, row: int, h: float, g: Floats) -> None:
-    """Copy a stored series into ``g``, in fractions of a step of size ``h`` (shape (order + 1,))."""
-    power = 1.0
+def series(W: Floats, lay: Layout, lane: int, row: int, g: Floats) -> None:
+    """Copy a stored series into ``g`` (shape (order + 1,)), in fractions of the planned step."""
     for k in range(lay.order + 1):
-        g[k] = W[(row + k) * lay.lanes + lane] * power
-        power *= h
+        g[k] = W[(row + k) * lay.lanes + lane]
 
 
 @compiled
-def rate(W: Floats, lay: Layout, lane: int, row: int, h: float, g: Floats) -> None:
-    """Like ``series``, but its derivative; one order less, so the highest coefficient is zero."""
-    power = 1.0
+def rate(W: Floats, lay: Layout, lane: int, row: int, g: Floats) -> None:
+    """Like ``series``, but its time derivative; one order less, so the highest coefficient is zero."""
+    h = W[lay.h * lay.lanes + lane]
     for k in range(lay.order):
-        g[k] = (k + 1) * W[(row + k + 1) * lay.lanes + lane] * power
-        power *= h
+        g[k] = (k + 1) * W[(row + k + 1) * lay.lanes + lane] / h
     g[lay.order] = 0.0
 
 
 @compiled
-def primitive(W: Floats, lay: Layout, lane: int, start: float, row: int, minus: int, h: float, g: Floats) -> None:
-    """Like ``series``, but its integral from the value ``start``; the series at row ``minus`` (if >= 0) is subtracted first."""
+def primitive(W: Floats, lay: Layout, lane: int, start: float, row: int, minus: int, g: Floats) -> None:
+    """Like ``series``, but its time integral from the value ``start``; the series at row ``minus`` (if >= 0) is subtracted first."""
+    h = W[lay.h * lay.lanes + lane]
     g[0] = start
-    power = h
     for k in range(lay.order):
         value = W[(row + k) * lay.lanes + lane]
         if minus >= 0:
             value -= W[(minus + k) * lay.lanes + lane]
-        g[k + 1] = value * power / (k + 1)
-        power *= h
+        g[k + 1] = h * value / (k + 1)
 
 
 @compiled
-def _raise(W: Floats, lay: Layout, lane: int, row: int, g: Floats, stack: Floats) -> None:
-    """Raise the maximum kept at ``row`` to the largest value of ``g`` on the step."""
-    W[row * lay.lanes + lane] = largest(g, lay.order, W[row * lay.lanes + lane], stack)
+def _update(W: Floats, lay: Layout, lane: int, row: int, block: int, sign: float, g: Floats, stack: Floats) -> None:
+    """Move the extremum kept at ``row`` (a maximum for ``sign`` 1, a minimum for -1) if the step's ``g`` can exceed it.
 
-
-@compiled
-def _lower(W: Floats, lay: Layout, lane: int, row: int, g: Floats, stack: Floats) -> None:
-    """Lower the minimum kept at ``row`` to the smallest value of ``g`` on the step; ``g`` changes sign."""
+    ``block`` rows further stands by how much it may.
+    """
+    if W[(row + block) * lay.lanes + lane] <= 0.0:
+        return
+    x = W[lay.x * lay.lanes + lane]
+    p = stack[-1]
+    power = sign
     for k in range(lay.order + 1):
-        g[k] = -g[k]
-    W[row * lay.lanes + lane] = -largest(g, lay.order, -W[row * lay.lanes + lane], stack)
+        p[k] = g[k] * power
+        power *= x
+    W[row * lay.lanes + lane] = sign * largest(p, lay.order, sign * W[row * lay.lanes + lane], stack)
+
+
+@compiled
+def _exceeds(W: Floats, lay: Layout, lane: int, first: int, last: int) -> bool:
+    """Whether any of the excesses at rows ``first`` .. ``last`` is positive."""
+    for row in range(first, last + 1):
+        if not W[row * lay.lanes + lane] <= 0.0:
+            return True
+    return False
 
 
 @compiled
 def update_extrema(W: Floats, lay: Layout, lane: int, g: Floats, stack: Floats) -> None:
-    """Extrema of every watched quantity over the lane's step, by its polynomials (nothing is sampled)."""
+    """Extrema of every watched quantity over the part of the step that is taken, by its polynomials (nothing is sampled)."""
     lanes = lay.lanes
-    h = W[lay.h * lanes + lane]
-    series(W, lay, lane, lay.speed, h, g)
-    _raise(W, lay, lane, lay.speed_max, g, stack)
-    _lower(W, lay, lane, lay.speed_min, g, stack)
-    rate(W, lay, lane, lay.speed, h, g)
-    _raise(W, lay, lane, lay.acc_max, g, stack)
-    series(W, lay, lane, lay.sum, h, g)
-    _raise(W, lay, lane, lay.sum_max, g, stack)
-    power = 1.0
-    for k in range(lay.order + 1):
-        value = 0.0
-        for j in range(k + 1):
-            value += W[(lay.sum + j) * lanes + lane] * W[(lay.speed + k - j) * lanes + lane]
-        g[k] = value * power
-        power *= h
-    _raise(W, lay, lane, lay.power_max, g, stack)
+    block = lay.x_speed_max - lay.speed_max
+    if _exceeds(W, lay, lane, lay.x_speed_max, lay.x_speed_min):
+        series(W, lay, lane, lay.speed, g)
+        _update(W, lay, lane, lay.speed_max, block, 1.0, g, stack)
+        _update(W, lay, lane, lay.speed_min, block, -1.0, g, stack)
+    if _exceeds(W, lay, lane, lay.x_acc_max, lay.x_acc_max):
+        rate(W, lay, lane, lay.speed, g)
+        _update(W, lay, lane, lay.acc_max, block, 1.0, g, stack)
+    if _exceeds(W, lay, lane, lay.x_sum_max, lay.x_sum_max):
+        series(W, lay, lane, lay.sum, g)
+        _update(W, lay, lane, lay.sum_max, block, 1.0, g, stack)
+    if _exceeds(W, lay, lane, lay.x_power_max, lay.x_power_max):
+        series(W, lay, lane, lay.power, g)
+        _update(W, lay, lane, lay.power_max, block, 1.0, g, stack)
+    block = lay.p_x_phi_max - lay.p_phi_max
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
         speed = base + lay.p_speed
-        primitive(W, lay, lane, W[(base + lay.p_phi) * lanes + lane], speed, -1, h, g)
-        _raise(W, lay, lane, base + lay.p_phi_max, g, stack)
-        _lower(W, lay, lane, base + lay.p_phi_min, g, stack)
-        series(W, lay, lane, speed, h, g)
-        _raise(W, lay, lane, base + lay.p_speed_max, g, stack)
-        _lower(W, lay, lane, base + lay.p_speed_min, g, stack)
-        rate(W, lay, lane, speed, h, g)
-        _raise(W, lay, lane, base + lay.p_acc_max, g, stack)
-        _lower(W, lay, lane, base + lay.p_acc_min, g, stack)
-        series(W, lay, lane, base + lay.p_torque, h, g)
-        _raise(W, lay, lane, base + lay.p_torque_max, g, stack)
+        if _exceeds(W, lay, lane, base + lay.p_x_phi_max, base + lay.p_x_phi_min):
+            primitive(W, lay, lane, W[(base + lay.p_phi) * lanes + lane], speed, -1, g)
+            _update(W, lay, lane, base + lay.p_phi_max, block, 1.0, g, stack)
+            _update(W, lay, lane, base + lay.p_phi_min, block, -1.0, g, stack)
+        if _exceeds(W, lay, lane, base + lay.p_x_speed_max, base + lay.p_x_speed_min):
+            series(W, lay, lane, speed, g)
+            _update(W, lay, lane, base + lay.p_speed_max, block, 1.0, g, stack)
+            _update(W, lay, lane, base + lay.p_speed_min, block, -1.0, g, stack)
+        if _exceeds(W, lay, lane, base + lay.p_x_acc_max, base + lay.p_x_acc_min):
+            rate(W, lay, lane, speed, g)
+            _update(W, lay, lane, base + lay.p_acc_max, block, 1.0, g, stack)
+            _update(W, lay, lane, base + lay.p_acc_min, block, -1.0, g, stack)
+        if _exceeds(W, lay, lane, base + lay.p_x_torque_max, base + lay.p_x_torque_max):
+            series(W, lay, lane, base + lay.p_torque, g)
+            _update(W, lay, lane, base + lay.p_torque_max, block, 1.0, g, stack)
         # A free clutch has u <= 0 (it opens with w <= 0), so that only real windup can exceed the initial maximum 0.
-        primitive(W, lay, lane, W[(base + lay.p_u) * lanes + lane], speed, lay.speed, h, g)
-        _raise(W, lay, lane, base + lay.p_u_max, g, stack)
+        if _exceeds(W, lay, lane, base + lay.p_x_u_max, base + lay.p_x_u_max):
+            primitive(W, lay, lane, W[(base + lay.p_u) * lanes + lane], speed, lay.speed, g)
+            _update(W, lay, lane, base + lay.p_u_max, block, 1.0, g, stack)
 
 
 @compiled
@@ -144,30 +156,29 @@ def sample(W: Floats, I: Ints, lay: Layout, lane: int, x: float, g: Floats, out:
     windup, acceleration of the base as it drives the pendulum. ``states`` gets the shaft's state and the clutches'.
     """
     lanes = lay.lanes
-    h = W[lay.h * lanes + lane]
-    primitive(W, lay, lane, W[lay.turn * lanes + lane], lay.speed, -1, h, g)
+    primitive(W, lay, lane, W[lay.turn * lanes + lane], lay.speed, -1, g)
     out[0] = evaluate(g, lay.order, x)
-    series(W, lay, lane, lay.speed, h, g)
+    series(W, lay, lane, lay.speed, g)
     out[1] = evaluate(g, lay.order, x)
-    rate(W, lay, lane, lay.speed, h, g)
+    rate(W, lay, lane, lay.speed, g)
     out[2] = evaluate(g, lay.order, x)
-    series(W, lay, lane, lay.sum, h, g)
+    series(W, lay, lane, lay.sum, g)
     out[3] = evaluate(g, lay.order, x)
     states[0] = int(W[lay.rotating * lanes + lane])
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
         speed = base + lay.p_speed
         column = 4 + 6 * i
-        primitive(W, lay, lane, W[(base + lay.p_phi) * lanes + lane], speed, -1, h, g)
+        primitive(W, lay, lane, W[(base + lay.p_phi) * lanes + lane], speed, -1, g)
         out[column] = evaluate(g, lay.order, x)
-        series(W, lay, lane, speed, h, g)
+        series(W, lay, lane, speed, g)
         out[column + 1] = evaluate(g, lay.order, x)
-        rate(W, lay, lane, speed, h, g)
+        rate(W, lay, lane, speed, g)
         out[column + 2] = evaluate(g, lay.order, x)
-        series(W, lay, lane, base + lay.p_torque, h, g)
+        series(W, lay, lane, base + lay.p_torque, g)
         out[column + 3] = evaluate(g, lay.order, x)
-        primitive(W, lay, lane, W[(base + lay.p_u) * lanes + lane], speed, lay.speed, h, g)
+        primitive(W, lay, lane, W[(base + lay.p_u) * lanes + lane], speed, lay.speed, g)
         out[column + 4] = evaluate(g, lay.order, x)
-        series(W, lay, lane, base + lay.p_drive, h, g)
+        series(W, lay, lane, base + lay.p_drive, g)
         out[column + 5] = evaluate(g, lay.order - 1, x)
         states[1 + i] = I[lane, i]
