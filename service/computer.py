@@ -7,12 +7,14 @@ import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from typing import Any, ParamSpec, Protocol, TypeVar
 
 from pebble import ProcessExpired, ProcessPool
 
 from service.errors import ApiError
+from worker import kernels
 from worker.processes import start_pool_process
 
 P = ParamSpec("P")
@@ -58,6 +60,8 @@ class ProcessComputer:
             raise ApiError("timed-out", f"The computation did not end within {self._timeout:g} s.") from error
         except ProcessExpired as error:
             raise ApiError("not-computed", "The process that ran the computation died.") from error
+        except BrokenProcessPool as error:
+            raise ApiError("unavailable", "The process for computations cannot be started.") from error
         finally:
             self._waiting -= 1
 
@@ -67,7 +71,7 @@ class ProcessComputer:
                 self._pool = ProcessPool(
                     max_workers=1,
                     initializer=start_pool_process,
-                    initargs=(os.getpid(),),
+                    initargs=(os.getpid(), kernels.prepare),
                     context=get_context("spawn"),
                 )
             future: Future[R] = self._pool.schedule(function, args=args, kwargs=kwargs, timeout=self._timeout)

@@ -117,9 +117,9 @@ def _label(name: str, unit: str) -> str:
 
 def _short(title: str) -> str:
     """``title`` as the font can write it, and not wider than a picture."""
-    from matplotlib.font_manager import findfont, get_font
+    from matplotlib.font_manager import FontProperties, findfont, get_font
 
-    glyphs = get_font(findfont(None)).get_charmap()
+    glyphs = get_font(findfont(FontProperties())).get_charmap()
     text = "".join(character if ord(character) in glyphs else "\N{WHITE SQUARE}" for character in title)
     return text if len(text) <= 80 else text[:79] + "…"
 

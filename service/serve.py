@@ -117,7 +117,8 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
     ``announce`` is called with the address once it is listened on (by default it is said on standard error). Raises
     UnsafeSettingsError, DatabaseError and AddressError, each with one sentence, before anything is started.
     """
-    logging.basicConfig(level=logging.INFO, format="%(message)s", stream=sys.stderr)
+    logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stderr)
+    _LOG.setLevel(logging.INFO)
     app = create_app(settings)  # makes the database ready before the dispatcher looks for it
     listener = _listen(settings)
     address = _address(settings, listener)

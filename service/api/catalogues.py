@@ -28,7 +28,7 @@ def list_models(request: Request) -> Any:
 @router.get(
     "/models/{name}", response_model=m.Model, responses=problems("not-found", "invalid-parameter") | documented_304()
 )
-def get_model(request: Request, name: Annotated[str, Path(examples=["vibration-drive"])]) -> Any:
+def get_model(request: Request, name: Annotated[str, Path(description="name of the model", examples=["vibration-drive"])]) -> Any:
     """One model with its parameters, results and endings."""
     if name not in kernels.models():
         raise ApiError("not-found", f"There is no such model; there is: {', '.join(kernels.models())}.")

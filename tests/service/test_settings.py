@@ -1,0 +1,76 @@
+"""Settings: one table, read from the environment."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+from pydantic import ValidationError
+
+from service.settings import Settings, available_cores, default_database_path, table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def test_the_environment_sets_them(settings: Settings, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("SPRAG_PORT", "81")
+    monkeypatch.setenv("SPRAG_ALLOWED_HOSTS", "a.example, B.example,")
+    monkeypatch.setenv("SPRAG_DATABASE", str(tmp_path / "a b.sqlite3"))
+    monkeypatch.setenv("SPRAG_TOKEN", "0123456789abcdef")
+    monkeypatch.setenv("SPRAG_HOST", "")
+    read = Settings()
+    assert (read.port, read.host) == (81, "127.0.0.1")
+    assert {"a.example", "b.example", "localhost", "127.0.0.1", "[::1]"} <= read.host_names
+    assert read.database_url == f"sqlite:///{tmp_path}/a b.sqlite3"
+    assert "0123456789abcdef" not in repr(read)
+
+
+def test_defaults_keep_to_this_machine(settings: Settings) -> None:
+    plain = Settings()
+    assert plain.loopback
+    assert plain.database_url == f"sqlite:///{default_database_path()}"
+    assert plain.pool_processes == available_cores() >= 1
+    assert Settings(processes=3).pool_processes == 3
+    assert Settings(database="sqlite:////x/y.db").database_url == "sqlite:////x/y.db"
+    plain.require_safe()
+
+
+@pytest.mark.parametrize(
+    ("host", "loopback"),
+    [
+        ("127.0.0.1", True),
+        ("127.8.8.8", True),
+        ("::1", True),
+        ("[::1]", True),
+        ("localhost", True),
+        ("0.0.0.0", False),
+        ("x", False),
+    ],
+)
+def test_loopback_is_recognised(settings: Settings, host: str, loopback: bool) -> None:
+    assert settings.model_copy(update={"host": host}).loopback is loopback
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"port": -1},
+        {"port": "x"},
+        {"processes": -1},
+        {"chunk_timeout": 0},
+        {"token": "short"},
+        {"token": "0123456789 abcdef"},
+        {"token": "0123456789abcdef\u00e9"},
+    ],
+)
+def test_wrong_settings_are_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(ValidationError):
+        Settings(**wrong)  # type: ignore[arg-type]
+
+
+def test_the_table_has_every_setting_with_its_help() -> None:
+    rows = list(table())
+    assert [row.variable for row in rows] == [f"SPRAG_{name.upper()}" for name in Settings.model_fields]
+    assert all(row.help for row in rows)
+    assert next(row.default for row in rows if row.variable == "SPRAG_HOST") == "127.0.0.1"
