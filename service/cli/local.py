@@ -18,7 +18,7 @@ from service.cli.console import (
     write_json,
     write_text,
 )
-from service.cli.files import output, read_study, write_pieces
+from service.cli.files import output, read_study
 from service.cli.options import ChunkCases, JsonFlag, OutputFile, Processes, SpecFile
 from service.cli.remote import TableFormat, table_format
 from service.cli.settings import read_settings
@@ -103,8 +103,9 @@ def trajectory(
 ) -> None:
     """Write the instantaneous values of one case: angles, speeds, torques, powers, states."""
     study = read_study(spec).study
-    made = _trajectory(study, case, start, end, points)
-    write_pieces(file, [_trajectory_bytes(made, study, case, table_format(form, file, as_json))])
+    with output(file) as write:
+        made = _trajectory(study, case, start, end, points)
+        write(_trajectory_bytes(made, study, case, table_format(form, file, as_json)))
     say(f"case {case}: {made.ending}, {points} times")
 
 

@@ -66,12 +66,12 @@ class Service:
 
 
 @contextmanager
-def service(folder: Path, *options: object) -> Iterator[Service]:
+def service(folder: Path, *options: object, **more: str) -> Iterator[Service]:
     """``sprag serve`` on a free port with a database in ``folder``; has ended, in order, when the block is left."""
     command = [*COMMAND, "serve", "--json", "--port", "0", "--db", str(folder / "sprag.sqlite3"), *map(str, options)]
     log = folder / "service.log"
     with log.open("wb") as errors:
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, env=environment())
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, env=environment(**more))
     assert process.stdout is not None
     with process.stdout as output:
         line = output.readline()

@@ -1,0 +1,273 @@
+"""Commands as processes of their own: a service followed and stopped, pipes, signals, the demonstration."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from tests.acceptance.processes import COMMAND, EXAMPLES, SECONDS, Service, environment, service, sprag
+
+SPEC = EXAMPLES / "one_pendulum.json"
+SMALL = EXAMPLES / "measured_clutch.json"
+#: A process that was started in the background may have been told to ignore interrupts; this one is not.
+INTERRUPTIBLE = [
+    sys.executable,
+    "-c",
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from service.cli import main; main()",
+]
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    with service(tmp_path_factory.mktemp("served"), "--processes", 1) as started:
+        yield started
+
+
+def test_a_study_from_submission_to_picture(running: Service, tmp_path: Path) -> None:
+    at = ("--server", running.address)
+    submitted = sprag("submit", SMALL, *at)
+    assert submitted.code == 0
+    study = submitted.out.decode().strip()
+    watched = sprag("watch", study, *at)
+    assert watched.code == 0
+    assert "17 of 17 cases done, 17 ok" in watched.err
+    assert watched.out.decode().strip() == study
+    assert study in [item["id"] for item in sprag("list", "--json", *at).data["studies"]]
+    assert study in sprag("list", "--state", "finished", *at).out.decode()
+    assert study not in sprag("list", "--state", "running", *at).out.decode()
+
+    picture = tmp_path / "curve.svg"
+    curve = ("curve", study, "--x", "shaft.load", "--y", "shaft.speed.mean", "--y", "efficiency", *at)
+    shown = sprag(*curve, "-o", picture)
+    assert shown.code == 0
+    assert "shaft.speed.mean [rad/s]" in shown.out.decode()
+    assert len([line for line in shown.out.decode().splitlines() if line.strip()[:1].isdigit()]) == 17
+    assert "<svg" in picture.read_text()
+    data = sprag(*curve, "--json").data
+    assert data["x"]["values"][0] == 0.0
+    assert len(data["curves"][0]["y"]["efficiency"]) == 17
+
+    for name in ("rows.csv", "rows.json"):
+        file = tmp_path / name
+        assert sprag("export", study, "-o", file, *at).code == 0
+        assert sprag("export", study, "--format", name[5:], *at).out == file.read_bytes()
+    assert json.loads((tmp_path / "rows.json").read_text())["rows"][3]["case"] == 3
+
+
+def test_the_same_key_submits_once(running: Service) -> None:
+    arguments = ("submit", SMALL, "--key", "once", "--json", "--server", running.address)
+    assert sprag(*arguments).data["id"] == sprag(*arguments).data["id"]
+    other = sprag("submit", EXAMPLES / "two_pendulums.toml", "--key", "once", "--server", running.address)
+    assert other.code == 2
+
+
+def test_a_study_is_held_and_cancelled(running: Service, tmp_path: Path) -> None:
+    at = ("--server", running.address, "--json")
+    spec = json.loads(SPEC.read_text())
+    spec["run"]["duration"] = "20000 periods"
+    spec["run"]["window"] = ["40 periods", "60 periods"]
+    long = tmp_path / "long.json"
+    long.write_text(json.dumps(spec))
+    study = sprag("submit", long, *at).data["id"]
+    assert sprag("pause", study, *at).data["state"] == "paused"
+    assert sprag("resume", study, *at).data["state"] in ("queued", "running")
+    assert sprag("cancel", study, *at).data["state"] in ("cancelling", "cancelled")
+    watched = sprag("watch", study, *at)
+    assert watched.code == 1
+    assert watched.data["state"] == "cancelled"
+
+
+def test_nobody_at_the_address_is_said_in_one_sentence() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))  # bound but not listening: nobody answers, and nobody else can begin to
+        address = f"http://127.0.0.1:{taken.getsockname()[1]}"
+        for arguments in (("list",), ("watch", "st_1"), ("submit", SMALL)):
+            done = sprag(*arguments, SPRAG_SERVER=address)
+            assert done.code == 3
+            assert done.err.count("\n") == 1
+            assert address in done.err
+            assert "`sprag serve`" in done.err
+
+
+@pytest.mark.parametrize("address", ["nonsense", "ftp://127.0.0.1", "http://", "http://[", "http://127.0.0.1:99999999"])
+def test_no_address(address: str) -> None:
+    assert sprag("list", "--server", address).code in (2, 3)
+
+
+def test_a_token_is_asked_for_and_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    token = sprag("token").out.decode().strip()
+    folder = tmp_path / "served"
+    folder.mkdir()
+    with service(folder, "--processes", 1, SPRAG_TOKEN=token) as running:
+        refused = sprag("list", "--server", running.address)
+        assert refused.code == 3
+        assert "token" in refused.err.lower()
+        assert sprag("list", "--server", running.address, SPRAG_TOKEN=token).code == 0
+
+
+def test_a_service_that_others_could_reach_needs_a_token(tmp_path: Path) -> None:
+    done = sprag("serve", "--host", "0.0.0.0", "--port", "0", "--db", tmp_path / "x.sqlite3")
+    assert done.code == 2
+    assert "SPRAG_TOKEN" in done.err
+
+
+def test_a_port_that_is_taken(running: Service, tmp_path: Path) -> None:
+    port = running.address.rpartition(":")[2]
+    done = sprag("serve", "--port", port, "--db", tmp_path / "x.sqlite3")
+    assert done.code == 3
+    assert port in done.err
+
+
+def test_wrong_settings_are_told_together(tmp_path: Path) -> None:
+    done = sprag("serve", SPRAG_PORT="x", SPRAG_PROCESSES="-1")
+    assert done.code == 2
+    assert "SPRAG_PORT" in done.err
+    assert "SPRAG_PROCESSES" in done.err
+
+
+def test_a_database_that_is_none(tmp_path: Path) -> None:
+    file = tmp_path / "notes.txt"
+    file.write_text("not a database, but long enough to be looked at as one" * 100)
+    for arguments in (("run", SMALL, "--db", file), ("db", "upgrade", "--db", file), ("db", "check", "--db", file)):
+        done = sprag(*arguments)
+        assert done.code == 3, arguments
+        assert "fault of Sprag" not in done.err
+    assert sprag("run", SMALL, "--db", "postgresql://localhost/x").code == 3
+
+
+def test_a_run_kept_in_a_database_is_found_there(tmp_path: Path) -> None:
+    database = tmp_path / "study.sqlite3"
+    done = sprag("run", SMALL, "--db", database, "--json")
+    assert done.code == 0
+    assert sprag("db", "check", "--db", database).code == 0
+    copy = tmp_path / "copy.sqlite3"
+    assert sprag("db", "backup", copy, "--db", database).code == 0
+    assert sprag("db", "backup", copy, "--db", database).code == 2
+    assert sprag("db", "upgrade", "--db", copy, "--json").data["before"] is not None
+    (folder := tmp_path / "served").mkdir()
+    copy.rename(folder / "sprag.sqlite3")
+    with service(folder, "--processes", 1) as running:
+        study = done.data["study"]
+        rows = httpx.get(f"{running.address}/api/v1/studies/{study}/results", params={"format": "json"}).json()["rows"]
+    assert rows == done.data["rows"]
+
+
+def test_a_worker_alone_runs_what_a_service_was_given(tmp_path: Path) -> None:
+    database = tmp_path / "study.sqlite3"
+    assert sprag("db", "upgrade", "--db", database).code == 0
+    worker = subprocess.Popen(
+        [*COMMAND, "worker", "--db", str(database), "--processes", "1"], stderr=subprocess.PIPE, env=environment()
+    )
+    assert worker.stderr is not None
+    with worker, worker.stderr as said:
+        assert b"at work" in said.readline()
+        # This process finds the database's lock taken, and leaves the study to the worker.
+        done = sprag("run", SMALL, "--db", database, "--json")
+        worker.send_signal(signal.SIGTERM)
+        assert worker.wait(SECONDS) == 0
+    assert done.code == 0
+    assert len(done.data["rows"]) == 17
+
+
+def test_a_reader_that_goes_away_is_no_failure_to_talk_about() -> None:
+    with subprocess.Popen(
+        [*COMMAND, "run", str(SPEC)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment()
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        assert process.stdout.readline().startswith(b"case,")
+        process.stdout.close()
+        assert process.stderr.read() == b""
+        assert process.wait(SECONDS) == 141
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_leaves_nothing_behind(tmp_path: Path, number: signal.Signals) -> None:
+    spec = json.loads(SPEC.read_text())
+    spec["run"] = {"duration": "100000 periods"}
+    long = tmp_path / "long.json"
+    long.write_text(json.dumps(spec))
+    temporary = tmp_path / "tmp"
+    temporary.mkdir()
+    with subprocess.Popen(
+        [*INTERRUPTIBLE, "run", str(long), "--processes", "2", "-o", str(tmp_path / "rows.csv")],
+        stderr=subprocess.PIPE,
+        env=environment(TMPDIR=str(temporary)),
+    ) as process:
+        assert process.stderr is not None
+        while not list(temporary.rglob("*.sqlite3")):
+            with pytest.raises(subprocess.TimeoutExpired):  # it is still at work
+                process.wait(0.05)
+        process.send_signal(number)
+        said = process.stderr.read()
+        assert process.wait(SECONDS) == 130
+    assert said == b"interrupted\n"
+    assert list(temporary.iterdir()) == []
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["long.json", "tmp"]
+
+
+def test_a_full_disk_is_storage_trouble() -> None:
+    if not os.path.exists("/dev/full"):  # only Linux has it
+        return
+    with open("/dev/full", "wb") as full:
+        done = subprocess.run(
+            [*COMMAND, "presets"], stdout=full, stderr=subprocess.PIPE, env=environment(), timeout=SECONDS, check=False
+        )
+    assert done.returncode == 3
+    assert b"no space left" in done.stderr
+    assert sprag("run", SMALL, "-o", "/dev/full").code == 3
+
+
+def test_specs_and_data_come_through_standard_input() -> None:
+    assert sprag("validate", "-", stdin=SPEC.read_bytes()).code == 0
+    assert sprag("validate", "-", stdin=(EXAMPLES / "two_pendulums.toml").read_bytes()).code == 0
+    fitted = sprag("fit", "-", "--accuracy", "0.05", "--json", stdin=(EXAMPLES / "clutch_measured.csv").read_bytes())
+    assert fitted.data["degree"] == 3
+
+
+def test_output_for_a_terminal_of_another_character_set() -> None:
+    done = sprag("validate", SPEC, PYTHONIOENCODING="ascii")
+    assert done.code == 0
+    assert sprag("--help", PYTHONIOENCODING="ascii").code == 0
+
+
+def test_doctor_finds_the_installation_sound(tmp_path: Path) -> None:
+    done = sprag("doctor", "--json", "--db", tmp_path / "x.sqlite3")
+    assert done.code == 0, done.data
+    assert done.data["sound"] is True
+    assert {"versions", "SQLite", "database", "disk", "kernel cache", "engine"} == {
+        finding["subject"] for finding in done.data["findings"]
+    }
+
+
+def test_doctor_finds_a_database_of_another_program(tmp_path: Path) -> None:
+    file = tmp_path / "x.sqlite3"
+    file.write_text("no database at all" * 1000)
+    done = sprag("doctor", "--db", file)
+    assert done.code == 3
+    assert "WRONG" in done.out.decode()
+
+
+def test_the_demonstration(tmp_path: Path) -> None:
+    done = sprag("demo", "--exit", cwd=tmp_path)
+    assert done.code == 0, done.err
+    text = done.out.decode()
+    assert "Mechanical characteristic at excitation.frequency 25 Hz" in text
+    assert "mean speed [rad/s]" in text
+    assert "512 cases" in done.err
+    assert "http://127.0.0.1:" in done.err
+    assert (tmp_path / "demo" / "curve.png").read_bytes().startswith(b"\x89PNG")
+    again = sprag("demo", "--exit", "--json", cwd=tmp_path)
+    speeds = again.data["curves"]["curves"][0]["y"]["shaft.speed.mean"]
+    assert speeds[0] > 10 * speeds[-1] > 0
+    with pytest.raises(httpx.ConnectError):
+        httpx.get(again.data["server"])

@@ -1,0 +1,67 @@
+"""`sprag serve` as real processes: its worker is replaced when it dies, and nothing outlives the service."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import httpx
+import psutil
+import pytest
+
+from tests.acceptance.processes import EXAMPLES, SECONDS, Service, service
+
+JSON = {"Content-Type": "application/json"}
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Wait until ``condition`` holds; fails when it takes far too long."""
+    deadline = time.monotonic() + SECONDS
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def worker_of(running: Service) -> psutil.Process:
+    """The dispatcher's process: the child that has children of its own."""
+    until(lambda: any(child.children() for child in psutil.Process(running.process.pid).children()))
+    return next(child for child in psutil.Process(running.process.pid).children() if child.children())
+
+
+def submit_and_finish(running: Service) -> None:
+    """A small study goes through."""
+    spec = json.loads((EXAMPLES / "one_pendulum.json").read_text())
+    spec["run"] = {"duration": "4 periods"}
+    answer = httpx.post(f"{running.address}/api/v1/studies", content=json.dumps(spec), headers=JSON)
+    address = running.address + answer.headers["location"]
+    until(lambda: httpx.get(address).json()["state"] == "finished")
+
+
+def test_a_killed_worker_is_replaced_and_all_end_with_the_service(tmp_path: Path) -> None:
+    with service(tmp_path, "--processes", 1) as running:
+        first = worker_of(running)
+        family = [first, *first.children(recursive=True)]
+        first.kill()
+        assert psutil.wait_procs(family, timeout=SECONDS)[1] == []
+        submit_and_finish(running)
+        assert worker_of(running) != first
+        family = psutil.Process(running.process.pid).children(recursive=True)
+    assert psutil.wait_procs(family, timeout=SECONDS)[1] == []
+
+
+def test_nothing_outlives_a_killed_service(tmp_path: Path) -> None:
+    folder = tmp_path / "killed"
+    folder.mkdir()
+    alive: list[psutil.Process] = []
+    with pytest.raises(AssertionError), service(folder, "--processes", 1) as running:
+        worker_of(running)
+        family = psutil.Process(running.process.pid).children(recursive=True)
+        running.process.send_signal(signal.SIGKILL)
+        alive = psutil.wait_procs(family, timeout=SECONDS)[1]
+        assert running.process.wait(SECONDS) != 0  # and so the block does not end in order
+    assert (alive, running.process.returncode) == ([], -signal.SIGKILL)
+    with service(folder, "--processes", 1) as again:
+        submit_and_finish(again)
