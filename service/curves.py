@@ -54,10 +54,10 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The cases of all curves, chosen from the study alone."""
+    """The cases of all curves, chosen from the study alone; ``units`` (SI) of every path that is drawn or fixed."""
 
     x: str
-    x_unit: str
+    units: dict[str, str]
     x_values: tuple[float, ...]
     results: tuple[ResultInfo, ...]
     lines: tuple[Line, ...]
@@ -83,7 +83,8 @@ class Curves:
         """SPEC.md's document: null for a missing number, with the ending that explains it."""
         chosen = self.selection
         return {
-            "x": {"path": chosen.x, "unit": chosen.x_unit, "values": list(chosen.x_values)},
+            "x": {"path": chosen.x, "unit": chosen.units[chosen.x], "values": list(chosen.x_values)},
+            "units": chosen.units,
             "results": {info.name: {"unit": info.unit, "description": info.description} for info in chosen.results},
             "curves": [
                 {
@@ -152,7 +153,9 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
     _no_axis_twice({query.x: x_axis}, by_axes, fixed)
     chooser = _zip_lines if study.combine == "zip" else _grid_lines
     x_values, lines = chooser(study, x_axis, by_axes, fixed, len(results))
-    return Selection(query.x, unit_of(study.model, query.x), x_values, results, tuple(lines))
+    made = tuple(lines)
+    units = {path: unit_of(study.model, path) for path in (query.x, *made[0].by, *made[0].at)}
+    return Selection(query.x, units, x_values, results, made)
 
 
 def draw(selection: Selection, fetch: Fetch) -> Curves:

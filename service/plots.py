@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import io
+import itertools
 import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
+
+from service.errors import ErrorItem
+from service.selection import SelectionError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,9 +24,12 @@ Picture = Literal["svg", "png", "pdf"]
 PICTURES: Final[tuple[Picture, ...]] = get_args(Picture)
 MEDIA_TYPES: Final[dict[Picture, str]] = {"svg": "image/svg+xml", "png": "image/png", "pdf": "application/pdf"}
 
-#: Curves in one picture that still can be told apart; the document has them all.
-MAX_PICTURE_CURVES: Final = 24
+#: What one picture can show; more would take minutes to draw and nobody could read it.
+MAX_PICTURE_CURVES: Final = 200
+MAX_PICTURE_POINTS: Final = 100_000
+#: Curves that have a colour and an entry in the legend each.
 _LEGEND_CURVES: Final = 10
+_STYLES: Final[tuple[Literal["-", "--", ":", "-."], ...]] = ("-", "--", ":", "-.")
 _STYLE: Final[dict[Any, Any]] = {
     "svg.hashsalt": "sprag",
     "svg.fonttype": "path",
@@ -45,7 +52,13 @@ _ONE_AT_A_TIME = threading.Lock()
 
 
 def draw_curves(curves: Curves, title: str, picture: Picture) -> bytes:
-    """Curves as a picture: one plot under another for results of different units, missing points left out."""
+    """Curves as a picture: one plot under another for results of different units, missing points left out.
+
+    Raises SelectionError when there are more curves or points than one picture can show.
+    """
+    points = sum(len(curve.endings) for curve in curves.curves) * len(curves.selection.results)
+    _check_size("curves", len(curves.curves), MAX_PICTURE_CURVES)
+    _check_size("points", points, MAX_PICTURE_POINTS)
     groups: dict[str, list[ResultInfo]] = {}
     for info in curves.selection.results:
         groups.setdefault(info.unit, []).append(info)
@@ -54,14 +67,15 @@ def draw_curves(curves: Curves, title: str, picture: Picture) -> bytes:
         plots = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (unit, infos) in zip(plots, groups.items(), strict=True):
             _paint_curves(axes, curves, infos, unit)
-        plots[-1].set_xlabel(_label(curves.selection.x, curves.selection.x_unit))
+        plots[-1].set_xlabel(_label(curves.selection.x, curves.selection.units[curves.selection.x]))
         figure.suptitle(_short(title), fontsize=11)
 
     return _render(paint, picture, (8.0, 1.2 + 3.6 * len(groups)))
 
 
 def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
-    """A map as a picture: colours over two axes, cases without a result left blank."""
+    """A map as a picture: colours over two axes, cases without a result left blank; SelectionError when too large."""
+    _check_size("points", drawn.values.size, MAX_PICTURE_POINTS)
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
@@ -77,6 +91,12 @@ def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
     return _render(paint, picture, (8.0, 6.0))
 
 
+def _check_size(what: str, count: int, most: int) -> None:
+    if count > most:
+        message = f"{count} {what} are too many for one picture; choose fewer, or take the numbers"
+        raise SelectionError([ErrorItem(message, parameter="format", allowed=f"<= {most} {what}")])
+
+
 def _render(paint: Callable[[Figure], None], picture: Picture, size: tuple[float, float]) -> bytes:
     import matplotlib as mpl
     from matplotlib.figure import Figure
@@ -90,29 +110,47 @@ def _render(paint: Callable[[Figure], None], picture: Picture, size: tuple[float
 
 
 def _paint_curves(axes: Axes, curves: Curves, infos: list[ResultInfo], unit: str) -> None:
-    styles = ("-", "--", ":", "-.")
-    for number, curve in enumerate(curves.curves[:MAX_PICTURE_CURVES]):
-        by = ", ".join(f"{path} = {value:.6g}" for path, value in curve.line.by.items())
-        for kind, info in enumerate(infos):
-            label = ", ".join(part for part in (info.name if len(infos) > 1 or not by else "", by) if part)
-            axes.plot(
-                curve.line.x,
-                curve.y[info.name],
-                marker="o",
-                markersize=3.0,
-                linewidth=1.4,
-                color=f"C{number % 10}",
-                linestyle=styles[kind % len(styles)],
-                label=label,
-            )
-    axes.set_ylabel(_label(infos[0].name if len(infos) == 1 else "", unit))
-    lines = min(len(curves.curves), MAX_PICTURE_CURVES) * len(infos)
-    if 1 < lines <= _LEGEND_CURVES or (lines == 1 and curves.curves[0].line.by):
-        axes.legend(fontsize=8)
+    """Colour tells the curves apart, the style of the line the results."""
+    colours = _colours(len(curves.curves))
+    for curve, colour in zip(curves.curves, colours, strict=True):
+        for info, style in zip(infos, itertools.cycle(_STYLES), strict=False):
+            y = curve.y[info.name]
+            axes.plot(curve.line.x, y, color=colour, linestyle=style, marker="o", markersize=3.0, linewidth=1.4)
+    axes.set_ylabel(_label(infos[0].name, unit) if len(infos) == 1 else unit)
+    _explain(axes, curves, infos, colours)
 
 
-def _label(name: str, unit: str) -> str:
-    return f"{name} ({unit})".strip() if unit != "1" else name
+def _colours(count: int) -> list[Any]:
+    """Colours that differ most for a few curves, and that follow the order of many."""
+    if count <= _LEGEND_CURVES:
+        return [f"C{number}" for number in range(count)]
+    from matplotlib import colormaps
+
+    return [colormaps["viridis"](number / (count - 1)) for number in range(count)]
+
+
+def _explain(axes: Axes, curves: Curves, infos: list[ResultInfo], colours: list[Any]) -> None:
+    """A legend for the styles and for a few colours; of many curves only the first, the middle and the last."""
+    from matplotlib.lines import Line2D
+
+    lines = [curve.line for curve in curves.curves]
+    shown = range(len(lines)) if len(lines) <= _LEGEND_CURVES else (0, len(lines) // 2, len(lines) - 1)
+    units = curves.selection.units
+    handles = [
+        Line2D([], [], color="0.3", linestyle=style, label=info.name)
+        for info, style in zip(infos, itertools.cycle(_STYLES), strict=False)
+        if len(infos) > 1
+    ]
+    for number in shown:
+        values = [f"{path} = {_label(f'{value:.6g}', units[path], '')}" for path, value in lines[number].by.items()]
+        if values:
+            handles.append(Line2D([], [], color=colours[number], label=", ".join(values)))
+    if handles:
+        axes.legend(handles=handles, fontsize=8)
+
+
+def _label(name: str, unit: str, brackets: str = "()") -> str:
+    return f"{name} {brackets[:1]}{unit}{brackets[1:]}" if unit != "1" else name
 
 
 def _short(title: str) -> str:

@@ -201,6 +201,7 @@ class Curves(Body):
 
     study: str
     x: CurveAxis
+    units: dict[str, str] = Field(description="SI unit of every parameter in x, by and at")
     results: dict[str, ResultMeaning]
     curves: list[Curve]
 

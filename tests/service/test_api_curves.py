@@ -65,6 +65,7 @@ def test_curves_are_the_rows_bit_for_bit(service: Service, grid: dict[str, Any])
     m.Curves.model_validate(body)
     assert body["x"] == {"path": "shaft.load", "unit": "N*m", "values": [0.02, 0.1, 0.3]}
     assert body["results"]["torque.max"]["unit"] == "N*m"
+    assert body["units"]["excitation.frequency"] == "Hz"
     assert [curve["by"] for curve in body["curves"]] == [{"excitation.frequency": f} for f in (16.0, 25.0, 35.0)]
     for curve in body["curves"]:
         assert curve["at"] == {"excitation.amplitude_y": 0.002, "pendulums.0.mass": 0.5}
@@ -211,6 +212,29 @@ def test_too_many_numbers_are_refused(service: Service, spec: dict[str, Any]) ->
     response = ask(service, service.submit(spec), "x=shaft.load&y=torque.max&by=excitation.frequency")
     assert response.status_code == 422
     assert "1100000 points" in response.json()["detail"]
+
+
+def test_a_picture_shows_only_so_much(service: Service, spec: dict[str, Any]) -> None:
+    spec["axes"] = [
+        {"path": "excitation.frequency", "linspace": [16, 35, 201]},
+        {"path": "shaft.load", "linspace": [0, 1, 500]},
+    ]
+    study_id = service.submit(spec)
+    curves = ask(service, study_id, "x=shaft.load&y=torque.max&by=excitation.frequency&format=png")
+    assert "201 curves are too many" in curves.json()["detail"]
+    points = ask(service, study_id, "x=excitation.frequency&y=shaft.load&z=torque.max&format=svg", "map")
+    assert "100500 points are too many" in points.json()["detail"]
+
+
+def test_pictures_are_the_same_for_the_same_numbers(service: Service, spec: dict[str, Any]) -> None:
+    spec["axes"][0] = {"path": "excitation.frequency", "linspace": [16, 35, 12]}
+    study_id = service.submit(spec)
+    service.fill(study_id)
+    query = "x=shaft.load&y=torque.max&y=torque.mean&y=efficiency&by=excitation.frequency&format="
+    for form in ("svg", "png", "pdf"):
+        first, again = ask(service, study_id, query + form), ask(service, study_id, query + form)
+        assert first.status_code == 200
+        assert first.content == again.content
 
 
 def test_curves_have_a_tag_that_changes_with_the_rows(service: Service, spec: dict[str, Any]) -> None:
