@@ -5,6 +5,10 @@ from typing import ParamSpec, TypeVar, cast
 
 import numba
 
+from engine.cache import cache_folder
+
+numba.config.CACHE_DIR = str(cache_folder())
+
 P = ParamSpec("P")
 R = TypeVar("R")
 

@@ -80,6 +80,7 @@ __all__ = [
     "models",
     "parameter_catalogue",
     "pendulums",
+    "prepare",
     "result_infos",
     "result_shapes",
     "run_chunk",
@@ -321,6 +322,11 @@ def estimate_seconds_per_case(study: Study) -> float:
     return estimate_seconds(shape.pendulums, shape.coefficients, shape.tolerance, _mean_periods(study))
 
 
+def prepare() -> None:
+    """Load the engine with its compiler, so that the first cases do not wait for that."""
+    import engine.vibration_drive.simulate  # noqa: F401
+
+
 def load(shape: KernelShape) -> None:
     """Compile the kernel of that shape into the on-disk cache, or load it from there."""
     from engine.vibration_drive.simulate import warm_up as engine_warm_up
@@ -335,6 +341,6 @@ def warm_up(study: Study) -> None:
 
 def cache_folder() -> Path:
     """Folder of the compiled kernels, made if need be."""
-    from engine.vibration_drive.kernel import cache_folder as engine_cache_folder
+    from engine.cache import cache_folder as engine_cache_folder
 
     return engine_cache_folder()

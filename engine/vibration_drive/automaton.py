@@ -51,7 +51,9 @@ class Threshold(IntEnum):
 class Transition:
     """One row of the automaton: in ``source``, when ``quantity`` passes ``threshold`` upward (+1) or downward (-1), go to ``target``.
 
-    ``reset`` says what is set at the crossing. ``literal_only`` rows hold under ``reset = "literal"`` alone (MODEL.md (5)).
+    ``reset`` says what is set at the crossing. ``literal_only`` rows hold under ``reset = "literal"`` alone (MODEL.md (5)):
+    there an engaged clutch restarts when w rises through 0, and since w is positive when it engages, the row that leads back
+    to the same state notes the fall of w through 0 that has to come first. It changes nothing and counts as no event.
     """
 
     source: Clutch | Shaft
@@ -69,8 +71,10 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition(Clutch.TAKE_UP, Quantity.RELATIVE_SPEED, -1, Threshold.ZERO, Clutch.FREE, "w = 0"),
     Transition(Clutch.ENGAGED, Quantity.WINDUP, -1, Threshold.ZERO, Clutch.FREE, "u = 0"),
     Transition(Clutch.ENGAGED, Quantity.WINDUP, +1, Threshold.DATA_END, Clutch.BEYOND, "u = u_end"),
+    Transition(Clutch.ENGAGED, Quantity.RELATIVE_SPEED, -1, Threshold.ZERO, Clutch.ENGAGED, "w = 0", True),
     Transition(Clutch.ENGAGED, Quantity.RELATIVE_SPEED, +1, Threshold.ZERO, Clutch.START, "xi = 0, energy lost", True),
     Transition(Clutch.BEYOND, Quantity.WINDUP, -1, Threshold.DATA_END, Clutch.ENGAGED, "u = u_end"),
+    Transition(Clutch.BEYOND, Quantity.RELATIVE_SPEED, -1, Threshold.ZERO, Clutch.BEYOND, "w = 0", True),
     Transition(Clutch.BEYOND, Quantity.RELATIVE_SPEED, +1, Threshold.ZERO, Clutch.START, "xi = 0, energy lost", True),
     Transition(Clutch.LOCKED, Quantity.LOCK_TORQUE, +1, Threshold.FIRST_COEFFICIENT, Clutch.ENGAGED, "u = 0, w = 0"),
     Transition(Clutch.LOCKED, Quantity.LOCK_TORQUE, -1, Threshold.ZERO, Clutch.FREE, "w = 0"),

@@ -102,9 +102,10 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
             own["backlash"], column(f"{law}windup_limit", math.inf), own["initial_angle"], own["initial_speed"],
         ]  # fmt: skip
         pendulums += [column(f"{law}coefficients.{k}", 0.0) for k in range(count)]
-    start = np.array([run.window_in_periods(f)[0] for f in frequency])
-    end = np.array([run.window_in_periods(f)[1] for f in frequency])
     end_of_run = np.array([run.duration.in_periods(f) for f in frequency])
+    # Seconds times frequency may round past the end of the run.
+    end = np.minimum([run.window_in_periods(f)[1] for f in frequency], end_of_run)
+    start = np.minimum([run.window_in_periods(f)[0] for f in frequency], end)
     whole = np.floor(end - start + 1e-9)
     # Without a whole period in the window its "start of whole periods" is its end, and there is no efficiency.
     times = (start, np.where(whole > 0, np.maximum(start, end - whole), end), end, end_of_run)

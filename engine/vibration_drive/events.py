@@ -20,6 +20,7 @@ _ROUNDING = 1e-12
 
 _FREE, _TAKE_UP, _ENGAGED, _BEYOND, _LOCKED, _START = (int(state) for state in Clutch)
 _HELD, _ROTATING = int(Shaft.HELD), int(Shaft.ROTATING)
+_W_LOW, _W_HIGH = int(Band.W_LOW), int(Band.W_HIGH)
 _AT_DATA_END, _AT_FIRST, _BANDS = int(Threshold.DATA_END), int(Threshold.FIRST_COEFFICIENT), len(Band)
 
 # Columns of a lane's integers. The first eight are the pendulums' clutch states.
@@ -135,7 +136,7 @@ def locate(W: Floats, I: Ints, lay: Layout, lane: int, g: Floats, stack: Floats)
     for i in range(lay.n):
         state = I[lane, i]
         for band in range(_BANDS):
-            if CLUTCH_THRESHOLD[literal, state, band] == 0:
+            if abs(W[(lay.pendulums + i * lay.stride + lay.p_w_low + band) * lanes + lane]) >= NEVER:
                 continue
             _guard(W, lay, lane, i, band, g)
             if fresh and band // 2 < 2:
@@ -154,10 +155,19 @@ def locate(W: Floats, I: Ints, lay: Layout, lane: int, g: Floats, stack: Floats)
 
 
 @compiled
+def _watch_fall(W: Floats, lay: Layout, lane: int, i: int, fall: bool) -> None:
+    """Let an engaged clutch under literal resets wait for w to fall through 0 (``fall``), or after that to rise through it."""
+    first = lay.pendulums + i * lay.stride + lay.p_w_low
+    W[(first + _W_LOW) * lay.lanes + lane] = 0.0 if fall else -NEVER
+    W[(first + _W_HIGH) * lay.lanes + lane] = NEVER if fall else 0.0
+
+
+@compiled
 def set_clutch(W: Floats, I: Ints, lay: Layout, lane: int, i: int, state: int) -> None:  # noqa: E741
     """Put the clutch of pendulum ``i`` into a state: its guards' bands, the law in force, the flags."""
     lanes = lay.lanes
     base = lay.pendulums + i * lay.stride
+    source = I[lane, i]
     I[lane, i] = state
     for band in range(_BANDS):
         kind = CLUTCH_THRESHOLD[I[lane, LITERAL], state, band]
@@ -169,6 +179,8 @@ def set_clutch(W: Floats, I: Ints, lay: Layout, lane: int, i: int, state: int) -
         elif kind != 0:
             edge = 0.0
         W[(base + lay.p_w_low + band) * lanes + lane] = edge
+    if I[lane, LITERAL] == 1 and (state == _ENGAGED or state == _BEYOND):
+        _watch_fall(W, lay, lane, i, source != _BEYOND)
     limit = W[(base + lay.p_limit) * lanes + lane]
     for k in range(lay.coefficients):
         value = 0.0
@@ -326,6 +338,10 @@ def transit(W: Floats, I: Ints, lay: Layout, lane: int) -> None:  # noqa: E741
     I[lane, SKIP_U + i] = 0
     if target == _START:
         _start(W, I, lay, lane, i)
+        return
+    if source == target:
+        W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
+        _watch_fall(W, lay, lane, i, False)
         return
     if source == _LOCKED:
         W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]

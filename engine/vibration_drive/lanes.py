@@ -192,7 +192,11 @@ def _finish(W: Floats, I: Ints, lay: Layout, lane: int, ending: int, cases: Floa
 def _take_event(W: Floats, I: Ints, lay: Layout, lane: int, h: float, most_events: int) -> int:  # noqa: E741
     """Carry out the event at the step's end and count it; the ending it causes, if any."""
     I[lane, ev.EVENTS_AT_ONCE] = 0 if h > 0.0 else I[lane, ev.EVENTS_AT_ONCE] + 1
+    pendulum = I[lane, ev.EVENT_PENDULUM]
+    counts = pendulum == ev.OF_SHAFT or I[lane, pendulum] != I[lane, ev.EVENT_TARGET]
     transit(W, I, lay, lane)
+    if not counts:
+        return _RUNNING
     if I[lane, ev.PERIOD] > 0 or W[lay.f * lay.lanes + lane] > 0.0:
         I[lane, ev.EVENTS] += 1
         I[lane, ev.EVENTS_IN_PERIOD] += 1
@@ -234,6 +238,7 @@ def settle(
         W[lay.f * lanes + lane] = W[lay.f_stop * lanes + lane]
     if ending == _RUNNING and event:
         ending = _take_event(W, I, lay, lane, h, most_events)
+        I[lane, ev.EVENT_PENDULUM] = ev.NO_EVENT
     if ending == _RUNNING and at_stop and h > 0.0:
         if W[lay.f * lanes + lane] == 1.0:
             W[lay.f * lanes + lane] = 0.0
@@ -252,7 +257,6 @@ def settle(
 @compiled
 def look(W: Floats, I: Ints, lay: Layout, lane: int, g: Floats, stack: Floats) -> None:  # noqa: E741
     """Before ``advance``: the scalar second look at one lane's step, for events and extrema that the bounds could not exclude."""
-    I[lane, ev.EVENT_PENDULUM] = ev.NO_EVENT
     if not W[lay.margin * lay.lanes + lane] > 0.0:
         locate(W, I, lay, lane, g, stack)
     if not W[lay.excess * lay.lanes + lane] <= 0.0:
@@ -266,10 +270,13 @@ def record(
     """Write the samples that fall into the lane's step, given sample times in excitation periods; how many are done then."""
     f = W[lay.f * lay.lanes + lane]
     x_taken = W[lay.x * lay.lanes + lane]
+    at_stop = W[lay.at_stop * lay.lanes + lane] == 1.0
     length = W[lay.h * lay.lanes + lane] / W[lay.period * lay.lanes + lane]
     while done < times.shape[0]:
         ahead = (times[done] - I[lane, ev.PERIOD]) - f
         x = max(0.0, ahead / length)
+        if at_stop and times[done] - I[lane, ev.PERIOD] <= W[lay.f_stop * lay.lanes + lane]:
+            x = min(1.0, x)
         if x > x_taken or x_taken == 0.0:
             break
         sample(W, I, lay, lane, x, g, samples[done], states[done])
