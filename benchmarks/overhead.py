@@ -1,0 +1,117 @@
+"""What the service adds to the engine: a study through dispatcher, pool and SQLite, against the engine alone.
+
+Both run on the same number of warm processes, in turn, in one run of this program; what counts is the ratio.
+
+    python benchmarks/overhead.py [--cases 20000] [--periods 20] [--processes N] [--repeats 3]
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from multiprocessing import get_context
+from multiprocessing.pool import Pool
+from pathlib import Path
+
+from service.dispatching import WorkerSettings, start_dispatcher_process
+from service.presets import preset_text
+from service.settings import available_cores
+from service.spec import load_spec, parse_spec
+from service.storage.store import Store
+from worker import kernels
+from worker.chunking import Chunking, spans
+from worker.processes import single_threaded_children
+from worker.study import Axis, Study
+
+_POLL_SECONDS = 0.01
+
+
+def example(cases: int, periods: float) -> Study:
+    """The one-pendulum example, with the load and the frequency drawn finely enough for that many cases."""
+    study = parse_spec(load_spec(preset_text("one_pendulum")[1], "json")).study
+    loads = max(cases // 50, 1)
+    axes = (
+        Axis(("excitation.frequency",), tuple(20.0 + 15.0 * i / 49 for i in range(50))),
+        Axis(("shaft.load",), tuple(0.5 * i / loads for i in range(loads))),
+    )
+    return replace(study, axes=axes, run={**study.run, "duration": [periods, "periods"], "window": None})
+
+
+def _compute(task: tuple[Study, int, int]) -> int:
+    return kernels.run_chunk(*task).count
+
+
+@contextmanager
+def warm_pool(study: Study, processes: int) -> Iterator[Pool]:
+    """Processes that have the kernel loaded."""
+    with get_context("spawn").Pool(processes, kernels.warm_up, (study,)) as pool:
+        pool.map(_compute, [(study, 0, 16)] * processes * 4, chunksize=1)
+        yield pool
+
+
+def engine_alone(pool: Pool, study: Study, chunk: int) -> float:
+    """Seconds for all cases in chunks of the same size; the results go nowhere."""
+    start = time.perf_counter()
+    done = sum(pool.imap_unordered(_compute, [(study, *span) for span in spans(study.cases, chunk)]))
+    assert done == study.cases
+    return time.perf_counter() - start
+
+
+def through_the_service(store: Store, study: Study) -> tuple[float, int]:
+    """Seconds from submission to the last row in the database, and the cases of a chunk."""
+    record = store.create_study({}, study)
+    while not (record := store.get_study(record.id)).state.terminal:
+        time.sleep(_POLL_SECONDS)
+    assert record.ok == study.cases, store.progress(record.id)
+    assert record.finished_at is not None
+    return (record.finished_at - record.created_at).total_seconds(), record.chunk_cases
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cases", type=int, default=20_000)
+    parser.add_argument("--periods", type=float, default=20.0)
+    parser.add_argument("--processes", type=int, default=available_cores())
+    parser.add_argument("--repeats", type=int, default=3)
+    options = parser.parse_args()
+    single_threaded_children()
+    study = example(options.cases, options.periods)
+    kernels.warm_up(study)
+    with tempfile.TemporaryDirectory() as folder:
+        url = f"sqlite:///{Path(folder) / 'overhead.sqlite3'}"
+        with Store.open(url, chunking=Chunking(0, options.processes)) as store:
+            dispatcher = start_dispatcher_process(WorkerSettings(url, options.processes, 600.0))
+            try:
+                through_the_service(store, example(50 * 16, 1.0))  # its processes load the kernel
+                measure(store, study, options.processes, options.repeats)
+            finally:
+                dispatcher.terminate()
+                dispatcher.join()
+
+
+def measure(store: Store, study: Study, processes: int, repeats: int) -> None:
+    """Alternate the two, and print every pair and the ratio of the medians."""
+    alone, service = [], []
+    with warm_pool(study, processes) as pool:
+        for _ in range(repeats):
+            seconds, chunk = through_the_service(store, study)
+            service.append(seconds)
+            alone.append(engine_alone(pool, study, chunk))
+            print(
+                f"service {service[-1]:6.2f} s   engine alone {alone[-1]:6.2f} s   ratio {service[-1] / alone[-1]:.3f}"
+            )
+    ratio = statistics.median(service) / statistics.median(alone)
+    print(
+        f"{study.cases} cases, {processes} processes, chunks of {chunk}: "
+        f"{study.cases / statistics.median(service):.0f} cases/s through the service, ratio of medians {ratio:.3f}"
+    )
+
+
+if __name__ == "__main__":
+    main()
