@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 RUNTIME := $(VENV)/.sprag-runtime
 DEV := $(VENV)/.sprag-dev
 SOURCES := pyproject.toml constraints.txt
-PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input --quiet
+PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input --quiet --quiet
 
 .PHONY: help demo test check serve clean
 
@@ -50,13 +50,13 @@ endef
 
 $(RUNTIME): $(SOURCES)
 	@$(MAKE_ENVIRONMENT)
-	@echo "Installing Sprag ..."
+	@echo "Installing Sprag (a minute or so, this once) ..."
 	@$(PIP) install -c constraints.txt -e .
 	@touch $@
 
 $(DEV): $(SOURCES)
 	@$(MAKE_ENVIRONMENT)
-	@echo "Installing Sprag and its tools ..."
+	@echo "Installing Sprag and its tools (a minute or so, this once) ..."
 	@$(PIP) install -c constraints.txt -e '.[dev]'
 	@touch $(RUNTIME) $@
 

@@ -29,9 +29,9 @@ _AXIS = "shaft.load"
 _HELD = (("excitation.frequency", "25 Hz"), ("excitation.amplitude_x", "2 mm"))
 _SHOWN = ("shaft.speed.mean", "shaft.speed.max", "torque.mean", "power.useful.mean", "efficiency")
 _TABLE = (
-    ("shaft.speed.mean", "mean speed [rad/s]"),
-    ("torque.mean", "torque [N*m]"),
-    ("power.useful.mean", "power [W]"),
+    ("shaft.speed.mean", "mean speed\n[rad/s]"),
+    ("torque.mean", "torque\n[N*m]"),
+    ("power.useful.mean", "power\n[W]"),
     ("efficiency", "efficiency"),
 )
 _BAR = 20
@@ -97,11 +97,14 @@ def _show(client: ServiceClient, picture: Path, as_json: bool) -> dict[str, Any]
     """Submit the study, follow it, show its curve and write the picture; the study at its end."""
     from service.presets import preset_text
     from service.spec_text import load_spec
+    from worker.kernels import cache_folder
 
     _, text = preset_text(PRESET)
     spec = load_spec(text, "json")
     created = client.create_study(spec)
     say(f"Submitted {created['name']!r} to {client.server}: {created['cases']} cases.")
+    if not any(cache_folder().iterdir()):
+        say("The kernel is compiled first; that takes some seconds, this once.")
     start = time.monotonic()
     study = follow(client, created["id"])
     say(f"{study['progress']['done']} cases done in {time.monotonic() - start:.1f} s, {study['progress']['ok']} ok.")
@@ -129,6 +132,6 @@ def _show_curve(curves: dict[str, Any]) -> None:
         for speed, ending in zip(speeds, drawn["endings"], strict=True)
     ]
     held = ", ".join(f"{path} {value}" for path, value in _HELD)
-    headings = [("load [N*m]", True), *((heading, True) for _, heading in _TABLE), ("mean speed", False)]
+    headings = [("load\n[N*m]", True), *((heading, True) for _, heading in _TABLE), ("mean speed", False)]
     rows = list(zip(drawn["x"], *columns, bars, strict=True))
     show_table(f"Mechanical characteristic at {held}", headings, rows)

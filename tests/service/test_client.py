@@ -1,0 +1,86 @@
+"""The client against servers that are no Sprag, or a broken one."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from typing import Any
+
+import pytest
+
+from service.client import RefusedError, ServiceClient, UnreachableError
+
+Sprag = Callable[..., Any]
+
+
+@pytest.fixture(
+    params=[
+        (200, "text/html", b"<html>It works!</html>"),
+        (200, "application/json", b"[1, 2]"),
+        (404, "text/html", b"<html>not here</html>"),
+        (502, "text/plain", b"bad gateway"),
+        (500, "application/problem+json", b'{"title": "The service failed", "detail": "it did"}'),
+        (422, "application/problem+json", b'{"title": "no", "errors": "none", "detail": "refused"}'),
+        (422, "application/json", b'{"errors": [{"message": "wrong", "pointer": "/a"}, 7]}'),
+    ]
+)
+def answering(request: pytest.FixtureRequest) -> Iterator[tuple[str, int]]:
+    """Address of a server that gives one answer to everything, and the status of it."""
+    status, kind, body = request.param
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(status)
+            self.send_header("Content-Type", kind)
+            self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body)
+
+        def do_POST(self) -> None:
+            self.rfile.read(int(self.headers["Content-Length"]))
+            self.do_GET()
+
+        def log_message(self, *_: object) -> None:
+            """Silent."""
+
+    with HTTPServer(("127.0.0.1", 0), Handler) as server:
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{server.server_port}", status
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+def test_every_foreign_answer_is_one_of_two_failures(answering: tuple[str, int]) -> None:
+    address, status = answering
+    with ServiceClient(address, token="secret") as client:
+        for ask in (
+            lambda: client.study("st_1"),
+            lambda: client.create_study({}),
+            lambda: client.curves("st_1", [("x", "shaft.load")]),
+        ):
+            with pytest.raises((UnreachableError, RefusedError)) as caught:
+                ask()
+            if status >= 400:
+                assert isinstance(caught.value, RefusedError)
+                assert caught.value.status == status
+                assert all(isinstance(error, dict) for error in caught.value.errors)
+            else:
+                assert "not Sprag" in str(caught.value)
+
+
+def test_commands_say_so_in_a_sentence(answering: tuple[str, int], sprag: Sprag) -> None:
+    address, status = answering
+    done = sprag("list", "--server", address)
+    assert done.code == (2 if 400 <= status < 500 else 3)
+    assert done.out == ""
+    assert done.err.startswith("sprag: ")
+
+
+@pytest.mark.parametrize("server", ["", "nonsense", "ftp://127.0.0.1", "http://"])
+def test_what_is_no_address(server: str) -> None:
+    with pytest.raises(ValueError, match="no address"):
+        ServiceClient(server)
