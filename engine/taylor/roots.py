@@ -25,6 +25,9 @@ NO_ROOT = 2.0
 _BINOMIAL = np.array([[float(comb(j, k)) for k in range(MAX_DEGREE + 1)] for j in range(MAX_DEGREE + 1)])
 _INVERSE_BINOMIAL = np.array([[1.0 / max(1, comb(j, k)) for k in range(MAX_DEGREE + 1)] for j in range(MAX_DEGREE + 1)])
 
+#: 1/k, and 0 for k = 0: integrating a series without divisions.
+RECIPROCAL = np.array([0.0, *(1.0 / k for k in range(1, MAX_DEGREE + 2))])
+
 #: Columns of the work stack behind the coefficients: where an interval starts and how wide it is.
 _LOW = MAX_DEGREE + 1
 _WIDTH = MAX_DEGREE + 2
@@ -38,30 +41,41 @@ def work_stack() -> Floats:
 @compiled
 def evaluate(g: Floats, degree: int, x: float) -> float:
     """Value of ``sum g[k] x^k`` for k = 0..degree."""
-    value = g[degree]
-    for k in range(degree - 1, -1, -1):
-        value = value * x + g[k]
-    return value
+    # Even and odd part by Horner's scheme in x^2: two short chains of operations instead of a long one.
+    y = x * x
+    even = 0.0
+    odd = 0.0
+    for k in range(degree - degree % 2, -1, -2):
+        even = even * y + g[k]
+    for k in range(degree - 1 + degree % 2, 0, -2):
+        odd = odd * y + g[k]
+    return even + x * odd
 
 
 @compiled
 def _value_and_slope(g: Floats, degree: int, x: float) -> tuple[float, float]:
-    value = g[degree]
-    slope = 0.0
-    for k in range(degree - 1, -1, -1):
-        slope = slope * x + value
-        value = value * x + g[k]
-    return value, slope
+    y = x * x
+    even = d_even = odd = d_odd = 0.0
+    for k in range(degree - degree % 2, -1, -2):
+        d_even = d_even * y + even
+        even = even * y + g[k]
+    for k in range(degree - 1 + degree % 2, 0, -2):
+        d_odd = d_odd * y + odd
+        odd = odd * y + g[k]
+    return even + x * odd, odd + 2.0 * (x * d_even + y * d_odd)
 
 
 @compiled
 def _slope_and_curvature(g: Floats, degree: int, x: float) -> tuple[float, float]:
-    slope = degree * g[degree]
-    curvature = 0.0
-    for k in range(degree - 1, 0, -1):
-        curvature = curvature * x + slope
-        slope = slope * x + k * g[k]
-    return slope, curvature
+    y = x * x
+    even = d_even = odd = d_odd = 0.0
+    for k in range(degree - 1 + degree % 2, 0, -2):
+        d_even = d_even * y + even
+        even = even * y + k * g[k]
+    for k in range(degree - degree % 2, 0, -2):
+        d_odd = d_odd * y + odd
+        odd = odd * y + k * g[k]
+    return even + x * odd, odd + 2.0 * (x * d_even + y * d_odd)
 
 
 @compiled
@@ -98,9 +112,9 @@ def _halve(stack: Floats, top: int, degree: int) -> None:
 
 
 @compiled
-def _refine_root(g: Floats, degree: int, low: float, high: float) -> float:
+def _refine_root(g: Floats, degree: int, low: float, high: float, guess: float) -> float:
     """The single sign change of ``g`` between ``low`` (positive there) and ``high`` (not positive): Newton kept inside."""
-    x = 0.5 * (low + high)
+    x = guess if low < guess < high else 0.5 * (low + high)
     for _ in range(80):
         value, slope = _value_and_slope(g, degree, x)
         if value > 0.0:
@@ -108,19 +122,21 @@ def _refine_root(g: Floats, degree: int, low: float, high: float) -> float:
         else:
             high = x
         new = x - value / slope if slope != 0.0 else low
-        if not (low < new < high):
+        inside = low < new < high
+        if not inside:
             new = 0.5 * (low + high)
-        if abs(new - x) <= 2e-16 * abs(x) or new in (low, high):
+        # Newton squares the error: after so small a step the next one is below rounding.
+        if (inside and abs(new - x) <= 1e-9 * x) or new in (low, high):
             return new
         x = new
     return x
 
 
 @compiled
-def _refine_peak(g: Floats, degree: int, low: float, high: float) -> float:
+def _refine_peak(g: Floats, degree: int, low: float, high: float, guess: float) -> float:
     """The single zero of the derivative of ``g`` between ``low`` and ``high``, where its sign changes: Newton kept inside."""
     rises = _slope_and_curvature(g, degree, low)[0] > 0.0
-    x = 0.5 * (low + high)
+    x = guess if low < guess < high else 0.5 * (low + high)
     for _ in range(80):
         slope, curvature = _slope_and_curvature(g, degree, x)
         if (slope > 0.0) == rises:
@@ -128,10 +144,11 @@ def _refine_peak(g: Floats, degree: int, low: float, high: float) -> float:
         else:
             high = x
         new = x - slope / curvature if curvature != 0.0 else low
-        if not (low < new < high):
+        inside = low < new < high
+        if not inside:
             new = 0.5 * (low + high)
         # A peak is flat: its value is exact to rounding long before its place is.
-        if abs(new - x) <= 1e-10 or new in (low, high):
+        if (inside and abs(new - x) <= 1e-6) or new in (low, high):
             return new
         x = new
     return x
@@ -195,12 +212,12 @@ def first_root(g: Floats, degree: int, stack: Floats) -> float:
     # A step of a high-order method is short: nearly always the second derivative keeps its sign, and the shape is plain.
     bend = _bend(p, n) if n >= 2 else -1
     if bend < 0 or (bend > 0 and (p[1] >= 0.0 or end <= 0.0)):
-        return _refine_root(p, n, 0.0, 1.0) if end <= 0.0 else NO_ROOT
+        return _refine_root(p, n, 0.0, 1.0, p[0] / (p[0] - end)) if end <= 0.0 else NO_ROOT
     if bend > 0:
         if _end_slope(p, n) <= 0.0:
             return NO_ROOT
-        x = _refine_peak(p, n, 0.0, 1.0)
-        return _refine_root(p, n, 0.0, x) if evaluate(p, n, x) <= 0.0 else NO_ROOT
+        x = _refine_peak(p, n, 0.0, 1.0, -0.5 * p[1] / p[2])
+        return _refine_root(p, n, 0.0, x, 0.5 * x) if evaluate(p, n, x) <= 0.0 else NO_ROOT
     _start(p, n, stack)
     top = 0
     while top >= 0:
@@ -216,7 +233,7 @@ def first_root(g: Floats, degree: int, stack: Floats) -> float:
         if changes == 0:
             top -= 1
         elif changes == 1:
-            return _refine_root(p, n, b[_LOW], b[_LOW] + b[_WIDTH])
+            return _refine_root(p, n, b[_LOW], b[_LOW] + b[_WIDTH], b[_LOW] + b[_WIDTH] * b[0] / (b[0] - b[n]))
         elif b[_WIDTH] < 1e-15:
             if not positive:
                 return b[_LOW]
@@ -244,7 +261,7 @@ def largest(g: Floats, degree: int, known: float, stack: Floats) -> float:
     bend = _bend(g, degree)
     if bend != 0:
         if bend < 0 and g[1] > 0.0 and _end_slope(g, degree) < 0.0:
-            best = max(best, evaluate(g, degree, _refine_peak(g, degree, 0.0, 1.0)))
+            best = max(best, evaluate(g, degree, _refine_peak(g, degree, 0.0, 1.0, -0.5 * g[1] / g[2])))
         return best
     _start(g, degree, stack)
     top = 0
@@ -263,7 +280,7 @@ def largest(g: Floats, degree: int, known: float, stack: Floats) -> float:
         if bound <= best or changes == 0 or (changes == 1 and not starts_rising) or b[_WIDTH] < 1e-9:
             top -= 1
         elif changes == 1:
-            x = _refine_peak(g, degree, b[_LOW], b[_LOW] + b[_WIDTH])
+            x = _refine_peak(g, degree, b[_LOW], b[_LOW] + b[_WIDTH], -1.0)
             best = max(best, evaluate(g, degree, x))
             top -= 1
         else:

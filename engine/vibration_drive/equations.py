@@ -221,10 +221,12 @@ def _bounds(
     excess = code.let("excess", "-1e300")
     code.let("inverse_h", "1.0/h")
 
-    def guard(bounds: tuple[str, str], low_row: int | None, high_row: int | None) -> None:
-        for text, row in ((f"{bounds[0]} - {{}}", low_row), (f"{{}} - {bounds[1]}", high_row)):
+    def guard(bounds: tuple[str, str], block: int, low: int | None, high: int | None) -> None:
+        """``low`` and ``high`` are rows of a band's edges; the distances to them go ``block`` rows further."""
+        for text, row in ((f"{bounds[0]} - {{}}", low), (f"{{}} - {bounds[1]}", high)):
             if row is not None:
                 code.let("gap", text.format(code.row(row)))
+                code.store(row + block, "gap")
                 code.let(margin, smaller("gap", margin))
 
     def peak(bounds: tuple[str, str], block: int, high: int, low: int | None = None) -> None:
@@ -240,15 +242,17 @@ def _bounds(
 
     lay = layout
     block = lay.x_speed_max - lay.speed_max
+    edges = lay.m_sum_high - lay.sum_high
     bounds = range_bounds(code, "W", shaft)
-    guard(bounds, lay.speed_low, None)
+    guard(bounds, edges, lay.speed_low, None)
     peak(bounds, block, lay.speed_max, lay.speed_min)
     bounds = range_bounds(code, "S", total)
-    guard(bounds, None, lay.sum_high)
+    guard(bounds, edges, None, lay.sum_high)
     peak(bounds, block, lay.sum_max)
     peak(range_bounds(code, "R", rates("R", shaft)), block, lay.acc_max)
     peak(range_bounds(code, "P", power), block, lay.power_max)
     block = lay.p_x_phi_max - lay.p_phi_max
+    edges = lay.p_m_w_low - lay.p_w_low
     for p in pendulums:
         tag = str(p.index)
         row = {name: p.row(lay, name) for name in (
@@ -256,12 +260,12 @@ def _bounds(
             "speed_max", "speed_min", "acc_max", "acc_min", "torque_max", "u_max",
         )}  # fmt: skip
         relative = [code.let(f"v{tag}_{k}", f"{p.w[k]} - {shaft[k]}") for k in range(lay.order + 1)]
-        guard(range_bounds(code, f"v{tag}", relative), row["w_low"], row["w_high"])
+        guard(range_bounds(code, f"v{tag}", relative), edges, row["w_low"], row["w_high"])
         bounds = range_bounds(code, f"u{tag}", p.u)
-        guard(bounds, row["u_low"], row["u_high"])
+        guard(bounds, edges, row["u_low"], row["u_high"])
         peak(bounds, block, row["u_max"])
         bounds = range_bounds(code, f"T{tag}", p.torque)
-        guard(bounds, row["t_low"], row["t_high"])
+        guard(bounds, edges, row["t_low"], row["t_high"])
         peak(bounds, block, row["torque_max"])
         peak(range_bounds(code, f"p{tag}", p.phi), block, row["phi_max"], row["phi_min"])
         peak(range_bounds(code, f"w{tag}", p.w), block, row["speed_max"], row["speed_min"])

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.jit import compiled
-from engine.taylor.roots import first_root
+from engine.taylor.roots import RECIPROCAL, first_root
 from engine.vibration_drive.automaton import CLUTCH_TARGET, CLUTCH_THRESHOLD, Band, Clutch, Shaft, Threshold
 from engine.vibration_drive.layout import Layout
 
@@ -98,7 +98,7 @@ def _guard(W: Floats, lay: Layout, lane: int, i: int, band: int, g: Floats) -> N
         g[0] = sign * W[(base + lay.p_u) * lanes + lane]
         step = sign * W[lay.h * lanes + lane]
         for k in range(lay.order):
-            g[k + 1] = step * (W[own + k * lanes] - W[shaft + k * lanes]) / (k + 1)
+            g[k + 1] = step * (W[own + k * lanes] - W[shaft + k * lanes]) * RECIPROCAL[k + 1]
     else:
         torque = (base + lay.p_torque) * lanes + lane
         for k in range(lay.order + 1):
@@ -119,7 +119,7 @@ def locate(W: Floats, I: Ints, lay: Layout, lane: int, g: Floats, stack: Floats)
     target = 0
     fresh = W[lay.steps * lanes + lane] == I[lane, SKIP_STEP]
     shaft = I[lane, SHAFT_STATE]
-    if shaft == _HELD or W[lay.speed_low * lanes + lane] > -NEVER:
+    if not W[(lay.m_sum_high if shaft == _HELD else lay.m_speed_low) * lanes + lane] > 0.0:
         first = (lay.sum if shaft == _HELD else lay.speed) * lanes + lane
         sign = -1.0 if shaft == _HELD else 1.0
         for k in range(lay.order + 1):
@@ -136,7 +136,7 @@ def locate(W: Floats, I: Ints, lay: Layout, lane: int, g: Floats, stack: Floats)
     for i in range(lay.n):
         state = I[lane, i]
         for band in range(_BANDS):
-            if abs(W[(lay.pendulums + i * lay.stride + lay.p_w_low + band) * lanes + lane]) >= NEVER:
+            if W[(lay.pendulums + i * lay.stride + lay.p_m_w_low + band) * lanes + lane] > 0.0:
                 continue
             _guard(W, lay, lane, i, band, g)
             if fresh and band // 2 < 2:

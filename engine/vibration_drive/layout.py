@@ -80,6 +80,9 @@ class Layout(NamedTuple):
     x_acc_max: int
     x_sum_max: int
     x_power_max: int
+    # distance of this step to the shaft's guards
+    m_sum_high: int
+    m_speed_low: int
     # series of the shaft, order + 1 coefficients each, in fractions of the planned step: speed, sum of the clutch torques,
     # power of the clutches
     speed: int
@@ -122,6 +125,13 @@ class Layout(NamedTuple):
     p_acc_min: int
     p_torque_max: int
     p_u_max: int
+    # distances of this step to the guards, in the order of the bands; excess over the known extrema
+    p_m_w_low: int
+    p_m_w_high: int
+    p_m_u_low: int
+    p_m_u_high: int
+    p_m_t_low: int
+    p_m_t_high: int
     p_x_phi_max: int
     p_x_phi_min: int
     p_x_speed_max: int

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.jit import compiled
-from engine.taylor.roots import evaluate, largest
+from engine.taylor.roots import RECIPROCAL, evaluate, largest
 from engine.vibration_drive.automaton import Clutch
 from engine.vibration_drive.events import NEVER, stored_energy
 from engine.vibration_drive.layout import Layout
@@ -27,9 +27,9 @@ def series(W: Floats, lay: Layout, lane: int, row: int, g: Floats) -> None:
 @compiled
 def rate(W: Floats, lay: Layout, lane: int, row: int, g: Floats) -> None:
     """Like ``series``, but its time derivative; one order less, so the highest coefficient is zero."""
-    h = W[lay.h * lay.lanes + lane]
+    per_h = 1.0 / W[lay.h * lay.lanes + lane]
     for k in range(lay.order):
-        g[k] = (k + 1) * W[(row + k + 1) * lay.lanes + lane] / h
+        g[k] = (k + 1) * per_h * W[(row + k + 1) * lay.lanes + lane]
     g[lay.order] = 0.0
 
 
@@ -42,7 +42,7 @@ def primitive(W: Floats, lay: Layout, lane: int, start: float, row: int, minus: 
         value = W[(row + k) * lay.lanes + lane]
         if minus >= 0:
             value -= W[(minus + k) * lay.lanes + lane]
-        g[k + 1] = h * value / (k + 1)
+        g[k + 1] = h * value * RECIPROCAL[k + 1]
 
 
 @compiled
