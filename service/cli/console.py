@@ -104,7 +104,7 @@ def table(title: str, columns: Iterable[tuple[str, bool]], rows: Iterable[Sequen
     from rich.table import Table
     from rich.text import Text
 
-    made = Table(title=title or None, title_justify="left", box=SIMPLE_HEAD, header_style="bold")
+    made = Table(title=Text(title) if title else None, title_justify="left", box=SIMPLE_HEAD, header_style="bold")
     for heading, numeric in columns:
         made.add_column(Text(heading), justify="right" if numeric else "left")
     for row in rows:
