@@ -1,7 +1,7 @@
 """Where generated kernels and all machine code are kept: one per-user folder for each state of the engine's source.
 
-numba notices when the file of a cached function changes, but not when a function it calls does. A folder named by a hash of all of the
-engine's sources (and of the compiler's version) makes old code unreachable instead.
+numba notices when the file of a cached function changes, but not when a function it calls does. A folder named by a
+hash of all of the engine's sources (and of the compiler's version) makes old code unreachable instead.
 """
 
 import hashlib

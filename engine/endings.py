@@ -1,4 +1,6 @@
-"""How a case can end, each with the sentence a user reads. A physical failure is a stored result, never an exception."""
+"""How a case can end, each with the sentence a user reads. A physical failure is a stored result, never an
+exception.
+"""
 
 from enum import StrEnum
 
@@ -21,15 +23,19 @@ class Ending(StrEnum):
 _SENTENCES = {
     Ending.OK: "The run reached its end.",
     Ending.ACCURACY_NOT_REACHED: (
-        "The step size the tolerance asks for fell under the floor of double precision: some rate (a spring, the clutch "
-        "or a very small inertia) is too fast for the rest of the machine, or the tolerance is too tight."
+        "The step size the tolerance asks for fell under the floor of double precision: some rate (a spring, the "
+        "clutch or a very small inertia) is too fast for the rest of the machine, or the tolerance is too tight."
     ),
     Ending.CHATTER: (
         "The clutches or the shaft changed state more often than the event budget allows: the motion chatters, and no "
         "mean value of it would be trustworthy."
     ),
-    Ending.STEP_BUDGET: "The step budget was used up before the end of the run: shorten the run or loosen the tolerance.",
-    Ending.DIVERGED: "An angle or a speed grew beyond every bound (or was no number): the parameters describe no steady machine.",
+    Ending.STEP_BUDGET: (
+        "The step budget was used up before the end of the run: shorten the run or loosen the tolerance."
+    ),
+    Ending.DIVERGED: (
+        "An angle or a speed grew beyond every bound (or was no number): the parameters describe no steady machine."
+    ),
 }
 
 #: Order in which compiled code numbers the endings; the position is the code.

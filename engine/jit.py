@@ -7,7 +7,7 @@ import numba
 
 from engine.cache import cache_folder
 
-numba.config.CACHE_DIR = str(cache_folder())
+setattr(numba.config, "CACHE_DIR", str(cache_folder()))  # noqa: B010  (numba does not declare it)
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -2,8 +2,9 @@
 
 A polynomial in Bernstein form lies between its smallest and its largest coefficient, and the number of its roots in the
 interval is at most the number of sign changes of its coefficients (Descartes' rule in Bernstein form; see Farouki, "The
-Bernstein polynomial basis: a centennial retrospective", 2012, sections 4 and 5). No change: no root. One change: exactly
-one root, which a guarded Newton iteration refines. More: halve the interval (de Casteljau) and look again, left half first.
+Bernstein polynomial basis: a centennial retrospective", 2012, sections 4 and 5). No change: no root. One change:
+exactly one root, which a guarded Newton iteration refines. More: halve the interval (de Casteljau) and look again, left
+half first.
 """
 
 from math import comb
@@ -113,7 +114,9 @@ def _halve(stack: Floats, top: int, degree: int) -> None:
 
 @compiled
 def _refine_root(g: Floats, degree: int, low: float, high: float, guess: float) -> float:
-    """The single sign change of ``g`` between ``low`` (positive there) and ``high`` (not positive): Newton kept inside."""
+    """The single sign change of ``g`` between ``low`` (positive there) and ``high`` (not positive): Newton kept
+    inside.
+    """
     x = guess if low < guess < high else 0.5 * (low + high)
     for _ in range(80):
         value, slope = _value_and_slope(g, degree, x)
@@ -134,7 +137,9 @@ def _refine_root(g: Floats, degree: int, low: float, high: float, guess: float) 
 
 @compiled
 def _refine_peak(g: Floats, degree: int, low: float, high: float, guess: float) -> float:
-    """The single zero of the derivative of ``g`` between ``low`` and ``high``, where its sign changes: Newton kept inside."""
+    """The single zero of the derivative of ``g`` between ``low`` and ``high``, where its sign changes: Newton kept
+    inside.
+    """
     rises = _slope_and_curvature(g, degree, low)[0] > 0.0
     x = guess if low < guess < high else 0.5 * (low + high)
     for _ in range(80):
@@ -180,8 +185,8 @@ def first_root(g: Floats, degree: int, stack: Floats) -> float:
     Parameters
     ----------
     g : array, shape (>= degree + 1,)
-        Monomial coefficients. Leading coefficients that are exactly zero are a root at 0 that has already been dealt with:
-        they are divided out. If the first other coefficient is negative the answer is 0.
+        Monomial coefficients. Leading coefficients that are exactly zero are a root at 0 that has already been dealt
+        with: they are divided out. If the first other coefficient is negative the answer is 0.
     degree : int
         At most ``MAX_DEGREE``.
     stack : array
@@ -209,7 +214,8 @@ def first_root(g: Floats, degree: int, stack: Floats) -> float:
         end += p[k]
     if rest < p[0]:
         return NO_ROOT
-    # A step of a high-order method is short: nearly always the second derivative keeps its sign, and the shape is plain.
+    # A step of a high-order method is short: nearly always the second derivative keeps its sign, and the shape is
+    # plain.
     bend = _bend(p, n) if n >= 2 else -1
     if bend < 0 or (bend > 0 and (p[1] >= 0.0 or end <= 0.0)):
         return _refine_root(p, n, 0.0, 1.0, p[0] / (p[0] - end)) if end <= 0.0 else NO_ROOT
@@ -223,7 +229,7 @@ def first_root(g: Floats, degree: int, stack: Floats) -> float:
     while top >= 0:
         b = stack[top]
         if not b[0] > 0.0:
-            return b[_LOW]
+            return float(b[_LOW])
         changes = 0
         positive = True
         for j in range(1, n + 1):
@@ -236,7 +242,7 @@ def first_root(g: Floats, degree: int, stack: Floats) -> float:
             return _refine_root(p, n, b[_LOW], b[_LOW] + b[_WIDTH], b[_LOW] + b[_WIDTH] * b[0] / (b[0] - b[n]))
         elif b[_WIDTH] < 1e-15:
             if not positive:
-                return b[_LOW]
+                return float(b[_LOW])
             top -= 1
         else:
             _halve(stack, top, n)
@@ -257,12 +263,12 @@ def largest(g: Floats, degree: int, known: float, stack: Floats) -> float:
         bound += abs(g[k])
     best = max(known, g[0], total)
     if bound <= best:
-        return best
+        return float(best)
     bend = _bend(g, degree)
     if bend != 0:
         if bend < 0 and g[1] > 0.0 and _end_slope(g, degree) < 0.0:
             best = max(best, evaluate(g, degree, _refine_peak(g, degree, 0.0, 1.0, -0.5 * g[1] / g[2])))
-        return best
+        return float(best)
     _start(g, degree, stack)
     top = 0
     while top >= 0:
@@ -286,4 +292,4 @@ def largest(g: Floats, degree: int, known: float, stack: Floats) -> float:
         else:
             _halve(stack, top, degree)
             top += 1
-    return best
+    return float(best)

@@ -1,7 +1,7 @@
 """Building blocks of generated straight-line code: one lane's arithmetic, unrolled over the orders of the series.
 
-LLVM turns a loop over lanes into SIMD code when its body is straight-line arithmetic on one flat array with literal rows;
-loops over orders, calls or a second array prevent it (docs/adr/0002). So the recurrences are written once in
+LLVM turns a loop over lanes into SIMD code when its body is straight-line arithmetic on one flat array with literal
+rows; loops over orders, calls or a second array prevent it (docs/adr/0002). So the recurrences are written once in
 Python, here and in the model's ``equations``, and unrolled into the source text of a kernel.
 """
 
@@ -41,7 +41,8 @@ class LaneCode:
     def function(self, name: str, arguments: str, docstring: str) -> str:
         """The finished function: the lane loop around the lines."""
         body = "\n".join(f"        {line}" for line in self.lines)
-        return f'@compiled\ndef {name}({arguments}):\n    """{docstring}"""\n    for lane in range({self.lanes}):\n{body}\n'
+        head = f'@compiled\ndef {name}({arguments}):\n    """{docstring}"""\n'
+        return f"{head}    for lane in range({self.lanes}):\n{body}\n"
 
 
 def product(a: Names, b: Names, k: int) -> str:
@@ -71,8 +72,8 @@ def chord_constant(k: int) -> float:
 def range_bounds(code: LaneCode, tag: str, coefficients: Names) -> tuple[str, str]:
     """Lower and upper bound of a polynomial on [0, 1]: the chord between its end values, less or plus the bulge.
 
-    ``sum c_k x^k`` differs from its chord by at most ``sum |c_k| max(x - x^k)`` over k >= 2. For the short steps of a high
-    order this is nearly sharp, and it takes no branches.
+    ``sum c_k x^k`` differs from its chord by at most ``sum |c_k| max(x - x^k)`` over k >= 2. For the short steps of a
+    high order this is nearly sharp, and it takes no branches.
     """
     start = coefficients[0]
     end = code.let(f"end_{tag}", " + ".join(coefficients))

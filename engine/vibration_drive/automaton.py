@@ -1,6 +1,7 @@
 """The hybrid automaton of MODEL.md A2 as one table: what each state watches, and where a crossing leads.
 
-Compiled code reads the arrays made from ``TRANSITIONS`` at the end of this module; documentation and tests read the table.
+Compiled code reads the arrays made from ``TRANSITIONS`` at the end of this module; documentation and tests read the
+table.
 """
 
 from dataclasses import dataclass
@@ -49,11 +50,13 @@ class Threshold(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One row of the automaton: in ``source``, when ``quantity`` passes ``threshold`` upward (+1) or downward (-1), go to ``target``.
+    """One row of the automaton: in ``source``, when ``quantity`` passes ``threshold`` upward (+1) or downward (-1), go
+    to ``target``.
 
-    ``reset`` says what is set at the crossing. ``literal_only`` rows hold under ``reset = "literal"`` alone (MODEL.md (5)):
-    there an engaged clutch restarts when w rises through 0, and since w is positive when it engages, the row that leads back
-    to the same state notes the fall of w through 0 that has to come first. It changes nothing and counts as no event.
+    ``reset`` says what is set at the crossing. ``literal_only`` rows hold under ``reset = "literal"`` alone
+    (MODEL.md (5)): there an engaged clutch restarts when w rises through 0. Since w is positive when it engages, the
+    row that leads back to the same state notes the fall of w through 0 that has to come first; it changes nothing and
+    counts as no event.
     """
 
     source: Clutch | Shaft
@@ -118,5 +121,6 @@ def _clutch_arrays() -> tuple[np.ndarray, np.ndarray]:
     return threshold, target
 
 
-#: Guard thresholds and targets of a clutch for compiled code, shape (2, states, bands): index 0 is reset "contact", 1 "literal".
+#: Guard thresholds and targets of a clutch for compiled code, shape (2, states, bands): index 0 is reset "contact", 1
+#: "literal".
 CLUTCH_THRESHOLD, CLUTCH_TARGET = _clutch_arrays()

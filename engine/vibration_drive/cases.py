@@ -90,7 +90,8 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
         own = {
             name: parameter(f"pendulums.{i}.{name}")
             for name in (
-                "inertia", "mass", "arm", "spring_rate", "spring_arm", "damping", "backlash", "initial_angle", "initial_speed",
+                "inertia", "mass", "arm", "spring_rate", "spring_arm", "damping", "backlash", "initial_angle",
+                "initial_speed",
             )
         }  # fmt: skip
         inertia = own["inertia"]
@@ -111,8 +112,8 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     times = (start, np.where(whole > 0, np.maximum(start, end - whole), end), end, end_of_run)
     shaft = [
         nu, 1.0 / frequency, parameter("excitation.amplitude_x") * nu**2, parameter("excitation.amplitude_y") * nu**2,
-        parameter("excitation.phase"), parameter("gravity"), parameter("shaft.load"), parameter("shaft.inertia"), 1.0 / rate,
-        parameter("shaft.initial_speed"),
+        parameter("excitation.phase"), parameter("gravity"), parameter("shaft.load"), parameter("shaft.inertia"),
+        1.0 / rate, parameter("shaft.initial_speed"),
     ]  # fmt: skip
     stops = [part for time in times for part in _stop(time)]
     return np.ascontiguousarray(np.column_stack([*shaft, *stops, *pendulums]))

@@ -27,7 +27,8 @@ def sum_columns(lay: Layout) -> int:
 def _ratio(numerator: Floats, denominator: Floats) -> Floats:
     """Quotient; NaN where the denominator is not positive."""
     out = np.full(np.broadcast(numerator, denominator).shape, np.nan)
-    return np.divide(numerator, denominator, out=out, where=denominator > 0.0)
+    np.divide(numerator, denominator, out=out, where=denominator > 0.0)
+    return out
 
 
 class _Cases:
@@ -121,8 +122,10 @@ def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
     mean = turn / cases.length
     out["shaft.speed.mean"] = mean
     out["shaft.speed.max"] = cases.shaft("speed_max")
-    out["shaft.speed.min"] = cases.shaft("speed_min")
-    out["shaft.irregularity"] = _ratio(cases.shaft("speed_max") - cases.shaft("speed_min"), mean)
+    # Under a load the shaft never turns back: a negative minimum is the rounding of the instant it stops.
+    lowest = cases.shaft("speed_min")
+    out["shaft.speed.min"] = np.where((cases.load > 0.0) & (lowest < 0.0), 0.0, lowest)
+    out["shaft.irregularity"] = _ratio(cases.shaft("speed_max") - out["shaft.speed.min"], mean)
     out["shaft.turn"] = turn
     out["shaft.acceleration.max"] = cases.shaft("acc_max")
     out["torque.mean"] = _over_pendulums(cases, out, "torque.mean")
@@ -150,8 +153,8 @@ def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
 def _balances(cases: _Cases, out: dict[str, Floats]) -> None:
     """Residuals of both balances of MODEL.md A4, each over the largest of its own terms.
 
-    The energy balance's terms include the largest kinetic energy in the window, so that a machine that only swings, with
-    next to no work done, is not judged against zero.
+    The energy balance's terms include the largest kinetic energy in the window, so that a machine that only swings,
+    with next to no work done, is not judged against zero.
     """
     length = cases.length
     turn = cases.shaft("turn_2") - cases.shaft("turn_0")
@@ -173,4 +176,6 @@ def _balances(cases: _Cases, out: dict[str, Floats]) -> None:
     held = cases.shaft("sum_held")
     size = np.max(np.abs([impulse, against, gained, held]), axis=0)
     residual = impulse - against - gained - held
-    out["balance.momentum"] = np.where(size > 0.0, _ratio(np.abs(residual), size), np.where(np.isnan(size), np.nan, 0.0))
+    out["balance.momentum"] = np.where(
+        size > 0.0, _ratio(np.abs(residual), size), np.where(np.isnan(size), np.nan, 0.0)
+    )

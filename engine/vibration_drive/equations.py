@@ -1,13 +1,14 @@
 """The equations of motion (MODEL.md A1) as recurrences of Taylor coefficients, written once for every kernel.
 
-Notation of one order k: ``phi, w, u, T`` are angle, speed, windup and clutch torque of a pendulum, ``W_`` and ``S`` speed and
-total clutch torque of the shaft, ``X, Y`` the base's accelerations x'' and y''. Equation (1) is used divided by J:
+Notation of one order k: ``phi, w, u, T`` are angle, speed, windup and clutch torque of a pendulum, ``W_`` and ``S``
+speed and total clutch torque of the shaft, ``X, Y`` the base's accelerations x'' and y''. Equation (1) is used divided
+by J:
 
     w' = (M l/J) (x'' cos phi + y'' sin phi + g sin phi) - (c a^2/J) phi - (lambda/J) w - T/J
     shaft' = (sum T - M_c) / J_e                  T = sum c_k u^(k-1)                 u' = w - shaft
 
-Modes enter as numbers, not branches: the law in force is zero where a clutch is free and a straight line beyond the data; the
-shaft's mobility is zero where it is held. A locked clutch has w' = shaft' and its torque is what that takes.
+Modes enter as numbers, not branches: the law in force is zero where a clutch is free and a straight line beyond the
+data; the shaft's mobility is zero where it is held. A locked clutch has w' = shaft' and its torque is what that takes.
 """
 
 from engine.taylor.straight import (
@@ -24,10 +25,13 @@ from engine.taylor.straight import (
 )
 from engine.vibration_drive.layout import Layout
 
-#: Share of the estimated convergence-limited step that is taken (Jorba and Zou 2005 take e^-2, which is far too careful here).
+#: Share of the estimated convergence-limited step that is taken (Jorba and Zou 2005 take e^-2, which is far too careful
+#: here).
 STEP_SAFETY = 0.55
 #: Longest step, in excitation periods.
 LONGEST_STEP = 0.25
+#: Share of the base's largest drive that counts as motion in any case when a step's error is weighed.
+DRIVE_SHARE = 1e-3
 #: Smallest step, in excitation periods: below it a step no longer moves the phase.
 STEP_FLOOR = 1e-13
 #: Angle (rad) and speed (rad/s) beyond which a case has diverged.
@@ -99,7 +103,9 @@ def _torque(code: LaneCode, p: _Pendulum, k: int) -> str:
 
 
 def _free_acceleration(code: LaneCode, p: _Pendulum, x: list[str], y: list[str], k: int) -> None:
-    """Coefficient k of a pendulum's acceleration without its clutch, and of the base's drive x'' cos phi + y'' sin phi."""
+    """Coefficient k of a pendulum's acceleration without its clutch, and of the base's drive x'' cos phi + y'' sin
+    phi.
+    """
     if k > 0:
         p.sin.append(code.let(f"s{p.index}_{k}", f"({product(p.cos, p.w, k - 1)})*{1.0 / k!r}"))
         p.cos.append(code.let(f"c{p.index}_{k}", f"({product(p.sin, p.w, k - 1)})*{-1.0 / k!r}"))
@@ -111,7 +117,9 @@ def _free_acceleration(code: LaneCode, p: _Pendulum, x: list[str], y: list[str],
 
 
 def step_source(layout: Layout) -> str:
-    """Source of ``step(W, log2_tolerance)``: series of every lane, step size, distance to guards, excess over extrema."""
+    """Source of ``step(W, log2_tolerance)``: series of every lane, step size, distance to guards, excess over
+    extrema.
+    """
     code = LaneCode(layout.lanes)
     order = layout.order
     for name in ("gravity", "load", "mobility"):
@@ -144,12 +152,12 @@ def step_source(layout: Layout) -> str:
     power = [code.let(f"P{k}", product(total, shaft, k)) for k in range(order + 1)]
     _store_series(code, layout, pendulums, shaft, total, power)
     _bounds(code, layout, pendulums, shaft, total, power)
-    return code.function("step", "W, log2_tolerance", "Series, step size, distances to guards and extrema of every lane.")
+    return code.function(
+        "step", "W, log2_tolerance", "Series, step size, distances to guards and extrema of every lane."
+    )
 
 
-def _in_fractions(
-    code: LaneCode, order: int, pendulums: list[_Pendulum], shaft: list[str], total: list[str]
-) -> None:
+def _in_fractions(code: LaneCode, order: int, pendulums: list[_Pendulum], shaft: list[str], total: list[str]) -> None:
     """Rescale every series from seconds to fractions of the step: coefficient k times h^k."""
     power = "h"
     for k in range(1, order + 1):
@@ -189,7 +197,13 @@ def _step_size(code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft
     code.load("inverse_rate", layout.inverse_rate)
     series = []
     for p in pendulums:
-        scale = code.let(f"scale{p.index}", f"abs({p.w[0]}) + abs({p.w[1]})*inverse_rate + 1e-300")
+        # The share of the base's drive is for the instant at which a locked pendulum starts from rest without
+        # acceleration.
+        drive = f"abs({p.ml})*{DRIVE_SHARE}*({code.row(layout.acc_x)} + {code.row(layout.acc_y)})"
+        scale = code.let(
+            f"scale{p.index}",
+            f"abs({p.w[0]}) + inverse_rate*(abs({p.w[1]}) + {drive} + inverse_rate*abs({p.w[2]})) + 1e-300",
+        )
         series.append((p.w, scale))
     code.let("scale_shaft", " + ".join(scale for _, scale in series) + f" + abs({shaft[0]})")
     series.append((shaft, "scale_shaft"))
@@ -275,7 +289,9 @@ def _bounds(
 
 
 def advance_source(layout: Layout) -> str:
-    """Source of ``advance(W)``: every lane's state and sums at the end of the part x of its step, and whether it needs attention."""
+    """Source of ``advance(W)``: every lane's state and sums at the end of the part x of its step, and whether it needs
+    attention.
+    """
     code = LaneCode(layout.lanes)
     order = layout.order
     x = code.load("x", layout.x)

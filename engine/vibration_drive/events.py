@@ -79,7 +79,7 @@ def stored_energy(W: Floats, lay: Layout, lane: int, i: int, u: float) -> float:
         end = law(W, first, lay.coefficients, lay.lanes, lane, limit)
         rate = law_slope(W, first, lay.coefficients, lay.lanes, lane, limit)
         value += (u - limit) * (end + 0.5 * rate * (u - limit))
-    return value
+    return float(value)
 
 
 @compiled
@@ -107,7 +107,7 @@ def _guard(W: Floats, lay: Layout, lane: int, i: int, band: int, g: Floats) -> N
 
 
 @compiled
-def locate(W: Floats, I: Ints, lay: Layout, lane: int, g: Floats, stack: Floats) -> None:  # noqa: E741
+def locate(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, stack: Floats) -> None:
     """Find the first event of a lane in its step; if there is one, shorten the step to it and note what happens.
 
     Of events at the same time the shaft's comes first, then the pendulum with the lowest index; the others are found
@@ -117,8 +117,8 @@ def locate(W: Floats, I: Ints, lay: Layout, lane: int, g: Floats, stack: Floats)
     best = 1.5
     pendulum = NO_EVENT
     target = 0
-    fresh = W[lay.steps * lanes + lane] == I[lane, SKIP_STEP]
-    shaft = I[lane, SHAFT_STATE]
+    fresh = W[lay.steps * lanes + lane] == Z[lane, SKIP_STEP]
+    shaft = Z[lane, SHAFT_STATE]
     if not W[(lay.m_sum_high if shaft == _HELD else lay.m_speed_low) * lanes + lane] > 0.0:
         first = (lay.sum if shaft == _HELD else lay.speed) * lanes + lane
         sign = -1.0 if shaft == _HELD else 1.0
@@ -127,28 +127,28 @@ def locate(W: Floats, I: Ints, lay: Layout, lane: int, g: Floats, stack: Floats)
         if shaft == _HELD:
             g[0] += W[lay.sum_high * lanes + lane]
         elif fresh:
-            for k in range(I[lane, SKIP_SHAFT]):
+            for k in range(Z[lane, SKIP_SHAFT]):
                 g[k] = 0.0
         x = first_root(g, lay.order, stack)
         if x < best:
             best, pendulum, target = x, OF_SHAFT, (_ROTATING if shaft == _HELD else _HELD)
-    literal = I[lane, LITERAL]
+    literal = Z[lane, LITERAL]
     for i in range(lay.n):
-        state = I[lane, i]
+        state = Z[lane, i]
         for band in range(_BANDS):
             if W[(lay.pendulums + i * lay.stride + lay.p_m_w_low + band) * lanes + lane] > 0.0:
                 continue
             _guard(W, lay, lane, i, band, g)
             if fresh and band // 2 < 2:
-                for k in range(I[lane, (SKIP_W if band // 2 == 0 else SKIP_U) + i]):
+                for k in range(Z[lane, (SKIP_W if band // 2 == 0 else SKIP_U) + i]):
                     g[k] = 0.0
             x = first_root(g, lay.order, stack)
             if x < best:
                 best, pendulum, target = x, i, CLUTCH_TARGET[literal, state, band]
-    I[lane, EVENT_PENDULUM] = pendulum
+    Z[lane, EVENT_PENDULUM] = pendulum
     if pendulum != NO_EVENT:
-        I[lane, EVENT_TARGET] = target
-        I[lane, EVENT_SMOOTH] = 1 if best > 0.0 else 0
+        Z[lane, EVENT_TARGET] = target
+        Z[lane, EVENT_SMOOTH] = 1 if best > 0.0 else 0
         W[lay.x * lanes + lane] = best
         if best < 1.0:
             W[lay.at_stop * lanes + lane] = 0.0
@@ -156,21 +156,23 @@ def locate(W: Floats, I: Ints, lay: Layout, lane: int, g: Floats, stack: Floats)
 
 @compiled
 def _watch_fall(W: Floats, lay: Layout, lane: int, i: int, fall: bool) -> None:
-    """Let an engaged clutch under literal resets wait for w to fall through 0 (``fall``), or after that to rise through it."""
+    """Let an engaged clutch under literal resets wait for w to fall through 0 (``fall``), or after that to rise through
+    it.
+    """
     first = lay.pendulums + i * lay.stride + lay.p_w_low
     W[(first + _W_LOW) * lay.lanes + lane] = 0.0 if fall else -NEVER
     W[(first + _W_HIGH) * lay.lanes + lane] = NEVER if fall else 0.0
 
 
 @compiled
-def set_clutch(W: Floats, I: Ints, lay: Layout, lane: int, i: int, state: int) -> None:  # noqa: E741
+def set_clutch(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, state: int) -> None:
     """Put the clutch of pendulum ``i`` into a state: its guards' bands, the law in force, the flags."""
     lanes = lay.lanes
     base = lay.pendulums + i * lay.stride
-    source = I[lane, i]
-    I[lane, i] = state
+    source = Z[lane, i]
+    Z[lane, i] = state
     for band in range(_BANDS):
-        kind = CLUTCH_THRESHOLD[I[lane, LITERAL], state, band]
+        kind = CLUTCH_THRESHOLD[Z[lane, LITERAL], state, band]
         edge = -NEVER if band % 2 == 0 else NEVER
         if kind == _AT_DATA_END:
             edge = W[(base + lay.p_limit) * lanes + lane]
@@ -179,7 +181,7 @@ def set_clutch(W: Floats, I: Ints, lay: Layout, lane: int, i: int, state: int) -
         elif kind != 0:
             edge = 0.0
         W[(base + lay.p_w_low + band) * lanes + lane] = edge
-    if I[lane, LITERAL] == 1 and (state == _ENGAGED or state == _BEYOND):
+    if Z[lane, LITERAL] == 1 and (_ENGAGED <= state <= _BEYOND):
         _watch_fall(W, lay, lane, i, source != _BEYOND)
     limit = W[(base + lay.p_limit) * lanes + lane]
     for k in range(lay.coefficients):
@@ -200,31 +202,31 @@ def set_clutch(W: Floats, I: Ints, lay: Layout, lane: int, i: int, state: int) -
         driving += W[(lay.pendulums + j * lay.stride + lay.p_engaged) * lanes + lane]
     W[lay.driven * lanes + lane] = 1.0 if driving > 0.0 else 0.0
     W[lay.driving_max * lanes + lane] = max(driving, W[lay.driving_max * lanes + lane])
-    _set_mobility(W, I, lay, lane)
+    _set_mobility(W, Z, lay, lane)
 
 
 @compiled
-def set_shaft(W: Floats, I: Ints, lay: Layout, lane: int, state: int) -> None:  # noqa: E741
+def set_shaft(W: Floats, Z: Ints, lay: Layout, lane: int, state: int) -> None:
     """Put the shaft into a state: its guard, its flag, its mobility."""
     lanes = lay.lanes
     load = W[lay.load * lanes + lane]
-    I[lane, SHAFT_STATE] = state
+    Z[lane, SHAFT_STATE] = state
     W[lay.rotating * lanes + lane] = 1.0 if state == _ROTATING else 0.0
     W[lay.sum_high * lanes + lane] = load if state == _HELD else NEVER
     # Without a load nothing slows the shaft, and it is never held.
     W[lay.speed_low * lanes + lane] = 0.0 if state == _ROTATING and load > 0.0 else -NEVER
-    _set_mobility(W, I, lay, lane)
+    _set_mobility(W, Z, lay, lane)
 
 
 @compiled
-def _set_mobility(W: Floats, I: Ints, lay: Layout, lane: int) -> None:  # noqa: E741
+def _set_mobility(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
     """1/(inertia of the shaft and of all pendulums locked to it), or 0 while the load holds it."""
     lanes = lay.lanes
     inertia = W[lay.inertia * lanes + lane]
     for i in range(lay.n):
-        if I[lane, i] == _LOCKED:
+        if Z[lane, i] == _LOCKED:
             inertia += W[(lay.pendulums + i * lay.stride + lay.p_inertia) * lanes + lane]
-    W[lay.mobility * lanes + lane] = 1.0 / inertia if I[lane, SHAFT_STATE] == _ROTATING else 0.0
+    W[lay.mobility * lanes + lane] = 1.0 / inertia if Z[lane, SHAFT_STATE] == _ROTATING else 0.0
 
 
 @compiled
@@ -239,7 +241,7 @@ def _acceleration(W: Floats, lay: Layout, lane: int, i: int) -> float:
         math.sin(theta) * W[lay.cos_chi * lanes + lane] + math.cos(theta) * W[lay.sin_chi * lanes + lane]
     )
     push = x * math.cos(phi) + (y + W[lay.gravity * lanes + lane]) * math.sin(phi)
-    return (
+    return float(
         W[(base + lay.p_ml) * lanes + lane] * push
         - W[(base + lay.p_spring) * lanes + lane] * phi
         - W[(base + lay.p_damping) * lanes + lane] * W[(base + lay.p_speed) * lanes + lane]
@@ -247,7 +249,7 @@ def _acceleration(W: Floats, lay: Layout, lane: int, i: int) -> float:
 
 
 @compiled
-def lock_or_engage(W: Floats, I: Ints, lay: Layout, lane: int, i: int) -> int:  # noqa: E741
+def lock_or_engage(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> int:
     """State of clutch ``i`` at the start of interaction when delta = 0 and c_1 > 0 (Filippov's choice).
 
     The torque that would keep w = 0 decides: above c_1 the clutch winds up, below 0 it opens, between it locks. If the
@@ -264,13 +266,13 @@ def lock_or_engage(W: Floats, I: Ints, lay: Layout, lane: int, i: int) -> int:  
         if j == i:
             continue
         other = lay.pendulums + j * lay.stride
-        if I[lane, j] == _LOCKED:
+        if Z[lane, j] == _LOCKED:
             moved = W[(other + lay.p_inertia) * lanes + lane]
             inertia += moved
             push += moved * _acceleration(W, lay, lane, j)
-        elif I[lane, j] >= _ENGAGED:
+        elif Z[lane, j] >= _ENGAGED:
             push += law(W, other + lay.p_force, lay.coefficients, lanes, lane, W[(other + lay.p_u) * lanes + lane])
-    if I[lane, SHAFT_STATE] == _ROTATING or push + min(needed, first) > 0.0:
+    if Z[lane, SHAFT_STATE] == _ROTATING or push + min(needed, first) > 0.0:
         needed -= own * (push + needed) / (inertia + own)
     if needed > first:
         return _ENGAGED
@@ -278,66 +280,66 @@ def lock_or_engage(W: Floats, I: Ints, lay: Layout, lane: int, i: int) -> int:  
 
 
 @compiled
-def _start(W: Floats, I: Ints, lay: Layout, lane: int, i: int) -> None:  # noqa: E741
+def _start(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> None:
     """Start of interaction (5): the relative turn counts from here."""
     lanes = lay.lanes
     base = lay.pendulums + i * lay.stride
     u = W[(base + lay.p_u) * lanes + lane]
-    if I[lane, i] >= _ENGAGED:
+    if Z[lane, i] >= _ENGAGED:
         W[lay.energy_lost * lanes + lane] += stored_energy(W, lay, lane, i, u)
     # w = 0 by the crossing itself, unless the case began with a pendulum already faster than the shaft.
     speed = W[(base + lay.p_speed) * lanes + lane]
     shaft = W[lay.speed * lanes + lane]
     size = abs(speed) + abs(_acceleration(W, lay, lane, i)) * W[lay.inverse_rate * lanes + lane]
-    crossing = I[lane, EVENT_SMOOTH] == 1 or abs(speed - shaft) <= _ROUNDING * size
+    crossing = Z[lane, EVENT_SMOOTH] == 1 or abs(speed - shaft) <= _ROUNDING * size
     if crossing:
         W[(base + lay.p_speed) * lanes + lane] = shaft
     backlash = W[(base + lay.p_backlash) * lanes + lane]
     if backlash > 0.0:
         W[(base + lay.p_u) * lanes + lane] = -backlash
-        set_clutch(W, I, lay, lane, i, _TAKE_UP)
+        set_clutch(W, Z, lay, lane, i, _TAKE_UP)
         return
     W[(base + lay.p_u) * lanes + lane] = 0.0
     state = _ENGAGED
     if crossing and W[(base + lay.p_law) * lanes + lane] > 0.0:
-        state = lock_or_engage(W, I, lay, lane, i)
+        state = lock_or_engage(W, Z, lay, lane, i)
     if state != _FREE:
         W[(base + lay.p_engagements) * lanes + lane] += 1.0
-    set_clutch(W, I, lay, lane, i, state)
+    set_clutch(W, Z, lay, lane, i, state)
 
 
 @compiled
-def transit(W: Floats, I: Ints, lay: Layout, lane: int) -> None:  # noqa: E741
+def transit(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
     """Carry out the event that ended a lane's step: exact values at the crossing, then the new state.
 
-    The skips tell the root finder which leading coefficients are zero by the nature of the crossing (a shaft that breaks
-    away starts with no acceleration) so that their rounding errors cannot fire a guard.
+    The skips tell the root finder which leading coefficients are zero by the nature of the crossing (a shaft that
+    breaks away starts with no acceleration) so that their rounding errors cannot fire a guard.
     """
     lanes = lay.lanes
-    i = I[lane, EVENT_PENDULUM]
-    target = I[lane, EVENT_TARGET]
-    smooth = I[lane, EVENT_SMOOTH] == 1
-    if W[lay.steps * lanes + lane] != I[lane, SKIP_STEP]:
-        I[lane, SKIP_STEP] = int(W[lay.steps * lanes + lane])
+    i = Z[lane, EVENT_PENDULUM]
+    target = Z[lane, EVENT_TARGET]
+    smooth = Z[lane, EVENT_SMOOTH] == 1
+    if W[lay.steps * lanes + lane] != Z[lane, SKIP_STEP]:
+        Z[lane, SKIP_STEP] = int(W[lay.steps * lanes + lane])
         for k in range(SKIP_SHAFT, LANE_INTEGERS):
-            I[lane, k] = 0
+            Z[lane, k] = 0
     if i == OF_SHAFT:
-        I[lane, SKIP_SHAFT] = 0
+        Z[lane, SKIP_SHAFT] = 0
         W[lay.speed * lanes + lane] = 0.0
         for j in range(lay.n):
             # A locked pendulum stops with the shaft.
-            if I[lane, j] == _LOCKED:
+            if Z[lane, j] == _LOCKED:
                 W[(lay.pendulums + j * lay.stride + lay.p_speed) * lanes + lane] = 0.0
-        set_shaft(W, I, lay, lane, target)
+        set_shaft(W, Z, lay, lane, target)
         if target == _ROTATING and smooth:
-            I[lane, SKIP_SHAFT] = 2
+            Z[lane, SKIP_SHAFT] = 2
         return
     base = lay.pendulums + i * lay.stride
-    source = I[lane, i]
-    I[lane, SKIP_W + i] = 0
-    I[lane, SKIP_U + i] = 0
+    source = Z[lane, i]
+    Z[lane, SKIP_W + i] = 0
+    Z[lane, SKIP_U + i] = 0
     if target == _START:
-        _start(W, I, lay, lane, i)
+        _start(W, Z, lay, lane, i)
         return
     if source == target:
         W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
@@ -347,15 +349,15 @@ def transit(W: Floats, I: Ints, lay: Layout, lane: int) -> None:  # noqa: E741
         W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
         W[(base + lay.p_u) * lanes + lane] = 0.0
         if smooth:
-            I[lane, SKIP_W + i] = 2
-            I[lane, SKIP_U + i] = 3
+            Z[lane, SKIP_W + i] = 2
+            Z[lane, SKIP_U + i] = 3
     elif source == _TAKE_UP and target == _FREE:
         if smooth:
             W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
-    elif source == _BEYOND or target == _BEYOND:
+    elif _BEYOND in (source, target):
         W[(base + lay.p_u) * lanes + lane] = W[(base + lay.p_limit) * lanes + lane]
     else:
         W[(base + lay.p_u) * lanes + lane] = 0.0
         if target == _ENGAGED:
             W[(base + lay.p_engagements) * lanes + lane] += 1.0
-    set_clutch(W, I, lay, lane, i, target)
+    set_clutch(W, Z, lay, lane, i, target)

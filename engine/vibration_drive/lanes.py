@@ -42,17 +42,17 @@ OUT_ENDING, OUT_STEPS, OUT_EVENTS, OUT_RUNUP, OUT_SUMS = 0, 1, 2, 3, 4
 
 
 @compiled
-def load_case(W: Floats, I: Ints, lay: Layout, lane: int, case: int, cases: Floats, literal: int) -> None:  # noqa: E741
+def load_case(W: Floats, Z: Ints, lay: Layout, lane: int, case: int, cases: Floats, literal: int) -> None:
     """Put a case into a lane at t = 0 (MODEL.md A2, "Start"). ``cases`` has the columns of ``cases.case_matrix``."""
     lanes = lay.lanes
     row = cases[case]
     for k in range(lay.rows):
         W[k * lanes + lane] = 0.0
     for k in range(ev.LANE_INTEGERS):
-        I[lane, k] = 0
-    I[lane, ev.CASE] = case
-    I[lane, ev.LITERAL] = literal
-    I[lane, ev.EVENT_PENDULUM] = ev.NO_EVENT
+        Z[lane, k] = 0
+    Z[lane, ev.CASE] = case
+    Z[lane, ev.LITERAL] = literal
+    Z[lane, ev.EVENT_PENDULUM] = ev.NO_EVENT
     W[lay.nu * lanes + lane] = row[_NU]
     W[lay.period * lanes + lane] = row[_PERIOD]
     W[lay.acc_x * lanes + lane] = row[_ACC_X]
@@ -74,8 +74,8 @@ def load_case(W: Floats, I: Ints, lay: Layout, lane: int, case: int, cases: Floa
         for k in range(lay.coefficients):
             W[(base + lay.p_law + k) * lanes + lane] = row[column + PENDULUM_COLUMNS + k]
         W[(base + lay.p_u) * lanes + lane] = -W[(base + lay.p_backlash) * lanes + lane]
-        set_clutch(W, I, lay, lane, i, _FREE)
-    set_shaft(W, I, lay, lane, _HELD if row[_SPEED] == 0.0 and row[_LOAD] > 0.0 else _ROTATING)
+        set_clutch(W, Z, lay, lane, i, _FREE)
+    set_shaft(W, Z, lay, lane, _HELD if row[_SPEED] == 0.0 and row[_LOAD] > 0.0 else _ROTATING)
     watch_extrema(W, lay, lane, False)
 
 
@@ -103,22 +103,24 @@ def _input_work(W: Floats, lay: Layout, lane: int) -> float:
 
 
 @compiled
-def _pass_stop(W: Floats, I: Ints, lay: Layout, lane: int, stop: int, sums: Floats) -> None:  # noqa: E741
-    """Do what a stop asks: 0 starts the window, 1 its whole periods, 2 ends it (3, the end of the run, asks nothing)."""
+def _pass_stop(W: Floats, Z: Ints, lay: Layout, lane: int, stop: int, sums: Floats) -> None:
+    """Do what a stop asks: 0 starts the window, 1 its whole periods, 2 ends it (3, the end of the run, asks
+    nothing).
+    """
     lanes = lay.lanes
     if stop == 0:
         _zero_sums(W, lay, lane)
         watch_extrema(W, lay, lane, True)
         W[lay.turn_0 * lanes + lane] = W[lay.turn * lanes + lane]
         W[lay.speed_0 * lanes + lane] = W[lay.speed * lanes + lane]
-        W[lay.energy_0 * lanes + lane] = energy(W, I, lay, lane)
+        W[lay.energy_0 * lanes + lane] = energy(W, Z, lay, lane)
     elif stop == 1:
         W[lay.turn_1 * lanes + lane] = W[lay.turn * lanes + lane]
         W[lay.input_1 * lanes + lane] = _input_work(W, lay, lane)
     elif stop == 2:
         W[lay.turn_2 * lanes + lane] = W[lay.turn * lanes + lane]
         W[lay.speed_2 * lanes + lane] = W[lay.speed * lanes + lane]
-        W[lay.energy_2 * lanes + lane] = energy(W, I, lay, lane)
+        W[lay.energy_2 * lanes + lane] = energy(W, Z, lay, lane)
         column = OUT_SUMS
         for row in range(lay.sum_held, lay.energy_lost + 1):
             sums[column] = W[row * lanes + lane]
@@ -132,33 +134,33 @@ def _pass_stop(W: Floats, I: Ints, lay: Layout, lane: int, stop: int, sums: Floa
 
 
 @compiled
-def next_stop(W: Floats, I: Ints, lay: Layout, lane: int, cases: Floats, sums: Floats) -> bool:  # noqa: E741
+def next_stop(W: Floats, Z: Ints, lay: Layout, lane: int, cases: Floats, sums: Floats) -> bool:
     """Pass every stop that is due, set the next one (at the latest the period's end); False when the run is over.
 
     Stops are pairs (whole periods, fraction), so that a window given in periods is met exactly.
     """
-    row = cases[I[lane, ev.CASE]]
-    while I[lane, ev.NEXT_STOP] < STOPS:
-        stop = I[lane, ev.NEXT_STOP]
+    row = cases[Z[lane, ev.CASE]]
+    while Z[lane, ev.NEXT_STOP] < STOPS:
+        stop = Z[lane, ev.NEXT_STOP]
         whole = row[_STOPS + 2 * stop]
         fraction = row[_STOPS + 2 * stop + 1]
-        if whole > I[lane, ev.PERIOD]:
+        if whole > Z[lane, ev.PERIOD]:
             break
-        if whole == I[lane, ev.PERIOD] and fraction > W[lay.f * lay.lanes + lane]:
+        if whole == Z[lane, ev.PERIOD] and fraction > W[lay.f * lay.lanes + lane]:
             W[lay.f_stop * lay.lanes + lane] = fraction
             return True
-        _pass_stop(W, I, lay, lane, stop, sums)
-        I[lane, ev.NEXT_STOP] = stop + 1
+        _pass_stop(W, Z, lay, lane, stop, sums)
+        Z[lane, ev.NEXT_STOP] = stop + 1
     W[lay.f_stop * lay.lanes + lane] = 1.0
-    return I[lane, ev.NEXT_STOP] < STOPS
+    return bool(Z[lane, ev.NEXT_STOP] < STOPS)
 
 
 @compiled
 def runup_periods(turns: Floats, periods: int) -> float:
     """Periods until the period-mean speed first reaches its share of the final one; NaN where the shaft does not turn.
 
-    The period-mean speed at a time is the mean over the period that ends there, taken at whole periods and linearly between;
-    it is 0 at the start. ``turns[k]`` is the shaft's turn after k periods.
+    The period-mean speed at a time is the mean over the period that ends there, taken at whole periods and linearly
+    between; it is 0 at the start. ``turns[k]`` is the shaft's turn after k periods.
     """
     if periods < 1:
         return math.nan
@@ -169,44 +171,46 @@ def runup_periods(turns: Floats, periods: int) -> float:
     for k in range(1, periods + 1):
         mean = turns[k] - turns[k - 1]
         if mean >= wanted:
-            return k - 1 + (wanted - before) / (mean - before)
+            return float(k - 1 + (wanted - before) / (mean - before))
         before = mean
     return math.nan
 
 
 @compiled
-def _finish(W: Floats, I: Ints, lay: Layout, lane: int, ending: int, cases: Floats, turns: Floats, sums: Floats) -> None:  # noqa: E741
-    case = I[lane, ev.CASE]
+def _finish(
+    W: Floats, Z: Ints, lay: Layout, lane: int, ending: int, cases: Floats, turns: Floats, sums: Floats
+) -> None:
+    case = Z[lane, ev.CASE]
     out = sums[case]
     out[OUT_ENDING] = ending
     out[OUT_STEPS] = W[lay.steps * lay.lanes + lane]
-    out[OUT_EVENTS] = I[lane, ev.EVENTS]
+    out[OUT_EVENTS] = Z[lane, ev.EVENTS]
     out[OUT_RUNUP] = math.nan
     if ending != _OK:
         out[OUT_SUMS:] = math.nan
     elif cases[case, _SPEED] == 0.0:
-        out[OUT_RUNUP] = cases[case, _PERIOD] * runup_periods(turns[lane], I[lane, ev.PERIOD])
+        out[OUT_RUNUP] = cases[case, _PERIOD] * runup_periods(turns[lane], Z[lane, ev.PERIOD])
 
 
 @compiled
-def _take_event(W: Floats, I: Ints, lay: Layout, lane: int, h: float, most_events: int) -> int:  # noqa: E741
+def _take_event(W: Floats, Z: Ints, lay: Layout, lane: int, h: float, most_events: int) -> int:
     """Carry out the event at the step's end and count it; the ending it causes, if any."""
-    I[lane, ev.EVENTS_AT_ONCE] = 0 if h > 0.0 else I[lane, ev.EVENTS_AT_ONCE] + 1
-    pendulum = I[lane, ev.EVENT_PENDULUM]
-    counts = pendulum == ev.OF_SHAFT or I[lane, pendulum] != I[lane, ev.EVENT_TARGET]
-    transit(W, I, lay, lane)
+    Z[lane, ev.EVENTS_AT_ONCE] = 0 if h > 0.0 else Z[lane, ev.EVENTS_AT_ONCE] + 1
+    pendulum = Z[lane, ev.EVENT_PENDULUM]
+    counts = pendulum == ev.OF_SHAFT or Z[lane, pendulum] != Z[lane, ev.EVENT_TARGET]
+    transit(W, Z, lay, lane)
     if not counts:
         return _RUNNING
-    if I[lane, ev.PERIOD] > 0 or W[lay.f * lay.lanes + lane] > 0.0:
-        I[lane, ev.EVENTS] += 1
-        I[lane, ev.EVENTS_IN_PERIOD] += 1
-    if I[lane, ev.EVENTS_IN_PERIOD] > most_events or I[lane, ev.EVENTS_AT_ONCE] > MOST_AT_ONCE:
+    if Z[lane, ev.PERIOD] > 0 or W[lay.f * lay.lanes + lane] > 0.0:
+        Z[lane, ev.EVENTS] += 1
+        Z[lane, ev.EVENTS_IN_PERIOD] += 1
+    if Z[lane, ev.EVENTS_IN_PERIOD] > most_events or Z[lane, ev.EVENTS_AT_ONCE] > MOST_AT_ONCE:
         return _CHATTER
     return _RUNNING
 
 
 @compiled
-def _lost(W: Floats, I: Ints, lay: Layout, lane: int, most_steps: int) -> int:  # noqa: E741
+def _lost(W: Floats, lay: Layout, lane: int, most_steps: int) -> int:
     """The abnormal ending a lane has reached after a step, or ``_RUNNING``."""
     lanes = lay.lanes
     if not abs(W[lay.speed * lanes + lane]) < SPEED_BOUND:
@@ -225,60 +229,73 @@ def _lost(W: Floats, I: Ints, lay: Layout, lane: int, most_steps: int) -> int:  
 
 @compiled
 def settle(
-    W: Floats, I: Ints, lay: Layout, lane: int, cases: Floats, turns: Floats, sums: Floats, most_steps: int, most_events: int
-) -> bool:  # noqa: E741
+    W: Floats,
+    Z: Ints,
+    lay: Layout,
+    lane: int,
+    cases: Floats,
+    turns: Floats,
+    sums: Floats,
+    most_steps: int,
+    most_events: int,
+) -> bool:
     """After ``advance``: events, stops, budgets of a lane that needs attention. True while its case goes on."""
     lanes = lay.lanes
     h = W[lay.x * lanes + lane] * W[lay.h * lanes + lane]
-    ending = _lost(W, I, lay, lane, most_steps)
-    event = I[lane, ev.EVENT_PENDULUM] != ev.NO_EVENT
+    ending = _lost(W, lay, lane, most_steps)
+    event = Z[lane, ev.EVENT_PENDULUM] != ev.NO_EVENT
     at_stop = W[lay.at_stop * lanes + lane] == 1.0
     if at_stop and h > 0.0:
         # The stop is met exactly, whatever the sum of the steps rounds to.
         W[lay.f * lanes + lane] = W[lay.f_stop * lanes + lane]
     if ending == _RUNNING and event:
-        ending = _take_event(W, I, lay, lane, h, most_events)
-        I[lane, ev.EVENT_PENDULUM] = ev.NO_EVENT
+        ending = _take_event(W, Z, lay, lane, h, most_events)
+        Z[lane, ev.EVENT_PENDULUM] = ev.NO_EVENT
     if ending == _RUNNING and at_stop and h > 0.0:
         if W[lay.f * lanes + lane] == 1.0:
             W[lay.f * lanes + lane] = 0.0
-            I[lane, ev.PERIOD] += 1
-            I[lane, ev.EVENTS_IN_PERIOD] = 0
-            if I[lane, ev.PERIOD] < turns.shape[1]:
-                turns[lane, I[lane, ev.PERIOD]] = W[lay.turn * lanes + lane]
-        if not next_stop(W, I, lay, lane, cases, sums[I[lane, ev.CASE]]):
+            Z[lane, ev.PERIOD] += 1
+            Z[lane, ev.EVENTS_IN_PERIOD] = 0
+            if Z[lane, ev.PERIOD] < turns.shape[1]:
+                turns[lane, Z[lane, ev.PERIOD]] = W[lay.turn * lanes + lane]
+        if not next_stop(W, Z, lay, lane, cases, sums[Z[lane, ev.CASE]]):
             ending = _OK
     if ending == _RUNNING:
         return True
-    _finish(W, I, lay, lane, ending, cases, turns, sums)
+    _finish(W, Z, lay, lane, ending, cases, turns, sums)
     return False
 
 
 @compiled
-def look(W: Floats, I: Ints, lay: Layout, lane: int, g: Floats, stack: Floats) -> None:  # noqa: E741
-    """Before ``advance``: the scalar second look at one lane's step, for events and extrema that the bounds could not exclude."""
+def look(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, stack: Floats) -> None:
+    """Before ``advance``: the scalar second look at one lane's step, for events and extrema that the bounds could not
+    exclude.
+    """
     if not W[lay.margin * lay.lanes + lane] > 0.0:
-        locate(W, I, lay, lane, g, stack)
-    if not W[lay.excess * lay.lanes + lane] <= 0.0:
+        locate(W, Z, lay, lane, g, stack)
+    # A state that is left at once lasts no time and has no extrema.
+    if W[lay.x * lay.lanes + lane] > 0.0 and not W[lay.excess * lay.lanes + lane] <= 0.0:
         update_extrema(W, lay, lane, g, stack)
 
 
 @compiled
 def record(
-    W: Floats, I: Ints, lay: Layout, lane: int, times: Floats, done: int, g: Floats, samples: Floats, states: Ints
-) -> int:  # noqa: E741
-    """Write the samples that fall into the lane's step, given sample times in excitation periods; how many are done then."""
+    W: Floats, Z: Ints, lay: Layout, lane: int, times: Floats, done: int, g: Floats, samples: Floats, states: Ints
+) -> int:
+    """Write the samples that fall into the lane's step, given sample times in excitation periods; how many are done
+    then.
+    """
     f = W[lay.f * lay.lanes + lane]
     x_taken = W[lay.x * lay.lanes + lane]
     at_stop = W[lay.at_stop * lay.lanes + lane] == 1.0
     length = W[lay.h * lay.lanes + lane] / W[lay.period * lay.lanes + lane]
     while done < times.shape[0]:
-        ahead = (times[done] - I[lane, ev.PERIOD]) - f
+        ahead = (times[done] - Z[lane, ev.PERIOD]) - f
         x = max(0.0, ahead / length)
-        if at_stop and times[done] - I[lane, ev.PERIOD] <= W[lay.f_stop * lay.lanes + lane]:
+        if at_stop and times[done] - Z[lane, ev.PERIOD] <= W[lay.f_stop * lay.lanes + lane]:
             x = min(1.0, x)
         if x > x_taken or x_taken == 0.0:
             break
-        sample(W, I, lay, lane, x, g, samples[done], states[done])
+        sample(W, Z, lay, lane, x, g, samples[done], states[done])
         done += 1
     return done

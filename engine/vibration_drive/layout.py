@@ -1,12 +1,13 @@
 """Rows of the lane workspace: the agreement between the generated kernel and the event code.
 
-The workspace is one flat float64 array; quantity ``row`` of lane ``lane`` is at ``row * lanes + lane``. Rows of pendulum i
-start at ``pendulums + i * stride``; fields that begin with ``p_`` are offsets into that block.
+The workspace is one flat float64 array; quantity ``row`` of lane ``lane`` is at ``row * lanes + lane``. Rows of
+pendulum i start at ``pendulums + i * stride``; fields that begin with ``p_`` are offsets into that block.
 """
 
 from typing import NamedTuple, cast
 
 import numpy as np
+
 
 class Layout(NamedTuple):
     """Sizes and row numbers. Compiled code gets them by ``as_record``."""
@@ -22,7 +23,8 @@ class Layout(NamedTuple):
     f: int
     f_stop: int
     period: int
-    # parameters; acc_x, acc_y are the amplitudes of the base's acceleration, inverse_rate scales accelerations to speeds
+    # parameters; acc_x, acc_y are the amplitudes of the base's acceleration, inverse_rate scales accelerations to
+    # speeds
     nu: int
     acc_x: int
     acc_y: int
@@ -38,9 +40,9 @@ class Layout(NamedTuple):
     driven: int
     sum_high: int
     speed_low: int
-    # step: size planned, size wanted by the tolerance, part of the planned step taken (x = 1 without an event), whether it
-    # ends at f_stop, smallest distance of a guarded quantity to its band, largest excess over a known extremum, whether
-    # anything but the next step has to happen, number of steps so far
+    # step: size planned, size wanted by the tolerance, part of the planned step taken (x = 1 without an event), whether
+    # it ends at f_stop, smallest distance of a guarded quantity to its band, largest excess over a known extremum,
+    # whether anything but the next step has to happen, number of steps so far
     h: int
     h_free: int
     x: int
@@ -83,8 +85,8 @@ class Layout(NamedTuple):
     # distance of this step to the shaft's guards
     m_sum_high: int
     m_speed_low: int
-    # series of the shaft, order + 1 coefficients each, in fractions of the planned step: speed, sum of the clutch torques,
-    # power of the clutches
+    # series of the shaft, order + 1 coefficients each, in fractions of the planned step: speed, sum of the clutch
+    # torques, power of the clutches
     speed: int
     sum: int
     power: int
@@ -150,7 +152,9 @@ class Layout(NamedTuple):
 
 
 def make_layout(n: int, coefficients: int, order: int, lanes: int) -> Layout:
-    """Lay out the rows for ``n`` pendulums, that many clutch coefficients, series of that order, and that many lanes."""
+    """Lay out the rows for ``n`` pendulums, that many clutch coefficients, series of that order, and that many
+    lanes.
+    """
     sizes = dict.fromkeys(("speed", "sum", "power", "p_speed", "p_torque"), order + 1)
     sizes |= {"p_drive": order, "p_law": coefficients, "p_force": coefficients}
     names = Layout._fields[Layout._fields.index("stride") + 1 :]

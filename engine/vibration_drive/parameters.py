@@ -13,7 +13,8 @@ class Parameter:
     """One numeric parameter.
 
     ``path`` is the SPEC path with ``N`` for a pendulum's index. ``symbol`` is MODEL.md's letter. The allowed range is
-    ``low`` .. ``high`` in ``unit``; an open end excludes the bound itself. ``default`` None means the value is required.
+    ``low`` .. ``high`` in ``unit``; an open end excludes the bound itself. ``default`` None means the value is
+    required.
     """
 
     path: str
@@ -60,7 +61,9 @@ PARAMETERS: tuple[Parameter, ...] = (
 )
 
 #: Coefficients of the clutch polynomial (MODEL.md (3)); ``K`` counts from 0, so K = 0 is c_1. Unit N*m/rad^K.
-CLUTCH_COEFFICIENT = Parameter("clutch.coefficients.K", "c_(K+1)", "N*m/rad^K", -1e30, 1e30, False, None, "clutch polynomial")
+CLUTCH_COEFFICIENT = Parameter(
+    "clutch.coefficients.K", "c_(K+1)", "N*m/rad^K", -1e30, 1e30, False, None, "clutch polynomial"
+)
 #: End of the measured data; beyond it the law goes on straight (state BEYOND). Infinite: no end.
 CLUTCH_WINDUP_LIMIT = Parameter(
     "clutch.windup_limit", "u_end", "rad", 0.0, _INF, True, _INF, "largest windup the clutch law was measured to"

@@ -1,4 +1,6 @@
-"""Running cases of the vibration drive: a batch of parameters in, characteristics and endings out; one case's trajectory."""
+"""Running cases of the vibration drive: a batch of parameters in, characteristics and endings out; one case's
+trajectory.
+"""
 
 import math
 from collections.abc import Mapping
@@ -79,7 +81,8 @@ def _integrate(
     samples = np.empty((len(times), _SHAFT_SAMPLES + n * _PENDULUM_SAMPLES))
     states = np.zeros((len(times), 1 + n), dtype=np.int64)
     done = module.integrate(
-        module.RECORD, matrix, math.log2(run.tolerance), int(run.reset == "literal"), run.max_steps, run.max_events_per_period,
+        module.RECORD, matrix, math.log2(run.tolerance), int(run.reset == "literal"),
+        run.max_steps, run.max_events_per_period,
         np.zeros(lay.rows * lay.lanes), np.zeros((lay.lanes, LANE_INTEGERS), dtype=np.int64),
         np.zeros(MAX_DEGREE + 1), work_stack(), np.zeros((lay.lanes, periods)), sums, times, samples, states,
     )  # fmt: skip
@@ -155,7 +158,8 @@ def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike) -> 
     Returns
     -------
     Trajectory
-        The values come from the local polynomials of the integration: they are as accurate as its steps, at any sampling.
+        The values come from the local polynomials of the integration: they are as accurate as its steps, at any
+        sampling.
 
     Raises
     ------
@@ -182,6 +186,9 @@ def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike) -> 
     }
     for column, name in enumerate(("shaft.angle", "shaft.speed", "shaft.acceleration", "torque")):
         out[name] = samples[:, column]
+    if value["shaft.load"] > 0.0:
+        # As for the minimum in ``characteristics``: only rounding can turn a loaded shaft back.
+        out["shaft.speed"] = np.maximum(out["shaft.speed"], 0.0)
     out["power.useful"] = value["shaft.load"] * out["shaft.speed"]
     out["power.clutch"] = out["torque"] * out["shaft.speed"]
     for i in range(n):

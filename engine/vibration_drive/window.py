@@ -35,7 +35,9 @@ def rate(W: Floats, lay: Layout, lane: int, row: int, g: Floats) -> None:
 
 @compiled
 def primitive(W: Floats, lay: Layout, lane: int, start: float, row: int, minus: int, g: Floats) -> None:
-    """Like ``series``, but its time integral from the value ``start``; the series at row ``minus`` (if >= 0) is subtracted first."""
+    """Like ``series``, but its time integral from the value ``start``; the series at row ``minus`` (if >= 0) is
+    subtracted first.
+    """
     h = W[lay.h * lay.lanes + lane]
     g[0] = start
     for k in range(lay.order):
@@ -65,15 +67,17 @@ def _update(W: Floats, lay: Layout, lane: int, row: int, block: int, sign: float
 @compiled
 def _exceeds(W: Floats, lay: Layout, lane: int, first: int, last: int) -> bool:
     """Whether any of the excesses at rows ``first`` .. ``last`` is positive."""
+    found = False
     for row in range(first, last + 1):
-        if not W[row * lay.lanes + lane] <= 0.0:
-            return True
-    return False
+        found |= not W[row * lay.lanes + lane] <= 0.0
+    return found
 
 
 @compiled
 def update_extrema(W: Floats, lay: Layout, lane: int, g: Floats, stack: Floats) -> None:
-    """Extrema of every watched quantity over the part of the step that is taken, by its polynomials (nothing is sampled)."""
+    """Extrema of every watched quantity over the part of the step that is taken, by its polynomials (nothing is
+    sampled).
+    """
     lanes = lay.lanes
     block = lay.x_speed_max - lay.speed_max
     if _exceeds(W, lay, lane, lay.x_speed_max, lay.x_speed_min):
@@ -131,7 +135,7 @@ def watch_extrema(W: Floats, lay: Layout, lane: int, active: bool) -> None:
 
 
 @compiled
-def energy(W: Floats, I: Ints, lay: Layout, lane: int) -> float:  # noqa: E741
+def energy(W: Floats, Z: Ints, lay: Layout, lane: int) -> float:
     """Mechanical energy of a lane (MODEL.md A4): pendulums, springs, weight, shaft and wound-up clutches."""
     lanes = lay.lanes
     speed = W[lay.speed * lanes + lane]
@@ -143,13 +147,13 @@ def energy(W: Floats, I: Ints, lay: Layout, lane: int) -> float:  # noqa: E741
         weight = W[(base + lay.p_ml) * lanes + lane] * W[lay.gravity * lanes + lane] * math.cos(phi)
         spring = 0.5 * W[(base + lay.p_spring) * lanes + lane] * phi * phi
         total += W[(base + lay.p_inertia) * lanes + lane] * (0.5 * w * w + weight + spring)
-        if I[lane, i] == _ENGAGED or I[lane, i] == _BEYOND:
+        if Z[lane, i] == _ENGAGED or Z[lane, i] == _BEYOND:
             total += stored_energy(W, lay, lane, i, W[(base + lay.p_u) * lanes + lane])
-    return total
+    return float(total)
 
 
 @compiled
-def sample(W: Floats, I: Ints, lay: Layout, lane: int, x: float, g: Floats, out: Floats, states: Ints) -> None:  # noqa: E741
+def sample(W: Floats, Z: Ints, lay: Layout, lane: int, x: float, g: Floats, out: Floats, states: Ints) -> None:
     """Write every variable at the fraction ``x`` of the step into ``out``.
 
     Columns: shaft turn, speed, acceleration, total torque; then per pendulum angle, speed, acceleration, clutch torque,
@@ -181,4 +185,4 @@ def sample(W: Floats, I: Ints, lay: Layout, lane: int, x: float, g: Floats, out:
         out[column + 4] = evaluate(g, lay.order, x)
         series(W, lay, lane, base + lay.p_drive, g)
         out[column + 5] = evaluate(g, lay.order - 1, x)
-        states[1 + i] = I[lane, i]
+        states[1 + i] = Z[lane, i]
