@@ -16,8 +16,18 @@ R = TypeVar("R")
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile ``function`` on first call and keep the machine code in numba's on-disk cache.
 
-    Division by zero gives infinities as in numpy. Products and sums may be contracted into fused multiply-adds, but are
-    never reordered: results do not depend on how a batch is cut.
+    Strict arithmetic: division by zero gives infinities as in numpy, nothing is contracted or reordered. A function that
+    several others call exists in several copies, each optimised with its caller, and which copy runs depends on what was
+    compiled or loaded before; only strict arithmetic gives the same bits from all of them.
     """
-    jitted = numba.njit(cache=True, error_model="numpy", fastmath={"contract"})(function)
+    jitted = numba.njit(cache=True, error_model="numpy")(function)
+    return cast(Callable[P, R], jitted)
+
+
+def contracted(function: Callable[P, R]) -> Callable[P, R]:
+    """The same with products and sums contracted into fused multiply-adds, for the vector code of one caller.
+
+    It is always inlined, so there is one copy of it and its bits are its caller's.
+    """
+    jitted = numba.njit(cache=True, error_model="numpy", fastmath={"contract"}, forceinline=True)(function)
     return cast(Callable[P, R], jitted)

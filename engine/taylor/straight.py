@@ -41,7 +41,7 @@ class LaneCode:
     def function(self, name: str, arguments: str, docstring: str) -> str:
         """The finished function: the lane loop around the lines."""
         body = "\n".join(f"        {line}" for line in self.lines)
-        head = f'@compiled\ndef {name}({arguments}):\n    """{docstring}"""\n'
+        head = f'@contracted\ndef {name}({arguments}):\n    """{docstring}"""\n'
         return f"{head}    for lane in range({self.lanes}):\n{body}\n"
 
 

@@ -29,7 +29,7 @@ _MODULE = '''"""Generated kernel: {n} pendulum(s), {coefficients} clutch coeffic
 
 import numpy as np
 
-from engine.jit import compiled
+from engine.jit import compiled, contracted
 from engine.vibration_drive.lanes import load_case, look, next_stop, record, settle
 from engine.vibration_drive.layout import Layout, as_record
 
