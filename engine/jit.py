@@ -16,9 +16,9 @@ R = TypeVar("R")
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile ``function`` on first call and keep the machine code in numba's on-disk cache.
 
-    Strict arithmetic: division by zero gives infinities as in numpy, nothing is contracted or reordered. A function that
-    several others call exists in several copies, each optimised with its caller, and which copy runs depends on what was
-    compiled or loaded before; only strict arithmetic gives the same bits from all of them.
+    Strict arithmetic: division by zero gives infinities as in numpy, nothing is contracted or reordered. A function
+    that several others call exists in several copies, each optimised with its caller, and which copy runs depends on
+    what was compiled or loaded before; only strict arithmetic gives the same bits from all of them.
     """
     jitted = numba.njit(cache=True, error_model="numpy")(function)
     return cast(Callable[P, R], jitted)
