@@ -5,6 +5,10 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 #: Libraries that would start threads of their own; the pool has a process for each core already.
 _THREAD_VARIABLES = (
@@ -34,8 +38,9 @@ def end_with_parent(parent: int, number: signal.Signals) -> None:
         os.kill(os.getpid(), number)
 
 
-def start_pool_process(parent: int) -> None:
+def start_pool_process(parent: int, prepare: Callable[[], None]) -> None:
     """First thing a pool process does. Interrupts at the terminal are the parent's to handle; a stop is at once."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     end_with_parent(parent, signal.SIGKILL)
+    prepare()

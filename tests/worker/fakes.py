@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from functools import partial
 
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker import kernels
+from worker.executors.process_pool import ProcessPoolExecutor
 from worker.kernels import ChunkResult, ChunkTask, KernelShape
 from worker.study import Axis, Study
 
@@ -70,6 +72,26 @@ def raising(task: ChunkTask) -> ChunkResult:
 
 def load(shape: KernelShape) -> None:
     """No kernel is needed."""
+
+
+def prepare() -> None:
+    """Nothing needs to be ready."""
+
+
+def broken() -> None:
+    """A process that dies as soon as it starts."""
+    os._exit(7)
+
+
+def pool(
+    processes: int = 2,
+    *,
+    chunk_timeout: float = 60.0,
+    run: Callable[[ChunkTask], ChunkResult] = run,
+    prepare: Callable[[], None] = prepare,
+) -> ProcessPoolExecutor:
+    """A process pool without the engine."""
+    return ProcessPoolExecutor(processes, chunk_timeout=chunk_timeout, run=run, load=load, prepare=prepare)
 
 
 def faulty(**faults: frozenset[int]) -> partial[ChunkResult]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from multiprocessing import get_context
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any
+from time import monotonic
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from pebble import ProcessExpired, ProcessFuture, ProcessPool
 
@@ -19,12 +20,17 @@ if TYPE_CHECKING:
 
     from worker.study import Study
 
+T = TypeVar("T")
+R = TypeVar("R")
+
 #: Chunks beyond one for each process, so that a process that is through finds the next one waiting.
 SPARE_CHUNKS = 2
 #: Pools that may break one after the other, with no chunk done between, before the executor gives up.
 MAX_BROKEN_POOLS = 3
 #: Seconds at least in which a kernel must be compiled.
 LOAD_SECONDS = 300.0
+#: Seconds between two looks whether the pool still lives.
+LOOK_SECONDS = 0.2
 #: Seconds for the processes of a closed pool to be gone.
 CLOSE_SECONDS = 10.0
 
@@ -41,8 +47,9 @@ class ProcessPoolExecutor:
         At least 1.
     chunk_timeout : float
         Seconds after which a chunk that is being run is killed with its process.
-    run, load : functions
-        What a process does with a chunk and with a new kernel; importable by name. Other than the engine's in tests.
+    run, load, prepare : functions
+        What a process does with a chunk, with a new kernel, and when it starts; importable by name. Other than the
+        engine's in tests.
     """
 
     def __init__(
@@ -52,11 +59,13 @@ class ProcessPoolExecutor:
         chunk_timeout: float,
         run: Callable[[kernels.ChunkTask], kernels.ChunkResult] = kernels.run_task,
         load: Callable[[kernels.KernelShape], None] = kernels.load,
+        prepare: Callable[[], None] = kernels.prepare,
     ) -> None:
         self._processes = processes
         self._timeout = chunk_timeout
         self._run = run
         self._load = load
+        self._prepare = prepare
         self._futures: dict[int, ProcessFuture[kernels.ChunkResult]] = {}
         self._loaded: set[kernels.KernelShape] = set()
         self._loading: dict[kernels.KernelShape, ProcessFuture[None]] = {}
@@ -67,12 +76,16 @@ class ProcessPoolExecutor:
         self._pool = self._new_pool()
 
     def _new_pool(self) -> ProcessPool:
-        return ProcessPool(
+        pool = ProcessPool(
             max_workers=self._processes,
             initializer=start_pool_process,
-            initargs=(os.getpid(),),
+            initargs=(os.getpid(), self._prepare),
             context=get_context("spawn"),
         )
+        # Asking starts the processes: they get ready while the first study is on its way.
+        if not pool.active:
+            raise ExecutorError("the processes of the pool cannot be started")
+        return pool
 
     @property
     def capacity(self) -> int:
@@ -88,9 +101,7 @@ class ProcessPoolExecutor:
             self._held[task.shape][ticket] = task
         else:
             self._held[task.shape] = {ticket: task}
-            loading: ProcessFuture[None] = self._living_pool().schedule(
-                self._load, args=(task.shape,), timeout=max(LOAD_SECONDS, self._timeout)
-            )
+            loading = self._schedule(self._load, task.shape, max(LOAD_SECONDS, self._timeout))
             self._loading[task.shape] = loading
             loading.add_done_callback(lambda _: self._ready.put(task.shape))
 
@@ -110,10 +121,17 @@ class ProcessPoolExecutor:
             self._pool = self._new_pool()
         return self._pool
 
+    def _schedule(self, function: Callable[[T], R], argument: T, timeout: float) -> ProcessFuture[R]:
+        while True:
+            pool = self._living_pool()
+            try:
+                future: ProcessFuture[R] = pool.schedule(function, args=(argument,), timeout=timeout)
+            except RuntimeError:  # it broke a moment ago
+                continue
+            return future
+
     def _start(self, ticket: int, task: kernels.ChunkTask) -> None:
-        future: ProcessFuture[kernels.ChunkResult] = self._living_pool().schedule(
-            self._run, args=(task,), timeout=self._timeout
-        )
+        future = self._schedule(self._run, task, self._timeout)
         self._futures[ticket] = future
         future.add_done_callback(lambda done: self._ready.put(self._outcome(ticket, done)))
 
@@ -135,14 +153,19 @@ class ProcessPoolExecutor:
     def wait(self, timeout: float) -> list[Outcome]:
         """Outcomes that have come in; waits for the first at most ``timeout`` s, gives [] when none came."""
         found: list[Outcome] = []
-        if self._futures or self._loading:
-            self._living_pool()
-        try:
-            self._sort(self._ready.get(timeout=timeout), found)
-            while True:
-                self._sort(self._ready.get_nowait(), found)
-        except Empty:
-            return found
+        deadline = monotonic() + timeout
+        while not found:
+            if self._futures or self._loading:
+                self._living_pool()
+            left = max(0.0, deadline - monotonic())
+            try:
+                self._sort(self._ready.get(timeout=min(left, LOOK_SECONDS)), found)
+                while True:
+                    self._sort(self._ready.get_nowait(), found)
+            except Empty:
+                if left == 0.0:
+                    break
+        return found
 
     def _sort(self, item: Outcome | kernels.KernelShape, found: list[Outcome]) -> None:
         if isinstance(item, Outcome):

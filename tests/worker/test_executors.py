@@ -1,0 +1,185 @@
+"""Both executors: the same results, one outcome for every chunk, and a death costs one chunk only."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from functools import partial
+
+import numpy as np
+import psutil
+import pytest
+
+from tests.worker import fakes
+from worker import kernels
+from worker.executors.inline import InlineExecutor
+from worker.executors.process_pool import MAX_BROKEN_POOLS, SPARE_CHUNKS, ProcessPoolExecutor
+from worker.ports import Chunk, Executor, ExecutorError, Fate, Outcome
+
+DEADLINE = 60.0
+
+
+def gather(executor: Executor, count: int) -> dict[int, Outcome]:
+    """Wait for that many outcomes."""
+    found: dict[int, Outcome] = {}
+    while len(found) < count:
+        came = executor.wait(DEADLINE)
+        assert came, "nothing came back"
+        for outcome in came:
+            assert outcome.ticket not in found
+            found[outcome.ticket] = outcome
+    return found
+
+
+def submit(executor: Executor, chunks: int, size: int = 4) -> None:
+    study = fakes.study(chunks * size)
+    for index in range(chunks):
+        executor.submit(index, study, Chunk(1, index * size, size))
+
+
+@pytest.fixture
+def start() -> Iterator[Callable[..., ProcessPoolExecutor]]:
+    """Starts pools and closes them at the end."""
+    pools: list[ProcessPoolExecutor] = []
+
+    def begin(processes: int = 2, **options: object) -> ProcessPoolExecutor:
+        pools.append(fakes.pool(processes, **options))  # type: ignore[arg-type]
+        return pools[-1]
+
+    yield begin
+    for pool in pools:
+        pool.close()
+
+
+def test_every_chunk_comes_back_with_its_own_cases(start: Callable[..., ProcessPoolExecutor]) -> None:
+    pool = start(2)
+    assert pool.capacity == 2 + SPARE_CHUNKS
+    submit(pool, 6)
+    for ticket, outcome in gather(pool, 6).items():
+        assert outcome.fate is Fate.DONE
+        assert outcome.result is not None
+        assert outcome.result.first == ticket * 4
+        np.testing.assert_array_equal(outcome.result.values, fakes.values(ticket * 4, 4))
+    assert pool.wait(0.0) == []
+
+
+def test_a_death_costs_one_chunk(start: Callable[..., ProcessPoolExecutor]) -> None:
+    pool = start(2, run=fakes.faulty(crash=frozenset({9})))
+    submit(pool, 6)
+    outcomes = gather(pool, 6)
+    assert {ticket for ticket, outcome in outcomes.items() if outcome.fate is Fate.CRASHED} == {2}
+    assert f"{-signal.SIGKILL}" in outcomes[2].detail
+    submit(pool, 1)
+    assert gather(pool, 1)[0].fate is Fate.DONE
+
+
+def test_what_never_returns_is_killed(start: Callable[..., ProcessPoolExecutor]) -> None:
+    pool = start(1, run=fakes.faulty(hang=frozenset({0})), chunk_timeout=0.3)
+    submit(pool, 3)
+    outcomes = gather(pool, 3)
+    assert outcomes[0].fate is Fate.TIMED_OUT
+    assert "0.3 s" in outcomes[0].detail
+    assert [outcomes[1].fate, outcomes[2].fate] == [Fate.DONE, Fate.DONE]
+
+
+def test_chunks_are_stopped_running_or_not(start: Callable[..., ProcessPoolExecutor]) -> None:
+    pool = start(1, run=fakes.faulty(hang=frozenset({0})))
+    submit(pool, 1)
+    assert pool.wait(0.5) == []
+    submit_second = partial(pool.submit, 1, fakes.study(8), Chunk(1, 4, 4))
+    submit_second()
+    pool.stop(1)
+    assert gather(pool, 1)[1].fate is Fate.STOPPED
+    pool.stop(0)
+    assert gather(pool, 1)[0].fate is Fate.STOPPED
+    submit_second()
+    assert gather(pool, 1)[1].fate is Fate.DONE
+
+
+def test_a_chunk_is_stopped_before_its_kernel_is_there(start: Callable[..., ProcessPoolExecutor]) -> None:
+    pool = start(1)
+    submit(pool, 2)
+    pool.stop(0)
+    outcomes = gather(pool, 2)
+    assert [outcomes[0].fate, outcomes[1].fate] == [Fate.STOPPED, Fate.DONE]
+
+
+def test_an_exception_is_told_as_a_crash(start: Callable[..., ProcessPoolExecutor]) -> None:
+    for executor in (start(1, run=fakes.raising), InlineExecutor(fakes.raising)):
+        submit(executor, 1)
+        (outcome,) = gather(executor, 1).values()
+        assert outcome.fate is Fate.CRASHED
+        assert outcome.detail == "ZeroDivisionError: no such thing"
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_processes_that_die_as_they_start_are_not_started_for_ever(start: Callable[..., ProcessPoolExecutor]) -> None:
+    pool = start(1, prepare=fakes.broken)
+    fates: list[Fate] = []
+
+    def insist() -> None:
+        while len(fates) < 100:
+            submit(pool, 1)
+            fates.extend(outcome.fate for outcome in gather(pool, 1).values())
+
+    with pytest.raises(ExecutorError, match="as soon as they start"):
+        insist()
+    assert set(fates) <= {Fate.STOPPED}
+    assert len(fates) <= MAX_BROKEN_POOLS + 1
+
+
+def test_an_idle_process_that_is_killed_costs_nothing(start: Callable[..., ProcessPoolExecutor]) -> None:
+    pool = start(1)
+    submit(pool, 1)
+    gather(pool, 1)
+    child = next(p for p in psutil.Process().children() if "spawn_main" in " ".join(p.cmdline()))
+    os.kill(child.pid, signal.SIGKILL)
+    submit(pool, 4)
+    assert all(outcome.fate in {Fate.DONE, Fate.STOPPED} for outcome in gather(pool, 4).values())
+    submit(pool, 1)
+    assert gather(pool, 1)[0].fate is Fate.DONE
+
+
+def test_no_process_outlives_its_pool() -> None:
+    before = set(psutil.Process().children())
+    pool = fakes.pool(2, run=fakes.faulty(hang=frozenset({0, 4})))
+    submit(pool, 2)
+    assert pool.wait(0.5) == []
+    started = set(psutil.Process().children(recursive=True)) - before
+    assert len([child for child in started if "spawn_main" in " ".join(child.cmdline())]) == 2
+    pool.close()
+    left = [child for child in set(psutil.Process().children()) - before if "spawn_main" in " ".join(child.cmdline())]
+    assert left == []
+
+
+def test_one_process_warms_the_cache_and_the_engine_gives_the_same_everywhere() -> None:
+    """Inline and pool agree bit for bit, for any cut of the study."""
+    study = fakes.study(20)
+    whole = kernels.run_chunk(study, 0, 20)
+    pool = ProcessPoolExecutor(2, chunk_timeout=DEADLINE)
+    try:
+        for executor, size in ((InlineExecutor(), 20), (InlineExecutor(), 3), (pool, 7), (pool, 1)):
+            firsts = range(0, 20, size)
+            for first in firsts:
+                executor.submit(first, study, Chunk(1, first, min(size, 20 - first)))
+            outcomes = gather(executor, len(firsts))
+            results = [outcomes[first].result for first in firsts]
+            found = np.concatenate([result.values for result in results if result is not None])
+            np.testing.assert_array_equal(found, whole.values)
+            assert [e for result in results if result is not None for e in result.endings] == whole.endings
+    finally:
+        pool.close()
+
+
+def test_inline_runs_one_at_a_time_and_drops_what_is_stopped() -> None:
+    executor = InlineExecutor(fakes.run)
+    assert executor.capacity == 1
+    submit(executor, 3)
+    executor.stop(1)
+    outcomes = gather(executor, 3)
+    assert [outcomes[ticket].fate for ticket in range(3)] == [Fate.DONE, Fate.STOPPED, Fate.DONE]
+    assert executor.wait(0.0) == []
+    submit(executor, 1)
+    executor.close()
+    assert executor.wait(0.0) == []
