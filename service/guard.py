@@ -56,6 +56,9 @@ class Guard:
         except ApiError as error:
             await problem_response(error)(scope, receive, _with_headers(send))
             return
+        if scope["method"] == "HEAD":
+            # Whatever can be read can be asked for its headers; the server itself sends no body then.
+            scope = {**scope, "method": "GET"}
         await self._app(scope, _limited(receive), _with_headers(send))
 
     def _check(self, scope: Scope) -> None:

@@ -87,7 +87,7 @@ def _methods_at(app: FastAPI, path: str) -> set[str]:
         pattern = getattr(route, "path_regex", None)
         if pattern is not None and pattern.match(path):
             found |= route.methods or set()
-    return found
+    return found | {"HEAD"} if "GET" in found else found
 
 
 def _invalid(_request: Request, error: Exception) -> Response:

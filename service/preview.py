@@ -10,11 +10,17 @@ from worker import kernels
 
 if TYPE_CHECKING:
     from service.spec import ParsedSpec
+    from worker.study import Study
 
 _FIRST_CASES = 5
 #: Bytes of a row beside its results: key, case number, ending, flags and SQLite's own header.
 _ROW_BYTES = 48
 _NUMBER_BYTES = 10
+
+
+def estimated_bytes(study: Study) -> int:
+    """Rough size of the results of ``study`` in the database."""
+    return study.cases * (_ROW_BYTES + _NUMBER_BYTES * len(kernels.study_results(study)))
 
 
 def preview_json(parsed: ParsedSpec, processes: int) -> dict[str, Any]:
@@ -23,7 +29,6 @@ def preview_json(parsed: ParsedSpec, processes: int) -> dict[str, Any]:
     ``estimated_seconds`` (wall time) and ``estimated_bytes`` (in the database) are rough.
     """
     study = parsed.study
-    results = len(kernels.study_results(study))
     # A study of fewer cases than processes still takes the time of one case.
     rounds = max(study.cases / processes, 1.0)
     first = range(min(_FIRST_CASES, study.cases))
@@ -34,9 +39,9 @@ def preview_json(parsed: ParsedSpec, processes: int) -> dict[str, Any]:
         "shape": list(study.shape),
         "combine": study.combine,
         "axes": axes_json(study),
-        "results": results,
+        "results": len(kernels.study_results(study)),
         "estimated_seconds": rounds * kernels.estimate_seconds_per_case(study),
-        "estimated_bytes": study.cases * (_ROW_BYTES + _NUMBER_BYTES * results),
+        "estimated_bytes": estimated_bytes(study),
         "warnings": list(parsed.warnings),
         "fits": {pointer: fit_json(fit) for pointer, fit in parsed.fits.items()},
         "first_cases": [

@@ -37,7 +37,7 @@ def list_cases(
     context: Ctx,
     study_id: StudyId,
     page_size: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="most cases on the page")] = 100,
-    page_token: Annotated[str | None, Query(max_length=20, description="`next_page_token` of the page before")] = None,
+    page_token: Annotated[str | None, Query(description="`next_page_token` of the page before")] = None,
     ending: Annotated[str | None, Query(description="only cases with this ending", examples=["ok"])] = None,
 ) -> Response:
     """Finished cases, in order of their numbers."""
@@ -54,8 +54,10 @@ def list_cases(
 def _after(page_token: str | None) -> int:
     if page_token is None:
         return -1
-    if not (page_token.isascii() and page_token.isdigit()):
-        raise parameter_error("page_token", "not a token of this list", page_token, "`next_page_token` of a page")
+    if not (page_token.isascii() and page_token.isdigit() and len(page_token) < 19):
+        raise parameter_error(
+            "page_token", "not a token of this list", shown(page_token), "`next_page_token` of a page"
+        )
     return int(page_token)
 
 

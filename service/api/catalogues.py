@@ -1,9 +1,10 @@
-"""GET /models: what can be varied, what comes out, and how a case can end."""
+"""What there is: models with their parameters, results and endings; studies that come with the program."""
 
 from __future__ import annotations
 
 import math
 import re
+from functools import lru_cache
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Path, Request
@@ -14,9 +15,14 @@ from service.api.document import problems
 from service.api.requests import strict_query
 from service.api.respond import entity_tag, json_response, not_modified, tagged
 from service.errors import ApiError
+from service.presets import preset_names, preset_text
+from service.spec import format_of, load_spec, parse_spec
 from worker import kernels
 
 router = APIRouter(tags=["models"], dependencies=[Depends(strict_query)])
+
+ModelName = Annotated[str, Path(description="name of the model", examples=["vibration-drive"])]
+PresetName = Annotated[str, Path(description="name of the preset", examples=["one_pendulum"])]
 
 
 @router.get("/models", response_model=m.ModelList, responses=problems("invalid-parameter") | documented_304())
@@ -28,11 +34,34 @@ def list_models(request: Request) -> Any:
 @router.get(
     "/models/{name}", response_model=m.Model, responses=problems("not-found", "invalid-parameter") | documented_304()
 )
-def get_model(request: Request, name: Annotated[str, Path(description="name of the model", examples=["vibration-drive"])]) -> Any:
+def get_model(request: Request, name: ModelName) -> Any:
     """One model with its parameters, results and endings."""
     if name not in kernels.models():
         raise ApiError("not-found", f"There is no such model; there is: {', '.join(kernels.models())}.")
     return _answer(request, _model(name))
+
+
+@router.get("/presets", response_model=m.PresetList, responses=problems("invalid-parameter") | documented_304())
+def list_presets(request: Request) -> Any:
+    """Studies that come with the program, each with its whole spec, to be submitted as they are or changed."""
+    return _answer(request, {"presets": [_preset(name) for name in preset_names()]})
+
+
+@router.get(
+    "/presets/{name}", response_model=m.Preset, responses=problems("not-found", "invalid-parameter") | documented_304()
+)
+def get_preset(request: Request, name: PresetName) -> Any:
+    """One study that comes with the program."""
+    if name not in preset_names():
+        raise ApiError("not-found", f"There is no such preset; there are: {', '.join(preset_names())}.")
+    return _answer(request, _preset(name))
+
+
+@lru_cache
+def _preset(name: str) -> dict[str, Any]:
+    file, text = preset_text(name)
+    spec = parse_spec(load_spec(text, format_of(file)))
+    return {"name": name, "title": spec.study.name, "cases": spec.study.cases, "spec": spec.spec}
 
 
 def _answer(request: Request, data: dict[str, Any]) -> Any:

@@ -268,6 +268,21 @@ class ModelList(Body):
     models: list[Model]
 
 
+class Preset(Body):
+    """A study that comes with the program."""
+
+    name: str
+    title: str = Field(description="the name of the study")
+    cases: int
+    spec: dict[str, Any] = Field(description="its spec, which can be submitted")
+
+
+class PresetList(Body):
+    """All studies that come with the program."""
+
+    presets: list[Preset]
+
+
 class Health(Body):
     """Whether the service is up."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Query, Request
@@ -16,8 +17,10 @@ from service.api.document import body, problems
 from service.api.document import not_modified as documented_304
 from service.api.requests import Body, read_body, strict_query
 from service.api.respond import entity_tag, json_response, not_modified, tagged
-from service.preview import preview_json
+from service.errors import ApiError
+from service.preview import estimated_bytes, preview_json
 from service.spec import ParsedSpec, load_spec, parse_spec
+from service.storage.store import Store
 from worker.limits import MAX_PAGE_SIZE
 from worker.states import StudyState
 
@@ -54,6 +57,7 @@ def _parsed(received: Body) -> ParsedSpec:
 def create_study(context: Ctx, received: SpecBody, idempotency_key: IdempotencyKey = None) -> Response:
     """Submit a study. It is queued, and its cases are run in the order of their numbers."""
     parsed = _parsed(received)
+    _require_room(context.store, parsed)
     canonical = json.dumps(parsed.spec, sort_keys=True).encode("ascii")
     record = context.store.create_study(
         parsed.spec,
@@ -63,6 +67,16 @@ def create_study(context: Ctx, received: SpecBody, idempotency_key: IdempotencyK
         body_hash=hashlib.sha256(canonical).hexdigest(),
     )
     return json_response(views.summary(record), 202, {"Location": views.study_address(record.id)})
+
+
+def _require_room(store: Store, parsed: ParsedSpec) -> None:
+    """Refuse a study whose results would not fit on the disk."""
+    needed, free = estimated_bytes(parsed.study), shutil.disk_usage(store.session.path.parent).free
+    if needed > free:
+        raise ApiError(
+            "storage-full",
+            f"The results would take about {needed / 1e9:.3g} GB; the database's disk has {free / 1e9:.3g} GB left.",
+        )
 
 
 @router.post(

@@ -21,7 +21,7 @@ def study_address(study_id: str) -> str:
 def study_links(study_id: str) -> dict[str, str]:
     """Addresses of what belongs to a study."""
     own = study_address(study_id)
-    parts = {name: f"{own}/{name}" for name in ("cases", "results", "curves", "map")}
+    parts = {name: f"{own}/{name}" for name in ("cases", "results", "curves", "map", "events")}
     return {"self": own, **parts, "cancel": f"{own}:cancel", "page": f"/studies/{study_id}"}
 
 
@@ -45,22 +45,27 @@ def summary(record: StudyRecord) -> dict[str, Any]:
     }
 
 
+def progress_json(progress: Progress) -> dict[str, Any]:
+    """How far a study is, how fast, and how long it will take."""
+    left = progress.seconds_left
+    return {
+        "total": progress.total,
+        "done": progress.done,
+        "ok": progress.ok,
+        "endings": progress.endings,
+        "rate": progress.rate,
+        "seconds_left": None if left is None else {"low": left[0], "high": left[1]},
+    }
+
+
 def detail(record: StudyRecord, progress: Progress, study: Study, spec: dict[str, Any]) -> dict[str, Any]:
     """A study with everything."""
-    left = progress.seconds_left
     return {
         **summary(record),
         # State and counts are read together, so that a finished study never shows fewer cases than it has.
         "state": progress.state.value,
         "state_meaning": progress.state.sentence,
-        "progress": {
-            "total": progress.total,
-            "done": progress.done,
-            "ok": progress.ok,
-            "endings": progress.endings,
-            "rate": progress.rate,
-            "seconds_left": None if left is None else {"low": left[0], "high": left[1]},
-        },
+        "progress": progress_json(progress),
         "combine": study.combine,
         "axes": axes_json(study),
         "physics_hash": record.physics_hash,

@@ -172,12 +172,12 @@ def test_an_unknown_address_is_not_found(service: Service, path: str) -> None:
 @pytest.mark.parametrize(
     ("method", "path", "allowed"),
     [
-        ("PUT", f"{API}/studies", "GET, POST"),
-        ("POST", f"{API}/studies/st_1", "DELETE, GET"),
+        ("PUT", f"{API}/studies", "GET, HEAD, POST"),
+        ("POST", f"{API}/studies/st_1", "DELETE, GET, HEAD"),
         ("GET", f"{API}/studies:preview", "POST"),
         ("GET", f"{API}/studies/st_1:cancel", "POST"),
-        ("DELETE", "/", "GET"),
-        ("OPTIONS", f"{API}/models", "GET"),
+        ("DELETE", "/", "GET, HEAD"),
+        ("OPTIONS", f"{API}/models", "GET, HEAD"),
     ],
 )
 def test_another_method_is_not_allowed(service: Service, method: str, path: str, allowed: str) -> None:

@@ -84,6 +84,17 @@ def test_models_describe_parameters_results_and_endings(service: Service) -> Non
     assert service.http.get("/api/v1/models", headers={"If-None-Match": tag}).status_code == 304
 
 
+def test_presets_can_be_submitted(service: Service) -> None:
+    body = service.get("/presets")
+    m.PresetList.model_validate(body)
+    assert len(body["presets"]) >= 2
+    for preset in body["presets"]:
+        assert service.get(f"/presets/{preset['name']}") == preset
+        shown = service.get(f"/studies/{service.submit(preset['spec'])}")
+        assert (shown["name"], shown["cases"]) == (preset["title"], preset["cases"])
+    assert service.http.get("/api/v1/presets/none").status_code == 404
+
+
 def test_health_is_told(service: Service) -> None:
     assert service.http.get("/livez").json() == service.http.get("/readyz").json() == {"status": "ok"}
 

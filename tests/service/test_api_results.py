@@ -63,6 +63,13 @@ def test_cases_can_be_chosen_by_their_ending(service: Service) -> None:
     assert "chatter" in refused.json()["errors"][0]["allowed"]
 
 
+@pytest.mark.parametrize("token", ["x", "-1", "9" * 19, "9" * 300, "\u0661", ""])
+def test_a_token_of_nothing_is_refused(service: Service, token: str) -> None:
+    response = service.http.get(f"{API}/studies/{service.submit()}/cases", params={"page_token": token})
+    assert response.status_code == 422
+    assert response.json()["errors"][0]["parameter"] == "page_token"
+
+
 def test_one_case_tells_what_its_ending_means(service: Service) -> None:
     study_id = service.submit()
     waiting = service.get(f"/studies/{study_id}/cases/3")

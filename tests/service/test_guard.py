@@ -137,6 +137,13 @@ def test_every_answer_has_the_security_headers(service: Service) -> None:
     assert "content-security-policy" in service.http.get("/", headers={"Host": "x"}).headers
 
 
+def test_what_can_be_read_can_be_asked_for_its_headers(service: Service) -> None:
+    whole, head = service.http.get("/api/v1/models"), service.http.head("/api/v1/models")
+    assert head.status_code == 200
+    assert head.headers["content-length"] == whole.headers["content-length"]
+    assert service.http.head("/api/v1/studies:preview").status_code == 405
+
+
 async def _endless(sent: list[int]) -> AsyncIterator[bytes]:
     while True:
         sent.append(65536)

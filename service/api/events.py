@@ -1,0 +1,85 @@
+"""GET /studies/{id}/events: the progress of a study as it goes, as server-sent events."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import AsyncIterator
+from typing import Annotated, Final
+
+import anyio
+from fastapi import APIRouter, Depends, Header
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response, StreamingResponse
+
+from service.api import views
+from service.api.context import Context, Ctx, StudyId
+from service.api.document import files, problems
+from service.api.requests import strict_query
+from service.errors import to_bytes
+from service.storage.errors import StoreError
+from service.storage.records import Progress, StudyRecord
+
+router = APIRouter(tags=["studies"], dependencies=[Depends(strict_query)])
+
+_MEDIA_TYPE: Final = "text/event-stream"
+#: Seconds between two looks at the study, and of silence after which a comment keeps the connection open.
+LOOK_SECONDS = 0.5
+_SILENCE_SECONDS: Final = 15.0
+#: Milliseconds after which a browser that lost the connection comes again.
+_RETRY: Final = 2000
+
+LastEventId = Annotated[
+    str | None, Header(alias="Last-Event-ID", max_length=40, description="id of the last event that was received")
+]
+
+
+@router.get(
+    "/studies/{study_id:study}/events",
+    response_class=StreamingResponse,
+    responses={
+        **files("Events `progress`, and `end` as the last one.", [_MEDIA_TYPE]),
+        204: {"description": "The study has ended and the client knows it: it need not come again."},
+        **problems("invalid-parameter", "study-not-found"),
+    },
+)
+async def get_events(context: Ctx, study_id: StudyId, last_event_id: LastEventId = None) -> Response:
+    """The progress of a study as it goes. Each event tells the whole state, so that a missed one is no loss."""
+    record = await run_in_threadpool(context.store.get_study, study_id)
+    if record.state.terminal and last_event_id == str(record.revision):
+        return Response(status_code=204)
+    return StreamingResponse(_events(context, study_id, last_event_id), media_type=_MEDIA_TYPE)
+
+
+async def _events(context: Context, study_id: str, last: str | None) -> AsyncIterator[bytes]:
+    yield b"retry: %d\n\n" % _RETRY
+    spoke = time.monotonic()
+    while True:
+        try:
+            record, progress = await run_in_threadpool(_look, context, study_id)
+        except StoreError:
+            return  # deleted, or the database is in trouble: a client that comes again is told which
+        if str(record.revision) != last:
+            last, spoke = str(record.revision), time.monotonic()
+            yield _event(record, progress)
+        if record.state.terminal:
+            return
+        if time.monotonic() - spoke > _SILENCE_SECONDS:
+            spoke = time.monotonic()
+            yield b":\n\n"
+        await anyio.sleep(LOOK_SECONDS)
+
+
+def _look(context: Context, study_id: str) -> tuple[StudyRecord, Progress]:
+    # In this order, so that the event of an ended study has all its cases.
+    return context.store.get_study(study_id), context.store.progress(study_id)
+
+
+def _event(record: StudyRecord, progress: Progress) -> bytes:
+    kind = b"end" if record.state.terminal else b"progress"
+    data = {
+        "id": record.id,
+        "state": record.state.value,
+        "reason": record.reason,
+        "progress": views.progress_json(progress),
+    }
+    return b"id: %d\nevent: %s\ndata: %s\n\n" % (record.revision, kind, to_bytes(data))
