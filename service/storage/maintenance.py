@@ -118,6 +118,8 @@ def backup(session: Session, path: Path) -> None:
     """
     if path.exists():
         raise DatabaseError(f"{path} exists already; a backup never replaces a file")
+    if not path.parent.is_dir():
+        raise DatabaseError(f"the backup cannot be written: there is no folder {path.parent}")
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with session.plain() as connection:

@@ -165,9 +165,7 @@ def explained(error: sa.exc.DBAPIError, path: Path) -> Exception:
         "database or disk is full": DatabaseFullError(f"the disk that holds {path} is full"),
         "disk I/O error": DatabaseFullError(f"the disk that holds {path} reports an error on reading or writing"),
         "readonly database": DatabaseError(f"the database {path} is read-only; make the file and its folder writable"),
-        "unable to open database file": DatabaseError(
-            f"the database {path} cannot be opened; check the folder's rights"
-        ),
+        "unable to open database": DatabaseError(f"the database {path} cannot be opened; check the folder's rights"),
         "file is not a database": DatabaseError(f"{path} is not a Sprag database; name another file"),
         "malformed": DatabaseError(
             f"the database {path} is damaged; run `sprag db check`, then go on with the latest `sprag db backup`"

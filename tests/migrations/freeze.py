@@ -1,0 +1,56 @@
+"""Writes the frozen database of the present revision: ``python -m tests.migrations.freeze``, once for each revision.
+
+The text is never changed afterwards: it is what users of that revision have on their disks.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import tempfile
+from pathlib import Path
+
+from service.storage.store import Store
+from service.storage.tables import HEAD_REVISION
+from tests.worker import fakes
+from worker.chunking import Chunking
+
+FOLDER = Path(__file__).parent / "frozen"
+
+
+def fill(store: Store) -> None:
+    """One finished study with a quarantined case, one half done, one waiting."""
+    finished = store.create_study(
+        {"sprag": 1, "name": "finished"}, fakes.study(5, "finished"), idempotency_key="key", body_hash="hash"
+    )
+    running = store.create_study({"sprag": 1, "name": "running"}, fakes.study(5, "running"), warnings=["odd"])
+    store.create_study({"sprag": 1, "name": "queued"}, fakes.study(5, "queued"))
+    epoch = store.take_over("frozen")
+    for chunk in store.open_chunks(finished.number):
+        store.claim(epoch, [chunk])
+        if chunk.count == 1:
+            store.quarantine(epoch, chunk, "crashed", "its process died")
+        else:
+            store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+    store.settle(epoch, finished.number)
+    chunks = store.open_chunks(running.number)
+    store.claim(epoch, chunks[:2])
+    store.commit(epoch, chunks[0], fakes.result(0, 2))
+
+
+def main() -> None:
+    """Write the file of the present revision, which must not be there yet."""
+    target = FOLDER / f"{HEAD_REVISION}.sql"
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "frozen.sqlite3"
+        with Store.open(f"sqlite:///{file}", chunking=Chunking(cases=2), clock=fakes.HandClock()) as store:
+            fill(store)
+        connection = sqlite3.connect(file)
+        lines = list(connection.iterdump())
+        connection.close()
+    FOLDER.mkdir(exist_ok=True)
+    with target.open("x", encoding="utf-8") as out:
+        out.write("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()

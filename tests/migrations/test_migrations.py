@@ -1,0 +1,188 @@
+"""Every revision's frozen database is upgraded and then used; the tables of the code are those of the migrations."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sqlalchemy as sa
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+
+from service.storage import maintenance
+from service.storage.errors import DatabaseError, SchemaError
+from service.storage.session import Session, sqlite_driver
+from service.storage.store import Store
+from service.storage.tables import HEAD_REVISION, all_tables
+from tests.migrations.freeze import FOLDER
+from tests.worker import fakes
+from worker.states import StudyState
+
+FROZEN = sorted(FOLDER.glob("*.sql"))
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "sprag.sqlite3"
+
+
+@pytest.fixture
+def url(file: Path) -> str:
+    return f"sqlite:///{file}"
+
+
+def thaw(frozen: Path, file: Path) -> None:
+    connection = sqlite_driver().connect(file)
+    connection.executescript(frozen.read_text(encoding="utf-8"))
+    connection.close()
+
+
+def set_revision(file: Path, revision: str) -> None:
+    connection = sqlite_driver().connect(file)
+    connection.execute("UPDATE alembic_version SET version_num = ?", (revision,))
+    connection.commit()
+    connection.close()
+
+
+def upgrade(url: str) -> tuple[str | None, str]:
+    session = Session(url)
+    try:
+        return maintenance.upgrade(session)
+    finally:
+        session.close()
+
+
+def test_there_is_a_frozen_database_of_every_revision() -> None:
+    assert [path.stem for path in FROZEN] == maintenance.known_revisions()
+    assert FROZEN[-1].stem == HEAD_REVISION
+
+
+@pytest.mark.parametrize("frozen", FROZEN, ids=lambda path: path.stem)
+def test_a_frozen_database_is_upgraded_and_then_used(
+    frozen: Path, file: Path, url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    thaw(frozen, file)
+    assert upgrade(url) == (frozen.stem, HEAD_REVISION)
+    with Store.open(url) as store:
+        assert not [problem for problem in store.check().problems if "SQLite" not in problem]
+        queued, running, finished = store.list_studies().studies
+        assert [queued.name, running.name, finished.name] == ["queued", "running", "finished"]
+        assert (finished.state, finished.done, finished.ok) == (StudyState.FINISHED, 5, 4)
+        assert store.progress(finished.id).endings == {"ok": 4, "crashed": 1}
+        block = store.case_rows(finished.id)
+        np.testing.assert_array_equal(block.values[:4], fakes.values(0, 4))
+        assert np.isnan(block.values[4]).all()
+        assert running.warnings == ("odd",)
+        assert store.study(running.id) == fakes.study(5, "running")
+        assert store.create_study({}, fakes.study(5), idempotency_key="key", body_hash="hash").id == finished.id
+        epoch = store.take_over("test")
+        chunks = store.open_chunks(running.number)
+        assert [chunk.first for chunk in chunks] == [2, 4]
+        assert store.claim(epoch, chunks) == chunks
+        for chunk in chunks:
+            assert store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+        assert store.settle(epoch, running.number) is StudyState.FINISHED
+        np.testing.assert_array_equal(store.case_rows(running.id).values, fakes.values(0, 5))
+        store.delete_study(finished.id)
+        assert store.create_study({}, fakes.study(3)).number > queued.number
+
+
+def test_code_and_migrations_have_the_same_tables(url: str) -> None:
+    with Store.open(url) as store, store.session.read() as connection:
+        context = MigrationContext.configure(connection, opts={"compare_type": True})
+        assert compare_metadata(context, all_tables()) == []
+
+
+def test_an_empty_database_is_made_ready_by_opening_it(url: str, file: Path) -> None:
+    with Store.open(url) as store:
+        assert store.list_studies().studies == ()
+        store.ping()
+    connection = sqlite_driver().connect(file)
+    assert connection.execute("PRAGMA journal_mode").fetchone() == ("wal",)
+    connection.close()
+
+
+def test_two_that_open_a_new_database_at_once_both_get_it(url: str) -> None:
+    def ready(_: int) -> int:
+        with Store.open(url) as store:
+            return len(store.list_studies().studies)
+
+    with ThreadPoolExecutor(4) as threads:
+        assert list(threads.map(ready, range(4))) == [0, 0, 0, 0]
+
+
+def test_upgrading_twice_changes_nothing(url: str) -> None:
+    assert upgrade(url) == (None, HEAD_REVISION)
+    assert upgrade(url) == (HEAD_REVISION, HEAD_REVISION)
+
+
+def test_an_older_database_names_the_command_that_mends_it(
+    url: str, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    upgrade(url)
+    monkeypatch.setattr(maintenance, "HEAD_REVISION", "0099")
+    with pytest.raises(SchemaError, match=f"has revision {HEAD_REVISION}.*run `sprag db upgrade`") as caught:
+        Store.open(url)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_newer_database_is_left_alone(url: str, file: Path) -> None:
+    upgrade(url)
+    set_revision(file, "9999")
+    with pytest.raises(SchemaError, match=r"newer than this program knows.*`sprag db upgrade`"):
+        Store.open(url)
+    with pytest.raises(SchemaError, match="newer"):
+        upgrade(url)
+    session = Session(url)
+    assert any("newer" in problem for problem in maintenance.check(session).problems)
+    session.close()
+
+
+def test_a_database_of_another_program_is_left_alone(url: str, file: Path) -> None:
+    connection = sqlite_driver().connect(file)
+    connection.execute("CREATE TABLE birds (name)")
+    connection.close()
+    with pytest.raises(SchemaError, match="another program"):
+        Store.open(url)
+
+
+def test_what_is_no_database_is_told_in_one_sentence(url: str, file: Path) -> None:
+    file.write_bytes(b"this is a letter, not a database" * 100)
+    with pytest.raises(DatabaseError, match="is not a Sprag database"):
+        Store.open(url)
+    assert any("not a Sprag database" in problem for problem in _problems(url))
+
+
+def test_damage_is_found(url: str, file: Path) -> None:
+    with Store.open(url) as store:
+        for _ in range(20):
+            store.create_study({"text": "x" * 10_000}, fakes.study(50))
+        with store.session.plain() as connection:
+            connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2 : len(data) // 2 + 20_000] = b"\xff" * 20_000
+    file.write_bytes(data)
+    assert [problem for problem in _problems(url) if "integrity" in problem or "damaged" in problem]
+
+
+def _problems(url: str) -> tuple[str, ...]:
+    session = Session(url)
+    try:
+        return maintenance.check(session).problems
+    finally:
+        session.close()
+
+
+def test_a_migration_that_fails_changes_nothing(url: str, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise sa.exc.OperationalError("CREATE TABLE", {}, Exception("database or disk is full"))
+
+    with monkeypatch.context() as patch:
+        patch.setattr("alembic.operations.Operations.create_index", fail)
+        with pytest.raises(DatabaseError, match="disk"):
+            Store.open(url)
+    with Store.open(url) as store:
+        assert store.list_studies().studies == ()

@@ -1,0 +1,171 @@
+"""The database session: places that are refused, transactions, backups, the lock of the dispatcher."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import sqlalchemy as sa
+
+from service.storage import session as session_module
+from service.storage.errors import DatabaseBusyError, DatabaseError
+from service.storage.lock import DispatcherLock
+from service.storage.progress import FinishedChunk, busy_seconds, estimate
+from service.storage.session import Session, file_system_of, sqlite_warning
+from service.storage.store import Store
+from service.storage.tables import STUDIES
+from tests.worker import fakes
+
+
+@pytest.fixture
+def url(tmp_path: Path) -> str:
+    return f"sqlite:///{tmp_path / 'a' / 'sprag.sqlite3'}"
+
+
+@pytest.mark.parametrize(
+    ("url", "message"),
+    [
+        ("no url", "is no database URL"),
+        ("postgresql://host/db", "kind 'postgresql' are not supported"),
+        ("sqlite://", "must be a file"),
+        ("sqlite:///:memory:", "must be a file"),
+        ("sqlite:////dev/null/x/sprag.sqlite3", "cannot be made"),
+    ],
+)
+def test_databases_that_cannot_be_used_are_refused_in_one_sentence(url: str, message: str) -> None:
+    with pytest.raises(DatabaseError, match=message):
+        Session(url)
+
+
+def test_a_folder_is_no_database(tmp_path: Path) -> None:
+    with pytest.raises(DatabaseError, match="is a folder"):
+        Session(f"sqlite:///{tmp_path}")
+
+
+def test_network_file_systems_are_refused(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(session_module, "file_system_of", lambda _: "nfs4")
+    with pytest.raises(DatabaseError, match=r"network file system \(nfs4\)"):
+        Session(url)
+
+
+MOUNTS = "/dev/a / ext4 rw 0 0\nserver:/x /home nfs4 rw 0 0\n/dev/b /home/me\\040too/local xfs rw 0 0\n\n"
+
+
+@pytest.mark.parametrize(
+    ("path", "kind"),
+    [
+        ("/var/x", "ext4"),
+        ("/home/x", "nfs4"),
+        ("/homeland/x", "ext4"),
+        ("/home/me too/local/x", "xfs"),
+        ("/home", "nfs4"),
+    ],
+)
+def test_the_innermost_mount_counts(path: str, kind: str) -> None:
+    assert file_system_of(Path(path), MOUNTS) == kind
+
+
+def test_an_old_library_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(session_module, "sqlite_version", lambda: (3, 40, 1))
+    assert "3.40.1" in (sqlite_warning() or "")
+    monkeypatch.setattr(session_module, "sqlite_version", lambda: (3, 51, 3))
+    assert sqlite_warning() is None
+
+
+def test_connections_are_safe(url: str) -> None:
+    with Store.open(url) as store, store.session.read() as connection:
+        asked = {
+            name: connection.exec_driver_sql(f"PRAGMA {name}").scalar_one()
+            for name in ("journal_mode", "synchronous", "foreign_keys", "busy_timeout", "page_size")
+        }
+    assert asked == {
+        "journal_mode": "wal",
+        "synchronous": 2,
+        "foreign_keys": 1,
+        "busy_timeout": 30_000,
+        "page_size": 16_384,
+    }
+
+
+def test_writers_take_the_lock_at_once_and_readers_go_on(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(session_module, "BUSY_SECONDS", 0.05)
+    with Store.open(url) as store, Store.open(url) as other, store.session.write():
+        assert other.list_studies().studies == ()
+        with pytest.raises(DatabaseBusyError, match="try again"), other.session.write():
+            pass
+
+
+def test_a_transaction_is_whole_or_nothing(url: str) -> None:
+    with Store.open(url) as store:
+        record = store.create_study({}, fakes.study(3))
+
+        def half() -> None:
+            with store.session.write() as connection:
+                connection.execute(sa.update(STUDIES).values(name="half"))
+                raise ZeroDivisionError
+
+        with pytest.raises(ZeroDivisionError):
+            half()
+        assert store.get_study(record.id).name == "a study"
+
+
+def test_a_reader_sees_one_moment(url: str) -> None:
+    with Store.open(url) as store, store.session.read() as connection:
+        count = sa.select(sa.func.count()).select_from(STUDIES)
+        assert connection.execute(count).scalar_one() == 0
+        store.create_study({}, fakes.study(3))
+        assert connection.execute(count).scalar_one() == 0
+
+
+def test_a_backup_is_a_whole_database_and_replaces_nothing(url: str, tmp_path: Path) -> None:
+    copy = tmp_path / "copy.sqlite3"
+    with Store.open(url) as store:
+        record = store.create_study({"sprag": 1}, fakes.study(3))
+        with store.session.write() as connection:  # others may be at work
+            connection.execute(sa.update(STUDIES).values(name="changed"))
+            store.backup(copy)
+        with pytest.raises(DatabaseError, match="exists already"):
+            store.backup(copy)
+        with pytest.raises(DatabaseError, match="no folder"):
+            store.backup(tmp_path / "nowhere" / "copy.sqlite3")
+    with Store.open(f"sqlite:///{copy}") as restored:
+        assert restored.get_study(record.id) == record
+        assert not [problem for problem in restored.check().problems if "SQLite" not in problem]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "copy.sqlite3"]
+
+
+def test_one_dispatcher_at_a_time(tmp_path: Path) -> None:
+    first, second = DispatcherLock(tmp_path / "db"), DispatcherLock(tmp_path / "db")
+    assert second.holder() == ""
+    assert first.take()
+    assert first.take()
+    assert not second.take()
+    assert int(second.holder()) > 0
+    first.release()
+    first.release()
+    assert second.take()
+    second.release()
+
+
+def test_pauses_do_not_count_as_work() -> None:
+    chunks = [FinishedChunk(0.0, 2.0, 10), FinishedChunk(1.0, 3.0, 10), FinishedChunk(100.0, 101.0, 10)]
+    assert busy_seconds(chunks) == 4.0
+    rate, left = estimate(0, chunks)
+    assert rate == 7.5
+    assert left == (0.0, 0.0)
+
+
+def test_time_left_is_unknown_before_the_first_chunk() -> None:
+    assert estimate(10, []) == (None, None)
+    assert estimate(10, [FinishedChunk(5.0, 5.0, 3)]) == (None, None)
+
+
+def test_the_interval_is_narrow_for_even_chunks_and_wide_for_uneven_ones() -> None:
+    even = [FinishedChunk(float(i), float(i + 1), 10) for i in range(20)]
+    uneven = [FinishedChunk(float(i * i), float((i + 1) ** 2), 10) for i in range(20)]
+    for chunks, widest in ((even, 0.2), (uneven, 2.0)):
+        rate, left = estimate(1000, chunks)
+        assert rate is not None
+        assert left is not None
+        assert left[0] < 1000 / rate < left[1]
+        assert (left[1] - left[0]) * rate / 1000 < widest
