@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from types import FrameType
 from typing import Protocol
 
 import uvicorn
@@ -106,6 +107,19 @@ class Supervisor(threading.Thread):
         self.join()
 
 
+class Server(uvicorn.Server):
+    """A server that tells the application when it is about to end, so that open streams end too."""
+
+    def __init__(self, config: uvicorn.Config, ending: threading.Event) -> None:
+        super().__init__(config)
+        self._told = ending
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """A signal asks for the end."""
+        self._told.set()
+        super().handle_exit(sig, frame)
+
+
 def worker_settings(settings: Settings) -> WorkerSettings:
     """The part of ``settings`` that a dispatcher needs."""
     return WorkerSettings(settings.database_url, settings.pool_processes, settings.chunk_timeout)
@@ -138,7 +152,7 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
         try:
             (announce or _say)(address)
             with suppress(KeyboardInterrupt):
-                uvicorn.Server(config).run(sockets=[listener])
+                Server(config, app.state.context.ending).run(sockets=[listener])
         finally:
             supervisor.stop()
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from threading import Event
 from typing import Annotated, cast
 
 from fastapi import Depends, Path, Request
@@ -15,11 +16,12 @@ from service.storage.store import Store
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """Settings, store and computer of one service."""
+    """Settings, store and computer of one service; ``ending`` is set when the service is about to end."""
 
     settings: Settings
     store: Store
     computer: Computes
+    ending: Event = field(default_factory=Event)
 
 
 class StudyIdConvertor(Convertor[str]):

@@ -53,7 +53,7 @@ async def get_events(context: Ctx, study_id: StudyId, last_event_id: LastEventId
 async def _events(context: Context, study_id: str, last: str | None) -> AsyncIterator[bytes]:
     yield b"retry: %d\n\n" % _RETRY
     spoke = time.monotonic()
-    while True:
+    while not context.ending.is_set():
         try:
             record, progress = await run_in_threadpool(_look, context, study_id)
         except StoreError:

@@ -65,3 +65,15 @@ def test_nothing_outlives_a_killed_service(tmp_path: Path) -> None:
     assert (alive, running.process.returncode) == ([], -signal.SIGKILL)
     with service(folder, "--processes", 1) as again:
         submit_and_finish(again)
+
+
+def test_an_open_stream_does_not_hold_up_the_end(tmp_path: Path) -> None:
+    with service(tmp_path, "--processes", 1) as running:
+        spec = (EXAMPLES / "one_pendulum.json").read_bytes()
+        address = httpx.post(f"{running.address}/api/v1/studies", content=spec, headers=JSON).headers["location"]
+        assert httpx.post(f"{running.address}{address}:pause").json()["state"] == "paused"
+        with httpx.stream("GET", f"{running.address}{address}/events") as stream:
+            lines = stream.iter_lines()
+            assert any(line == "event: progress" for line in lines)
+            running.process.send_signal(signal.SIGTERM)
+            assert "event: end" not in list(lines)
