@@ -1,0 +1,219 @@
+"""The dispatcher between a real database and executors whose cases are made up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from service.storage.part import SystemClock
+from service.storage.records import StudyRecord
+from service.storage.store import Store
+from tests.worker import fakes
+from worker.chunking import Chunking
+from worker.dispatcher import HEARTBEAT_SECONDS, POLL_SECONDS, Dispatcher
+from worker.executors.inline import InlineExecutor
+from worker.kernels import ChunkResult, ChunkTask
+from worker.ports import EpochLostError, Executor
+from worker.states import StudyState
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    with Store.open(f"sqlite:///{tmp_path / 'sprag.sqlite3'}", chunking=Chunking(cases=4)) as store:
+        yield store
+
+
+def submit(store: Store, cases: int = 20, name: str = "a study") -> StudyRecord:
+    return store.create_study({"name": name}, fakes.study(cases, name))
+
+
+def work(store: Store, executor: Executor, only: int | None = None) -> None:
+    """Dispatch until nothing is left to do but what is paused."""
+
+    def idle() -> bool:
+        return all(
+            study.state is StudyState.PAUSED or only not in {None, study.number} for study in store.active_studies()
+        )
+
+    Dispatcher(store, executor, SystemClock(), only=only).run(idle)
+
+
+def endings(store: Store, record: StudyRecord) -> dict[int, str]:
+    return {
+        int(case): ending
+        for block in store.iter_rows(record.id)
+        for case, ending in zip(block.cases, block.endings, strict=True)
+    }
+
+
+def after(store: Store, case: int, act: Callable[[], object]) -> Callable[[ChunkTask], ChunkResult]:
+    """A run of chunks that does something when it comes to ``case``."""
+
+    def run(task: ChunkTask) -> ChunkResult:
+        if task.first == case:
+            act()
+        return fakes.run(task)
+
+    return run
+
+
+def test_studies_are_run_to_their_ends(store: Store) -> None:
+    records = [submit(store, cases, f"study {cases}") for cases in (1, 17, 8)]
+    work(store, InlineExecutor(fakes.run))
+    for record in records:
+        ended = store.get_study(record.id)
+        assert (ended.state, ended.done, ended.ok) == (StudyState.FINISHED, record.cases, record.cases)
+        assert ended.started_at is not None
+        block = store.case_rows(record.id)
+        assert block.cases.tolist() == list(range(record.cases))
+        np.testing.assert_array_equal(block.values, fakes.values(0, record.cases))
+
+
+def test_two_studies_take_turns(store: Store) -> None:
+    first, second = submit(store, 20), submit(store, 20)
+    seen: list[int] = []
+
+    def run(task: ChunkTask) -> ChunkResult:
+        seen.append(store.get_study(first.id).done - store.get_study(second.id).done)
+        return fakes.run(task)
+
+    class Wide(InlineExecutor):
+        capacity = 2
+
+    work(store, Wide(run))
+    assert max(map(abs, seen)) <= 8  # two chunks of one were under way before the other was seen
+
+
+def test_a_crash_and_a_hang_are_found_among_their_neighbours(store: Store) -> None:
+    record = submit(store, 24)
+    work(store, fakes.pool(2, run=fakes.faulty(crash=frozenset({6}), hang=frozenset({17})), chunk_timeout=0.3))
+    found = endings(store, record)
+    assert found == {case: {6: "crashed", 17: "timed_out"}.get(case, "ok") for case in range(24)}
+    ended = store.get_study(record.id)
+    assert (ended.state, ended.done, ended.ok) == (StudyState.FINISHED, 24, 22)
+
+
+def test_an_engine_fault_holds_the_study_until_it_is_resumed(store: Store) -> None:
+    record = submit(store)
+    work(store, InlineExecutor(fakes.raising))
+    held = store.get_study(record.id)
+    assert (held.state, held.done) == (StudyState.PAUSED, 0)
+    assert "engine fault" in (held.reason or "")
+    assert "ZeroDivisionError: no such thing" in (held.reason or "")
+    store.resume_study(record.id)
+    work(store, InlineExecutor(fakes.run))
+    assert store.get_study(record.id).state is StudyState.FINISHED
+
+
+def test_cancelling_keeps_what_is_done(store: Store) -> None:
+    record = submit(store)
+    work(store, InlineExecutor(after(store, 8, lambda: store.cancel_study(record.id))))
+    ended = store.get_study(record.id)
+    assert ended.state is StudyState.CANCELLED
+    assert endings(store, record) == dict.fromkeys(range(ended.done), "ok")
+    assert 12 <= ended.done < 20
+
+
+def test_cancelling_stops_what_would_never_end(store: Store) -> None:
+    record = submit(store, 4)
+    pool = fakes.pool(1, run=fakes.faulty(hang=frozenset({0})))
+
+    def ended() -> bool:
+        state = store.get_study(record.id).state
+        if state is StudyState.RUNNING:
+            store.cancel_study(record.id)
+        return state.terminal
+
+    Dispatcher(store, pool, SystemClock()).run(ended)
+    assert store.get_study(record.id).state is StudyState.CANCELLED
+
+
+def test_a_study_is_cancelled_before_it_was_begun(store: Store) -> None:
+    record = submit(store)
+    store.cancel_study(record.id)
+    work(store, InlineExecutor(fakes.run))
+    assert store.get_study(record.id).state is StudyState.CANCELLED
+    assert endings(store, record) == {}
+
+
+def test_a_paused_study_goes_on_where_it_was(store: Store) -> None:
+    record, other = submit(store), submit(store, 8)
+    work(store, InlineExecutor(after(store, 8, lambda: store.pause_study(record.id))))
+    held = store.get_study(record.id)
+    assert held.state is StudyState.PAUSED
+    assert 0 < held.done < 20
+    assert store.get_study(other.id).state is StudyState.FINISHED
+    store.resume_study(record.id)
+    work(store, InlineExecutor(fakes.run))
+    assert endings(store, record) == dict.fromkeys(range(20), "ok")
+
+
+def test_only_one_study_is_run_when_asked(store: Store) -> None:
+    other, wanted = submit(store), submit(store)
+    work(store, InlineExecutor(fakes.run), only=wanted.number)
+    assert store.get_study(wanted.id).state is StudyState.FINISHED
+    assert store.get_study(other.id).state is StudyState.QUEUED
+
+
+def test_a_dispatcher_gives_up_when_another_has_taken_over(store: Store) -> None:
+    record = submit(store)
+    executor = InlineExecutor(after(store, 8, lambda: store.take_over("another")))
+    with pytest.raises(EpochLostError, match="another dispatcher"):
+        work(store, executor)
+    assert endings(store, record) == dict.fromkeys(range(8), "ok")
+    work(store, InlineExecutor(fakes.run))
+    assert endings(store, record) == dict.fromkeys(range(20), "ok")
+
+
+def test_stopping_hands_the_claims_back(store: Store) -> None:
+    record = submit(store)
+    asked = iter([False, False, True])
+    Dispatcher(store, InlineExecutor(fakes.run), SystemClock()).run(lambda: next(asked))
+    assert store.get_study(record.id).done == 8
+    epoch = store.take_over("test")
+    chunks = store.open_chunks(record.number)
+    assert store.claim(epoch, chunks) == chunks
+
+
+def test_a_study_whose_last_commit_was_not_settled_is_settled_later(store: Store) -> None:
+    record = submit(store, 4)
+    epoch = store.take_over("died between commit and settle")
+    chunks = store.open_chunks(record.number)
+    store.claim(epoch, chunks)
+    store.commit(epoch, chunks[0], fakes.result(0, 4))
+    work(store, InlineExecutor(fakes.run))
+    assert store.get_study(record.id).state is StudyState.FINISHED
+
+
+def test_it_shows_that_it_is_alive_and_polls_when_it_is_time(store: Store) -> None:
+    class Quiet(InlineExecutor):
+        def wait(self, timeout: float) -> list[object]:  # type: ignore[override]
+            return []
+
+    clock = fakes.HandClock()
+    store.clock = clock
+    beats: list[float] = []
+    turns = iter(range(100))
+
+    def turn() -> bool:
+        dispatcher = store.dispatcher()
+        assert dispatcher is not None
+        beats.append(dispatcher.heartbeat_at.timestamp() - fakes.HandClock().now().timestamp())
+        clock.seconds += POLL_SECONDS
+        return next(turns) == 60
+
+    Dispatcher(store, Quiet(), clock, owner="test").run(turn)
+    assert max(np.diff(sorted(set(beats)))) <= HEARTBEAT_SECONDS + 1.01 * POLL_SECONDS
+    assert len(set(beats)) >= 3
+
+
+@pytest.mark.parametrize("size", [1, 7, 40])
+@pytest.mark.parametrize("processes", [1, 2])
+def test_rows_do_not_depend_on_chunks_and_processes(tmp_path: Path, size: int, processes: int) -> None:
+    with Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}", chunking=Chunking(cases=size)) as store:
+        record = submit(store, 40)
+        work(store, fakes.pool(processes))
+        np.testing.assert_array_equal(store.case_rows(record.id).values, fakes.values(0, 40))
