@@ -70,12 +70,16 @@ def _value_and_slope(g: Floats, degree: int, x: float) -> tuple[float, float]:
 def _slope_and_curvature(g: Floats, degree: int, x: float) -> tuple[float, float]:
     y = x * x
     even = d_even = odd = d_odd = 0.0
+    factor = float(degree - 1 + degree % 2)
     for k in range(degree - 1 + degree % 2, 0, -2):
         d_even = d_even * y + even
-        even = even * y + k * g[k]
+        even = even * y + factor * g[k]
+        factor -= 2.0
+    factor = float(degree - degree % 2)
     for k in range(degree - degree % 2, 0, -2):
         d_odd = d_odd * y + odd
-        odd = odd * y + k * g[k]
+        odd = odd * y + factor * g[k]
+        factor -= 2.0
     return even + x * odd, odd + 2.0 * (x * d_even + y * d_odd)
 
 
@@ -124,23 +128,24 @@ def _refine_root(g: Floats, degree: int, low: float, high: float, guess: float) 
             low = x
         else:
             high = x
-        new = x - value / slope if slope != 0.0 else low
-        inside = low < new < high
-        if not inside:
-            new = 0.5 * (low + high)
+        new = x - value / slope if slope != 0.0 else low - 1.0
         # Newton squares the error: after so small a step the next one is below rounding.
-        if (inside and abs(new - x) <= 1e-9 * x) or new in (low, high):
-            return new
+        if abs(new - x) <= 1e-9 * x:
+            return min(max(new, low), high)
+        if not low < new < high:
+            new = 0.5 * (low + high)
+            if new in (low, high):
+                return new
         x = new
     return x
 
 
 @compiled
-def _refine_peak(g: Floats, degree: int, low: float, high: float, guess: float) -> float:
-    """The single zero of the derivative of ``g`` between ``low`` and ``high``, where its sign changes: Newton kept
-    inside.
+def _refine_peak(g: Floats, degree: int, low: float, high: float, guess: float, rises: bool) -> float:
+    """The single zero of the derivative of ``g`` between ``low`` and ``high``: Newton kept inside.
+
+    ``rises`` tells whether ``g`` rises at ``low``.
     """
-    rises = _slope_and_curvature(g, degree, low)[0] > 0.0
     x = guess if low < guess < high else 0.5 * (low + high)
     for _ in range(80):
         slope, curvature = _slope_and_curvature(g, degree, x)
@@ -148,34 +153,43 @@ def _refine_peak(g: Floats, degree: int, low: float, high: float, guess: float) 
             low = x
         else:
             high = x
-        new = x - slope / curvature if curvature != 0.0 else low
-        inside = low < new < high
-        if not inside:
-            new = 0.5 * (low + high)
+        new = x - slope / curvature if curvature != 0.0 else low - 1.0
         # A peak is flat: its value is exact to rounding long before its place is.
-        if (inside and abs(new - x) <= 1e-6) or new in (low, high):
-            return new
+        if abs(new - x) <= 1e-6:
+            return min(max(new, low), high)
+        if not low < new < high:
+            new = 0.5 * (low + high)
+            if new in (low, high):
+                return new
         x = new
     return x
 
 
 @compiled
-def _bend(g: Floats, degree: int) -> int:
-    """Sign of the second derivative on all of [0, 1], or 0 if the sum of moduli cannot tell."""
-    rest = 0.0
-    for k in range(3, degree + 1):
-        rest += k * (k - 1) * abs(g[k])
-    if abs(2.0 * g[2]) <= rest:
-        return 0
-    return 1 if g[2] > 0.0 else -1
+def _shape(g: Floats, degree: int) -> tuple[float, float, float, bool, int]:
+    """Value at 1, sum of the moduli of all coefficients but the first, slope at 1, monotony, sign of the curvature.
 
-
-@compiled
-def _end_slope(g: Floats, degree: int) -> float:
-    value = 0.0
+    Monotony and the sign of the second derivative hold on all of [0, 1]; False and 0 if the moduli cannot tell.
+    """
+    end = g[0]
+    moduli = 0.0
+    slope = 0.0
+    slopes = 0.0
+    bends = 0.0
+    factor = 1.0
     for k in range(1, degree + 1):
-        value += k * g[k]
-    return value
+        size = abs(g[k])
+        end += g[k]
+        moduli += size
+        slope += factor * g[k]
+        slopes += factor * size
+        bends += factor * (factor - 1.0) * size
+        factor += 1.0
+    # The leading term is among the others; it must outweigh them.
+    sign = 0
+    if degree >= 2 and 4.0 * abs(g[2]) > bends:
+        sign = 1 if g[2] > 0.0 else -1
+    return end, moduli, slope, degree == 0 or 2.0 * abs(g[1]) > slopes, sign
 
 
 @compiled
@@ -186,7 +200,7 @@ def first_root(g: Floats, degree: int, stack: Floats) -> float:
     ----------
     g : array, shape (>= degree + 1,)
         Monomial coefficients. Leading coefficients that are exactly zero are a root at 0 that has already been dealt
-        with: they are divided out. If the first other coefficient is negative the answer is 0.
+        with: they are divided out (in place). If the first other coefficient is negative the answer is 0.
     degree : int
         At most ``MAX_DEGREE``.
     stack : array
@@ -204,27 +218,23 @@ def first_root(g: Floats, degree: int, stack: Floats) -> float:
         return NO_ROOT
     if not g[first] > 0.0:
         return 0.0
-    p = g[first:]
     n = degree - first
-    # The sum of moduli is the cheapest proof that nothing happens.
-    rest = 0.0
-    end = p[0]
-    for k in range(1, n + 1):
-        rest += abs(p[k])
-        end += p[k]
-    if rest < p[0]:
+    if first > 0:
+        for k in range(n + 1):
+            g[k] = g[k + first]
+    end, moduli, end_slope, monotone, bend = _shape(g, n)
+    # A step of a high-order method is short: nearly always a derivative keeps its sign, and the shape is plain. A slope,
+    # an arch, or a bowl that ends below zero has just the one crossing, if any.
+    if moduli < g[0]:
         return NO_ROOT
-    # A step of a high-order method is short: nearly always the second derivative keeps its sign, and the shape is
-    # plain.
-    bend = _bend(p, n) if n >= 2 else -1
-    if bend < 0 or (bend > 0 and (p[1] >= 0.0 or end <= 0.0)):
-        return _refine_root(p, n, 0.0, 1.0, p[0] / (p[0] - end)) if end <= 0.0 else NO_ROOT
+    if monotone or bend < 0 or (bend > 0 and end <= 0.0):
+        return _refine_root(g, n, 0.0, 1.0, g[0] / (g[0] - end)) if end <= 0.0 else NO_ROOT
     if bend > 0:
-        if _end_slope(p, n) <= 0.0:
+        if g[1] >= 0.0 or end_slope <= 0.0:
             return NO_ROOT
-        x = _refine_peak(p, n, 0.0, 1.0, -0.5 * p[1] / p[2])
-        return _refine_root(p, n, 0.0, x, 0.5 * x) if evaluate(p, n, x) <= 0.0 else NO_ROOT
-    _start(p, n, stack)
+        x = _refine_peak(g, n, 0.0, 1.0, -0.5 * g[1] / g[2], False)
+        return _refine_root(g, n, 0.0, x, 0.5 * x) if evaluate(g, n, x) <= 0.0 else NO_ROOT
+    _start(g, n, stack)
     top = 0
     while top >= 0:
         b = stack[top]
@@ -239,7 +249,7 @@ def first_root(g: Floats, degree: int, stack: Floats) -> float:
         if changes == 0:
             top -= 1
         elif changes == 1:
-            return _refine_root(p, n, b[_LOW], b[_LOW] + b[_WIDTH], b[_LOW] + b[_WIDTH] * b[0] / (b[0] - b[n]))
+            return _refine_root(g, n, b[_LOW], b[_LOW] + b[_WIDTH], b[_LOW] + b[_WIDTH] * b[0] / (b[0] - b[n]))
         elif b[_WIDTH] < 1e-15:
             if not positive:
                 return float(b[_LOW])
@@ -256,18 +266,14 @@ def largest(g: Floats, degree: int, known: float, stack: Floats) -> float:
 
     ``g`` has shape (>= degree + 1,); ``stack`` comes from ``work_stack`` and is overwritten.
     """
-    total = g[0]
-    bound = g[0]
-    for k in range(1, degree + 1):
-        total += g[k]
-        bound += abs(g[k])
-    best = max(known, g[0], total)
-    if bound <= best:
+    end, moduli, end_slope, monotone, bend = _shape(g, degree)
+    best = max(known, g[0], end)
+    if monotone or g[0] + moduli <= best:
         return float(best)
-    bend = _bend(g, degree)
     if bend != 0:
-        if bend < 0 and g[1] > 0.0 and _end_slope(g, degree) < 0.0:
-            best = max(best, evaluate(g, degree, _refine_peak(g, degree, 0.0, 1.0, -0.5 * g[1] / g[2])))
+        if bend < 0 and g[1] > 0.0 and end_slope < 0.0:
+            x = _refine_peak(g, degree, 0.0, 1.0, -0.5 * g[1] / g[2], True)
+            best = max(best, evaluate(g, degree, x))
         return float(best)
     _start(g, degree, stack)
     top = 0
@@ -286,7 +292,7 @@ def largest(g: Floats, degree: int, known: float, stack: Floats) -> float:
         if bound <= best or changes == 0 or (changes == 1 and not starts_rising) or b[_WIDTH] < 1e-9:
             top -= 1
         elif changes == 1:
-            x = _refine_peak(g, degree, b[_LOW], b[_LOW] + b[_WIDTH], -1.0)
+            x = _refine_peak(g, degree, b[_LOW], b[_LOW] + b[_WIDTH], -1.0, True)
             best = max(best, evaluate(g, degree, x))
             top -= 1
         else:

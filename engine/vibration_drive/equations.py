@@ -27,7 +27,7 @@ from engine.vibration_drive.layout import Layout
 
 #: Share of the estimated convergence-limited step that is taken (Jorba and Zou 2005 take e^-2, which is far too careful
 #: here).
-STEP_SAFETY = 0.55
+STEP_SAFETY = 0.62
 #: Longest step, in excitation periods.
 LONGEST_STEP = 0.25
 #: Share of the base's largest drive that counts as motion in any case when a step's error is weighed.

@@ -56,11 +56,13 @@ def _update(W: Floats, lay: Layout, lane: int, row: int, block: int, sign: float
     if W[(row + block) * lay.lanes + lane] <= 0.0:
         return
     x = W[lay.x * lay.lanes + lane]
-    p = stack[-1]
-    power = sign
-    for k in range(lay.order + 1):
-        p[k] = g[k] * power
-        power *= x
+    p = g
+    if sign < 0.0 or x < 1.0:
+        p = stack[-1]
+        power = sign
+        for k in range(lay.order + 1):
+            p[k] = g[k] * power
+            power *= x
     W[row * lay.lanes + lane] = sign * largest(p, lay.order, sign * W[row * lay.lanes + lane], stack)
 
 
