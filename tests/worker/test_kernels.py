@@ -1,0 +1,106 @@
+"""The border between studies and the engine."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from engine.endings import Ending
+from tests.worker import fakes
+from worker import kernels
+from worker.study import Axis, Study
+
+
+def test_every_ending_has_a_sentence() -> None:
+    assert set(kernels.ENDING_SENTENCES) == {ending.value for ending in (*Ending, *kernels.WorkerEnding)}
+    assert all(sentence.endswith(".") for sentence in kernels.ENDING_SENTENCES.values())
+    assert all(sentence.endswith(".") for sentence in kernels.FLAG_SENTENCES.values())
+
+
+def test_unknown_models_are_named() -> None:
+    assert kernels.models() == ("vibration-drive",)
+    for ask in (kernels.parameter_catalogue, kernels.result_shapes, lambda model: kernels.result_infos(model, 1)):
+        with pytest.raises(ValueError, match="unknown model 'steam-engine'; there is: vibration-drive"):
+            ask("steam-engine")
+
+
+def test_the_catalogues_are_complete() -> None:
+    paths = [parameter.path for parameter in kernels.parameter_catalogue("vibration-drive")]
+    assert len(set(paths)) == len(paths)
+    assert {"shaft.load", "pendulums.N.mass", "clutch.coefficients.K", "clutch.windup_limit"} <= set(paths)
+    for pendulums in kernels.result_shapes("vibration-drive"):
+        infos = kernels.result_infos("vibration-drive", pendulums)
+        assert len({info.column for info in infos}) == len(infos)
+
+
+def test_the_shape_of_a_machine_comes_from_its_paths() -> None:
+    study = fakes.study(3)
+    assert kernels.shape_of(study) == kernels.KernelShape("vibration-drive", 1, 2, 1e-9)
+    own_clutch = {"pendulums.2.clutch.coefficients.4": 1.0}
+    assert kernels.pendulums(replace(study, base=study.base | own_clutch)) == 3
+    assert kernels.coefficients(replace(study, base=study.base | own_clutch)) == 5
+    on_axis = Axis(("pendulums.1.mass", "clutch.coefficients.2"), (0.5,))
+    assert kernels.pendulums(replace(study, axes=(on_axis,))) == 2
+    assert kernels.coefficients(replace(study, axes=(on_axis,))) == 3
+    assert len(kernels.study_results(study)) == fakes.RESULTS
+
+
+def test_a_process_gets_its_own_cases_only() -> None:
+    study = fakes.study(100_000)
+    task = kernels.chunk_task(study, 99_990, 10)
+    assert len(pickle.dumps(task)) < 5_000
+    np.testing.assert_array_equal(task.columns["shaft.load"], np.arange(99_990, 100_000) * 1e-3)
+    assert task.columns["shaft.inertia"] == study.base["shaft.inertia"]
+
+
+def test_results_travel_small() -> None:
+    result = kernels.run_chunk(fakes.study(20), 0, 20)
+    assert result.count == 20
+    assert result.values.flags.c_contiguous
+    assert not np.signbit(result.values[result.values == 0.0]).any()
+    assert len(pickle.dumps(result)) < result.values.nbytes + 1_000
+
+
+def test_work_beyond_the_measured_data_is_flagged() -> None:
+    study = fakes.study(2)
+    run = {"duration": [20.0, "periods"], "window": None, "tolerance": 1e-9, "reset": "contact"}
+    within = kernels.run_chunk(replace(study, run=run), 0, 2)
+    beyond = kernels.run_chunk(replace(study, run=run, base=study.base | {"clutch.windup_limit": 1e-4}), 0, 2)
+    assert within.endings == beyond.endings == ["ok", "ok"]
+    assert within.flags == ["", ""]
+    assert beyond.flags == [kernels.WINDUP_OUT_OF_DATA] * 2
+
+
+def test_runs_are_given_in_periods_or_seconds() -> None:
+    study = fakes.study(2)
+    assert kernels.duration_seconds(study, 0) == pytest.approx(3.0 / 25.0)
+    seconds = replace(study, run=study.run | {"duration": [2.0, "s"], "window": [[1.0, "s"], [2.0, "s"]]})
+    assert kernels.duration_seconds(seconds, 0) == 2.0
+    run = kernels.run_of(seconds)
+    assert run.window_in_periods(25.0) == (25.0, 50.0)
+    fast = Axis(("excitation.frequency",), (10.0, 50.0))
+    assert kernels.duration_seconds(replace(study, axes=(fast,)), 1) == pytest.approx(3.0 / 50.0)
+
+
+def test_the_estimate_grows_with_the_run() -> None:
+    def estimate(study: Study) -> float:
+        return kernels.estimate_seconds_per_case(study)
+
+    short = fakes.study(2)
+    longer = replace(short, run=short.run | {"duration": [30.0, "periods"]})
+    slower = replace(
+        short, axes=(Axis(("excitation.frequency",), (5.0, 15.0)),), run=short.run | {"duration": [3.0, "s"]}
+    )
+    assert 0.0 < estimate(short) < estimate(longer)
+    assert estimate(slower) == pytest.approx(estimate(longer))
+
+
+def test_a_trajectory_is_that_of_the_case() -> None:
+    study = fakes.study(3)
+    end = kernels.duration_seconds(study, 2)
+    trajectory = kernels.run_trajectory(study, 2, 0.0, end, 11)
+    np.testing.assert_allclose(trajectory.times, np.linspace(0.0, end, 11))
+    assert trajectory.values.shape == (11, len(trajectory.names))
