@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# How long an example takes says something about the machine, not about the program. The gate draws the same examples
+# every time; on a developer's machine new ones are tried.
+settings.register_profile(
+    "sprag", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize="CI" in os.environ
+)
+settings.load_profile("sprag")
 
 ROOT = Path(__file__).resolve().parents[1]
 
