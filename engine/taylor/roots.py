@@ -223,8 +223,8 @@ def first_root(g: Floats, degree: int, stack: Floats) -> float:
         for k in range(n + 1):
             g[k] = g[k + first]
     end, moduli, end_slope, monotone, bend = _shape(g, n)
-    # A step of a high-order method is short: nearly always a derivative keeps its sign, and the shape is plain. A slope,
-    # an arch, or a bowl that ends below zero has just the one crossing, if any.
+    # A step of a high-order method is short: nearly always a derivative keeps its sign, and the shape is plain. A
+    # slope, an arch, or a bowl that ends below zero has just the one crossing, if any.
     if moduli < g[0]:
         return NO_ROOT
     if monotone or bend < 0 or (bend > 0 and end <= 0.0):

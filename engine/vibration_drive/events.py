@@ -1,85 +1,47 @@
 """Events of one lane: finding the first one inside a step, and changing the state when it is reached (MODEL.md A2)."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.jit import compiled
 from engine.taylor.roots import RECIPROCAL, first_root
-from engine.vibration_drive.automaton import CLUTCH_TARGET, CLUTCH_THRESHOLD, Band, Clutch, Shaft, Threshold
+from engine.vibration_drive.automaton import CLUTCH_TARGET, Band
 from engine.vibration_drive.layout import Layout
+from engine.vibration_drive.locking import EDGE, acceleration, lock_share, lock_together
+from engine.vibration_drive.states import (
+    BEYOND,
+    ENGAGED,
+    EVENT_PENDULUM,
+    EVENT_SMOOTH,
+    EVENT_TARGET,
+    FREE,
+    HELD,
+    LANE_INTEGERS,
+    LITERAL,
+    LOCKED,
+    NO_EVENT,
+    OF_SHAFT,
+    ROTATING,
+    SHAFT_STATE,
+    SKIP_SHAFT,
+    SKIP_STEP,
+    SKIP_U,
+    SKIP_W,
+    START,
+    TAKE_UP,
+    set_clutch,
+    set_shaft,
+    stored_energy,
+    watch_fall,
+)  # fmt: skip
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Edge of a band that is not watched.
-NEVER = 1e300
 #: Relative speed, against the pendulum's own motion, below which a start of interaction counts as a crossing of zero.
 _ROUNDING = 1e-12
 
-_FREE, _TAKE_UP, _ENGAGED, _BEYOND, _LOCKED, _START = (int(state) for state in Clutch)
-_HELD, _ROTATING = int(Shaft.HELD), int(Shaft.ROTATING)
-_W_LOW, _W_HIGH = int(Band.W_LOW), int(Band.W_HIGH)
-_AT_DATA_END, _AT_FIRST, _BANDS = int(Threshold.DATA_END), int(Threshold.FIRST_COEFFICIENT), len(Band)
-
-# Columns of a lane's integers. The first eight are the pendulums' clutch states.
-SHAFT_STATE = 8
-CASE = 9
-PERIOD = 10
-EVENT_PENDULUM = 11  # -2: no event in this step; -1: the shaft
-EVENT_TARGET = 12
-EVENT_SMOOTH = 13  # the event was located inside the step, not found violated at its start
-NEXT_STOP = 14
-EVENTS = 15
-EVENTS_IN_PERIOD = 16
-EVENTS_AT_ONCE = 17
-SKIP_STEP = 18  # the skips below hold while the lane has made this many steps
-LITERAL = 19
-# Coefficients that vanish analytically at a transition but not in rounding: leading orders the root finder passes over.
-SKIP_SHAFT = 20
-SKIP_W = 21  # eight columns
-SKIP_U = 29  # eight columns
-LANE_INTEGERS = 37
-
-NO_EVENT = -2
-OF_SHAFT = -1
-
-
-@compiled
-def law(W: Floats, first: int, count: int, lanes: int, lane: int, u: float) -> float:
-    """Clutch torque at windup ``u`` by the polynomial whose coefficients start at workspace row ``first``."""
-    value = 0.0
-    for k in range(count - 1, -1, -1):
-        value = value * u + W[(first + k) * lanes + lane]
-    return value
-
-
-@compiled
-def law_slope(W: Floats, first: int, count: int, lanes: int, lane: int, u: float) -> float:
-    """Derivative of ``law``."""
-    value = 0.0
-    for k in range(count - 1, 0, -1):
-        value = value * u + k * W[(first + k) * lanes + lane]
-    return value
-
-
-@compiled
-def stored_energy(W: Floats, lay: Layout, lane: int, i: int, u: float) -> float:
-    """Energy Pi(u) in the clutch of pendulum ``i`` at windup ``u >= 0``, the straight part beyond the data included."""
-    base = lay.pendulums + i * lay.stride
-    limit = W[(base + lay.p_limit) * lay.lanes + lane]
-    inside = min(u, limit)
-    first = base + lay.p_law
-    value = 0.0
-    for k in range(lay.coefficients - 1, -1, -1):
-        value = value * inside + W[(first + k) * lay.lanes + lane] / (k + 1)
-    value *= inside
-    if u > limit:
-        end = law(W, first, lay.coefficients, lay.lanes, lane, limit)
-        rate = law_slope(W, first, lay.coefficients, lay.lanes, lane, limit)
-        value += (u - limit) * (end + 0.5 * rate * (u - limit))
-    return float(value)
+_BANDS = len(Band)
 
 
 @compiled
@@ -119,19 +81,19 @@ def locate(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, stack: Floats)
     target = 0
     fresh = W[lay.steps * lanes + lane] == Z[lane, SKIP_STEP]
     shaft = Z[lane, SHAFT_STATE]
-    if not W[(lay.m_sum_high if shaft == _HELD else lay.m_speed_low) * lanes + lane] > 0.0:
-        first = (lay.sum if shaft == _HELD else lay.speed) * lanes + lane
-        sign = -1.0 if shaft == _HELD else 1.0
+    if not W[(lay.m_sum_high if shaft == HELD else lay.m_speed_low) * lanes + lane] > 0.0:
+        first = (lay.sum if shaft == HELD else lay.speed) * lanes + lane
+        sign = -1.0 if shaft == HELD else 1.0
         for k in range(lay.order + 1):
             g[k] = sign * W[first + k * lanes]
-        if shaft == _HELD:
+        if shaft == HELD:
             g[0] += W[lay.sum_high * lanes + lane]
         elif fresh:
             for k in range(Z[lane, SKIP_SHAFT]):
                 g[k] = 0.0
         x = first_root(g, lay.order, stack)
         if x < best:
-            best, pendulum, target = x, OF_SHAFT, (_ROTATING if shaft == _HELD else _HELD)
+            best, pendulum, target = x, OF_SHAFT, (ROTATING if shaft == HELD else HELD)
     literal = Z[lane, LITERAL]
     for i in range(lay.n):
         state = Z[lane, i]
@@ -155,155 +117,39 @@ def locate(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, stack: Floats)
 
 
 @compiled
-def _watch_fall(W: Floats, lay: Layout, lane: int, i: int, fall: bool) -> None:
-    """Let an engaged clutch under literal resets wait for w to fall through 0 (``fall``), or after that to rise through
-    it.
-    """
-    first = lay.pendulums + i * lay.stride + lay.p_w_low
-    W[(first + _W_LOW) * lay.lanes + lane] = 0.0 if fall else -NEVER
-    W[(first + _W_HIGH) * lay.lanes + lane] = NEVER if fall else 0.0
-
-
-@compiled
-def set_clutch(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, state: int) -> None:
-    """Put the clutch of pendulum ``i`` into a state: its guards' bands, the law in force, the flags."""
-    lanes = lay.lanes
-    base = lay.pendulums + i * lay.stride
-    source = Z[lane, i]
-    Z[lane, i] = state
-    for band in range(_BANDS):
-        kind = CLUTCH_THRESHOLD[Z[lane, LITERAL], state, band]
-        edge = -NEVER if band % 2 == 0 else NEVER
-        if kind == _AT_DATA_END:
-            edge = W[(base + lay.p_limit) * lanes + lane]
-        elif kind == _AT_FIRST:
-            edge = W[(base + lay.p_law) * lanes + lane]
-        elif kind != 0:
-            edge = 0.0
-        W[(base + lay.p_w_low + band) * lanes + lane] = edge
-    if Z[lane, LITERAL] == 1 and (_ENGAGED <= state <= _BEYOND):
-        _watch_fall(W, lay, lane, i, source != _BEYOND)
-    limit = W[(base + lay.p_limit) * lanes + lane]
-    for k in range(lay.coefficients):
-        value = 0.0
-        if state == _ENGAGED:
-            value = W[(base + lay.p_law + k) * lanes + lane]
-        elif state == _BEYOND and k < 2:
-            rate = law_slope(W, base + lay.p_law, lay.coefficients, lanes, lane, limit)
-            value = rate
-            if k == 0:
-                value = law(W, base + lay.p_law, lay.coefficients, lanes, lane, limit) - rate * limit
-        W[(base + lay.p_force + k) * lanes + lane] = value
-    W[(base + lay.p_locked) * lanes + lane] = 1.0 if state == _LOCKED else 0.0
-    W[(base + lay.p_engaged) * lanes + lane] = 1.0 if state >= _ENGAGED else 0.0
-    W[(base + lay.p_beyond) * lanes + lane] = 1.0 if state == _BEYOND else 0.0
-    driving = 0.0
-    for j in range(lay.n):
-        driving += W[(lay.pendulums + j * lay.stride + lay.p_engaged) * lanes + lane]
-    W[lay.driven * lanes + lane] = 1.0 if driving > 0.0 else 0.0
-    W[lay.driving_max * lanes + lane] = max(driving, W[lay.driving_max * lanes + lane])
-    _set_mobility(W, Z, lay, lane)
-
-
-@compiled
-def set_shaft(W: Floats, Z: Ints, lay: Layout, lane: int, state: int) -> None:
-    """Put the shaft into a state: its guard, its flag, its mobility."""
-    lanes = lay.lanes
-    load = W[lay.load * lanes + lane]
-    Z[lane, SHAFT_STATE] = state
-    W[lay.rotating * lanes + lane] = 1.0 if state == _ROTATING else 0.0
-    W[lay.sum_high * lanes + lane] = load if state == _HELD else NEVER
-    # Without a load nothing slows the shaft, and it is never held.
-    W[lay.speed_low * lanes + lane] = 0.0 if state == _ROTATING and load > 0.0 else -NEVER
-    _set_mobility(W, Z, lay, lane)
-
-
-@compiled
-def _set_mobility(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
-    """1/(inertia of the shaft and of all pendulums locked to it), or 0 while the load holds it."""
-    lanes = lay.lanes
-    inertia = W[lay.inertia * lanes + lane]
-    for i in range(lay.n):
-        if Z[lane, i] == _LOCKED:
-            inertia += W[(lay.pendulums + i * lay.stride + lay.p_inertia) * lanes + lane]
-    W[lay.mobility * lanes + lane] = 1.0 / inertia if Z[lane, SHAFT_STATE] == _ROTATING else 0.0
-
-
-@compiled
-def _acceleration(W: Floats, lay: Layout, lane: int, i: int) -> float:
-    """Acceleration of pendulum ``i`` without its clutch, at the lane's state (equation (1))."""
-    lanes = lay.lanes
-    base = lay.pendulums + i * lay.stride
-    phi = W[(base + lay.p_phi) * lanes + lane]
-    theta = 2.0 * math.pi * W[lay.f * lanes + lane]
-    x = -W[lay.acc_x * lanes + lane] * math.cos(theta)
-    y = -W[lay.acc_y * lanes + lane] * (
-        math.sin(theta) * W[lay.cos_chi * lanes + lane] + math.cos(theta) * W[lay.sin_chi * lanes + lane]
-    )
-    push = x * math.cos(phi) + (y + W[lay.gravity * lanes + lane]) * math.sin(phi)
-    return float(
-        W[(base + lay.p_ml) * lanes + lane] * push
-        - W[(base + lay.p_spring) * lanes + lane] * phi
-        - W[(base + lay.p_damping) * lanes + lane] * W[(base + lay.p_speed) * lanes + lane]
-    )
-
-
-@compiled
-def lock_or_engage(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> int:
-    """State of clutch ``i`` at the start of interaction when delta = 0 and c_1 > 0 (Filippov's choice).
-
-    The torque that would keep w = 0 decides: above c_1 the clutch winds up, below 0 it opens, between it locks. If the
-    torque then breaks the held shaft away, what counts is the torque with the shaft already moving.
-    """
-    lanes = lay.lanes
-    base = lay.pendulums + i * lay.stride
-    first = W[(base + lay.p_law) * lanes + lane]
-    own = W[(base + lay.p_inertia) * lanes + lane]
-    needed = own * _acceleration(W, lay, lane, i)
-    push = -W[lay.load * lanes + lane]
-    inertia = W[lay.inertia * lanes + lane]
-    for j in range(lay.n):
-        if j == i:
-            continue
-        other = lay.pendulums + j * lay.stride
-        if Z[lane, j] == _LOCKED:
-            moved = W[(other + lay.p_inertia) * lanes + lane]
-            inertia += moved
-            push += moved * _acceleration(W, lay, lane, j)
-        elif Z[lane, j] >= _ENGAGED:
-            push += law(W, other + lay.p_force, lay.coefficients, lanes, lane, W[(other + lay.p_u) * lanes + lane])
-    if Z[lane, SHAFT_STATE] == _ROTATING or push + min(needed, first) > 0.0:
-        needed -= own * (push + needed) / (inertia + own)
-    if needed > first:
-        return _ENGAGED
-    return _FREE if needed < 0.0 else _LOCKED
-
-
-@compiled
 def _start(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> None:
     """Start of interaction (5): the relative turn counts from here."""
     lanes = lay.lanes
     base = lay.pendulums + i * lay.stride
     u = W[(base + lay.p_u) * lanes + lane]
-    if Z[lane, i] >= _ENGAGED:
+    if Z[lane, i] >= ENGAGED:
         W[lay.energy_lost * lanes + lane] += stored_energy(W, lay, lane, i, u)
     # w = 0 by the crossing itself, unless the case began with a pendulum already faster than the shaft.
     speed = W[(base + lay.p_speed) * lanes + lane]
     shaft = W[lay.speed * lanes + lane]
-    size = abs(speed) + abs(_acceleration(W, lay, lane, i)) * W[lay.inverse_rate * lanes + lane]
+    size = abs(speed) + abs(acceleration(W, lay, lane, i)) * W[lay.inverse_rate * lanes + lane]
     crossing = Z[lane, EVENT_SMOOTH] == 1 or abs(speed - shaft) <= _ROUNDING * size
     if crossing:
         W[(base + lay.p_speed) * lanes + lane] = shaft
     backlash = W[(base + lay.p_backlash) * lanes + lane]
     if backlash > 0.0:
         W[(base + lay.p_u) * lanes + lane] = -backlash
-        set_clutch(W, Z, lay, lane, i, _TAKE_UP)
+        set_clutch(W, Z, lay, lane, i, TAKE_UP)
         return
     W[(base + lay.p_u) * lanes + lane] = 0.0
-    state = _ENGAGED
+    state = ENGAGED
     if crossing and W[(base + lay.p_law) * lanes + lane] > 0.0:
-        state = lock_or_engage(W, Z, lay, lane, i)
-    if state != _FREE:
+        if lock_together(W, Z, lay, lane, i, size):
+            return
+        share = lock_share(W, Z, lay, lane, i)
+        if share < EDGE:
+            state = FREE
+            Z[lane, SKIP_W + i] = 2 if share > -EDGE else 0
+        elif share <= 1.0 - EDGE:
+            state = LOCKED
+        elif share < 1.0 + EDGE:
+            Z[lane, SKIP_U + i] = 3
+    if state != FREE:
         W[(base + lay.p_engagements) * lanes + lane] += 1.0
     set_clutch(W, Z, lay, lane, i, state)
 
@@ -328,36 +174,36 @@ def transit(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
         W[lay.speed * lanes + lane] = 0.0
         for j in range(lay.n):
             # A locked pendulum stops with the shaft.
-            if Z[lane, j] == _LOCKED:
+            if Z[lane, j] == LOCKED:
                 W[(lay.pendulums + j * lay.stride + lay.p_speed) * lanes + lane] = 0.0
         set_shaft(W, Z, lay, lane, target)
-        if target == _ROTATING and smooth:
+        if target == ROTATING and smooth:
             Z[lane, SKIP_SHAFT] = 2
         return
     base = lay.pendulums + i * lay.stride
     source = Z[lane, i]
     Z[lane, SKIP_W + i] = 0
     Z[lane, SKIP_U + i] = 0
-    if target == _START:
+    if target == START:
         _start(W, Z, lay, lane, i)
         return
     if source == target:
         W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
-        _watch_fall(W, lay, lane, i, False)
+        watch_fall(W, lay, lane, i, False)
         return
-    if source == _LOCKED:
+    if source == LOCKED:
         W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
         W[(base + lay.p_u) * lanes + lane] = 0.0
         if smooth:
             Z[lane, SKIP_W + i] = 2
             Z[lane, SKIP_U + i] = 3
-    elif source == _TAKE_UP and target == _FREE:
+    elif source == TAKE_UP and target == FREE:
         if smooth:
             W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
-    elif _BEYOND in (source, target):
+    elif BEYOND in (source, target):
         W[(base + lay.p_u) * lanes + lane] = W[(base + lay.p_limit) * lanes + lane]
     else:
         W[(base + lay.p_u) * lanes + lane] = 0.0
-        if target == _ENGAGED:
+        if target == ENGAGED:
             W[(base + lay.p_engagements) * lanes + lane] += 1.0
     set_clutch(W, Z, lay, lane, i, target)

@@ -7,12 +7,13 @@ from numpy.typing import NDArray
 
 from engine.endings import ENDING_CODES, Ending
 from engine.jit import compiled
-from engine.vibration_drive import events as ev
+from engine.vibration_drive import states as ev
 from engine.vibration_drive.automaton import Clutch, Shaft
 from engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS
 from engine.vibration_drive.equations import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR
-from engine.vibration_drive.events import locate, set_clutch, set_shaft, transit
+from engine.vibration_drive.events import locate, transit
 from engine.vibration_drive.layout import Layout
+from engine.vibration_drive.states import set_clutch, set_shaft
 from engine.vibration_drive.window import energy, sample, update_extrema, watch_extrema
 
 Floats = NDArray[np.float64]

@@ -15,10 +15,10 @@ from engine.taylor.roots import MAX_DEGREE, work_stack
 from engine.vibration_drive.automaton import Clutch, Shaft
 from engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count
 from engine.vibration_drive.characteristics import characteristics, sum_columns
-from engine.vibration_drive.events import LANE_INTEGERS
 from engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
 from engine.vibration_drive.lanes import OUT_ENDING
 from engine.vibration_drive.parameters import PARAMETERS
+from engine.vibration_drive.states import LANE_INTEGERS
 
 Floats = NDArray[np.float64]
 

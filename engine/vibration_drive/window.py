@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from engine.jit import compiled
 from engine.taylor.roots import RECIPROCAL, evaluate, largest
 from engine.vibration_drive.automaton import Clutch
-from engine.vibration_drive.events import NEVER, stored_energy
 from engine.vibration_drive.layout import Layout
+from engine.vibration_drive.states import NEVER, stored_energy
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

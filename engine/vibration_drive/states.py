@@ -1,0 +1,152 @@
+"""States of one lane's clutches and shaft: what is set when one is entered, and the laws that act in it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.jit import compiled
+from engine.vibration_drive.automaton import CLUTCH_THRESHOLD, Band, Clutch, Shaft, Threshold
+from engine.vibration_drive.layout import Layout
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Edge of a band that is not watched.
+NEVER = 1e300
+
+FREE, TAKE_UP, ENGAGED, BEYOND, LOCKED, START = (int(state) for state in Clutch)
+HELD, ROTATING = int(Shaft.HELD), int(Shaft.ROTATING)
+_W_LOW, _W_HIGH = int(Band.W_LOW), int(Band.W_HIGH)
+_AT_DATA_END, _AT_FIRST, _BANDS = int(Threshold.DATA_END), int(Threshold.FIRST_COEFFICIENT), len(Band)
+
+# Columns of a lane's integers. The first eight are the pendulums' clutch states.
+SHAFT_STATE = 8
+CASE = 9
+PERIOD = 10
+EVENT_PENDULUM = 11  # -2: no event in this step; -1: the shaft
+EVENT_TARGET = 12
+EVENT_SMOOTH = 13  # the event was located inside the step, not found violated at its start
+NEXT_STOP = 14
+EVENTS = 15
+EVENTS_IN_PERIOD = 16
+EVENTS_AT_ONCE = 17
+SKIP_STEP = 18  # the skips below hold while the lane has made this many steps
+LITERAL = 19
+# Coefficients that vanish analytically at a transition but not in rounding: leading orders the root finder passes over.
+SKIP_SHAFT = 20
+SKIP_W = 21  # eight columns
+SKIP_U = 29  # eight columns
+LANE_INTEGERS = 37
+
+NO_EVENT = -2
+OF_SHAFT = -1
+
+
+@compiled
+def law(W: Floats, first: int, count: int, lanes: int, lane: int, u: float) -> float:
+    """Clutch torque at windup ``u`` by the polynomial whose coefficients start at workspace row ``first``."""
+    value = 0.0
+    for k in range(count - 1, -1, -1):
+        value = value * u + W[(first + k) * lanes + lane]
+    return value
+
+
+@compiled
+def law_slope(W: Floats, first: int, count: int, lanes: int, lane: int, u: float) -> float:
+    """Derivative of ``law``."""
+    value = 0.0
+    for k in range(count - 1, 0, -1):
+        value = value * u + k * W[(first + k) * lanes + lane]
+    return value
+
+
+@compiled
+def stored_energy(W: Floats, lay: Layout, lane: int, i: int, u: float) -> float:
+    """Energy Pi(u) in the clutch of pendulum ``i`` at windup ``u >= 0``, the straight part beyond the data included."""
+    base = lay.pendulums + i * lay.stride
+    limit = W[(base + lay.p_limit) * lay.lanes + lane]
+    inside = min(u, limit)
+    first = base + lay.p_law
+    value = 0.0
+    for k in range(lay.coefficients - 1, -1, -1):
+        value = value * inside + W[(first + k) * lay.lanes + lane] / (k + 1)
+    value *= inside
+    if u > limit:
+        end = law(W, first, lay.coefficients, lay.lanes, lane, limit)
+        rate = law_slope(W, first, lay.coefficients, lay.lanes, lane, limit)
+        value += (u - limit) * (end + 0.5 * rate * (u - limit))
+    return float(value)
+
+
+@compiled
+def watch_fall(W: Floats, lay: Layout, lane: int, i: int, fall: bool) -> None:
+    """Let an engaged clutch under literal resets wait for w to fall through 0 (``fall``), or after that to rise through
+    it.
+    """
+    first = lay.pendulums + i * lay.stride + lay.p_w_low
+    W[(first + _W_LOW) * lay.lanes + lane] = 0.0 if fall else -NEVER
+    W[(first + _W_HIGH) * lay.lanes + lane] = NEVER if fall else 0.0
+
+
+@compiled
+def set_clutch(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, state: int) -> None:
+    """Put the clutch of pendulum ``i`` into a state: its guards' bands, the law in force, the flags."""
+    lanes = lay.lanes
+    base = lay.pendulums + i * lay.stride
+    source = Z[lane, i]
+    Z[lane, i] = state
+    for band in range(_BANDS):
+        kind = CLUTCH_THRESHOLD[Z[lane, LITERAL], state, band]
+        edge = -NEVER if band % 2 == 0 else NEVER
+        if kind == _AT_DATA_END:
+            edge = W[(base + lay.p_limit) * lanes + lane]
+        elif kind == _AT_FIRST:
+            edge = W[(base + lay.p_law) * lanes + lane]
+        elif kind != 0:
+            edge = 0.0
+        W[(base + lay.p_w_low + band) * lanes + lane] = edge
+    if Z[lane, LITERAL] == 1 and (ENGAGED <= state <= BEYOND):
+        watch_fall(W, lay, lane, i, source != BEYOND)
+    limit = W[(base + lay.p_limit) * lanes + lane]
+    for k in range(lay.coefficients):
+        value = 0.0
+        if state == ENGAGED:
+            value = W[(base + lay.p_law + k) * lanes + lane]
+        elif state == BEYOND and k < 2:
+            rate = law_slope(W, base + lay.p_law, lay.coefficients, lanes, lane, limit)
+            value = rate
+            if k == 0:
+                value = law(W, base + lay.p_law, lay.coefficients, lanes, lane, limit) - rate * limit
+        W[(base + lay.p_force + k) * lanes + lane] = value
+    W[(base + lay.p_locked) * lanes + lane] = 1.0 if state == LOCKED else 0.0
+    W[(base + lay.p_engaged) * lanes + lane] = 1.0 if state >= ENGAGED else 0.0
+    W[(base + lay.p_beyond) * lanes + lane] = 1.0 if state == BEYOND else 0.0
+    driving = 0.0
+    for j in range(lay.n):
+        driving += W[(lay.pendulums + j * lay.stride + lay.p_engaged) * lanes + lane]
+    W[lay.driven * lanes + lane] = 1.0 if driving > 0.0 else 0.0
+    W[lay.driving_max * lanes + lane] = max(driving, W[lay.driving_max * lanes + lane])
+    _set_mobility(W, Z, lay, lane)
+
+
+@compiled
+def set_shaft(W: Floats, Z: Ints, lay: Layout, lane: int, state: int) -> None:
+    """Put the shaft into a state: its guard, its flag, its mobility."""
+    lanes = lay.lanes
+    load = W[lay.load * lanes + lane]
+    Z[lane, SHAFT_STATE] = state
+    W[lay.rotating * lanes + lane] = 1.0 if state == ROTATING else 0.0
+    W[lay.sum_high * lanes + lane] = load if state == HELD else NEVER
+    # Without a load nothing slows the shaft, and it is never held.
+    W[lay.speed_low * lanes + lane] = 0.0 if state == ROTATING and load > 0.0 else -NEVER
+    _set_mobility(W, Z, lay, lane)
+
+
+@compiled
+def _set_mobility(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
+    """1/(inertia of the shaft and of all pendulums locked to it), or 0 while the load holds it."""
+    lanes = lay.lanes
+    inertia = W[lay.inertia * lanes + lane]
+    for i in range(lay.n):
+        if Z[lane, i] == LOCKED:
+            inertia += W[(lay.pendulums + i * lay.stride + lay.p_inertia) * lanes + lane]
+    W[lay.mobility * lanes + lane] = 1.0 / inertia if Z[lane, SHAFT_STATE] == ROTATING else 0.0
