@@ -2,7 +2,7 @@
 
 Both run on the same number of warm processes, in turn, in one run of this program; what counts is the ratio.
 
-    python benchmarks/overhead.py [--cases 20000] [--periods 20] [--processes N] [--repeats 3]
+    python -m benchmarks.overhead [--cases 20000] [--periods 20] [--processes N] [--repeats 3]
 """
 
 from __future__ import annotations
