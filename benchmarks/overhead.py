@@ -96,7 +96,7 @@ def main() -> None:
 
 
 def measure(store: Store, study: Study, processes: int, repeats: int) -> None:
-    """Alternate the two; print every pair, and the ratios of the medians and of the least times, the least disturbed."""
+    """Alternate the two; print every pair, and the ratios of the least times (the least disturbed) and the medians."""
     alone, service = [], []
     with warm_pool(study, processes) as pool:
         for _ in range(repeats):
@@ -107,10 +107,8 @@ def measure(store: Store, study: Study, processes: int, repeats: int) -> None:
                 f"service {service[-1]:6.2f} s   engine alone {alone[-1]:6.2f} s   ratio {service[-1] / alone[-1]:.3f}"
             )
     ratios = [pick(service) / pick(alone) for pick in (min, statistics.median)]
-    print(
-        f"{study.cases} cases, {processes} processes, chunks of {chunk}: {study.cases / min(service):.0f} cases/s through "
-        f"the service; ratio of least times {ratios[0]:.3f}, of medians {ratios[1]:.3f}"
-    )
+    print(f"{study.cases} cases, {processes} processes, chunks of {chunk}: {study.cases / min(service):.0f} cases/s")
+    print(f"service / engine alone: ratio of least times {ratios[0]:.3f}, of medians {ratios[1]:.3f}")
 
 
 if __name__ == "__main__":
