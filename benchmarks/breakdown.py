@@ -1,0 +1,116 @@
+"""Where the engine's time goes: stepping, the scalar look for events, and the statistics of the window.
+
+The stepping is timed by itself: the kernel's ``step`` and ``advance`` are called in a loop on the workspace of a batch
+that was stopped in the middle of its cases. Neither has branches, so their time does not depend on what they find. The
+statistics are the difference between a run with the whole window and one whose window is next to nothing.
+"""
+
+from __future__ import annotations
+
+import inspect
+import time
+from dataclasses import replace
+from typing import Any
+from unittest.mock import patch
+
+import numba
+import numpy as np
+
+from benchmarks.workloads import CASES, PERIODS, Timing, Workload, take_turns
+from engine.run import Run, Span
+from engine.vibration_drive import simulate as module
+
+_LOOPS = 2000
+_MID_RUN = 700
+
+
+class _Spy:
+    """A kernel that remembers the arguments of its last ``integrate``."""
+
+    def __init__(self, kernel: Any) -> None:
+        self.kernel = kernel
+        self.arguments: dict[str, Any] = {}
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.kernel, name)
+
+    def integrate(self, *arguments: Any) -> Any:
+        self.arguments = inspect.signature(self.kernel.integrate.py_func).bind(*arguments).arguments
+        return self.kernel.integrate(*arguments)
+
+
+@numba.njit
+def _restore(W: Any, saved: Any, times: int) -> None:
+    for _ in range(times):
+        W[:] = saved
+
+
+@numba.njit
+def _step(W: Any, saved: Any, times: int, step: Any, rest: Any) -> None:
+    for _ in range(times):
+        W[:] = saved
+        step(W, *rest)
+
+
+@numba.njit
+def _step_and_advance(W: Any, saved: Any, times: int, step: Any, rest: Any, advance: Any) -> None:
+    for _ in range(times):
+        W[:] = saved
+        step(W, *rest)
+        advance(W)
+
+
+def _seconds(function: Any, *arguments: Any) -> float:
+    """Processor time of one of a loop's turns."""
+    function(*arguments)
+    best = np.inf
+    for _ in range(5):
+        start = time.process_time()
+        function(*arguments)
+        best = min(best, time.process_time() - start)
+    return float(best) / _LOOPS
+
+
+def stepping(workload: Workload, tolerance: float) -> tuple[float, float, int, int]:
+    """Seconds of ``step`` and of ``advance`` for one case-step; order and lanes of the kernel."""
+    spies: list[_Spy] = []
+    original = module.kernel
+
+    def spying(*key: Any) -> _Spy:
+        spies.append(_Spy(original(*key)))
+        return spies[-1]
+
+    with patch.object(module, "kernel", spying):
+        cases = np.arange(0, CASES, CASES // 16)
+        module.simulate(workload.columns(cases), Run(tolerance=tolerance, max_steps=_MID_RUN), cases=len(cases))
+    spy = spies[-1]
+    W, saved = spy.arguments["W"], spy.arguments["W"].copy()
+    rest = tuple(spy.arguments[name] for name in list(inspect.signature(spy.step.py_func).parameters)[1:])
+    copied = _seconds(_restore, W, saved, _LOOPS)
+    stepped = _seconds(_step, W, saved, _LOOPS, spy.step, rest)
+    both = _seconds(_step_and_advance, W, saved, _LOOPS, spy.step, rest, spy.advance)
+    lanes = spy.LAYOUT.lanes
+    return (stepped - copied) / lanes, (both - stepped) / lanes, spy.LAYOUT.order, lanes
+
+
+def print_breakdown(workload: Workload, tolerance: float, timing: Timing, steps: float, repeats: int) -> None:
+    """Print steps, time per case-step and shares of a run of the whole workload that took ``timing``."""
+    step, advance, order, lanes = stepping(workload, tolerance)
+    columns = workload.columns(np.arange(CASES))
+    whole = Run(tolerance=tolerance)
+    tiny = replace(whole, window=(Span(PERIODS - 1e-6), Span(PERIODS)))
+    runs = {
+        name: lambda run=run: module.simulate(columns, run, cases=CASES)
+        for name, run in (("whole", whole), ("tiny", tiny))
+    }
+    timings = {name: timing.cpu for name, (timing, _) in take_turns(runs, repeats).items()}
+    statistics = max(0.0, 1.0 - timings["tiny"] / timings["whole"])
+    stepping_share = (step + advance) * steps / timing.cpu
+    print(
+        f"  order {order}, {lanes} lanes; {steps / CASES / PERIODS:.1f} steps a period; "
+        f"{timing.cpu / steps * 1e9:.0f} ns a case-step, of which step {step * 1e9:.0f}, advance {advance * 1e9:.0f}"
+    )
+    print(
+        f"  share of time: stepping {stepping_share:.0%}, statistics of the window {statistics:.0%}, "
+        f"events and the rest {1.0 - stepping_share - statistics:.0%}"
+    )

@@ -1,0 +1,27 @@
+"""This engine, behind the same face as its peers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.workloads import COMPARED, EVENTS, Ints, Outcome, Workload
+from engine.endings import ENDING_CODES, Ending
+from engine.run import Run
+from engine.vibration_drive.results import result_infos
+from engine.vibration_drive.simulate import simulate
+
+
+class SpragDrive:
+    """Runs cases through the public interface: all characteristics are computed, the default window is used."""
+
+    def __init__(self, workload: Workload, tolerance: float) -> None:
+        self.workload = workload
+        self.settings = Run(tolerance=tolerance)
+        self.names = [info.name for info in result_infos(workload.pendulums)]
+
+    def run(self, cases: Ints) -> Outcome:
+        """Run the cases as one batch."""
+        batch = simulate(self.workload.columns(cases), self.settings, cases=len(cases))
+        assert np.all(batch.endings == ENDING_CODES.index(Ending.OK))
+        values = {name: batch.values[:, self.names.index(name)] for name in (*COMPARED, EVENTS)}
+        return Outcome(cases, values, float(batch.values[:, self.names.index("run.steps")].sum()))
