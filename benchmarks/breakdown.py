@@ -46,13 +46,6 @@ def _restore(W: Any, saved: Any, times: int) -> None:
 
 
 @numba.njit
-def _step(W: Any, saved: Any, times: int, step: Any, rest: Any) -> None:
-    for _ in range(times):
-        W[:] = saved
-        step(W, *rest)
-
-
-@numba.njit
 def _step_and_advance(W: Any, saved: Any, times: int, step: Any, rest: Any, advance: Any) -> None:
     for _ in range(times):
         W[:] = saved
@@ -71,8 +64,8 @@ def _seconds(function: Any, *arguments: Any) -> float:
     return float(best) / _LOOPS
 
 
-def stepping(workload: Workload, tolerance: float) -> tuple[float, float, int, int]:
-    """Seconds of ``step`` and of ``advance`` for one case-step; order and lanes of the kernel."""
+def stepping(workload: Workload, tolerance: float) -> tuple[float, int, int]:
+    """Seconds of ``step`` and ``advance`` together for one case-step; order and lanes of the kernel."""
     spies: list[_Spy] = []
     original = module.kernel
 
@@ -86,16 +79,14 @@ def stepping(workload: Workload, tolerance: float) -> tuple[float, float, int, i
     spy = spies[-1]
     W, saved = spy.arguments["W"], spy.arguments["W"].copy()
     rest = tuple(spy.arguments[name] for name in list(inspect.signature(spy.step.py_func).parameters)[1:])
-    copied = _seconds(_restore, W, saved, _LOOPS)
-    stepped = _seconds(_step, W, saved, _LOOPS, spy.step, rest)
-    both = _seconds(_step_and_advance, W, saved, _LOOPS, spy.step, rest, spy.advance)
+    stepped = _seconds(_step_and_advance, W, saved, _LOOPS, spy.step, rest, spy.advance)
     lanes = spy.LAYOUT.lanes
-    return (stepped - copied) / lanes, (both - stepped) / lanes, spy.LAYOUT.order, lanes
+    return (stepped - _seconds(_restore, W, saved, _LOOPS)) / lanes, spy.LAYOUT.order, lanes
 
 
 def print_breakdown(workload: Workload, tolerance: float, timing: Timing, steps: float, repeats: int) -> None:
     """Print steps, time per case-step and shares of a run of the whole workload that took ``timing``."""
-    step, advance, order, lanes = stepping(workload, tolerance)
+    step, order, lanes = stepping(workload, tolerance)
     columns = workload.columns(np.arange(CASES))
     whole = Run(tolerance=tolerance)
     tiny = replace(whole, window=(Span(PERIODS - 1e-6), Span(PERIODS)))
@@ -105,10 +96,10 @@ def print_breakdown(workload: Workload, tolerance: float, timing: Timing, steps:
     }
     timings = {name: timing.cpu for name, (timing, _) in take_turns(runs, repeats).items()}
     statistics = max(0.0, 1.0 - timings["tiny"] / timings["whole"])
-    stepping_share = (step + advance) * steps / timing.cpu
+    stepping_share = step * steps / timing.cpu
     print(
         f"  order {order}, {lanes} lanes; {steps / CASES / PERIODS:.1f} steps a period; "
-        f"{timing.cpu / steps * 1e9:.0f} ns a case-step, of which step {step * 1e9:.0f}, advance {advance * 1e9:.0f}"
+        f"{timing.cpu / steps * 1e9:.0f} ns a case-step, {step * 1e9:.0f} of them stepping"
     )
     print(
         f"  share of time: stepping {stepping_share:.0%}, statistics of the window {statistics:.0%}, "

@@ -61,9 +61,9 @@ def processes(repeats: int, seconds: float = 2.0) -> None:
 
 
 def pendulums(repeats: int) -> None:
-    """The cost of a case and of a case-step with 1, 2, 4 and 8 pendulums, over the same grid."""
+    """The cost of a case and of a case-step with 1, 2 and 8 pendulums, over the same grid."""
     cases = np.arange(CASES)
-    workloads = {n: many_pendulums(n) for n in (1, 2, 4, 8)}
+    workloads = {n: many_pendulums(n) for n in (1, 2, 8)}
 
     def job(workload: Workload) -> Any:
         return simulate(workload.columns(cases), Run(), cases=CASES)

@@ -72,9 +72,10 @@ def main() -> None:
             assert warm["first_compiled"] == 0, f"a warm cache left {warm['first_compiled']} functions to compile"
         print(
             f"n = {pendulums}: first chunk of {_CHUNK} cases {fresh['first']:.2f} s with an empty cache "
-            f"({fresh['first_cpu']:.2f} s of processor time, {fresh['first_compiled']} functions compiled), {warm['first']:.2f} s with a warm one after "
-            f"{warm['import']:.2f} s of imports; second chunk {warm['second'] * 1e3:.0f} ms, nothing compiled; "
-            f"whole process {warm['process']:.2f} s"
+            f"({fresh['first_cpu']:.2f} s of processor time, {fresh['first_compiled']} functions compiled), "
+            f"{warm['first']:.2f} s with a warm one after {warm['import']:.2f} s of imports; "
+            f"second chunk {warm['second'] * 1e3:.0f} ms, nothing compiled; whole process {warm['process']:.2f} s",
+            flush=True,
         )
 
 
