@@ -1,0 +1,132 @@
+"""Every abnormal ending, and that nothing hangs or raises, whatever valid parameters are given."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from engine.endings import ENDING_CODES, Ending
+from engine.run import Run
+from engine.vibration_drive.parameters import PARAMETERS
+from engine.vibration_drive.simulate import trajectory
+from tests.engine.drive import Columns, Results, batch_of, clutch, drive, one, pendulum, periods
+
+RUN = periods(6.0, 3.0, 6.0)
+
+FLYING: Columns = (
+    drive(1)
+    | pendulum(0, mass=0.0, spring_rate=0.0, damping=0.0, initial_speed=1e6, backlash=1000.0, inertia=1.0)
+    | {"excitation.frequency": 0.5}
+)
+STIFF: Columns = drive(1) | pendulum(0, inertia=1e-12, spring_rate=1e12, spring_arm=1e3)
+
+
+@pytest.mark.parametrize(
+    ("ending", "columns", "run"),
+    [
+        (Ending.DIVERGED, FLYING, RUN),
+        (Ending.ACCURACY_NOT_REACHED, STIFF, RUN),
+        (Ending.CHATTER, drive(1), periods(6.0, 3.0, 6.0, max_events_per_period=2)),
+        (Ending.STEP_BUDGET, drive(1), periods(6.0, 3.0, 6.0, max_steps=20)),
+    ],
+    ids=lambda value: str(value) if isinstance(value, Ending) else "",
+)
+def test_abnormal_ending(ending: Ending, columns: Columns, run: Run) -> None:
+    results = Results(columns, run, 1)
+    assert results.endings == [ending]
+    row = results.row(0)
+    assert row.pop("run.steps") > 0.0
+    assert row.pop("run.events") >= 0.0
+    assert all(math.isnan(value) for value in row.values())
+    assert ending.sentence.endswith(".")
+
+
+def test_a_trajectory_that_ends_early_says_so() -> None:
+    times = np.linspace(0.0, 0.3, 31)
+    path = trajectory(drive(1), periods(6.0, 3.0, 6.0, max_steps=40), times)
+    assert path.ending is Ending.STEP_BUDGET
+    assert 0 < len(path.times) < 31
+    assert path.values.shape[0] == len(path.times) == len(path.states["shaft"])
+    assert np.isfinite(path.values).all()
+    whole = trajectory(drive(1), RUN, times)
+    assert whole.ending is Ending.OK
+    np.testing.assert_array_equal(whole.values[: len(path.times)], path.values)
+
+
+def test_neighbours_are_untouched() -> None:
+    cases = [drive(1) | {"pendulums.0.initial_speed": 0.0}, FLYING, drive(1) | {"pendulums.0.initial_speed": 1.0}]
+    results = Results(batch_of(cases), RUN, 3)
+    assert [str(ending) for ending in results.endings] == ["ok", "diverged", "ok"]
+    assert results.row(0) == one(cases[0], RUN)
+    assert results.row(2) == one(cases[2], RUN)
+
+
+def test_budget_counts_events_in_one_period_only() -> None:
+    row = one(drive(1), RUN)
+    enough = math.ceil(row["run.events"] / 6.0 * 2.0)
+    assert one(drive(1), periods(6.0, 3.0, 6.0, max_events_per_period=enough)) == row
+
+
+def test_a_step_budget_of_exactly_the_steps_needed_is_enough_but_for_the_last() -> None:
+    row = one(drive(1), RUN)
+    steps = int(row["run.steps"])
+    assert one(drive(1), periods(6.0, 3.0, 6.0, max_steps=steps + 1)) == row
+    assert Results(drive(1), periods(6.0, 3.0, 6.0, max_steps=steps - 1), 1).endings == [Ending.STEP_BUDGET]
+
+
+# Extremes.
+
+#: Results that may be null in a case that ended well: nothing turned or nothing was put in.
+MAY_BE_NULL = {"shaft.irregularity", "efficiency", "runup.time"}
+
+
+def _wide(low: float, high: float) -> st.SearchStrategy[float]:
+    """Over all magnitudes of a positive range, and zero where allowed."""
+    return st.floats(math.log10(low), math.log10(high)).map(lambda exponent: 10.0**exponent)
+
+
+def _any(path: str) -> st.SearchStrategy[float]:
+    """Any valid value of a parameter: ordinary, zero, and out to the bounds of its range."""
+    parameter = next(p for p in PARAMETERS if p.path == path)
+    top = parameter.high
+    positive = _wide(1e-9, top)
+    choices = [positive, _wide(1e-3, 1.0), st.just(top)]
+    if not parameter.low_open:
+        choices.append(st.just(max(parameter.low, 0.0)))
+    if parameter.low < 0.0:
+        choices += [positive.map(lambda value: -value), st.just(parameter.low)]
+    return st.one_of(choices)
+
+
+def _machine(pendulums: int) -> st.SearchStrategy[Columns]:
+    paths = {p.path.replace("N", str(i)): p.path for p in PARAMETERS for i in range(pendulums)}
+    return st.fixed_dictionaries({path: _any(generic) for path, generic in paths.items()})
+
+
+LAWS = [(0.0, 200.0, 0.0, 2e4), (1.0,), (0.0, 1e-6), (1e3, 1e9), (0.0, 0.0, 1e12), (0.0, 0.0, 0.0, 1.0)]
+
+
+@pytest.mark.parametrize("reset", ["contact", "literal"])
+@pytest.mark.parametrize("pendulums", [1, 2])
+@settings(max_examples=8, derandomize=True, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+@given(data=st.data())
+def test_extreme_machines_end(pendulums: int, reset: Any, data: st.DataObject) -> None:
+    cases = [data.draw(_machine(pendulums)) for _ in range(12)]
+    law = data.draw(st.sampled_from(LAWS))
+    limit = data.draw(st.sampled_from([math.inf, 1e-9, 1e-3, 1.0]))
+    columns = batch_of(cases) | clutch(*law) | {"clutch.windup_limit": limit}
+    run = periods(3.0, 1.0, 3.0, reset=reset, max_steps=2000, max_events_per_period=200)
+    results = Results(columns, run, len(cases))
+    for case, ending in enumerate(results.endings):
+        assert ending in ENDING_CODES
+        row = results.row(case)
+        assert not any(math.isinf(value) for value in row.values())
+        if ending is Ending.OK:
+            assert {name for name, value in row.items() if math.isnan(value)} <= MAY_BE_NULL
+            rounding = 1e-12 * row["shaft.speed.max"]
+            assert row["shaft.speed.max"] + rounding >= row["shaft.speed.mean"] >= row["shaft.speed.min"] - rounding
