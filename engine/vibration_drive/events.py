@@ -70,13 +70,14 @@ def _guard(W: Floats, lay: Layout, lane: int, i: int, band: int, g: Floats) -> N
 
 @compiled
 def locate(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, stack: Floats) -> None:
-    """Find the first event of a lane in its step; if there is one, shorten the step to it and note what happens.
+    """Find the first event of a lane in the part x of its step; if there is one, end the part there and note it.
 
     Of events at the same time the shaft's comes first, then the pendulum with the lowest index; the others are found
     violated at the start of the next step and follow at once.
     """
     lanes = lay.lanes
-    best = 1.5
+    whole = W[lay.x * lanes + lane]
+    best = 1.5 if whole == 1.0 else whole
     pendulum = NO_EVENT
     target = 0
     fresh = W[lay.steps * lanes + lane] == Z[lane, SKIP_STEP]

@@ -43,7 +43,8 @@ RECORD = as_record(LAYOUT)
 
 @compiled
 def integrate(
-    lay, cases, log2_tolerance, literal, most_steps, most_events, W, Z, g, stack, turns, sums, times, samples, states
+    lay, cases, tolerance, log2_tolerance, literal, most_steps, most_events, W, Z, g, stack, turns, sums,
+    times, samples, states,
 ):
     """Run every case, filling a lane again the moment its case ends; the number of samples recorded (of case 0)."""
     running = 0
@@ -60,7 +61,7 @@ def integrate(
                 running += 1
         if running == 0:
             return recorded
-        step(W, log2_tolerance)
+        step(W, tolerance, log2_tolerance)
         for lane in range({lanes}):
             if busy[lane] and (not W[{margin} + lane] > 0.0 or not W[{excess} + lane] <= 0.0):
                 look(W, Z, lay, lane, g, stack)
@@ -81,8 +82,8 @@ class Kernel(Protocol):
     RECORD: Layout
 
     def integrate(
-        self, lay: Layout, cases: Floats, log2_tolerance: float, literal: int, most_steps: int, most_events: int,
-        W: Floats, Z: Ints, g: Floats, stack: Floats, turns: Floats, sums: Floats,
+        self, lay: Layout, cases: Floats, tolerance: float, log2_tolerance: float, literal: int,
+        most_steps: int, most_events: int, W: Floats, Z: Ints, g: Floats, stack: Floats, turns: Floats, sums: Floats,
         times: Floats, samples: Floats, states: Ints,
     ) -> int: ...  # fmt: skip
 

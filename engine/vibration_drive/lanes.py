@@ -7,20 +7,23 @@ from numpy.typing import NDArray
 
 from engine.endings import ENDING_CODES, Ending
 from engine.jit import compiled
+from engine.taylor.roots import evaluate
 from engine.vibration_drive import states as ev
 from engine.vibration_drive.automaton import Clutch, Shaft
 from engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS
 from engine.vibration_drive.equations import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR
 from engine.vibration_drive.events import locate, transit
 from engine.vibration_drive.layout import Layout
-from engine.vibration_drive.states import set_clutch, set_shaft
-from engine.vibration_drive.window import energy, sample, update_extrema, watch_extrema
+from engine.vibration_drive.states import law, set_clutch, set_shaft
+from engine.vibration_drive.window import energy, primitive, sample, series, update_extrema, watch_extrema
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: Transitions without any time passing that count as chatter.
 MOST_AT_ONCE = 64
+#: Halvings of a step after which a series that still misses its law is left to the step floor and the balances.
+MOST_HALVINGS = 60
 #: Share of the final period-mean speed that ends the run-up.
 RUNUP_SHARE = 0.95
 
@@ -268,11 +271,34 @@ def settle(
 
 
 @compiled
+def shorten(W: Floats, lay: Layout, lane: int, g: Floats) -> None:
+    """Halve the part x of the step that is taken until the series of every clutch's torque meets its law there."""
+    lanes = lay.lanes
+    x = 1.0
+    for i in range(lay.n):
+        base = lay.pendulums + i * lay.stride
+        if W[(base + lay.p_locked) * lanes + lane] > 0.5:
+            continue
+        for _ in range(MOST_HALVINGS):
+            primitive(W, lay, lane, W[(base + lay.p_u) * lanes + lane], base + lay.p_speed, lay.speed, g)
+            u = evaluate(g, lay.order, x)
+            series(W, lay, lane, base + lay.p_torque, g)
+            torque = law(W, base + lay.p_force, lay.coefficients, lanes, lane, u)
+            if abs(torque - evaluate(g, lay.order, x)) <= W[(base + lay.p_allowed) * lanes + lane]:
+                break
+            x *= 0.5
+    if x < 1.0:
+        W[lay.x * lanes + lane] = x
+        W[lay.at_stop * lanes + lane] = 0.0
+
+
+@compiled
 def look(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, stack: Floats) -> None:
     """Before ``advance``: the scalar second look at one lane's step, for events and extrema that the bounds could not
     exclude.
     """
     if not W[lay.margin * lay.lanes + lane] > 0.0:
+        shorten(W, lay, lane, g)
         locate(W, Z, lay, lane, g, stack)
     # A state that is left at once lasts no time and has no extrema.
     if W[lay.x * lay.lanes + lane] > 0.0 and not W[lay.excess * lay.lanes + lane] <= 0.0:

@@ -127,6 +127,8 @@ class Layout(NamedTuple):
     p_acc_min: int
     p_torque_max: int
     p_u_max: int
+    # largest defect of the torque's series that the tolerance allows
+    p_allowed: int
     # distances of this step to the guards, in the order of the bands; excess over the known extrema
     p_m_w_low: int
     p_m_w_high: int

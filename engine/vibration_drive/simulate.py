@@ -81,7 +81,7 @@ def _integrate(
     samples = np.empty((len(times), _SHAFT_SAMPLES + n * _PENDULUM_SAMPLES))
     states = np.zeros((len(times), 1 + n), dtype=np.int64)
     done = module.integrate(
-        module.RECORD, matrix, math.log2(run.tolerance), int(run.reset == "literal"),
+        module.RECORD, matrix, run.tolerance, math.log2(run.tolerance), int(run.reset == "literal"),
         run.max_steps, run.max_events_per_period,
         np.zeros(lay.rows * lay.lanes), np.zeros((lay.lanes, LANE_INTEGERS), dtype=np.int64),
         np.zeros(MAX_DEGREE + 1), work_stack(), np.zeros((lay.lanes, periods)), sums, times, samples, states,
