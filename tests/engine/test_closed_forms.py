@@ -188,7 +188,7 @@ def test_capture_winds_every_law_up_to_the_kinetic_energy(law: tuple[float, ...]
     row = capture(2e-3, *law)
     u = row["pendulums.0.windup.max"]
     stored = sum(c * u ** (k + 1) / (k + 1) for k, c in enumerate(law))
-    assert stored == pytest.approx(REDUCED * W0**2 / 2.0, rel=1e-9)
+    assert stored == pytest.approx(REDUCED * W0**2 / 2.0, rel=5e-9)
     assert row["torque.max"] == pytest.approx(sum(c * u**k for k, c in enumerate(law)), rel=1e-9)
     assert row["shaft.speed.max"] == pytest.approx(2.0 * J * W0 / (J + J_E), rel=1e-9)
 
@@ -206,7 +206,7 @@ def test_capture_beyond_the_data_goes_on_straight() -> None:
     stored = k * limit**2 / 2.0 + cubic * limit**4 / 4.0 + end * over + rate * over**2 / 2.0
     assert over > 0.0
     assert row["torque.max"] == pytest.approx(end + rate * over, rel=1e-9)
-    assert stored == pytest.approx(REDUCED * W0**2 / 2.0, rel=1e-9)
+    assert stored == pytest.approx(REDUCED * W0**2 / 2.0, rel=5e-9)
     assert 0.0 < row["pendulums.0.fraction.beyond_data"] < row["pendulums.0.fraction.engaged"]
 
 
