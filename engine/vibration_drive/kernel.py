@@ -9,7 +9,6 @@ import math
 import os
 import sys
 import tempfile
-import textwrap
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -20,9 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.cache import cache_folder
-from engine.vibration_drive.advance import pendulum_advance, shaft_advance
-from engine.vibration_drive.bounds import pendulum_bounds, shaft_bounds
-from engine.vibration_drive.equations import series_loop
+from engine.vibration_drive.equations import advance_source, step_source
 from engine.vibration_drive.layout import Layout, make_layout
 
 Floats = NDArray[np.float64]
@@ -32,7 +29,7 @@ _MODULE = '''"""Generated kernel: {n} pendulum(s), {coefficients} clutch coeffic
 
 import numpy as np
 
-from engine.jit import contracted
+from engine.jit import compiled, contracted
 from engine.vibration_drive.lanes import load_case, look, next_stop, record, settle
 from engine.vibration_drive.layout import Layout, as_record
 
@@ -40,19 +37,11 @@ LAYOUT = {layout!r}
 RECORD = as_record(LAYOUT)
 
 
-@contracted
-def step(W, tolerance, log2_tolerance):
-    """Series, step size, distances to guards and extrema of every lane (alone only for measurements)."""
 {step}
 
-
-@contracted
-def advance(W, most_steps):
-    """State and sums of every lane at the end of its step (alone only for measurements)."""
 {advance}
 
-
-@contracted
+@compiled
 def integrate(
     lay, cases, tolerance, log2_tolerance, literal, most_steps, most_events, W, Z, g, stack, turns, sums,
     times, samples, states,
@@ -72,15 +61,15 @@ def integrate(
                 running += 1
         if running == 0:
             return recorded
-{step_inside}
+        step(W, tolerance, log2_tolerance)
         for lane in range({lanes}):
             if busy[lane] and (not W[{margin} + lane] > 0.0 or not W[{excess} + lane] <= 0.0):
                 look(W, Z, lay, lane, g, stack)
         if recorded < times.shape[0]:
             recorded = record(W, Z, lay, 0, times, recorded, g, samples, states)
-{advance_inside}
+        advance(W)
         for lane in range({lanes}):
-            if busy[lane] and W[{attention} + lane] != 0.0:
+            if busy[lane] and (W[{attention} + lane] != 0.0 or W[{steps} + lane] >= most_steps):
                 busy[lane] = settle(W, Z, lay, lane, cases, turns, sums, most_steps, most_events)
                 running -= not busy[lane]
 '''
@@ -115,20 +104,12 @@ def lane_count() -> int:
 
 
 def source(layout: Layout) -> str:
-    """The text of the kernel module for a layout.
-
-    The loops stand inside ``integrate`` itself: called as functions they would be compiled twice.
-    """
-    pendulums = range(layout.n)
-    step = [series_loop(layout), shaft_bounds(layout), *(pendulum_bounds(layout, i) for i in pendulums)]
-    advance = [*(pendulum_advance(layout, i) for i in pendulums), shaft_advance(layout)]
-    blocks = {"step": "\n".join(step), "advance": "\n".join(advance)}
+    """The text of the kernel module for a layout."""
     return _MODULE.format(
-        n=layout.n, coefficients=layout.coefficients, order=layout.order, lanes=layout.lanes, layout=layout,
+        n=layout.n, coefficients=layout.coefficients, order=layout.order, lanes=layout.lanes,
+        attention=layout.attention * layout.lanes, steps=layout.steps * layout.lanes,
         margin=layout.margin * layout.lanes, excess=layout.excess * layout.lanes,
-        attention=layout.attention * layout.lanes,
-        **{name: textwrap.indent(text, " " * 4) for name, text in blocks.items()},
-        **{f"{name}_inside": textwrap.indent(text, " " * 8) for name, text in blocks.items()},
+        layout=layout, step=step_source(layout), advance=advance_source(layout),
     )  # fmt: skip
 
 
