@@ -22,12 +22,3 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """
     jitted = numba.njit(cache=True, error_model="numpy")(function)
     return cast(Callable[P, R], jitted)
-
-
-def contracted(function: Callable[P, R]) -> Callable[P, R]:
-    """The same with products and sums contracted into fused multiply-adds, for the vector code of one caller.
-
-    It is always inlined, so there is one copy of it and its bits are its caller's.
-    """
-    jitted = numba.njit(cache=True, error_model="numpy", fastmath={"contract"}, forceinline=True)(function)
-    return cast(Callable[P, R], jitted)

@@ -121,7 +121,9 @@ def _refine_root(g: Floats, degree: int, low: float, high: float, guess: float) 
     """The single sign change of ``g`` between ``low`` (positive there) and ``high`` (not positive): Newton kept
     inside.
     """
-    x = guess if low < guess < high else 0.5 * (low + high)
+    # Away from the ends: where another root lies on an end, rounding there would lead astray.
+    edge = 0.05 * (high - low)
+    x = min(max(guess, low + edge), high - edge)
     for _ in range(80):
         value, slope = _value_and_slope(g, degree, x)
         if value > 0.0:

@@ -11,20 +11,28 @@ Names = Sequence[str]
 
 
 class LaneCode:
-    """Source lines of the body of ``for lane in range(lanes)`` over the flat workspace ``W``."""
+    """Source lines of the body of ``for lane in range(lanes)`` over the flat workspace ``W``.
 
-    def __init__(self, lanes: int) -> None:
+    Every local variable is assigned once: numba's analysis takes time in proportion to the number of reassigned
+    variables times the length of the function. ``tag`` keeps the names of several loops in one function apart.
+    """
+
+    def __init__(self, lanes: int, tag: str = "") -> None:
         self.lanes = lanes
+        self.tag = tag
         self.lines: list[str] = []
+        self._uses: dict[str, int] = {}
 
     def row(self, row: int) -> str:
         """The element of workspace row ``row`` that belongs to this lane."""
         return f"W[{row * self.lanes} + lane]"
 
     def let(self, name: str, expression: str) -> str:
-        """Define a local variable and return its name."""
-        self.lines.append(f"{name} = {expression}")
-        return name
+        """Define a local variable; return the name it really got, which is new each time."""
+        use = self._uses[name] = self._uses.get(name, 0) + 1
+        unique = name + self.tag if use == 1 else f"{name}{self.tag}_again{use}"
+        self.lines.append(f"{unique} = {expression}")
+        return unique
 
     def load(self, name: str, row: int) -> str:
         """Define a local variable from a workspace row."""
@@ -38,11 +46,9 @@ class LaneCode:
         """Load ``count`` consecutive rows as the coefficients of a series."""
         return [self.load(f"{name}{k}", row + k) for k in range(count)]
 
-    def function(self, name: str, arguments: str, docstring: str) -> str:
-        """The finished function: the lane loop around the lines."""
-        body = "\n".join(f"        {line}" for line in self.lines)
-        head = f'@contracted\ndef {name}({arguments}):\n    """{docstring}"""\n'
-        return f"{head}    for lane in range({self.lanes}):\n{body}\n"
+    def loop(self) -> str:
+        """The finished loop over the lanes around the lines."""
+        return f"for lane in range({self.lanes}):\n" + "\n".join(f"    {line}" for line in self.lines)
 
 
 def product(a: Names, b: Names, k: int) -> str:
@@ -134,10 +140,10 @@ def sincos(code: LaneCode, x: str, tag: str) -> tuple[str, str]:
 
 
 def log2(x: str) -> str:
-    """Base-2 logarithm of a positive double within 0.09, from its bits."""
-    return f"(np.float64({x}).view(np.int64) * 2.220446049250313e-16 - 1023.0)"
+    """Base-2 logarithm of a positive double within 0.09, from its bits read as an integer."""
+    return f"(bits_of({x})*2.220446049250313e-16 - 1023.0)"
 
 
 def exp2(x: str) -> str:
     """Power of two within 6 %, inverse of ``log2``: only for choosing a step size."""
-    return f"np.int64(({x} + 1023.0) * 4503599627370496.0).view(np.float64)"
+    return f"of_bits(({x} + 1023.0)*4503599627370496.0)"

@@ -84,6 +84,9 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
 
     frequency = parameter("excitation.frequency")
     nu = 2.0 * math.pi * frequency
+    shaft_inertia = parameter("shaft.inertia")
+    # The fastest of excitation, pendulums on their springs, and pendulums against the shaft through their clutches: it
+    # turns accelerations into speeds when a step's error is weighed.
     rate = nu
     pendulums: list[Floats] = []
     for i in range(n):
@@ -98,6 +101,8 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
         spring = own["spring_rate"] * own["spring_arm"] ** 2 / inertia
         rate = np.maximum(rate, np.sqrt(spring))
         law = _law_prefix(columns, i)
+        stiffness = np.maximum(column(f"{law}coefficients.1", 0.0), 0.0)
+        rate = np.maximum(rate, np.sqrt(stiffness * (1.0 / inertia + 1.0 / shaft_inertia)))
         pendulums += [
             own["mass"] * own["arm"] / inertia, spring, own["damping"] / inertia, 1.0 / inertia, inertia,
             own["backlash"], column(f"{law}windup_limit", math.inf), own["initial_angle"], own["initial_speed"],
@@ -112,7 +117,7 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     times = (start, np.where(whole > 0, np.maximum(start, end - whole), end), end, end_of_run)
     shaft = [
         nu, 1.0 / frequency, parameter("excitation.amplitude_x") * nu**2, parameter("excitation.amplitude_y") * nu**2,
-        parameter("excitation.phase"), parameter("gravity"), parameter("shaft.load"), parameter("shaft.inertia"),
+        parameter("excitation.phase"), parameter("gravity"), parameter("shaft.load"), shaft_inertia,
         1.0 / rate, parameter("shaft.initial_speed"),
     ]  # fmt: skip
     stops = [part for time in times for part in _stop(time)]

@@ -92,7 +92,8 @@ def _pendulum(cases: _Cases, i: int, out: dict[str, Floats]) -> None:
         out[f"pendulums.{i}.{name}"] = values
 
     inertia = cases.parameter(i, 4)
-    put("angle.mean", cases.pendulum(i, "sum_phi") / cases.length)
+    mean = cases.pendulum(i, "sum_phi") / cases.length
+    put("angle.mean", np.clip(mean, cases.pendulum(i, "phi_min"), cases.pendulum(i, "phi_max")))
     put("angle.max", cases.pendulum(i, "phi_max"))
     put("angle.min", cases.pendulum(i, "phi_min"))
     put("angle.amplitude", 0.5 * (cases.pendulum(i, "phi_max") - cases.pendulum(i, "phi_min")))
@@ -119,7 +120,8 @@ def _over_pendulums(cases: _Cases, out: dict[str, Floats], name: str) -> Floats:
 
 def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
     turn = cases.shaft("turn_2") - cases.shaft("turn_0")
-    mean = turn / cases.length
+    # Within its extrema in spite of rounding: the mean of a steady speed is that speed.
+    mean = np.clip(turn / cases.length, cases.shaft("speed_min"), cases.shaft("speed_max"))
     out["shaft.speed.mean"] = mean
     out["shaft.speed.max"] = cases.shaft("speed_max")
     # Under a load the shaft never turns back: a negative minimum is the rounding of the instant it stops.

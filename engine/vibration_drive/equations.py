@@ -14,12 +14,8 @@ data; the shaft's mobility is zero where it is held. A locked clutch has w' = sh
 from engine.taylor.straight import (
     LaneCode,
     exp2,
-    horner,
-    integral,
-    larger,
     log2,
     product,
-    range_bounds,
     sincos,
     smaller,
 )
@@ -32,11 +28,6 @@ STEP_SAFETY = 0.62
 LONGEST_STEP = 0.25
 #: Share of the base's largest drive that counts as motion in any case when a step's error is weighed.
 DRIVE_SHARE = 1e-3
-#: Smallest step, in excitation periods: below it a step no longer moves the phase.
-STEP_FLOOR = 1e-13
-#: Angle (rad) and speed (rad/s) beyond which a case has diverged.
-ANGLE_BOUND = 1e6
-SPEED_BOUND = 1e9
 
 
 class _Pendulum:
@@ -116,11 +107,8 @@ def _free_acceleration(code: LaneCode, p: _Pendulum, x: list[str], y: list[str],
     )
 
 
-def step_source(layout: Layout) -> str:
-    """Source of ``step(W, tolerance, log2_tolerance)``: series of every lane, step size, distance to guards, excess
-    over
-    extrema.
-    """
+def series_loop(layout: Layout) -> str:
+    """Source of the loop that finds the series of every lane, in fractions of the step they allow, and stores them."""
     code = LaneCode(layout.lanes)
     order = layout.order
     for name in ("gravity", "load", "mobility"):
@@ -152,10 +140,7 @@ def step_source(layout: Layout) -> str:
     _in_fractions(code, order, pendulums, shaft, total)
     power = [code.let(f"P{k}", product(total, shaft, k)) for k in range(order + 1)]
     _store_series(code, layout, pendulums, shaft, total, power)
-    _bounds(code, layout, pendulums, shaft, total, power)
-    return code.function(
-        "step", "W, tolerance, log2_tolerance", "Series, step size, distances to guards and extrema of every lane."
-    )
+    return code.loop()
 
 
 def _in_fractions(code: LaneCode, order: int, pendulums: list[_Pendulum], shaft: list[str], total: list[str]) -> None:
@@ -168,8 +153,6 @@ def _in_fractions(code: LaneCode, order: int, pendulums: list[_Pendulum], shaft:
         for p in pendulums:
             i = p.index
             p.w[k] = code.let(f"wx{i}_{k}", f"{p.w[k]}*{power}")
-            p.phi[k] = code.let(f"px{i}_{k}", f"{p.phi[k]}*{power}")
-            p.u[k] = code.let(f"ux{i}_{k}", f"{p.u[k]}*{power}")
             p.torque[k] = code.let(f"Tx{i}_{k}", f"{p.torque[k]}*{power}")
             if k < order:
                 p.drive[k] = code.let(f"Dx{i}_{k}", f"{p.drive[k]}*{power}")
@@ -226,141 +209,5 @@ def _step_size(code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft
     code.let("h", f"h_wanted if h_wanted < {rest}*0.999999 else {rest}")
     code.store(layout.h, "h")
     code.store(layout.x, "1.0")
-
-
-def _bounds(
-    code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft: list[str], total: list[str], power: list[str]
-) -> None:
-    """Store how far every guarded quantity keeps from its band and how far others may exceed their known extrema."""
-    margin = code.let("margin", "1e300")
-    excess = code.let("excess", "-1e300")
-    code.let("inverse_h", "1.0/h")
-
-    def guard(bounds: tuple[str, str], block: int, low: int | None, high: int | None) -> None:
-        """``low`` and ``high`` are rows of a band's edges; the distances to them go ``block`` rows further."""
-        for text, row in ((f"{bounds[0]} - {{}}", low), (f"{{}} - {bounds[1]}", high)):
-            if row is not None:
-                code.let("gap", text.format(code.row(row)))
-                code.store(row + block, "gap")
-                code.let(margin, smaller("gap", margin))
-
-    def peak(bounds: tuple[str, str], block: int, high: int, low: int | None = None) -> None:
-        """``high`` and ``low`` are rows of known extrema; their excess goes ``block`` rows further."""
-        for text, row in ((f"{bounds[1]} - {{}}", high), (f"{{}} - {bounds[0]}", low)):
-            if row is not None:
-                code.let("gap", text.format(code.row(row)))
-                code.store(row + block, "gap")
-                code.let(excess, larger("gap", excess))
-
-    def rates(tag: str, names: list[str]) -> list[str]:
-        return [code.let(f"{tag}_{k}", f"{names[k + 1]}*inverse_h*{k + 1.0!r}") for k in range(layout.order)]
-
-    lay = layout
-    block = lay.x_speed_max - lay.speed_max
-    edges = lay.m_sum_high - lay.sum_high
-    bounds = range_bounds(code, "W", shaft)
-    guard(bounds, edges, lay.speed_low, None)
-    peak(bounds, block, lay.speed_max, lay.speed_min)
-    bounds = range_bounds(code, "S", total)
-    guard(bounds, edges, None, lay.sum_high)
-    peak(bounds, block, lay.sum_max)
-    peak(range_bounds(code, "R", rates("R", shaft)), block, lay.acc_max)
-    peak(range_bounds(code, "P", power), block, lay.power_max)
-    block = lay.p_x_phi_max - lay.p_phi_max
-    edges = lay.p_m_w_low - lay.p_w_low
     for p in pendulums:
-        tag = str(p.index)
-        row = {name: p.row(lay, name) for name in (
-            "w_low", "w_high", "u_low", "u_high", "t_low", "t_high", "phi_max", "phi_min",
-            "speed_max", "speed_min", "acc_max", "acc_min", "torque_max", "u_max",
-        )}  # fmt: skip
-        relative = [code.let(f"v{tag}_{k}", f"{p.w[k]} - {shaft[k]}") for k in range(lay.order + 1)]
-        guard(range_bounds(code, f"v{tag}", relative), edges, row["w_low"], row["w_high"])
-        bounds = range_bounds(code, f"u{tag}", p.u)
-        guard(bounds, edges, row["u_low"], row["u_high"])
-        peak(bounds, block, row["u_max"])
-        bounds = range_bounds(code, f"T{tag}", p.torque)
-        guard(bounds, edges, row["t_low"], row["t_high"])
-        _check_torque(code, layout, p)
-        peak(bounds, block, row["torque_max"])
-        peak(range_bounds(code, f"p{tag}", p.phi), block, row["phi_max"], row["phi_min"])
-        peak(range_bounds(code, f"w{tag}", p.w), block, row["speed_max"], row["speed_min"])
-        peak(range_bounds(code, f"R{tag}", rates(f"R{tag}", p.w)), block, row["acc_max"], row["acc_min"])
-    code.store(lay.margin, margin)
-    code.store(lay.excess, excess)
-
-
-def _check_torque(code: LaneCode, layout: Layout, p: _Pendulum) -> None:
-    """Call for a second look where the torque's series misses the law at the step's end.
-
-    The step is chosen by two coefficients. A law without a linear term, entered from uniform motion, has a series in
-    which most coefficients vanish, these two perhaps among them: only the defect itself tells that the step is too
-    long.
-    """
-    i = p.index
-    allowed = code.let(f"allowed{i}", f"tolerance*scale{i}*{p.inertia}*inverse_h")
-    code.store(p.row(layout, "allowed"), allowed)
-    code.let("defect", f"abs({horner(p.force, f'end_u{i}')} - end_T{i})*(1.0 - {p.locked})")
-    code.let("margin", f"margin if defect <= {allowed} else -1.0")
-
-
-def advance_source(layout: Layout) -> str:
-    """Source of ``advance(W)``: every lane's state and sums at the end of the part x of its step, and whether it needs
-    attention.
-    """
-    code = LaneCode(layout.lanes)
-    order = layout.order
-    x = code.load("x", layout.x)
-    h = code.load("h", layout.h)
-    taken = code.let("taken", f"{x}*{h}")
-    shaft = code.series("W", layout.speed, order + 1)
-    total = code.series("S", layout.sum, order + 1)
-
-    def add(row: int, amount: str) -> None:
-        code.store(row, f"{code.row(row)} + {amount}")
-
-    def over(names: list[str]) -> str:
-        """Integral over the time taken."""
-        return f"{h}*({integral(names, x)})"
-
-    def of_product(tag: str, a: list[str], b: list[str]) -> str:
-        return over([code.let(f"{tag}{k}", product(a, b, k)) for k in range(order)])
-
-    rotating = code.load("rotating", layout.rotating)
-    add(layout.sum_held, f"(1.0 - {rotating})*({over(total)})")
-    add(layout.time_held, f"(1.0 - {rotating})*{taken}")
-    add(layout.time_rotating, f"{rotating}*{taken}")
-    add(layout.time_driven, f"{code.row(layout.driven)}*{taken}")
-    add(layout.work_clutch, over(code.series("P", layout.power, order + 1)))
-    bounded = []
-    for i in range(layout.n):
-        base = layout.pendulums + i * layout.stride
-        w = code.series(f"w{i}_", base + layout.p_speed, order + 1)
-        drive = code.series(f"D{i}_", base + layout.p_drive, order)
-        torque = code.series(f"T{i}_", base + layout.p_torque, order + 1)
-        phi0 = code.load(f"phi{i}", base + layout.p_phi)
-        angle = [phi0, *(code.let(f"phi{i}_{k + 1}", f"{h}*{w[k]}*{1.0 / (k + 1)!r}") for k in range(order))]
-        add(base + layout.p_sum_phi, over(angle))
-        add(base + layout.p_sum_torque, over(torque))
-        add(base + layout.p_work_input, of_product(f"I{i}_", w, drive))
-        add(base + layout.p_work_loss, of_product(f"Q{i}_", w, w))
-        add(base + layout.p_time_engaged, f"{code.row(base + layout.p_engaged)}*{taken}")
-        add(base + layout.p_time_beyond, f"{code.row(base + layout.p_beyond)}*{taken}")
-        relative = [code.let(f"v{i}_{k}", f"{w[k]} - W{k}") for k in range(order)]
-        add(base + layout.p_u, over(relative))
-        code.store(base + layout.p_phi, code.let(f"phi_end{i}", horner(angle, x)))
-        code.store(base + layout.p_speed, code.let(f"w_end{i}", horner(w, x)))
-        bounded += [f"abs(phi_end{i}) < {ANGLE_BOUND!r}", f"abs(w_end{i}) < {SPEED_BOUND!r}"]
-    add(layout.turn, over(shaft))
-    code.store(layout.speed, code.let("W_end", horner(shaft, x)))
-    bounded.append(f"abs(W_end) < {SPEED_BOUND!r}")
-    add(layout.f, f"{taken}/{code.row(layout.period)}")
-    code.store(layout.steps, f"{code.row(layout.steps)} + (1.0 if {taken} > 0.0 else 0.0)")
-    # An event makes x < 1 or coincides with a stop; a NaN fails every comparison.
-    code.let("quiet", f"1.0 if {code.row(layout.h_free)} > {STEP_FLOOR!r}*{code.row(layout.period)} else 0.0")
-    for number, condition in enumerate(bounded):
-        code.let(f"ok{number}", f"1.0 if {condition} else 0.0")
-        code.let("quiet", f"quiet*ok{number}")
-    code.let("usual", f"1.0 if {code.row(layout.margin)} > 0.0 else 0.0")
-    code.store(layout.attention, f"1.0 - quiet*(1.0 - {code.row(layout.at_stop)})*usual")
-    return code.function("advance", "W", "State and sums of every lane at the end of its step.")
+        code.store(p.row(layout, "allowed"), f"tolerance*scale{p.index}*{p.inertia}/h")

@@ -143,7 +143,11 @@ def _start(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> None:
         if lock_together(W, Z, lay, lane, i, size):
             return
         share = lock_share(W, Z, lay, lane, i)
-        if share < EDGE:
+        # At the edge the trend decides. At a step's start the series tell it: w'' has the sign of the torque's rate.
+        bend = W[(base + lay.p_speed + 2) * lanes + lane] - W[(lay.speed + 2) * lanes + lane]
+        if abs(share) <= EDGE and Z[lane, EVENT_SMOOTH] == 0 and bend > 0.0:
+            state = LOCKED
+        elif share < EDGE:
             state = FREE
             Z[lane, SKIP_W + i] = 2 if share > -EDGE else 0
         elif share <= 1.0 - EDGE:

@@ -19,7 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.cache import cache_folder
-from engine.vibration_drive.equations import advance_source, step_source
+from engine.vibration_drive.advance import pendulum_advance, shaft_advance
+from engine.vibration_drive.bounds import pendulum_bounds, shaft_bounds
+from engine.vibration_drive.equations import series_loop
 from engine.vibration_drive.layout import Layout, make_layout
 
 Floats = NDArray[np.float64]
@@ -29,7 +31,8 @@ _MODULE = '''"""Generated kernel: {n} pendulum(s), {coefficients} clutch coeffic
 
 import numpy as np
 
-from engine.jit import compiled, contracted
+from engine.jit import compiled
+from engine.taylor.lowering import lane_loops
 from engine.vibration_drive.lanes import load_case, look, next_stop, record, settle
 from engine.vibration_drive.layout import Layout, as_record
 
@@ -37,9 +40,16 @@ LAYOUT = {layout!r}
 RECORD = as_record(LAYOUT)
 
 
+# Series, step size, distances to guards and extrema of every lane.
+step = lane_loops("""
 {step}
+""", "tolerance", "log2_tolerance")
 
+# State and sums of every lane at the end of the part x of its step.
+advance = lane_loops("""
 {advance}
+""", "most_steps", "unused")
+
 
 @compiled
 def integrate(
@@ -67,9 +77,9 @@ def integrate(
                 look(W, Z, lay, lane, g, stack)
         if recorded < times.shape[0]:
             recorded = record(W, Z, lay, 0, times, recorded, g, samples, states)
-        advance(W)
+        advance(W, float(most_steps), 0.0)
         for lane in range({lanes}):
-            if busy[lane] and (W[{attention} + lane] != 0.0 or W[{steps} + lane] >= most_steps):
+            if busy[lane] and W[{attention} + lane] != 0.0:
                 busy[lane] = settle(W, Z, lay, lane, cases, turns, sums, most_steps, most_events)
                 running -= not busy[lane]
 '''
@@ -105,11 +115,14 @@ def lane_count() -> int:
 
 def source(layout: Layout) -> str:
     """The text of the kernel module for a layout."""
+    pendulums = range(layout.n)
+    step = [series_loop(layout), shaft_bounds(layout), *(pendulum_bounds(layout, i) for i in pendulums)]
+    advance = [*(pendulum_advance(layout, i) for i in pendulums), shaft_advance(layout)]
     return _MODULE.format(
-        n=layout.n, coefficients=layout.coefficients, order=layout.order, lanes=layout.lanes,
-        attention=layout.attention * layout.lanes, steps=layout.steps * layout.lanes,
+        n=layout.n, coefficients=layout.coefficients, order=layout.order, lanes=layout.lanes, layout=layout,
         margin=layout.margin * layout.lanes, excess=layout.excess * layout.lanes,
-        layout=layout, step=step_source(layout), advance=advance_source(layout),
+        attention=layout.attention * layout.lanes,
+        step="\n".join(step), advance="\n".join(advance),
     )  # fmt: skip
 
 

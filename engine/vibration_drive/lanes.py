@@ -9,9 +9,9 @@ from engine.endings import ENDING_CODES, Ending
 from engine.jit import compiled
 from engine.taylor.roots import evaluate
 from engine.vibration_drive import states as ev
+from engine.vibration_drive.advance import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR
 from engine.vibration_drive.automaton import Clutch, Shaft
 from engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS
-from engine.vibration_drive.equations import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR
 from engine.vibration_drive.events import locate, transit
 from engine.vibration_drive.layout import Layout
 from engine.vibration_drive.states import law, set_clutch, set_shaft

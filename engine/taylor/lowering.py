@@ -1,0 +1,129 @@
+"""From the text of lane loops straight to LLVM: a compiler for the arithmetic that ``straight`` writes.
+
+The loops are thousands of assignments; numba's type inference alone takes longer over them than everything else
+together, although all of it is double precision. Here each statement becomes the LLVM instructions it means, inside the
+numba function that calls the loops (measured in benchmarks/start.py; docs/adr/0002).
+
+The language is a subset of Python: ``for lane in range(N)`` around assignments to names and to ``W[k + lane]``; ``+ - *
+/``, comparisons, ``or``, ``a if c else b``, ``abs``, and the two views of a double's bits of ``straight.log2`` and
+``exp2``.
+"""
+
+import ast
+from collections.abc import Callable
+from typing import Any, cast
+
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.extending import intrinsic
+
+_DOUBLE = ir.DoubleType()
+_INT = ir.IntType(64)
+#: Products and sums may become fused multiply-adds; nothing is reordered.
+_FLAGS = ("contract",)
+_ARITHMETIC = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"}
+_COMPARISONS = {ast.Lt: "<", ast.Gt: ">", ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
+
+
+class _Lane:
+    """Lowers the statements of one loop body; ``names`` maps local names to LLVM values."""
+
+    def __init__(self, builder: Any, workspace: Any, lane: Any, names: dict[str, Any]) -> None:
+        self.builder, self.workspace, self.lane, self.names = builder, workspace, lane, names
+
+    def statement(self, node: ast.stmt) -> None:
+        assert isinstance(node, ast.Assign)
+        target, value = node.targets[0], self.value(node.value)
+        if isinstance(target, ast.Name):
+            self.names[target.id] = value
+        else:
+            self.builder.store(value, self.element(target))
+
+    def element(self, node: ast.expr) -> Any:
+        """Address of ``W[k + lane]``."""
+        assert isinstance(node, ast.Subscript)
+        assert isinstance(node.slice, ast.BinOp)
+        assert isinstance(node.slice.left, ast.Constant)
+        index = self.builder.add(_INT(node.slice.left.value), self.lane, flags=("nsw", "nuw"))
+        return self.builder.gep(self.workspace, [index], inbounds=True)
+
+    def value(self, node: ast.expr) -> Any:
+        lower = {
+            ast.Constant: self._constant,
+            ast.Name: self._name,
+            ast.Subscript: self._subscript,
+            ast.BinOp: self._bin_op,
+            ast.UnaryOp: self._unary_op,
+            ast.Compare: self._compare,
+            ast.BoolOp: self._bool_op,
+            ast.IfExp: self._if_exp,
+            ast.Call: self._call,
+        }[type(node)]
+        return lower(node)  # type: ignore[operator]
+
+    def _constant(self, node: ast.Constant) -> Any:
+        assert isinstance(node.value, (int, float))
+        return _DOUBLE(float(node.value))
+
+    def _name(self, node: ast.Name) -> Any:
+        return self.names[node.id]
+
+    def _subscript(self, node: ast.Subscript) -> Any:
+        return self.builder.load(self.element(node))
+
+    def _bin_op(self, node: ast.BinOp) -> Any:
+        operation = getattr(self.builder, _ARITHMETIC[type(node.op)])
+        return operation(self.value(node.left), self.value(node.right), flags=_FLAGS)
+
+    def _unary_op(self, node: ast.UnaryOp) -> Any:
+        assert isinstance(node.op, ast.USub)
+        return self.builder.fneg(self.value(node.operand))
+
+    def _compare(self, node: ast.Compare) -> Any:
+        sign = _COMPARISONS[type(node.ops[0])]
+        return self.builder.fcmp_ordered(sign, self.value(node.left), self.value(node.comparators[0]))
+
+    def _bool_op(self, node: ast.BoolOp) -> Any:
+        assert isinstance(node.op, ast.Or)
+        return self.builder.or_(self.value(node.values[0]), self.value(node.values[1]))
+
+    def _if_exp(self, node: ast.IfExp) -> Any:
+        return self.builder.select(self.value(node.test), self.value(node.body), self.value(node.orelse))
+
+    def _call(self, node: ast.Call) -> Any:
+        assert isinstance(node.func, ast.Name)
+        argument = self.value(node.args[0])
+        if node.func.id == "abs":
+            return self.builder.call(self.builder.module.declare_intrinsic("llvm.fabs", [_DOUBLE]), [argument])
+        if node.func.id == "bits_of":
+            return self.builder.sitofp(self.builder.bitcast(argument, _INT), _DOUBLE)
+        assert node.func.id == "of_bits"
+        return self.builder.bitcast(self.builder.fptosi(argument, _INT), _DOUBLE)
+
+
+def lane_loops(text: str, first: str, second: str) -> Callable[[Any, float, float], None]:
+    """A function ``(W, a, b)`` for compiled code that runs the loops in ``text`` over the float64 workspace ``W``.
+
+    ``first`` and ``second`` are the names under which the loops know the numbers a and b. The function can only be
+    called from a numba function; it is compiled as part of that one.
+    """
+    tree = ast.parse(text)
+
+    @intrinsic
+    def run(typing_context: Any, W: Any, a: Any, b: Any) -> Any:  # noqa: ARG001
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            array = context.make_array(signature.args[0])(context, builder, arguments[0])
+            numbers = {first: arguments[1], second: arguments[2]}
+            for loop in tree.body:
+                assert isinstance(loop, ast.For)
+                assert isinstance(loop.iter, ast.Call)
+                assert isinstance(loop.iter.args[0], ast.Constant)
+                with cgutils.for_range(builder, _INT(loop.iter.args[0].value)) as counter:
+                    lane = _Lane(builder, array.data, counter.index, dict(numbers))
+                    for statement in loop.body:
+                        lane.statement(statement)
+            return context.get_dummy_value()
+
+        return types.void(W, types.float64, types.float64), generate
+
+    return cast(Callable[[Any, float, float], None], run)
