@@ -6,13 +6,22 @@ from enum import StrEnum
 
 
 class Ending(StrEnum):
-    """Ending of one case as the engine sees it (MODEL.md A5). The member's value is what is stored and shown."""
+    """Ending of one case as the engine sees it (MODEL.md A5). The member's value is what is stored and shown.
+
+    New members go to the end: positions are stored in compiled code.
+    """
 
     OK = "ok"
     ACCURACY_NOT_REACHED = "accuracy_not_reached"
     CHATTER = "chatter"
     STEP_BUDGET = "step_budget"
     DIVERGED = "diverged"
+    INERTIA_INSUFFICIENT = "inertia_insufficient"
+    UNBALANCED_WORK = "unbalanced_work"
+    CANNOT_ASSEMBLE = "cannot_assemble"
+    NEGATIVE_INERTIA = "negative_inertia"
+    MOTOR_STALLED = "motor_stalled"
+    QUADRATURE_NOT_REACHED = "quadrature_not_reached"
 
     @property
     def sentence(self) -> str:
@@ -35,6 +44,27 @@ _SENTENCES = {
     ),
     Ending.DIVERGED: (
         "An angle or a speed grew beyond every bound (or was no number): the parameters describe no steady machine."
+    ),
+    Ending.INERTIA_INSUFFICIENT: (
+        "The inertia is insufficient for the mean speed asked for: the shaft would stop within the cycle. The result "
+        "least_mean_speed tells the least feasible mean speed."
+    ),
+    Ending.UNBALANCED_WORK: (
+        "Drive and resistance do not do opposite work over the cycle, so there is no steady motion: scale the drive, "
+        "let it be constant, or correct the torques."
+    ),
+    Ending.CANNOT_ASSEMBLE: (
+        "The mechanism cannot be assembled at every angle of the shaft: the result assembly.angle tells the first "
+        "angle at which its links do not reach each other."
+    ),
+    Ending.NEGATIVE_INERTIA: "The reduced inertia is not positive at every angle of the shaft.",
+    Ending.MOTOR_STALLED: (
+        "The motor has no steady cycle with this load: the resistance stalls it. Choose a stronger motor or more "
+        "inertia."
+    ),
+    Ending.QUADRATURE_NOT_REACHED: (
+        "A torque or the inertia changes too abruptly for its integral to be found to 1e-10: split the formula where "
+        "it jumps, or smooth the table."
     ),
 }
 

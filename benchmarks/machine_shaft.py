@@ -1,0 +1,85 @@
+"""How many machines a second one core solves, and what the definition of the mean and the kind of axis cost.
+
+All in one run of this program, in turn; the ratios are to the first line.
+
+    python benchmarks/machine_shaft.py [--cases 2000] [--repeats 3]
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from engine.machine_shaft.simulate import estimate_seconds, simulate
+from engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
+from engine.machine_shaft.tables import Table
+
+PRESS = MachineSpec(
+    mechanism=MechanismChoice("slider_crank"), operation=OperationChoice("force", "steps", steps=1), balance="constant"
+)
+NUMBERS: dict[str, Any] = {
+    "mean_speed": 4.0 * math.pi,
+    "drive.inertia": 15.0,
+    "mechanism.slider_crank.crank": 0.1,
+    "mechanism.slider_crank.rod": 0.4,
+    "mechanism.slider_crank.rod_centre": 0.16,
+    "mechanism.slider_crank.rod_mass": 6.0,
+    "mechanism.slider_crank.rod_inertia": 0.12,
+    "mechanism.slider_crank.ram_mass": 20.0,
+    "operation.steps.0.from": math.radians(120.0),
+    "operation.steps.0.to": math.radians(180.0),
+    "operation.steps.0.value": 20e3,
+}
+
+
+def studies(cases: int) -> dict[str, tuple[MachineSpec, Mapping[str, Any]]]:
+    """The course's three questions, and what makes a case dearer."""
+    inertia = NUMBERS | {"drive.inertia": np.linspace(5.0, 50.0, cases)}
+    ram = NUMBERS | {"mechanism.slider_crank.ram_mass": np.linspace(1.0, 60.0, cases)}
+    ram["mechanism.slider_crank.crank"] = np.linspace(0.08, 0.12, cases)
+    onset = NUMBERS | {"operation.steps.0.from": np.radians(np.linspace(100.0, 140.0, cases))}
+    motor = {path: value for path, value in inertia.items() if path != "mean_speed"}
+    motor |= {"drive.motor.synchronous_speed": 13.0, "drive.motor.breakdown_torque": 500.0}
+    motor |= {"drive.motor.breakdown_slip": 0.15}
+    rows = tuple((math.radians(a), 130.0 + 40.0 * math.sin(math.radians(a))) for a in range(0, 360, 10))
+    tabled = replace(PRESS, balance="scale", drive=Drive("table", table=Table(rows)))
+    return {
+        "drive inertia, midrange": (PRESS, inertia),
+        "drive inertia, mean over angle": (replace(PRESS, mean_speed_is="angle"), inertia),
+        "drive inertia, mean over time": (replace(PRESS, mean_speed_is="time"), inertia),
+        "masses and geometry": (PRESS, ram),
+        "onset of the force": (PRESS, onset),
+        "with the flywheel for an irregularity": (PRESS, inertia | {"wanted_irregularity": 0.05}),
+        "driving torque from a table of 36 rows": (tabled, inertia),
+        "motor, limit cycle": (replace(PRESS, balance="motor", drive=Drive(motor="kloss")), motor),
+    }
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cases", type=int, default=2_000)
+    parser.add_argument("--repeats", type=int, default=3)
+    arguments = parser.parse_args()
+    first = 0.0
+    print(f"{'':40}{'cases/s':>10}{'ratio':>8}{'estimate':>10}")
+    for name, (spec, numbers) in studies(arguments.cases).items():
+        simulate(spec, numbers, cases=arguments.cases)
+        best = math.inf
+        for _ in range(arguments.repeats):
+            start = time.perf_counter()
+            simulate(spec, numbers, cases=arguments.cases)
+            best = min(best, time.perf_counter() - start)
+        rate = arguments.cases / best
+        first = first or rate
+        print(f"{name:40}{rate:10.0f}{rate / first:8.2f}{1.0 / estimate_seconds(spec):10.0f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,359 @@
+"""Formulas of the shaft's angle: read by a parser of our own, never by the language's.
+
+Grammar, loosest first (``^`` and ``**`` are the same and bind to the right)::
+
+    comparison := sum [("<" | "<=" | ">" | ">=") sum]
+    sum        := product {("+" | "-") product}
+    product    := sign {("*" | "/") sign}
+    sign       := {"+" | "-"} power
+    power      := atom ["^" sign]
+    atom       := number | name | name "(" comparison {"," comparison} ")" | "(" comparison ")"
+
+A formula is evaluated together with its derivative by its first variable.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.machine_shaft.problems import ExpressionError
+
+Floats = NDArray[np.float64]
+Value = Floats | float
+#: Value and derivative; a derivative that is the float 0.0 is known to vanish.
+Dual = tuple[Value, Value]
+
+MAX_LENGTH = 2_000
+MAX_NODES = 500
+MAX_DEPTH = 40
+
+CONSTANTS: Mapping[str, float] = {"pi": float(np.pi), "deg": float(np.pi) / 180.0}
+
+_TOKEN = re.compile(
+    r"\s*(?:(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)|(?P<name>[A-Za-z_][A-Za-z_0-9]*)"
+    r"|(?P<sign>\*\*|<=|>=|[-+*/^(),<>]))"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One step of a formula: what it does, to which nodes, and where it stands in the text."""
+
+    kind: str
+    position: int
+    parts: tuple["Node", ...] = ()
+    number: float = 0.0
+
+
+def _known_zero(derivative: Value) -> bool:
+    return isinstance(derivative, float) and derivative == 0.0
+
+
+def _chain(outer: Callable[[], Value], inner: Value) -> Value:
+    return 0.0 if _known_zero(inner) else outer() * inner
+
+
+def _power(u: Dual, v: Dual) -> Dual:
+    base, exponent = np.asarray(u[0], dtype=np.float64), v[0]
+    value = base**exponent
+    slope = _chain(lambda: exponent * base ** (np.asarray(exponent) - 1.0), u[1])
+    return value, slope + _chain(lambda: value * np.log(base), v[1])
+
+
+def _pick(condition: Value | NDArray[np.bool_], u: Dual, v: Dual) -> Dual:
+    chosen = np.asarray(condition) != 0.0
+    flat = _known_zero(u[1]) and _known_zero(v[1])
+    return np.where(chosen, u[0], v[0]), 0.0 if flat else np.where(chosen, u[1], v[1])
+
+
+def _atan2(y: Dual, x: Dual) -> Dual:
+    size = np.asarray(x[0]) ** 2 + np.asarray(y[0]) ** 2
+    return np.arctan2(y[0], x[0]), _chain(lambda: x[0] / size, y[1]) + _chain(lambda: -y[0] / size, x[1])
+
+
+def _mod(u: Dual, v: Dual) -> Dual:
+    quotient = np.floor(u[0] / np.asarray(v[0]))
+    return u[0] - v[0] * quotient, u[1] - _chain(lambda: quotient, v[1])
+
+
+def _extreme(parts: list[Dual], larger: bool) -> Dual:
+    best = parts[0]
+    for other in parts[1:]:
+        better = np.asarray(best[0]) >= other[0] if larger else np.asarray(best[0]) <= other[0]
+        best = _pick(better, best, other)
+    return best
+
+
+#: Functions of one variable: value and derivative.
+_SMOOTH: Mapping[str, tuple[Callable[[Value], Value], Callable[[Value], Value]]] = {
+    "sin": (np.sin, np.cos),
+    "cos": (np.cos, lambda u: -np.sin(u)),
+    "tan": (np.tan, lambda u: 1.0 / np.cos(u) ** 2),
+    "asin": (np.arcsin, lambda u: 1.0 / np.sqrt(1.0 - u * u)),
+    "acos": (np.arccos, lambda u: -1.0 / np.sqrt(1.0 - u * u)),
+    "atan": (np.arctan, lambda u: 1.0 / (1.0 + u * u)),
+    "sinh": (np.sinh, np.cosh),
+    "cosh": (np.cosh, np.sinh),
+    "tanh": (np.tanh, lambda u: 1.0 / np.cosh(u) ** 2),
+    "exp": (np.exp, np.exp),
+    "log": (np.log, lambda u: 1.0 / u),
+    "sqrt": (np.sqrt, lambda u: 0.5 / np.sqrt(u)),
+    "abs": (np.abs, np.sign),
+    "sign": (np.sign, lambda u: 0.0 * u),
+    "floor": (np.floor, lambda u: 0.0 * u),
+    "step": (lambda u: np.where(np.asarray(u) >= 0.0, 1.0, 0.0), lambda u: 0.0 * u),
+}
+#: Functions of more variables: fewest and most arguments.
+_ARITY: Mapping[str, tuple[int, int]] = {
+    **dict.fromkeys(_SMOOTH, (1, 1)),
+    "atan2": (2, 2),
+    "mod": (2, 2),
+    "min": (2, 16),
+    "max": (2, 16),
+    "if": (3, 3),
+}
+#: Names that a constant or variable may not have.
+RESERVED = frozenset(_ARITY) | frozenset(CONSTANTS)
+_COMPARE: Mapping[str, Callable[[Value, Value], NDArray[np.bool_]]] = {
+    "<": np.less,
+    "<=": np.less_equal,
+    ">": np.greater,
+    ">=": np.greater_equal,
+}
+
+
+class _Parser:
+    def __init__(self, text: str, names: frozenset[str]) -> None:
+        self.text, self.names, self.nodes, self.depth = text, names, 0, 0
+        self.tokens: list[tuple[str, str, int]] = []
+        position = 0
+        end = len(text.rstrip())
+        while position < end:
+            match = _TOKEN.match(text, position)
+            if match is None:
+                raise ExpressionError(f"{text[position:].lstrip()[:1]!r} means nothing here", self._bare(position))
+            kind = match.lastgroup or ""
+            self.tokens.append((kind, match.group(kind), match.start(kind)))
+            position = match.end()
+        self.index = 0
+
+    def _bare(self, position: int) -> int:
+        rest = self.text[position:]
+        return position + len(rest) - len(rest.lstrip())
+
+    def peek(self) -> str:
+        return self.tokens[self.index][1] if self.index < len(self.tokens) else ""
+
+    def position(self) -> int:
+        return self.tokens[self.index][2] if self.index < len(self.tokens) else len(self.text)
+
+    def node(self, kind: str, position: int, *parts: Node, number: float = 0.0) -> Node:
+        self.nodes += 1
+        if self.nodes > MAX_NODES:
+            raise ExpressionError(f"the formula has more than {MAX_NODES} operations", position)
+        return Node(kind, position, parts, number)
+
+    def expect(self, sign: str) -> None:
+        if self.peek() != sign:
+            found = repr(self.peek()) if self.peek() else "the end"
+            raise ExpressionError(f"{sign!r} expected, {found} found", self.position())
+        self.index += 1
+
+    def comparison(self) -> Node:
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise ExpressionError(f"the formula is nested more than {MAX_DEPTH} deep", self.position())
+        left = self.chain(("+", "-"), lambda: self.chain(("*", "/"), self.sign))
+        if self.peek() in _COMPARE:
+            position, kind = self.position(), self.peek()
+            self.index += 1
+            left = self.node(kind, position, left, self.chain(("+", "-"), lambda: self.chain(("*", "/"), self.sign)))
+        self.depth -= 1
+        return left
+
+    def chain(self, signs: tuple[str, ...], part: Callable[[], Node]) -> Node:
+        left = part()
+        while self.peek() in signs:
+            position, kind = self.position(), self.peek()
+            self.index += 1
+            left = self.node(kind, position, left, part())
+        return left
+
+    def sign(self) -> Node:
+        negative, position = False, self.position()
+        while self.peek() in {"+", "-"}:
+            negative ^= self.peek() == "-"
+            self.index += 1
+        power = self.power()
+        return self.node("negative", position, power) if negative else power
+
+    def power(self) -> Node:
+        base = self.atom()
+        if self.peek() in {"^", "**"}:
+            position = self.position()
+            self.depth += 1
+            if self.depth > MAX_DEPTH:
+                raise ExpressionError(f"the formula is nested more than {MAX_DEPTH} deep", position)
+            self.index += 1
+            base = self.node("^", position, base, self.sign())
+            self.depth -= 1
+        return base
+
+    def atom(self) -> Node:
+        position = self.position()
+        if self.index >= len(self.tokens):
+            raise ExpressionError("a number, a name or a bracket expected, the end found", position)
+        kind, text, _ = self.tokens[self.index]
+        self.index += 1
+        if kind == "number":
+            number = float(text)
+            if not np.isfinite(number):
+                raise ExpressionError(f"the number {text} is too large", position)
+            return self.node("number", position, number=number)
+        if kind == "name":
+            return self.named(text, position)
+        if text == "(":
+            inner = self.comparison()
+            self.expect(")")
+            return inner
+        raise ExpressionError(f"a number, a name or a bracket expected, {text!r} found", position)
+
+    def named(self, name: str, position: int) -> Node:
+        if name in _ARITY:
+            self.expect("(")
+            parts = [self.comparison()]
+            while self.peek() == ",":
+                self.index += 1
+                parts.append(self.comparison())
+            self.expect(")")
+            fewest, most = _ARITY[name]
+            if not fewest <= len(parts) <= most:
+                wanted = str(fewest) if fewest == most else f"{fewest} to {most}"
+                raise ExpressionError(f"{name} takes {wanted} arguments, not {len(parts)}", position)
+            return self.node(name, position, *parts)
+        if name in CONSTANTS:
+            return self.node("number", position, number=CONSTANTS[name])
+        if name in self.names:
+            return self.node(f"name {name}", position)
+        known = ", ".join(sorted(self.names | RESERVED))
+        raise ExpressionError(f"{name[:40]!r} is not known; known are {known}", position)
+
+
+class Expression:
+    """A formula.
+
+    Parameters
+    ----------
+    text : str
+        See the module's grammar.
+    names : iterable of str
+        Variables it may use; every value is an array or a number when it is evaluated.
+
+    Raises
+    ------
+    ExpressionError
+        If it cannot be read; tells where.
+    """
+
+    def __init__(self, text: str, names: Iterable[str] = ("phi",)) -> None:
+        if len(text) > MAX_LENGTH:
+            raise ExpressionError(f"the formula is longer than {MAX_LENGTH} characters", MAX_LENGTH)
+        parser = _Parser(text, frozenset(names))
+        self.text = text
+        self.root = parser.comparison()
+        if parser.index < len(parser.tokens):
+            raise ExpressionError(f"{parser.peek()!r} is not expected here", parser.position())
+        self._switches: list[Callable[[Mapping[str, Dual]], Value]] = []
+        self._find_switches(self.root)
+
+    @property
+    def switch_count(self) -> int:
+        """How many quantities there are whose change of sign is a jump or a kink of the formula."""
+        return len(self._switches)
+
+    def evaluate(self, variables: Mapping[str, Dual]) -> Dual:
+        """Value and derivative; ``variables`` gives both for every name. Not-finite values are left for the caller."""
+        with np.errstate(all="ignore"):
+            return _evaluate(self.root, variables)
+
+    def __call__(self, **variables: Value) -> Floats:
+        """Value of the formula, broadcast over its variables."""
+        value, _ = self.evaluate({name: (given, 0.0) for name, given in variables.items()})
+        shape = np.broadcast_shapes(*(np.shape(given) for given in variables.values()))
+        return np.broadcast_to(np.asarray(value, dtype=np.float64), shape)
+
+    def switches(self, variables: Mapping[str, Dual]) -> list[Value]:
+        """The quantities whose change of sign is a jump or a kink of the formula."""
+        with np.errstate(all="ignore"):
+            return [switch(variables) for switch in self._switches]
+
+    def _find_switches(self, node: Node) -> None:
+        parts = node.parts
+        for part in parts:
+            self._find_switches(part)
+        if node.kind in {"abs", "sign", "step"}:
+            self._switches.append(lambda v: _evaluate(parts[0], v)[0])
+        elif node.kind in {"floor", "mod"}:
+            # Each whole turn of the quotient is a change of sign of its sine.
+            self._switches.append(lambda v: np.sin(np.pi * _evaluate(parts[0], v)[0] / _divisor(parts, v)))
+        elif node.kind in _COMPARE or node.kind in {"min", "max"}:
+            for i in range(len(parts)):
+                for j in range(i):
+                    self._switches.append(_difference(parts[i], parts[j]))
+        elif node.kind == "atan2":
+            self._switches.append(lambda v: _turn(_evaluate(parts[0], v)[0], _evaluate(parts[1], v)[0]))
+        elif node.kind == "if" and parts[0].kind not in _COMPARE:
+            self._switches.append(lambda v: np.abs(np.sign(_evaluate(parts[0], v)[0])) - 0.5)
+
+
+def _divisor(parts: tuple[Node, ...], variables: Mapping[str, Dual]) -> Value:
+    return np.asarray(_evaluate(parts[1], variables)[0]) if len(parts) > 1 else 1.0
+
+
+def _turn(y: Value, x: Value) -> Value:
+    return np.where(np.asarray(x) < 0.0, y, 1.0)
+
+
+def _difference(left: Node, right: Node) -> Callable[[Mapping[str, Dual]], Value]:
+    return lambda v: _evaluate(left, v)[0] - _evaluate(right, v)[0]
+
+
+def _evaluate(node: Node, variables: Mapping[str, Dual]) -> Dual:
+    kind = node.kind
+    if kind == "number":
+        return node.number, 0.0
+    if kind.startswith("name "):
+        return variables[kind[5:]]
+    parts = [_evaluate(part, variables) for part in node.parts]
+    u = parts[0]
+    if kind in _SMOOTH:
+        value, slope = _SMOOTH[kind]
+        return value(u[0]), _chain(lambda: slope(u[0]), u[1])
+    if kind == "negative":
+        return -u[0], 0.0 if _known_zero(u[1]) else -u[1]
+    if kind in {"min", "max"}:
+        return _extreme(parts, kind == "max")
+    if kind == "if":
+        return _pick(u[0], parts[1], parts[2])
+    v = parts[1]
+    if kind in _COMPARE:
+        return np.where(_COMPARE[kind](u[0], v[0]), 1.0, 0.0), 0.0
+    return _arithmetic(kind, u, v)
+
+
+def _arithmetic(kind: str, u: Dual, v: Dual) -> Dual:
+    if kind == "+":
+        return u[0] + v[0], u[1] + v[1]
+    if kind == "-":
+        return u[0] - v[0], u[1] - v[1]
+    if kind == "*":
+        return u[0] * v[0], _chain(lambda: v[0], u[1]) + _chain(lambda: u[0], v[1])
+    if kind == "/":
+        quotient = u[0] / np.asarray(v[0], dtype=np.float64)
+        return quotient, _chain(lambda: 1.0 / np.asarray(v[0]), u[1]) - _chain(lambda: quotient / v[0], v[1])
+    if kind == "^":
+        return _power(u, v)
+    return _atan2(u, v) if kind == "atan2" else _mod(u, v)

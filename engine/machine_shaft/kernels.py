@@ -1,0 +1,260 @@
+"""Compiled loops under the panels: products with small matrices, Legendre series, their roots and highest values.
+
+Arrays are C-contiguous float64. One case's numbers never depend on another's.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.jit import compiled
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@compiled
+def product(matrix: Floats, values: Floats, out: Floats) -> None:
+    """``out[n, r] = sum over j of matrix[r, j] * values[n, j]``, summed in the order of j."""
+    rows, terms = matrix.shape
+    for n in range(len(values)):
+        for r in range(rows):
+            total = 0.0
+            for j in range(terms):
+                total += matrix[r, j] * values[n, j]
+            out[n, r] = total
+
+
+@compiled
+def integrals(values: Floats, half: Floats, weights: Floats, out: Floats) -> None:
+    """Integral over each case's panels, summed in their order; panels of no length are not looked at."""
+    for case in range(len(values)):
+        row = case if len(half) > 1 else 0
+        total = 0.0
+        for p in range(values.shape[1]):
+            if half[row, p] > 0.0:
+                part = 0.0
+                for j in range(values.shape[2]):
+                    part += weights[j] * values[case, p, j]
+                total += half[row, p] * part
+        out[case] = total
+
+
+@compiled
+def series_value(coefficients: Floats, count: int, t: float) -> float:
+    """Legendre series of the first ``count`` of ``coefficients`` at ``t``, by Clenshaw's recurrence."""
+    b1 = b2 = 0.0
+    for k in range(count - 1, 0, -1):
+        b1, b2 = coefficients[k] + (2 * k + 1) / (k + 1) * t * b1 - (k + 1) / (k + 2) * b2, b1
+    total: float = coefficients[0] + t * b1 - 0.5 * b2
+    return total
+
+
+@compiled
+def series_values(coefficients: Floats, t: Floats, out: Floats) -> None:
+    """Each row's series at its own ``t``."""
+    for n in range(len(t)):
+        out[n] = series_value(coefficients[n], coefficients.shape[1], t[n])
+
+
+@compiled
+def series_root(coefficients: Floats, count: int, a: float, b: float, fa: float, fb: float) -> float:
+    """Root between ``a`` and ``b``, where the series has ``fa`` and ``fb``, by the Illinois rule."""
+    if fa == 0.0 or not fa * fb < 0.0:
+        return a if abs(fa) <= abs(fb) else b
+    x = b
+    for step in range(80):
+        before = x
+        x = b - fb * (b - a) / (fb - fa)
+        if step % 8 == 7 or not min(a, b) < x < max(a, b):
+            x = 0.5 * (a + b)
+        fx = series_value(coefficients, count, x)
+        if fx == 0.0:
+            return x
+        if fx * fb < 0.0:
+            a, fa = b, fb
+        else:
+            fa *= 0.5
+        b, fb = x, fx
+        if abs(b - a) <= 4e-16 or (step > 0 and x == before):
+            break
+    return x
+
+
+@compiled
+def series_roots(coefficients: Floats, low: Floats, high: Floats, f_low: Floats, f_high: Floats, out: Floats) -> None:
+    """Each row's root in its own bracket."""
+    for n in range(len(low)):
+        out[n] = series_root(coefficients[n], coefficients.shape[1], low[n], high[n], f_low[n], f_high[n])
+
+
+@compiled
+def highest(
+    values: Floats,
+    sign: float,
+    half: Floats,
+    places: Floats,
+    ends: Floats,
+    slopes: Floats,
+    to_series: Floats,
+    to_slope: Floats,
+    value: Floats,
+    panel: Integers,
+    t: Floats,
+) -> None:
+    """Highest value of ``sign * values`` over each case's panels, their ends and the hills within them.
+
+    Parameters
+    ----------
+    values : array, shape (cases, panels, nodes)
+    sign : float
+        1, or -1 for the lowest.
+    half : array, shape (cases or 1, panels)
+        Half lengths; panels of no length are not looked at.
+    places : array, shape (nodes + 2,)
+        Ends and nodes within -1 .. 1.
+    ends, slopes, to_series, to_slope : arrays
+        Matrices from the nodes' values to the ends' values, the slopes at ``places``, the Legendre series, and from
+        that to the series of its derivative.
+    value, panel, t : arrays, shape (cases,), written
+        The value (with its own sign), and where it is; NaN for a case with a value that is no number.
+    """
+    cases, panels, nodes = values.shape
+    samples = np.empty(nodes + 2)
+    slope = np.empty(nodes + 2)
+    series = np.empty(nodes)
+    derivative = np.empty(nodes - 1)
+    for case in range(cases):
+        row = case if len(half) > 1 else 0
+        best, best_panel, best_t = -np.inf, 0, -1.0
+        known = True
+        for p in range(panels):
+            if half[row, p] == 0.0:
+                continue
+            for j in range(nodes):
+                known = known and not np.isnan(values[case, p, j])
+                if sign * values[case, p, j] > best:
+                    best, best_panel, best_t = sign * values[case, p, j], p, places[j + 1]
+            for e in range(2):
+                total = 0.0
+                for j in range(nodes):
+                    total += ends[e, j] * values[case, p, j]
+                if sign * total > best:
+                    best, best_panel, best_t = sign * total, p, places[e * (nodes + 1)]
+        if not known:
+            value[case], panel[case], t[case] = np.nan, 0, -1.0
+            continue
+        for p in range(panels):
+            if half[row, p] == 0.0:
+                continue
+            for i in range(nodes + 2):
+                total = 0.0
+                for j in range(nodes):
+                    total += slopes[i, j] * values[case, p, j]
+                slope[i] = sign * total
+            for i in range(nodes + 1):
+                if not (slope[i] > 0.0 and slope[i + 1] < 0.0):
+                    continue
+                if i == 0:
+                    total = 0.0
+                    for j in range(nodes):
+                        total += ends[0, j] * values[case, p, j]
+                    samples[0] = sign * total
+                else:
+                    samples[i] = sign * values[case, p, i - 1]
+                # A hill cannot rise above its tangent; those that cannot reach the best so far are left out.
+                if not samples[i] + slope[i] * (places[i + 1] - places[i]) > best:
+                    continue
+                for k in range(nodes):
+                    total = 0.0
+                    for j in range(nodes):
+                        total += to_series[k, j] * values[case, p, j]
+                    series[k] = sign * total
+                for k in range(nodes - 1):
+                    total = 0.0
+                    for j in range(nodes):
+                        total += to_slope[k, j] * series[j]
+                    derivative[k] = total
+                x = series_root(derivative, nodes - 1, places[i], places[i + 1], slope[i], slope[i + 1])
+                height = series_value(series, nodes, x)
+                if height > best:
+                    best, best_panel, best_t = height, p, x
+        value[case], panel[case], t[case] = sign * best, best_panel, best_t
+
+
+@compiled
+def solve_two(matrix: Floats, right: Floats) -> None:
+    """Solve in place for the two columns of ``right``, by elimination with pivots."""
+    n = len(matrix)
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > abs(matrix[pivot, k]):
+                pivot = i
+        if pivot != k:
+            for j in range(n):
+                matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+            for j in range(2):
+                right[k, j], right[pivot, j] = right[pivot, j], right[k, j]
+        for i in range(k + 1, n):
+            factor = matrix[i, k] / matrix[k, k]
+            if factor != 0.0:
+                for j in range(k + 1, n):
+                    matrix[i, j] -= factor * matrix[k, j]
+                for j in range(2):
+                    right[i, j] -= factor * right[k, j]
+    for k in range(n - 1, -1, -1):
+        for j in range(2):
+            total = right[k, j]
+            for i in range(k + 1, n):
+                total -= matrix[k, i] * right[i, j]
+            right[k, j] = total / matrix[k, k]
+
+
+@compiled
+def periodic_linear(
+    slope: Floats, source: Floats, half: Floats, running: Floats, weights: Floats, energy: Floats, start: Floats
+) -> None:
+    """Periodic solution of ``T' = slope T + source`` by collocation at the nodes, panel after panel.
+
+    Parameters
+    ----------
+    slope, source : arrays, shape (cases, panels, nodes)
+    half : array, shape (cases or 1, panels)
+    running, weights : arrays, shape (nodes, nodes) and (nodes,)
+        From values at the nodes to integrals within -1 .. 1.
+    energy : array, shape (cases, panels, nodes), written
+        T at the nodes.
+    start : array, shape (cases,), written
+        T at the angle 0.
+    """
+    cases, panels, nodes = slope.shape
+    matrix = np.empty((nodes, nodes))
+    parts = np.empty((panels, nodes, 2))
+    ends = np.empty((panels, 2))
+    for case in range(cases):
+        row = case if len(half) > 1 else 0
+        growth, gained = 1.0, 0.0
+        for p in range(panels):
+            h = half[row, p]
+            if h == 0.0:
+                parts[p, :, 0], parts[p, :, 1] = 1.0, 0.0
+                ends[p, 0], ends[p, 1] = 1.0, 0.0
+                continue
+            for i in range(nodes):
+                parts[p, i, 0], parts[p, i, 1] = 1.0, 0.0
+                for j in range(nodes):
+                    matrix[i, j] = -h * running[i, j] * slope[case, p, j]
+                    parts[p, i, 1] += h * running[i, j] * source[case, p, j]
+                matrix[i, i] += 1.0
+            solve_two(matrix, parts[p])
+            ends[p, 0], ends[p, 1] = 1.0, 0.0
+            for j in range(nodes):
+                ends[p, 0] += h * weights[j] * slope[case, p, j] * parts[p, j, 0]
+                ends[p, 1] += h * weights[j] * (slope[case, p, j] * parts[p, j, 1] + source[case, p, j])
+            growth, gained = ends[p, 0] * growth, ends[p, 0] * gained + ends[p, 1]
+        left = gained / (1.0 - growth)
+        start[case] = left
+        for p in range(panels):
+            for j in range(nodes):
+                energy[case, p, j] = left * parts[p, j, 0] + parts[p, j, 1]
+            left = left * ends[p, 0] + ends[p, 1]

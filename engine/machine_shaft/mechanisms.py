@@ -1,0 +1,123 @@
+"""What a mechanism is to the main shaft: an inertia that depends on the angle, and a way of its working part.
+
+Each mechanism gives, at angles of the shaft, the kinetic energy of its bodies as a reduced inertia I''(phi) with its
+derivative, and the way x of its working part (ram, rocker pin, follower) from where the forward stroke starts, with
+dx/dphi: the ratio by which a force on the working part becomes a torque on the shaft.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+#: Values of parameters by their name within the mechanism; each of shape (cases or 1, 1, 1).
+Values = Mapping[str, Floats]
+
+_SCAN = 3_600
+
+
+class Body(NamedTuple):
+    """A body in plane motion: first and second derivatives of its centre and its angle by the shaft's angle."""
+
+    mass: Floats
+    inertia: Floats
+    x1: Floats
+    y1: Floats
+    turn1: Floats
+    x2: Floats
+    y2: Floats
+    turn2: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A mechanism at angles of the shaft; all arrays broadcast to the angles' shape.
+
+    Attributes
+    ----------
+    inertia, inertia_slope : arrays
+        I'' in kg*m^2 and dI''/dphi.
+    way, way_slope : arrays
+        Way of the working part from the start of its forward stroke, in m, and its derivative, in m/rad.
+    """
+
+    inertia: Floats
+    inertia_slope: Floats
+    way: Floats
+    way_slope: Floats
+
+
+def reduced(bodies: Sequence[Body]) -> tuple[Floats, Floats]:
+    """Reduced inertia sum(m v^2 + J w^2)/omega^2 of the bodies and its derivative by the angle."""
+    inertia: Floats = np.zeros(1)
+    slope: Floats = np.zeros(1)
+    for b in bodies:
+        inertia = inertia + b.mass * (b.x1**2 + b.y1**2) + b.inertia * b.turn1**2
+        slope = slope + 2.0 * (b.mass * (b.x1 * b.x2 + b.y1 * b.y2) + b.inertia * b.turn1 * b.turn2)
+    return inertia, slope
+
+
+class Mechanism(ABC):
+    """Base of the mechanisms: one period is one revolution of the shaft."""
+
+    #: Name of the parameter that is the mass of the working part; None where it has no straight way.
+    ram_mass: str | None = None
+
+    @abstractmethod
+    def motion(self, values: Values, phi: Floats) -> Motion:
+        """Inertia and way at ``phi`` (rad)."""
+
+    @abstractmethod
+    def dead_centres(self, values: Values) -> tuple[Floats, Floats]:
+        """Angles, of the parameters' shape, at which the forward stroke starts and ends (rad, any revolution)."""
+
+    @abstractmethod
+    def margin(self, values: Values, phi: Floats) -> Floats:
+        """Positive where the mechanism can be assembled at ``phi``."""
+
+    @abstractmethod
+    def worst_angles(self, values: Values) -> Sequence[Floats]:
+        """Angles of which one has the smallest margin."""
+
+    def breaks(self, values: Values) -> Sequence[Floats]:
+        """Angles at which the inertia or the way has a kink, of the parameters' shape."""
+        del values
+        return ()
+
+    def unassembled(self, values: Values) -> Floats:
+        """First angle at which the mechanism cannot be assembled, in 0 .. 2 pi; NaN where it always can.
+
+        Returns
+        -------
+        array, shape (cases or 1,)
+        """
+        with np.errstate(invalid="ignore", divide="ignore"):
+            margins = [self.margin(values, angle) for angle in self.worst_angles(values)]
+            least = np.minimum.reduce(np.broadcast_arrays(*margins))[:, 0, 0]
+        angle = np.full(len(least), np.nan)
+        for case in np.nonzero(~(least > 1e-12))[0]:
+            own = {name: value[case if len(value) > 1 else 0].reshape(1, 1, 1) for name, value in values.items()}
+            angle[case] = self._first_failure(own)
+        return angle
+
+    def _first_failure(self, values: Values) -> float:
+        def fails(phi: Floats) -> NDArray[np.bool_]:
+            with np.errstate(invalid="ignore", divide="ignore"):
+                margin = self.margin(values, phi.reshape(1, 1, -1))
+            return np.asarray(~np.broadcast_to(margin > 1e-12, (1, 1, phi.size))[0, 0])
+
+        worst = [float(np.mod(angle[0, 0, 0], 2.0 * np.pi)) for angle in self.worst_angles(values)]
+        grid = np.unique(np.concatenate([np.linspace(0.0, 2.0 * np.pi, _SCAN + 1), np.array(worst)]))
+        failing = fails(grid)
+        first = int(np.argmax(failing)) if failing.any() else 0
+        if first == 0:
+            return float(grid[first])
+        good, bad = grid[first - 1], grid[first]
+        for _ in range(50):
+            middle = 0.5 * (good + bad)
+            good, bad = (good, middle) if fails(np.array([middle]))[0] else (middle, bad)
+        return float(bad)

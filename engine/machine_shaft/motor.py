@@ -1,0 +1,133 @@
+"""A motor whose torque depends on its speed, and the limit cycle it brings a machine to."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.machine_shaft.panels import Panels
+from engine.machine_shaft.spec import Motor
+
+Floats = NDArray[np.float64]
+
+_MAX_ITERATIONS = 80
+
+
+def motor_torque(motor: Motor, values: Mapping[str, Floats], omega: Floats) -> tuple[Floats, Floats]:
+    """Torque in N*m at the speeds ``omega`` (rad/s) and its derivative by the speed.
+
+    Linear: M_0 (1 - omega/omega_0). Kloss: 2 M_k/(s/s_k + s_k/s) with the slip s = 1 - omega/omega_s, written so that
+    no slip is singular.
+    """
+    if motor == "linear":
+        stall, free = values["stall_torque"], values["no_load_speed"]
+        return stall * (1.0 - omega / free), np.broadcast_to(-stall / free, omega.shape)
+    most, critical, synchronous = values["breakdown_torque"], values["breakdown_slip"], values["synchronous_speed"]
+    slip = 1.0 - omega / synchronous
+    size = slip**2 + critical**2
+    by_slip = 2.0 * most * critical * (critical**2 - slip**2) / size**2
+    return 2.0 * most * critical * slip / size, -by_slip / synchronous
+
+
+def steady_speed(motor: Motor, values: Mapping[str, Floats], torque: Floats) -> Floats:
+    """Speed of the stable branch at which the motor gives ``torque``; that of its largest torque where it cannot."""
+    if motor == "linear":
+        return np.asarray(values["no_load_speed"] * (1.0 - torque / values["stall_torque"]))
+    most, critical = values["breakdown_torque"], values["breakdown_slip"]
+    share = np.clip(torque / most, -1.0, 1.0)
+    # The root of s^2 - 2 s s_k/share + s_k^2 nearer to no slip, in a form that is right for no torque too.
+    slip = critical * share / (1.0 + np.sqrt(1.0 - share**2))
+    return np.asarray(values["synchronous_speed"] * (1.0 - slip))
+
+
+@dataclass(frozen=True, slots=True)
+class LimitCycle:
+    """The periodic motion.
+
+    Attributes
+    ----------
+    start : array, shape (cases,)
+        Kinetic energy T_0 at the angle 0, in J.
+    drive : array, shape (cases, panels, nodes)
+        The motor's torque in N*m.
+    stalled : array of bool, shape (cases,)
+        Where no stable periodic motion was found.
+    """
+
+    start: Floats
+    drive: Floats
+    stalled: NDArray[np.bool_]
+
+
+def limit_cycle(
+    motor: Motor, values: Mapping[str, Floats], panels: Panels, cycle: float, inertia: Floats, resistance: Floats
+) -> LimitCycle:
+    """The periodic motion that the machine comes to with a motor.
+
+    Marching T' = M(omega) + M_r(phi), omega^2 = 2 T/I, from cycle to cycle leads to a periodic T. It is found at
+    once: the equation is linearised about the last T, the periodic solution of the linear one (collocation at the
+    nodes, panel after panel) is the next, and so on, which converges quadratically. It attracts if the mean of dM/dT
+    is negative; only then would marching come to it.
+
+    Parameters
+    ----------
+    motor : {"linear", "kloss"}
+    values : mapping
+        Parameters under ``drive.motor.``, each of shape (cases or 1, 1, 1).
+    panels : Panels
+    cycle : float
+        In rad.
+    inertia, resistance : arrays, shape (cases, panels, nodes)
+
+    Returns
+    -------
+    LimitCycle
+    """
+    needed = -(panels.integral(resistance) / cycle)[:, None, None]
+    speed = np.maximum(steady_speed(motor, values, needed), 0.05 * steady_speed(motor, values, 0.0 * needed))
+    energy = 0.5 * inertia * speed**2
+    start = energy[:, 0, 0].copy()
+    active = np.arange(len(inertia))
+    previous = np.full(len(inertia), np.inf)
+    for _ in range(_MAX_ITERATIONS):
+        own = {name: value[active] if len(value) > 1 else value for name, value in values.items()}
+        own_panels, last = panels.take(active), energy[active]
+        with np.errstate(all="ignore"):
+            found, start[active] = _linear_step(motor, own, own_panels, inertia[active], resistance[active], last)
+            kept = np.maximum(found, 0.1 * last)
+            change = own_panels.largest(kept - last) / own_panels.largest(kept)
+        energy[active] = kept
+        # Quadratic until rounding: a small change that no longer falls is rounding.
+        rounding = (change < 1e-11) & (change >= 0.5 * previous[active])
+        previous[active] = change
+        active = active[~((change < 1e-15) | rounding | ~np.isfinite(change))]
+        if not active.size:
+            break
+    with np.errstate(all="ignore"):
+        drive, by_energy = _torque_and_slope(motor, values, inertia, energy)
+        final, _ = _linear_step(motor, values, panels, inertia, resistance, energy)
+        error = panels.largest(final - energy) / panels.largest(energy)
+        stalled = ~((error < 1e-9) & (start > 0.0) & (panels.integral(by_energy) < 0.0))
+    return LimitCycle(start, drive, stalled)
+
+
+def _torque_and_slope(
+    motor: Motor, values: Mapping[str, Floats], inertia: Floats, energy: Floats
+) -> tuple[Floats, Floats]:
+    omega = np.sqrt(2.0 * energy / inertia)
+    torque, slope = motor_torque(motor, values, omega)
+    return torque, slope / (inertia * omega)
+
+
+def _linear_step(
+    motor: Motor,
+    values: Mapping[str, Floats],
+    panels: Panels,
+    inertia: Floats,
+    resistance: Floats,
+    energy: Floats,
+) -> tuple[Floats, Floats]:
+    """Periodic solution of the equation linearised about ``energy``: at the nodes and at the angle 0."""
+    torque, slope = _torque_and_slope(motor, values, inertia, energy)
+    return panels.periodic(slope, torque + resistance - slope * energy)

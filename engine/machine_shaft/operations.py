@@ -1,0 +1,240 @@
+"""The resistance of the operation, and the weight and spring that a mechanism carries, as torques on the shaft."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.machine_shaft.expressions import Expression
+from engine.machine_shaft.mechanisms import Mechanism, Values
+from engine.machine_shaft.roots import bracketed_roots, switches
+from engine.machine_shaft.spec import OperationChoice
+from engine.machine_shaft.tables import Curve, over_stroke, periodic
+
+Floats = NDArray[np.float64]
+
+_TURN = 2.0 * np.pi
+#: Samples of a revolution in which a formula's changes of sign are looked for.
+_SAMPLES = 720
+
+
+@dataclass(frozen=True, slots=True)
+class Stroke:
+    """The strokes of a mechanism with certain values.
+
+    Attributes
+    ----------
+    start, end : arrays, shape (cases or 1, 1, 1)
+        Angles at which the forward stroke starts and ends, ``end`` within a revolution after ``start``.
+    length : array of that shape
+        Way of a stroke in m.
+    """
+
+    mechanism: Mechanism
+    values: Values
+    start: Floats
+    end: Floats
+    length: Floats
+
+    @classmethod
+    def of(cls, mechanism: Mechanism, values: Values) -> "Stroke":
+        """The strokes of ``mechanism``; not numbers where it cannot be assembled."""
+        with np.errstate(all="ignore"):
+            start, end = mechanism.dead_centres(values)
+            end = start + np.mod(end - start, _TURN)
+            return cls(mechanism, values, start, end, mechanism.motion(values, end).way)
+
+    def fraction(self, phi: Floats) -> Floats:
+        """Fraction of the stroke at ``phi``, 0 where the forward stroke starts, 1 where it ends."""
+        return np.clip(self.mechanism.motion(self.values, phi).way / self.length, 0.0, 1.0)
+
+    def forward(self, phi: Floats) -> NDArray[np.bool_]:
+        """Whether the forward stroke is under way."""
+        return np.asarray(np.mod(phi - self.start, _TURN) < self.end - self.start)
+
+    def angles(self, fraction: Floats, *, forward: bool) -> Floats:
+        """Angles at which a stroke has come to ``fraction`` (cases or 1, 1, n); NaN outside 0 .. 1."""
+        low, high = (self.start, self.end) if forward else (self.end, self.start + _TURN)
+        shape = np.broadcast_shapes(low.shape, fraction.shape)
+        low, high, target = (np.broadcast_to(part, shape) for part in (low, high, fraction))
+        rising = 1.0 if forward else -1.0
+        inside = (target > 0.0) & (target < 1.0)
+        edge = np.where(inside, -1.0, 0.0)
+        found = bracketed_roots(lambda phi: rising * (self.fraction(phi) - target), low, high, edge, -edge)
+        return np.where(inside, found, np.nan)
+
+
+def every_revolution(angles: Floats, revolutions: int) -> Floats:
+    """Angles (cases, 1, n) of one revolution in every revolution of the cycle, shape (cases, n * revolutions)."""
+    flat = np.mod(angles[:, 0, :], _TURN)
+    return np.concatenate([flat + _TURN * k for k in range(revolutions)], axis=1)
+
+
+def formula_breaks(
+    expression: Expression,
+    environment: Callable[[Floats], Mapping[str, tuple[Floats, Floats | float]]],
+    revolutions: int,
+) -> list[Floats]:
+    """Angles at which a formula jumps or has a kink, arrays of shape (cases or 1, n), NaN where a case has fewer."""
+    count = _SAMPLES * revolutions
+    # Shifted a little, so that no sample falls on a round angle.
+    grid = (np.linspace(0.0, _TURN * revolutions, count + 1) + 1e-4)[None, None, :]
+    breaks = []
+    for index in range(expression.switch_count):
+
+        def sign(phi: Floats, index: int = index) -> Floats:
+            value = np.asarray(expression.switches(environment(phi))[index])
+            return np.where(np.broadcast_to(value, np.broadcast_shapes(value.shape, phi.shape)) >= 0.0, 1.0, -1.0)
+
+        samples = sign(np.concatenate([grid[..., :1] - 2e-4, grid], axis=2))[:, 0, :]
+        changes = samples[:, 1:] != samples[:, :-1]
+        most = int(changes.sum(axis=1).max(initial=0))
+        if most == 0:
+            continue
+        low = np.full((len(samples), 1, most), np.nan)
+        for case, row in enumerate(changes):
+            places = np.nonzero(row)[0]
+            low[case, 0, : len(places)] = places
+        edges = np.concatenate([grid[0, 0, :1] - 2e-4, grid[0, 0]])
+        known = ~np.isnan(low)
+        place = np.where(known, low, 0.0).astype(np.int64)
+        found = switches(sign, edges[place], edges[place + 1])
+        breaks.append(np.where(known, np.mod(found, _TURN * revolutions), np.nan)[:, 0, :])
+    return breaks
+
+
+class Operation:
+    """The operation's resistance made ready.
+
+    Parameters
+    ----------
+    choice : OperationChoice
+    revolutions : int
+        Of a cycle.
+    values : mapping
+        Values of the parameters under ``operation.`` without that prefix, each of shape (cases or 1, 1, 1).
+    constants : mapping
+        The formulas' constants, of that shape.
+    stroke : Stroke or None
+        Of the mechanism, if it has one.
+    """
+
+    def __init__(
+        self, choice: OperationChoice, revolutions: int, values: Values, constants: Values, stroke: Stroke | None
+    ) -> None:
+        self._choice, self._revolutions, self._values = choice, revolutions, values
+        self._constants, self._stroke = constants, stroke
+        self._cycle = _TURN * revolutions
+        self._curve: Curve | None = None
+        self._expression: Expression | None = None
+        if choice.table is not None and choice.form == "table":
+            self._curve = over_stroke(choice.table) if choice.over == "stroke" else periodic(choice.table, self._cycle)
+        if choice.formula is not None and choice.form == "formula":
+            names = ("phi", "x", *constants) if stroke is not None else ("phi", *constants)
+            self._expression = Expression(choice.formula, names)
+
+    def _environment(self, phi: Floats) -> dict[str, tuple[Floats, Floats | float]]:
+        names: dict[str, tuple[Floats, Floats | float]] = {"phi": (phi, 0.0)}
+        if self._stroke is not None:
+            names["x"] = (self._stroke.fraction(phi), 0.0)
+        return names | {name: (value, 0.0) for name, value in self._constants.items()}
+
+    def _diagram(self, phi: Floats) -> Floats:
+        """Value of the torque or force diagram at ``phi``."""
+        choice, stroke = self._choice, self._stroke if self._choice.over == "stroke" else None
+        place = phi if stroke is None else stroke.fraction(phi)
+        if choice.form == "constant":
+            diagram = self._values["value"] + 0.0 * phi
+        elif self._curve is not None:
+            diagram = self._curve(place)
+        elif self._expression is not None:
+            diagram = np.asarray(self._expression.evaluate(self._environment(phi))[0])
+        else:
+            diagram = self._steps(place, wraps=stroke is None)
+        if stroke is not None and choice.during != "both":
+            diagram = np.where(stroke.forward(phi) == (choice.during == "forward"), diagram, 0.0)
+        return np.asarray(diagram)
+
+    def _steps(self, place: Floats, *, wraps: bool) -> Floats:
+        total: Floats = 0.0 * place
+        for k in range(self._choice.steps):
+            first, last, value = (self._values[f"steps.{k}.{name}"] for name in ("from", "to", "value"))
+            if wraps:
+                whole = last - first >= self._cycle
+                width = np.where(whole, self._cycle, np.mod(last - first, self._cycle))
+                inside = np.mod(place - first, self._cycle) < width
+            else:
+                inside = (place >= first) & (place < last)
+            total = total + np.where(inside, value, 0.0)
+        return total
+
+    def torque(self, phi: Floats, way_slope: Floats | None) -> Floats:
+        """Reduced torque M_r of the operation in N*m, negative where it resists.
+
+        Parameters
+        ----------
+        phi : array
+            Angles in rad, not at a jump.
+        way_slope : array
+            dx/dphi of the working part there, in m/rad; None where there is no mechanism.
+        """
+        choice = self._choice
+        if choice.quantity == "none":
+            return 0.0 * phi
+        scale = self._values["scale"]
+        if choice.quantity == "torque":
+            return np.asarray(-scale * self._diagram(phi))
+        if way_slope is None or self._stroke is None:
+            raise AssertionError("a force needs a mechanism")
+        if choice.quantity == "gas":
+            return np.asarray(scale * self._gas(phi, self._stroke) * way_slope)
+        against = np.abs(way_slope) if choice.sense == "resisting" else way_slope
+        return np.asarray(-scale * self._diagram(phi) * against)
+
+    def _gas(self, phi: Floats, stroke: Stroke) -> Floats:
+        """Force on the piston towards the forward stroke, in N; the cylinder's head is where that stroke starts."""
+        v = self._values
+        low, high, clearance, n = (
+            v[f"gas.{name}"] for name in ("suction_pressure", "discharge_pressure", "clearance", "exponent")
+        )
+        x = stroke.fraction(phi)
+        # Without clearance the pressure at the head is 0/0: the other bound holds there.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            expanding = np.fmax(low, high * (clearance / (clearance + x)) ** n)
+            compressing = np.fmin(high, low * ((1.0 + clearance) / (clearance + x)) ** n)
+        pressure = np.where(stroke.forward(phi), expanding, compressing)
+        return np.asarray((pressure - v["gas.back_pressure"]) * v["gas.piston_area"])
+
+    def breaks(self) -> list[Floats]:
+        """Angles at which the torque jumps or has a kink, arrays of shape (cases or 1, n); NaN is none."""
+        choice, values = self._choice, self._values
+        if choice.quantity == "none":
+            return []
+        if choice.quantity == "gas" and self._stroke is not None:
+            return self._gas_breaks(self._stroke)
+        if choice.form == "formula" and self._expression is not None:
+            return formula_breaks(self._expression, self._environment, self._revolutions)
+        if choice.form == "steps":
+            names = [f"steps.{k}.{end}" for k in range(choice.steps) for end in ("from", "to")]
+            places = [values[name] for name in names]
+        elif self._curve is not None:
+            places = [self._curve.knots[None, None, :]]
+        else:
+            return []
+        if choice.over == "angle":
+            return [np.mod(place[:, 0, :], self._cycle) for place in places]
+        if self._stroke is None:
+            return []
+        sides = {"forward": (True,), "return": (False,), "both": (True, False)}[choice.during]
+        stroke = self._stroke
+        angles = [stroke.angles(place, forward=side) for place in places for side in sides]
+        return [every_revolution(angle, self._revolutions) for angle in angles]
+
+    def _gas_breaks(self, stroke: Stroke) -> list[Floats]:
+        v = self._values
+        clearance = v["gas.clearance"]
+        ratio = (v["gas.discharge_pressure"] / v["gas.suction_pressure"]) ** (1.0 / v["gas.exponent"])
+        opens_suction = stroke.angles(clearance * (ratio - 1.0), forward=True)
+        opens_discharge = stroke.angles((1.0 + clearance) / ratio - clearance, forward=False)
+        return [every_revolution(angle, self._revolutions) for angle in (opens_suction, opens_discharge)]

@@ -1,0 +1,262 @@
+"""Gauss-Legendre panels over a cycle: integrals, running integrals, extrema and crossings of many cases at once.
+
+A cycle is cut into panels at every jump and kink, so that within a panel everything is smooth and is known by its
+values at the panel's Gauss nodes. No node lies on a cut, so no value is taken at a jump. Sums are written out term by
+term (``kernels``) instead of being left to a matrix product, whose rounding would depend on how many cases are
+computed together.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from engine.machine_shaft import kernels
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Gauss nodes of a panel.
+NODES = 12
+
+
+def _matrices() -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
+    x, w = legendre.leggauss(NODES)
+    degrees = np.arange(NODES)
+    coefficients = (2 * degrees[:, None] + 1) / 2.0 * legendre.legvander(x, NODES - 1).T * w
+    integral = np.zeros((NODES + 1, NODES))
+    derivative = np.zeros((NODES - 1, NODES))
+    for k in degrees:
+        unit = np.eye(NODES)[k]
+        integral[: k + 2, k] = legendre.legint(unit[: k + 1], lbnd=-1)
+        if k:
+            derivative[:k, k] = legendre.legder(unit[: k + 1])
+    samples = np.concatenate([[-1.0], x, [1.0]])
+    running = legendre.legvander(x, NODES) @ integral @ coefficients
+    ends = legendre.legvander(np.array([-1.0, 1.0]), NODES - 1) @ coefficients
+    slopes = legendre.legvander(samples, NODES - 2) @ derivative @ coefficients
+    return coefficients, integral, derivative, running, ends, slopes
+
+
+POSITIONS, WEIGHTS = legendre.leggauss(NODES)
+_SAMPLES = np.concatenate([[-1.0], POSITIONS, [1.0]])
+_COEFFICIENTS, _INTEGRAL, _DERIVATIVE, _RUNNING, _ENDS, _SLOPES = (np.ascontiguousarray(m) for m in _matrices())
+_TAIL = _COEFFICIENTS[-2:].copy()
+_TOTAL = WEIGHTS[None, :].copy()
+
+
+def apply(matrix: Floats, values: Floats) -> Floats:
+    """``values @ matrix.T`` over the last axis, each sum in one fixed order."""
+    out = np.empty((*values.shape[:-1], len(matrix)))
+    rows = np.ascontiguousarray(values, dtype=np.float64).reshape(-1, values.shape[-1])
+    kernels.product(matrix, rows, out.reshape(-1, len(matrix)))
+    return out
+
+
+def series(coefficients: Floats, t: Floats) -> Floats:
+    """Legendre series of each row of ``coefficients`` (n, k) at its own ``t`` (n,)."""
+    out = np.empty(len(t))
+    kernels.series_values(coefficients, np.ascontiguousarray(t), out)
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class Points:
+    """Places in the cycle, one a case: panel, position -1 .. 1 within it, and angle in rad; all of shape (cases,)."""
+
+    panel: Integers
+    t: Floats
+    angle: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Within:
+    """Integrals from the start of each panel: to its nodes (cases, panels, NODES) and to its end (cases, panels)."""
+
+    nodes: Floats
+    ends: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Extremes:
+    """Largest and smallest value of each case and where they are."""
+
+    highest: Floats
+    at_highest: Points
+    lowest: Floats
+    at_lowest: Points
+
+
+class Panels:
+    """Panels of a block of cases.
+
+    How many panels of no length a case has depends on the other cases of its block, so nothing looks at what stands at
+    their nodes: a case's numbers must not.
+
+    Attributes
+    ----------
+    cuts : array, shape (cases, panels + 1)
+        Ends of the panels in rad, from 0 to the cycle. Panels of no length are allowed and count for nothing. A first
+        axis of 1 means that all cases share them.
+    angles : array, shape (cases, panels, NODES)
+        Gauss nodes in rad.
+    """
+
+    def __init__(self, cuts: Floats) -> None:
+        self.cuts = cuts
+        self.half = 0.5 * (cuts[:, 1:] - cuts[:, :-1])
+        self.angles = cuts[:, :-1, None] + self.half[..., None] * (1.0 + POSITIONS)
+        self.weights = self.half[..., None] * WEIGHTS
+
+    @classmethod
+    def over(cls, cycle: float, breaks: Sequence[Floats], panels: int) -> "Panels":
+        """``panels`` equal panels cut further at ``breaks``, arrays of shape (cases or 1, n); NaN is no break."""
+        parts = [np.linspace(0.0, cycle, panels + 1)[None, :], *[np.nan_to_num(b, nan=0.0) for b in breaks if b.size]]
+        rows = max(part.shape[0] for part in parts)
+        cuts = np.concatenate([np.broadcast_to(part, (rows, part.shape[1])) for part in parts], axis=1)
+        cuts = np.sort(np.clip(cuts, 0.0, cycle), axis=1)
+        # Two cuts meant to be one: a sliver between them would hold a jump that its polynomial cannot follow.
+        for column in range(1, cuts.shape[1]):
+            close = cuts[:, column] - cuts[:, column - 1] < 1e-11 * cycle
+            cuts[:, column] = np.where(close, cuts[:, column - 1], cuts[:, column])
+        cuts[:, -1] = cycle
+        return cls(cuts)
+
+    def take(self, rows: Integers) -> "Panels":
+        """The panels of some of the cases."""
+        return self if len(self.cuts) == 1 else Panels(self.cuts[rows])
+
+    def integral(self, values: Floats) -> Floats:
+        """Integral over the cycle for each case; ``values`` at the nodes, shape (cases, panels, NODES)."""
+        out = np.empty(len(values))
+        kernels.integrals(np.ascontiguousarray(values), self.half, WEIGHTS, out)
+        return out
+
+    def largest(self, values: Floats) -> Floats:
+        """Largest size of the values at the nodes, shape (cases,)."""
+        real = (self.half > 0.0)[..., None]
+        return np.asarray(np.where(real, np.abs(values), 0.0).reshape(len(values), -1).max(axis=1))
+
+    def within(self, values: Floats) -> "Within":
+        """Integrals from each panel's own start."""
+        totals = np.where(self.half > 0.0, self.half * apply(_TOTAL, values)[..., 0], 0.0)
+        return Within(self.half[..., None] * apply(_RUNNING, values), totals)
+
+    def running(self, values: Floats) -> tuple[Floats, Floats]:
+        """Integral from 0 to every node, shape (cases, panels, NODES), and to every cut, (cases, panels + 1)."""
+        own = self.within(values)
+        ends = np.zeros((own.ends.shape[0], own.ends.shape[1] + 1))
+        np.cumsum(own.ends, axis=1, out=ends[:, 1:])
+        return ends[:, :-1, None] + own.nodes, ends
+
+    def periodic(self, slope: Floats, source: Floats) -> tuple[Floats, Floats]:
+        """Periodic solution of ``T' = slope T + source``: T at the nodes and, shape (cases,), at the angle 0."""
+        energy, start = np.empty(slope.shape), np.empty(len(slope))
+        kernels.periodic_linear(
+            np.ascontiguousarray(slope), np.ascontiguousarray(source), self.half, _RUNNING, WEIGHTS, energy, start
+        )
+        return energy, start
+
+    def roughness(self, values: Floats) -> Floats:
+        """Sizes of the two last Legendre coefficients in each panel, (cases, panels): how badly it is resolved."""
+        tail = np.abs(apply(_TAIL, values)).sum(axis=2)
+        return np.asarray(np.where(self.half > 0.0, tail, 0.0))
+
+    def middles(self, chosen: NDArray[np.bool_]) -> Floats:
+        """Middles of the chosen panels of each case, (cases, most), NaN where a case has fewer."""
+        middles = np.where(chosen, 0.5 * (self.cuts[:, :-1] + self.cuts[:, 1:]), np.nan)
+        return np.sort(middles, axis=1)[:, : int(chosen.sum(axis=1).max(initial=0))]
+
+    def starts(self, cases: int) -> Points:
+        """The angle 0 of that many cases."""
+        first = np.argmax(np.broadcast_to(self.half, (cases, self.half.shape[1])) > 0.0, axis=1)
+        return Points(first, np.full(cases, -1.0), np.zeros(cases))
+
+    def locate(self, case: int, angles: Floats) -> Points:
+        """Panels of any number of ``angles`` in the cycle of one case; at a cut, the panel before it."""
+        row = case if len(self.cuts) > 1 else 0
+        cuts, half = self.cuts[row], self.half[row]
+        first = int(np.argmax(half > 0.0))
+        panel = np.clip(np.searchsorted(cuts, angles, side="left") - 1, first, len(half) - 1)
+        t = np.clip((angles - cuts[panel]) / half[panel] - 1.0, -1.0, 1.0)
+        return Points(panel, t, angles)
+
+    def _rows(self, values: Floats, cases: Integers, panel: Integers) -> Floats:
+        picked: Floats = values[cases if values.shape[0] > 1 else np.zeros_like(cases), panel]
+        return picked
+
+    def _half_at(self, cases: Integers, panel: Integers) -> Floats:
+        return self._rows(self.half, cases, panel)
+
+    def _angle(self, cases: Integers, panel: Integers, t: Floats) -> Floats:
+        return self._rows(self.cuts, cases, panel) + self._half_at(cases, panel) * (1.0 + t)
+
+    def at(self, values: Floats, points: Points) -> Floats:
+        """Values at ``points``, from the polynomial through the nodes of the panel."""
+        return self.at_rows(values, np.arange(len(points.t)), points)
+
+    def at_rows(self, values: Floats, cases: Integers, points: Points) -> Floats:
+        """Values at any number of ``points``, each of the case told by ``cases``."""
+        return series(apply(_COEFFICIENTS, self._rows(values, cases, points.panel)), points.t)
+
+    def running_at(self, values: Floats, ends: Floats, points: Points) -> Floats:
+        """Running integral at ``points``; ``values`` is the integrand and ``ends`` its integral to every cut."""
+        return self.running_at_rows(values, ends, np.arange(len(points.t)), points)
+
+    def running_at_rows(self, values: Floats, ends: Floats, cases: Integers, points: Points) -> Floats:
+        """The same at any number of ``points``, each of the case told by ``cases``."""
+        start = self._rows(ends, cases, points.panel)
+        rows = apply(_INTEGRAL, apply(_COEFFICIENTS, self._rows(values, cases, points.panel)))
+        return start + self._half_at(cases, points.panel) * series(rows, points.t)
+
+    def extremes(self, values: Floats) -> Extremes:
+        """Largest and smallest value over the cycle, of the continuous function and not of its nodes.
+
+        A panel's ends count with the values they have within that panel. A case with a value that is no number has
+        no extremes.
+        """
+        high, at_high = self._highest(values, 1.0)
+        low, at_low = self._highest(values, -1.0)
+        return Extremes(high, at_high, low, at_low)
+
+    def _highest(self, values: Floats, sign: float) -> tuple[Floats, Points]:
+        cases = len(values)
+        value, t, panel = np.empty(cases), np.empty(cases), np.empty(cases, dtype=np.int64)
+        kernels.highest(
+            np.ascontiguousarray(values), sign, self.half, _SAMPLES, _ENDS, _SLOPES, _COEFFICIENTS, _DERIVATIVE,
+            value, panel, t,
+        )  # fmt: skip
+        return value, Points(panel, t, self._angle(np.arange(cases), panel, t))
+
+    def crossings(self, values: Floats, running: Floats, ends: Floats, level: Floats) -> "Crossings":
+        """Where the running integral of ``values`` passes ``level`` (cases,).
+
+        ``running`` and ``ends`` are from ``running``. The end of the cycle is taken to be its start again.
+        """
+        right = ends[:, 1:, None].copy()
+        right[:, -1] = ends[:, :1]
+        height = np.concatenate([ends[:, :-1, None], running, right], axis=2) - level[:, None, None]
+        above = height >= 0.0
+        case, panel, place = np.nonzero((above[..., 1:] != above[..., :-1]) & (self.half > 0.0)[..., None])
+        start = ends[case, panel] - level[case]
+        half = self._half_at(case, panel)
+        rows = apply(_INTEGRAL, apply(_COEFFICIENTS, values[case, panel])) if len(case) else np.empty((0, NODES + 1))
+        rows = half[:, None] * rows
+        rows[:, 0] += start
+        t = np.empty(len(case))
+        before, after = height[case, panel, place], height[case, panel, place + 1]
+        kernels.series_roots(rows, _SAMPLES[place], _SAMPLES[place + 1], before, after, t)
+        return Crossings(case, panel, t, self._angle(case, panel, t), ~above[case, panel, place])
+
+
+@dataclass(frozen=True, slots=True)
+class Crossings:
+    """Crossings of a level by all cases, in order of case and angle; all shape (n,)."""
+
+    case: Integers
+    panel: Integers
+    t: Floats
+    angle: Floats
+    upward: NDArray[np.bool_]

@@ -1,0 +1,169 @@
+"""Numeric parameters of a machine: paths, SI units, ranges, defaults, by the parts it is made of (MODEL.md Part B)."""
+
+import math
+from collections.abc import Mapping
+from itertools import chain
+
+from engine.machine_shaft.spec import MachineSpec, MechanismKind
+from engine.vibration_drive.parameters import STANDARD_GRAVITY, Parameter
+
+_INF = math.inf
+_TURN = 2.0 * math.pi
+_ANY = 1e30
+
+
+def _length(path: str, symbol: str, help_: str, default: float | None = None) -> Parameter:
+    return Parameter(path, symbol, "m", 0.0, 1e3, True, default, help_)
+
+
+def _mass(path: str, symbol: str, help_: str) -> Parameter:
+    return Parameter(path, symbol, "kg", 0.0, 1e9, False, 0.0, help_)
+
+
+def _inertia(path: str, symbol: str, help_: str) -> Parameter:
+    return Parameter(path, symbol, "kg*m^2", 0.0, 1e12, False, 0.0, help_)
+
+
+def _rod_and_ram(kind: str) -> tuple[Parameter, ...]:
+    p = f"mechanism.{kind}"
+    return (
+        _length(f"{p}.rod", "L", "length of the connecting rod"),
+        Parameter(f"{p}.offset", "e", "m", -1e3, 1e3, False, 0.0, "height of the ram's line above its crank's centre"),
+        Parameter(f"{p}.rod_centre", "s", "m", -1e3, 1e3, False, 0.0, "crank pin to the rod's centre of mass"),
+        _mass(f"{p}.rod_mass", "m2", "mass of the rod"),
+        _inertia(f"{p}.rod_inertia", "J2", "inertia of the rod about its centre of mass"),
+        _mass(f"{p}.ram_mass", "m3", "mass of the ram"),
+        _inclination(p),
+    )
+
+
+def _inclination(prefix: str) -> Parameter:
+    return Parameter(
+        f"{prefix}.inclination", "beta", "rad", -_TURN, _TURN, False, 0.0, "rise of the forward stroke above the level"
+    )
+
+
+def _cam_angle(path: str, symbol: str, help_: str, default: float | None, low_open: bool) -> Parameter:
+    return Parameter(path, symbol, "rad", 0.0, _TURN, low_open, default, help_)
+
+
+#: Parameters of each mechanism.
+MECHANISM_PARAMETERS: Mapping[MechanismKind, tuple[Parameter, ...]] = {
+    "none": (),
+    "table": (),
+    "formula": (),
+    "slider_crank": (
+        _length("mechanism.slider_crank.crank", "r", "length of the crank"),
+        *_rod_and_ram("slider_crank"),
+    ),
+    "four_bar": (
+        _length("mechanism.four_bar.frame", "d", "distance of the fixed pivots"),
+        _length("mechanism.four_bar.crank", "a", "length of the crank"),
+        _length("mechanism.four_bar.coupler", "b", "length of the coupler"),
+        _length("mechanism.four_bar.rocker", "c", "length of the rocker"),
+        Parameter(
+            "mechanism.four_bar.coupler_centre", "s", "m", -1e3, 1e3, False, 0.0, "crank pin to its centre of mass"
+        ),
+        _mass("mechanism.four_bar.coupler_mass", "m2", "mass of the coupler"),
+        _inertia("mechanism.four_bar.coupler_inertia", "J2", "inertia of the coupler about its centre of mass"),
+        _inertia("mechanism.four_bar.rocker_inertia", "J3", "inertia of the rocker about its pivot"),
+        _mass("mechanism.four_bar.tray_mass", "m4", "mass carried along the arc of the rocker's pin"),
+    ),
+    "quick_return": (
+        _length("mechanism.quick_return.crank", "r", "length of the crank"),
+        _length("mechanism.quick_return.pivot_distance", "d", "distance of the link's pivot below the shaft"),
+        _length("mechanism.quick_return.link_arm", "R", "link's pivot to the rod's pin"),
+        *_rod_and_ram("quick_return"),
+        _inertia("mechanism.quick_return.link_inertia", "J_l", "inertia of the slotted link about its pivot"),
+        _mass("mechanism.quick_return.block_mass", "m_b", "mass of the sliding block on the crank pin"),
+    ),
+    "cam": (
+        _length("mechanism.cam.lift", "h", "lift of the follower"),
+        _cam_angle("mechanism.cam.start", "phi_0", "angle at which the rise begins", 0.0, False),
+        _cam_angle("mechanism.cam.rise_angle", "beta_1", "angle of the rise", None, True),
+        _cam_angle("mechanism.cam.dwell_angle", "beta_2", "angle of the upper dwell", 0.0, False),
+        _cam_angle("mechanism.cam.fall_angle", "beta_3", "angle of the fall", None, True),
+        _mass("mechanism.cam.follower_mass", "m", "mass of the follower"),
+        Parameter("mechanism.cam.spring_rate", "c", "N/m", 0.0, 1e12, False, 0.0, "rate of the follower's spring"),
+        Parameter("mechanism.cam.spring_preload", "F_0", "N", 0.0, 1e12, False, 0.0, "its force at no lift"),
+        _inclination("mechanism.cam"),
+    ),
+}  # fmt: skip
+
+_MOTOR = {
+    "linear": (
+        Parameter("drive.motor.no_load_speed", "w_0", "rad/s", 0.0, 1e6, True, None, "speed at which its torque is 0"),
+        Parameter("drive.motor.stall_torque", "M_0", "N*m", 0.0, 1e12, True, None, "its torque at rest"),
+    ),
+    "kloss": (
+        Parameter("drive.motor.synchronous_speed", "w_s", "rad/s", 0.0, 1e6, True, None, "its synchronous speed"),
+        Parameter("drive.motor.breakdown_torque", "M_k", "N*m", 0.0, 1e12, True, None, "its largest torque"),
+        Parameter("drive.motor.breakdown_slip", "s_k", "1", 0.0, 1e3, True, None, "slip at its largest torque"),
+    ),
+}
+
+_GAS = (
+    Parameter("operation.gas.piston_area", "A", "m^2", 0.0, 1e6, True, None, "area of the piston"),
+    Parameter("operation.gas.suction_pressure", "p_1", "Pa", 0.0, 1e12, True, None, "absolute pressure of suction"),
+    Parameter("operation.gas.discharge_pressure", "p_2", "Pa", 0.0, 1e12, True, None, "absolute pressure of discharge"),
+    Parameter("operation.gas.back_pressure", "p_0", "Pa", 0.0, 1e12, False, 101325.0, "pressure on the piston's back"),
+    Parameter("operation.gas.clearance", "c", "1", 0.0, 10.0, False, 0.05, "clearance volume over displaced volume"),
+    Parameter("operation.gas.exponent", "n", "1", 1e-3, 10.0, False, 1.3, "exponent of compression and expansion"),
+)
+
+
+def _operation(spec: MachineSpec) -> tuple[Parameter, ...]:
+    operation = spec.operation
+    if operation.quantity == "none":
+        return ()
+    scale = Parameter("operation.scale", "k", "1", -_ANY, _ANY, False, 1.0, "factor on the whole diagram")
+    if operation.quantity == "gas":
+        return (scale, *_GAS)
+    unit = "N*m" if operation.quantity == "torque" else "N"
+    if operation.form == "constant":
+        own = Parameter("operation.value", "F", unit, -_ANY, _ANY, False, None, "resistance, the same at every angle")
+        return (scale, own)
+    return (scale, *chain.from_iterable(_step(spec, k, unit) for k in range(operation.steps)))
+
+
+def _step(spec: MachineSpec, index: int, unit: str) -> tuple[Parameter, ...]:
+    p = f"operation.steps.{index}"
+    over_angle = spec.operation.over == "angle"
+    end, end_unit = (_TURN * spec.cycle, "rad") if over_angle else (1.0, "1")
+    return (
+        Parameter(f"{p}.from", "from", end_unit, 0.0, end, False, None, "where the step begins"),
+        Parameter(f"{p}.to", "to", end_unit, 0.0, end, False, None, "where the step ends"),
+        Parameter(f"{p}.value", "F", unit, -_ANY, _ANY, False, None, "resistance within the step"),
+    )
+
+
+def _drive(spec: MachineSpec) -> tuple[Parameter, ...]:
+    if spec.balance == "motor":
+        return _MOTOR[spec.drive.motor] if spec.drive.motor else ()
+    if spec.drive.form == "constant":
+        return (Parameter("drive.torque", "M_d", "N*m", -_ANY, _ANY, False, 0.0, "driving torque"),)
+    return (Parameter("drive.scale", "k_d", "1", -_ANY, _ANY, False, 1.0, "factor on the driving torque"),)
+
+
+def parameters(spec: MachineSpec) -> tuple[Parameter, ...]:
+    """Every numeric parameter of a machine of this structure, in SI units."""
+    speed = (
+        ()
+        if spec.balance == "motor"
+        else (Parameter("mean_speed", "w_m", "rad/s", 0.0, 1e6, True, None, "required mean speed of the shaft"),)
+    )
+    return (
+        *speed,
+        Parameter("gravity", "g", "m/s^2", 0.0, 1e3, False, STANDARD_GRAVITY, "gravitational acceleration"),
+        Parameter("drive.inertia", "I'", "kg*m^2", 0.0, 1e12, False, None, "inertia that turns with the shaft"),
+        Parameter(
+            "wanted_irregularity", "delta", "1", 0.0, 2.0, True, _INF, "irregularity that required_inertia is to give"
+        ),
+        *_drive(spec),
+        *MECHANISM_PARAMETERS[spec.mechanism.kind],
+        *_operation(spec),
+        *(
+            Parameter(f"constants.{name}", name, "1", -_ANY, _ANY, False, None, "constant of the formulas")
+            for name in spec.constants
+        ),
+    )

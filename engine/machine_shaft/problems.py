@@ -1,0 +1,110 @@
+"""What can be wrong with a machine. A base machine raises these; one case of a grid stores the ending instead."""
+
+import math
+
+from engine.endings import Ending
+
+
+class MachineError(ValueError):
+    """Something is wrong with a machine; ``str`` is a plain sentence.
+
+    Attributes
+    ----------
+    ending : Ending or None
+        What a case of a grid with the same fault is stored as; None for faults that no numeric parameter mends.
+    """
+
+    ending: Ending | None = None
+
+
+class StructureError(MachineError):
+    """The parts named do not make a machine (a missing table, a force without a mechanism, an unknown kind)."""
+
+
+class TableError(MachineError):
+    """A table is not ascending, not finite, too short, or does not close on itself."""
+
+
+class ExpressionError(MachineError):
+    """A formula cannot be read or gives no number.
+
+    Attributes
+    ----------
+    position : int
+        Where in the text, from 0.
+    """
+
+    def __init__(self, message: str, position: int) -> None:
+        super().__init__(f"{message} (at character {position + 1})")
+        self.position = position
+
+
+class AssemblyError(MachineError):
+    """The mechanism cannot be assembled at ``angle`` (rad)."""
+
+    ending = Ending.CANNOT_ASSEMBLE
+
+    def __init__(self, angle: float) -> None:
+        super().__init__(
+            f"The mechanism cannot be assembled at a shaft angle of {math.degrees(angle):.6g} deg: its links do not "
+            "reach each other there, or its motions take more than a revolution. Change the dimensions."
+        )
+        self.angle = angle
+
+
+class NegativeInertiaError(MachineError):
+    """The reduced inertia is not positive; ``inertia`` (kg*m^2) is its least value."""
+
+    ending = Ending.NEGATIVE_INERTIA
+
+    def __init__(self, inertia: float) -> None:
+        super().__init__(
+            f"The reduced inertia falls to {inertia:.6g} kg*m^2 within the cycle; it must be positive at every angle. "
+            "Give the drive more inertia, or correct the table or formula of the mechanism."
+        )
+        self.inertia = inertia
+
+
+class UnbalancedWorkError(MachineError):
+    """Drive and resistance do not do opposite work over the cycle, and the balance asked for cannot mend it."""
+
+    ending = Ending.UNBALANCED_WORK
+
+    def __init__(self, drive: float, resistance: float) -> None:
+        super().__init__(
+            f"The work over a cycle is not zero: the drive does {drive:.6g} J and the resistance {resistance:.6g} J. "
+            'Steady motion needs opposite works: choose balance "scale" or "constant", or correct the torques.'
+        )
+        self.drive, self.resistance = drive, resistance
+
+
+class InsufficientInertiaError(MachineError):
+    """The shaft would stop at the mean speed asked for; ``least_mean_speed`` (rad/s) is the least feasible one."""
+
+    ending = Ending.INERTIA_INSUFFICIENT
+
+    def __init__(self, asked: float, least_mean_speed: float) -> None:
+        super().__init__(
+            f"The inertia is insufficient for a mean speed of {asked:.6g} rad/s: the shaft would stop within the "
+            f"cycle. The least feasible mean speed is {least_mean_speed:.6g} rad/s "
+            f"({least_mean_speed * 30.0 / math.pi:.6g} rpm); or give the drive more inertia."
+        )
+        self.asked, self.least_mean_speed = asked, least_mean_speed
+
+
+class MotorStalledError(MachineError):
+    """The motor has no steady cycle with this load."""
+
+    ending = Ending.MOTOR_STALLED
+
+    def __init__(self) -> None:
+        super().__init__(Ending.MOTOR_STALLED.sentence)
+
+
+class QuadratureError(MachineError):
+    """Torque or inertia is too rough for its integral to be found to 1e-10."""
+
+    ending = Ending.QUADRATURE_NOT_REACHED
+
+    def __init__(self) -> None:
+        super().__init__(Ending.QUADRATURE_NOT_REACHED.sentence)

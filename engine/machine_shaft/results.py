@@ -1,0 +1,64 @@
+"""The results of a machine shaft: names, units, meaning (MODEL.md Part B, SPEC.md "Result names")."""
+
+from engine.vibration_drive.results import ResultInfo
+
+
+def _squares() -> tuple[ResultInfo, ...]:
+    meaning = {
+        1: "S1 = 2 T_min/I, the share of the least energy",
+        2: "S2 = 2 (T_mean - T_min)/I, the share of the mean energy above the least",
+        3: "S3 = 2 A_d/I, the share of the drive's work since phi_c",
+        4: "S4 = 2 A_r/I, the share of the resistance's work since phi_c",
+    }
+    return tuple(
+        ResultInfo(f"s{k}.{end}", "rad^2/s^2", f"{word} value of {meaning[k]}")
+        for k in meaning
+        for end, word in (("max", "largest"), ("min", "smallest"), ("amplitude", "half the range of the"))
+    )
+
+
+_R = ResultInfo
+MACHINE_RESULTS: tuple[ResultInfo, ...] = (
+    _R("omega.mean", "rad/s", "mean speed of the shaft, by the definition of mean_speed_is"),
+    _R("omega.max", "rad/s", "largest speed of the shaft"),
+    _R("omega.min", "rad/s", "smallest speed of the shaft"),
+    _R("omega.angle_at_max", "rad", "angle at which the speed is largest"),
+    _R("omega.angle_at_min", "rad", "angle at which the speed is smallest"),
+    _R("irregularity", "1", "(largest - smallest)/mean speed, by the definition of mean_speed_is"),
+    _R("energy.fluctuation", "J", "largest less smallest kinetic energy"),
+    _R("energy.mean", "J", "mean kinetic energy over the angle"),
+    _R("energy.min", "J", "smallest kinetic energy"),
+    _R("drive_torque.mean", "N*m", "mean driving torque over the angle"),
+    _R("power.mean", "W", "mean driving torque times the mean speed"),
+    _R("acceleration.max", "rad/s^2", "largest angular acceleration"),
+    *_squares(),
+    _R("required_inertia", "kg*m^2", "inertia of the drive that gives the wanted irregularity at the same mean speed"),
+    _R("acceleration.min", "rad/s^2", "smallest (most negative) angular acceleration"),
+    _R("omega.start", "rad/s", "speed at the angle 0 (omega_0)"),
+    _R("omega.midrange", "rad/s", "half the sum of largest and smallest speed"),
+    _R("omega.mean_angle", "rad/s", "mean of the speed over the angle"),
+    _R("omega.mean_time", "rad/s", "mean of the speed over time"),
+    _R("irregularity.midrange", "1", "(largest - smallest)/omega.midrange"),
+    _R("irregularity.angle", "1", "(largest - smallest)/omega.mean_angle"),
+    _R("irregularity.time", "1", "(largest - smallest)/omega.mean_time"),
+    _R("energy.max", "J", "largest kinetic energy"),
+    _R("energy.angle_at_max", "rad", "angle at which the kinetic energy is largest"),
+    _R("energy.angle_at_min", "rad", "angle at which the kinetic energy is smallest"),
+    _R("phi_c", "rad", "angle with T = T_mean from which the works of S3 and S4 are counted"),
+    _R("phi_c.count", "1", "number of angles with T = T_mean in a cycle", "count"),
+    _R("inertia.mean", "kg*m^2", "mean reduced inertia over the angle"),
+    _R("inertia.max", "kg*m^2", "largest reduced inertia"),
+    _R("inertia.min", "kg*m^2", "smallest reduced inertia"),
+    _R("drive_torque.max", "N*m", "largest driving torque"),
+    _R("drive_torque.min", "N*m", "smallest driving torque"),
+    _R("work.drive", "J", "work of the drive over a cycle"),
+    _R("work.resistance", "J", "work of the resistance over a cycle"),
+    _R("balance.work", "1", "work left over from a cycle / largest work within it"),
+    _R("least_mean_speed", "rad/s", "mean speed at which the smallest speed would reach 0: none lower is feasible"),
+    _R("assembly.angle", "rad", "first angle at which the mechanism cannot be assembled"),
+)  # fmt: skip
+
+
+def result_infos() -> tuple[ResultInfo, ...]:
+    """Every result of a machine shaft, in the order of the engine's result columns."""
+    return MACHINE_RESULTS

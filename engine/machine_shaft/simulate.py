@@ -1,0 +1,316 @@
+"""Running machines: a batch of cases in, results and endings out; the tables of one case over the angle."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from engine.endings import ENDING_CODES, Ending
+from engine.machine_shaft.balance import balanced, largest_work
+from engine.machine_shaft.decomposition import Decomposition, characteristics
+from engine.machine_shaft.flywheel import required_inertia
+from engine.machine_shaft.machine import Columns, Fields, Machine, check_structure
+from engine.machine_shaft.motor import limit_cycle
+from engine.machine_shaft.panels import Panels
+from engine.machine_shaft.problems import (
+    AssemblyError,
+    InsufficientInertiaError,
+    MachineError,
+    MotorStalledError,
+    NegativeInertiaError,
+    QuadratureError,
+    UnbalancedWorkError,
+)
+from engine.machine_shaft.results import result_infos
+from engine.machine_shaft.spec import MachineSpec
+from engine.machine_shaft.start import Shape, Stop, least_mean_speed, start_energy
+
+Floats = NDArray[np.float64]
+Codes = NDArray[np.int8]
+Bools = NDArray[np.bool_]
+
+#: Panels of a revolution to begin with, and with how many a case is given up.
+PANELS, MAX_PANELS = 16, 600
+MAX_ATTEMPTS = 32
+#: Cases computed together: few enough for their arrays to stay in the processor's cache.
+BLOCK = 64
+
+_NAMES = tuple(info.name for info in result_infos())
+_OF_TIME = np.array([_NAMES.index("omega.mean_time"), _NAMES.index("irregularity.time")])
+_CODE = {ending: np.int8(code) for code, ending in enumerate(ENDING_CODES)}
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """Results of a batch.
+
+    Attributes
+    ----------
+    values : array, shape (cases, results)
+        In the order of ``result_infos()``; NaN where a value could not be computed.
+    endings : int8 array, shape (cases,)
+        Index into ``engine.endings.ENDING_CODES``.
+    """
+
+    values: Floats
+    endings: Codes
+
+
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """One attempt at a block of cases.
+
+    Attributes
+    ----------
+    decomposition : Decomposition
+    results : dict
+        Every result but the angle of assembly by name, each (cases,).
+    endings : int8 array, shape (cases,)
+    rough, rough_pace : arrays of bool, shape (cases, panels)
+        Panels that do not resolve their torques, inertia or speed, and those that do not resolve 1/omega.
+    """
+
+    decomposition: Decomposition
+    results: dict[str, Floats]
+    endings: Codes
+    rough: Bools
+    rough_pace: Bools
+
+
+def _rough(d: Decomposition) -> Bools:
+    """Panels that do not resolve their torques, inertia or speed."""
+    panels, still = d.panels, np.isnan(d.start)[:, None]
+    # A case without motion is judged by what was given.
+    drive = np.where(still[..., None], d.fields.drive, d.drive.torque)
+    torque = panels.roughness(drive) + panels.roughness(d.fields.resistance)
+    scale = largest_work(panels, drive, d.fields.resistance)[:, None]
+    fine = (torque * panels.half <= 1e-10 * scale) & _resolved(panels, d.fields.inertia, 1e-11)
+    with np.errstate(invalid="ignore"):
+        for values, limit in ((d.squares, 1e-10), (np.sqrt(d.squares), 1e-6)):
+            fine &= _resolved(panels, values, limit) | still
+    return np.asarray(~fine)
+
+
+def _rough_pace(d: Decomposition) -> Bools:
+    """Panels in which the shaft turns so slowly that the time is not resolved."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        fine = _resolved(d.panels, 1.0 / np.sqrt(d.squares), 1e-6)
+    return np.asarray(~(fine | np.isnan(d.start)[:, None]))
+
+
+def _resolved(panels: Panels, values: Floats, limit: float) -> Bools:
+    return np.asarray(panels.roughness(values) <= limit * panels.largest(values)[:, None])
+
+
+def attempts(spec: MachineSpec, columns: Columns) -> Iterator[tuple[NDArray[np.int64], Solved]]:
+    """Solve assembled cases, again and again with those panels halved that were too rough.
+
+    Yields the numbers of the cases and what was found for them; the last time a case is there is what counts.
+    """
+    rows = np.arange(columns.cases)
+    cuts = np.empty((rows.size, 0))
+    for _ in range(MAX_ATTEMPTS):
+        if not rows.size:
+            return
+        solved = _attempt(spec, columns.take(rows), cuts)
+        yield rows, solved
+        chosen = solved.rough | solved.rough_pace
+        panels = solved.decomposition.panels
+        real = np.broadcast_to((panels.half > 0.0).sum(axis=1), rows.shape)
+        again = np.nonzero(chosen.any(axis=1) & (real <= MAX_PANELS * spec.cycle))[0]
+        middles = panels.take(again).middles(chosen[again])
+        rows, cuts = rows[again], np.concatenate([cuts[again], middles], axis=1)
+
+
+def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
+    machine = Machine(spec, columns)
+    cycle = machine.cycle
+    panels = Panels.over(cycle, [*machine.breaks(), cuts], PANELS * spec.cycle)
+    with np.errstate(all="ignore"):
+        fields = machine.fields(panels.angles)
+    endings = np.full(columns.cases, _CODE[Ending.OK])
+    least_inertia = panels.extremes(fields.inertia).lowest
+    # An inertia of nothing but rounding lets the speed be anything.
+    negative = ~(least_inertia > 1e-12 * panels.largest(fields.inertia))
+    endings[negative] = _CODE[Ending.NEGATIVE_INERTIA]
+    if spec.balance == "motor":
+        drive, start, stalled = _motored(spec, columns, panels, cycle, fields)
+        endings[stalled & ~negative] = _CODE[Ending.MOTOR_STALLED]
+        least = np.full(columns.cases, np.nan)
+    else:
+        balance = balanced(spec.balance, panels, cycle, fields.drive, fields.resistance)
+        drive = balance.drive
+        endings[balance.wrong & ~negative] = _CODE[Ending.UNBALANCED_WORK]
+        start, least = _started(spec, columns, panels, cycle, fields, drive, endings)
+    start = np.where(endings == _CODE[Ending.OK], start, np.nan)
+    d = Decomposition(panels, cycle, fields, drive, start)
+    results = characteristics(d, spec.phi_c)
+    results["work.drive"], results["work.resistance"] = d.drive.ends[:, -1], d.resistance.ends[:, -1]
+    results["least_mean_speed"] = least
+    results["inertia.min"] = np.where(negative, least_inertia, results["inertia.min"])
+    _by_definition(spec, columns, d, results)
+    rough, rough_pace = _rough(d), _rough_pace(d)
+    return Solved(d, results, endings, rough | rough_pace if spec.mean_speed_is == "time" else rough, rough_pace)
+
+
+def _motored(
+    spec: MachineSpec, columns: Columns, panels: Panels, cycle: float, fields: Fields
+) -> tuple[Floats, Floats, Bools]:
+    if spec.drive.motor is None:
+        raise AssertionError("check_structure lets no motor be missing")
+    values = columns.under("drive.motor.")
+    found = limit_cycle(spec.drive.motor, values, panels, cycle, fields.inertia, fields.resistance)
+    return found.drive, found.start, found.stalled
+
+
+def _started(
+    spec: MachineSpec, columns: Columns, panels: Panels, cycle: float, fields: Fields, drive: Floats, endings: Codes
+) -> tuple[Floats, Floats]:
+    """Energy at the start for the required mean speed, and the least feasible mean speed; marks ``endings``."""
+    wanted, kind = columns.row("mean_speed"), spec.mean_speed_is
+    start, least = np.full(columns.cases, np.nan), np.full(columns.cases, np.nan)
+    rows = np.nonzero(endings == _CODE[Ending.OK])[0]
+    if rows.size == 0:
+        return start, least
+    torque = (drive + fields.resistance)[rows]
+    own = panels.take(rows)
+    shape = Shape(own, cycle, fields.inertia[rows], own.running(torque)[0])
+    stop = Stop.of(shape)
+    with np.errstate(all="ignore"):
+        least[rows] = least_mean_speed(shape, stop, kind, torque)
+        feasible = wanted[rows] > least[rows]
+        endings[rows[~feasible]] = _CODE[Ending.INERTIA_INSUFFICIENT]
+        going = np.nonzero(feasible)[0]
+        if going.size:
+            start[rows[going]] = start_energy(shape.take(going), stop.take(going), kind, wanted[rows[going]])
+    return start, least
+
+
+def _by_definition(spec: MachineSpec, columns: Columns, d: Decomposition, out: dict[str, Floats]) -> None:
+    """Results that depend on which mean is meant, and the flywheel."""
+    kind = spec.mean_speed_is
+    out["omega.mean"] = out["omega.midrange" if kind == "midrange" else f"omega.mean_{kind}"]
+    out["irregularity"] = out[f"irregularity.{kind}"]
+    out["power.mean"] = out["drive_torque.mean"] * out["omega.mean"]
+    left = d.total.ends[:, -1]
+    largest = largest_work(d.panels, d.drive.torque, d.fields.resistance)
+    out["balance.work"] = np.abs(left) / np.where(largest > 0.0, largest, 1.0)
+    required = np.full(columns.cases, np.nan)
+    wanted = columns.row("wanted_irregularity")
+    rows = np.nonzero(np.isfinite(wanted) & np.isfinite(d.start))[0]
+    if rows.size and spec.balance != "motor":
+        mechanism = d.fields.inertia[rows] - columns.row("drive.inertia")[rows, None, None]
+        required[rows] = required_inertia(
+            d.panels.take(rows), d.cycle, mechanism, d.total.nodes[rows], kind, columns.row("mean_speed")[rows],
+            wanted[rows],
+        )  # fmt: skip
+    out["required_inertia"] = required
+
+
+def _block(spec: MachineSpec, columns: Columns) -> tuple[Floats, Codes]:
+    """Results and endings of a block of cases: finer panels for those that need them."""
+    values = np.full((columns.cases, len(_NAMES)), np.nan)
+    endings = np.full(columns.cases, _CODE[Ending.CANNOT_ASSEMBLE])
+    angle = Machine(spec, columns).unassembled()
+    values[:, _NAMES.index("assembly.angle")] = angle
+    assembled = np.nonzero(np.isnan(angle))[0]
+    for found, solved in attempts(spec, columns.take(assembled)):
+        rows = assembled[found]
+        for position, name in enumerate(_NAMES):
+            if name != "assembly.angle":
+                values[rows, position] = solved.results[name]
+        values[np.ix_(rows[solved.rough_pace.any(axis=1)], _OF_TIME)] = np.nan
+        endings[rows] = solved.endings
+        lost = rows[solved.rough.any(axis=1) & (solved.endings != _CODE[Ending.NEGATIVE_INERTIA])]
+        values[lost] = np.nan
+        endings[lost] = _CODE[Ending.QUADRATURE_NOT_REACHED]
+    values[~np.isfinite(values)] = np.nan
+    return values, endings
+
+
+def simulate(model: MachineSpec, columns: Mapping[str, ArrayLike], *, cases: int) -> Batch:
+    """Run a batch of cases.
+
+    Every case's result is the same to the last bit whatever batch or order it is computed in.
+
+    Parameters
+    ----------
+    model : MachineSpec
+        The structure all cases share.
+    columns : mapping
+        SPEC paths (``parameters(model)``) to scalars or arrays of shape (cases,), SI units. Missing ones take the
+        catalogue's default.
+    cases : int
+        Number of cases, at least 0.
+
+    Returns
+    -------
+    Batch
+
+    Raises
+    ------
+    MachineError
+        If the structure makes no machine (a table that does not close, a formula that cannot be read).
+    ValueError
+        If a parameter is missing, unknown, or of the wrong shape.
+    """
+    check_structure(model)
+    block = Columns.of(model, columns, cases)
+    values = np.empty((cases, len(_NAMES)))
+    endings = np.empty(cases, dtype=np.int8)
+    for first in range(0, cases, BLOCK):
+        part = slice(first, min(first + BLOCK, cases))
+        values[part], endings[part] = _block(model, block.take(part))
+    return Batch(values, endings)
+
+
+def check(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> None:
+    """Refuse a base machine that has no steady motion, with all that is known about why.
+
+    Parameters
+    ----------
+    model : MachineSpec
+    columns : mapping
+        As for ``simulate``, scalars only.
+
+    Raises
+    ------
+    MachineError
+        One of ``engine.machine_shaft.problems``.
+    """
+    check_structure(model)
+    row = Columns.of(model, columns, 1)
+    batch = simulate(model, columns, cases=1)
+    ending, result = ENDING_CODES[int(batch.endings[0])], dict(zip(_NAMES, batch.values[0], strict=True))
+    if ending is not Ending.CANNOT_ASSEMBLE:
+        Machine(model, row).check_finite()
+    problem = _problem(ending, result, row)
+    if problem is not None:
+        raise problem
+
+
+def _problem(ending: Ending, result: Mapping[str, float], row: Columns) -> MachineError | None:
+    if ending is Ending.CANNOT_ASSEMBLE:
+        return AssemblyError(float(result["assembly.angle"]))
+    if ending is Ending.NEGATIVE_INERTIA:
+        return NegativeInertiaError(float(result["inertia.min"]))
+    if ending is Ending.UNBALANCED_WORK:
+        return UnbalancedWorkError(float(result["work.drive"]), float(result["work.resistance"]))
+    if ending is Ending.INERTIA_INSUFFICIENT:
+        return InsufficientInertiaError(float(row.row("mean_speed")[0]), float(result["least_mean_speed"]))
+    if ending is Ending.MOTOR_STALLED:
+        return MotorStalledError()
+    return QuadratureError() if ending is Ending.QUADRATURE_NOT_REACHED else None
+
+
+#: Times of a case by the benchmark, over that with the mean as midrange.
+_COST = {"midrange": 1.0, "angle": 2.2, "time": 1.7}
+
+
+def estimate_seconds(model: MachineSpec) -> float:
+    """Rough time of one case on one core, in s."""
+    tables = [part.table for part in (model.drive, model.mechanism, model.operation) if part.table is not None]
+    panels = PANELS * model.cycle + sum(len(table.rows) for table in tables)
+    factor = 8.0 if model.balance == "motor" else _COST[model.mean_speed_is]
+    return 1e-5 + factor * 7e-6 * panels

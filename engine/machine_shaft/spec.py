@@ -1,0 +1,143 @@
+"""What a machine is made of: everything about it that is no number. Numbers come as columns, by SPEC path."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+from engine.machine_shaft.cams import CamLaw
+from engine.machine_shaft.tables import Interpolation, Table
+
+MeanSpeed = Literal["midrange", "angle", "time"]
+Balance = Literal["scale", "constant", "refuse", "motor"]
+Motor = Literal["linear", "kloss"]
+MechanismKind = Literal["none", "table", "formula", "slider_crank", "four_bar", "quick_return", "cam"]
+QuickReturn = Literal["whitworth", "crank_shaper"]
+Form = Literal["constant", "table", "formula", "steps"]
+Quantity = Literal["none", "torque", "force", "gas"]
+Over = Literal["angle", "stroke"]
+During = Literal["forward", "return", "both"]
+Sense = Literal["resisting", "fixed"]
+
+#: Mechanisms with dimensions: those whose working part a force can act on.
+LINKED: frozenset[str] = frozenset({"slider_crank", "four_bar", "quick_return", "cam"})
+MAX_STEPS = 32
+MAX_CONSTANTS = 32
+REVOLUTIONS = (1, 2, 3)
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """The driving torque: ``drive.torque`` (constant), or a table or formula over the angle, or a motor."""
+
+    form: Literal["constant", "table", "formula"] = "constant"
+    table: Table | None = None
+    formula: str | None = None
+    motor: Motor | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class MechanismChoice:
+    """Which mechanism; ``table`` and ``formula`` give I''(phi) in kg*m^2.
+
+    A table of no more than one revolution repeats with every revolution.
+    """
+
+    kind: MechanismKind = "none"
+    table: Table | None = None
+    formula: str | None = None
+    quick_return: QuickReturn = "crank_shaper"
+    rise: CamLaw = "cycloidal"
+    fall: CamLaw = "cycloidal"
+
+
+@dataclass(frozen=True, slots=True)
+class OperationChoice:
+    """The resistance of the operation.
+
+    Attributes
+    ----------
+    quantity : {"none", "torque", "force", "gas"}
+        Torque on the shaft (N*m, positive where it resists), force on the mechanism's working part (N), or a gas
+        compressed by it.
+    form : {"constant", "table", "formula", "steps"}
+        How a torque or force is given.
+    over : {"angle", "stroke"}
+        Against the shaft's angle (rad, over the whole cycle), or the fraction 0 .. 1 of the stroke that is done, seen
+        from where the forward stroke starts.
+    during : {"forward", "return", "both"}
+        The strokes in which a diagram over the stroke holds.
+    sense : {"resisting", "fixed"}
+        A positive force is against the motion, whichever way it goes, or always against the forward stroke.
+    steps : int
+        Number of steps.
+    """
+
+    quantity: Quantity = "none"
+    form: Form = "constant"
+    over: Over = "angle"
+    during: During = "forward"
+    sense: Sense = "resisting"
+    table: Table | None = None
+    formula: str | None = None
+    steps: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class MachineSpec:
+    """A machine's structure.
+
+    Attributes
+    ----------
+    cycle : int
+        Revolutions of a cycle, 1 to 3.
+    mean_speed_is : {"midrange", "angle", "time"}
+        Which mean of the speed the required mean speed and the irregularity refer to.
+    balance : {"scale", "constant", "refuse", "motor"}
+        What makes the work over a cycle zero.
+    drive, mechanism, operation :
+        Its parts.
+    constants : tuple of str
+        Names that its formulas use beside ``phi`` (and ``x``, the fraction of the stroke); given as
+        ``constants.NAME``.
+    phi_c : int, optional
+        Which of the angles with T = T_mean the squares S3 and S4 are counted from; by default the first at which T
+        rises.
+    """
+
+    cycle: int = 1
+    mean_speed_is: MeanSpeed = "midrange"
+    balance: Balance = "constant"
+    drive: Drive = field(default_factory=Drive)
+    mechanism: MechanismChoice = field(default_factory=MechanismChoice)
+    operation: OperationChoice = field(default_factory=OperationChoice)
+    constants: tuple[str, ...] = ()
+    phi_c: int | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data that ``from_json`` reads."""
+        data = asdict(self)
+        data["constants"] = list(self.constants)
+        for part in ("drive", "mechanism", "operation"):
+            table = data[part]["table"]
+            if table is not None:
+                table["rows"] = [list(row) for row in table["rows"]]
+        return data
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> "MachineSpec":
+        """The spec of ``to_json``'s data; TypeError where a field is unknown."""
+        parts = {"drive": Drive, "mechanism": MechanismChoice, "operation": OperationChoice}
+        fields = dict(data)
+        for name, part in parts.items():
+            if name in fields:
+                own = dict(fields[name])
+                if own.get("table") is not None:
+                    own["table"] = _table(own["table"])
+                fields[name] = part(**own)
+        fields["constants"] = tuple(fields.get("constants", ()))
+        return cls(**fields)
+
+
+def _table(data: Mapping[str, Any]) -> Table:
+    interpolation: Interpolation = data.get("interpolation", "smooth")
+    return Table(tuple((float(x), float(y)) for x, y in data["rows"]), interpolation)

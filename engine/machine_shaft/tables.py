@@ -1,0 +1,157 @@
+"""Tables of numbers as functions: interpolated without overshoot, closed on themselves where they are periodic."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator, PPoly
+
+from engine.machine_shaft.problems import TableError
+
+Floats = NDArray[np.float64]
+Interpolation = Literal["smooth", "linear"]
+
+MAX_ROWS = 5_000
+#: How well the last row of a periodic table must repeat the first, over the table's range.
+CLOSING = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Rows (x, value), ascending in x; two rows with the same x make a jump.
+
+    ``interpolation`` is "smooth" (monotone cubic pieces by Fritsch and Carlson, with a continuous slope between jumps,
+    and no value beyond the neighbouring rows) or "linear".
+    """
+
+    rows: tuple[tuple[float, float], ...]
+    interpolation: Interpolation = "smooth"
+
+
+class Curve:
+    """A table made ready.
+
+    Attributes
+    ----------
+    knots : array, shape (n,)
+        The rows' x: where the function may have a kink or a jump.
+    """
+
+    def __init__(self, pieces: PPoly, period: float | None) -> None:
+        self._pieces, self._slope, self._period = pieces, pieces.derivative(), period
+        self._start = float(pieces.x[0])
+        self.knots: Floats = np.asarray(pieces.x)
+
+    def _place(self, x: Floats) -> Floats:
+        if self._period is None:
+            return np.clip(x, self.knots[0], self.knots[-1])
+        return self._start + np.mod(x - self._start, self._period)
+
+    def __call__(self, x: Floats) -> Floats:
+        """Values at ``x``, any shape; periodic, or held at the ends' values."""
+        return np.asarray(self._pieces(self._place(x)))
+
+    def slope(self, x: Floats) -> Floats:
+        """Derivatives at ``x``."""
+        return np.asarray(self._slope(self._place(x)))
+
+
+def _checked(rows: Sequence[tuple[float, float]]) -> tuple[Floats, Floats]:
+    if not 2 <= len(rows) <= MAX_ROWS:
+        raise TableError(f"A table needs 2 to {MAX_ROWS} rows, not {len(rows)}.")
+    x, y = np.array(rows, dtype=np.float64).T
+    if not (np.isfinite(x).all() and np.isfinite(y).all()):
+        raise TableError("A table holds finite numbers only.")
+    steps = np.diff(x)
+    if np.any(steps < 0.0):
+        row = int(np.argmax(steps < 0.0)) + 1
+        raise TableError(f"The rows of a table ascend: row {row + 1} has {x[row]:g} after {x[row - 1]:g}.")
+    if np.any((steps[1:] == 0.0) & (steps[:-1] == 0.0)):
+        raise TableError("A table has at most two rows with the same x (a jump).")
+    return x, y
+
+
+def _smooth(x: Floats, y: Floats) -> PPoly:
+    if len(x) == 2:
+        return PPoly(np.array([[(y[1] - y[0]) / (x[1] - x[0])], [y[0]]]), x)
+    cubic = PchipInterpolator(x, y)
+    return PPoly(cubic.c, cubic.x)
+
+
+def _pieces(x: Floats, y: Floats, interpolation: Interpolation) -> PPoly:
+    """Piecewise polynomial through the rows, in parts between jumps."""
+    edges = [0, *[int(i) + 1 for i in np.nonzero(np.diff(x) == 0.0)[0]], len(x)]
+    knots, columns = [x[:1]], []
+    for first, end in pairwise(edges):
+        if end - first < 2:
+            continue
+        part_x, part_y = x[first:end], y[first:end]
+        if interpolation == "linear":
+            coefficients = np.array([np.diff(part_y) / np.diff(part_x), part_y[:-1]])
+        else:
+            coefficients = _smooth(part_x, part_y).c
+        columns.append(np.vstack([np.zeros((4 - len(coefficients), coefficients.shape[1])), coefficients]))
+        knots.append(part_x[1:])
+    return PPoly(np.concatenate(columns, axis=1), np.concatenate(knots))
+
+
+@cache
+def periodic(table: Table, period: float) -> Curve:
+    """The table as a function of this period.
+
+    The rows cover at most one period. If the last row stands one period after the first it must repeat its value;
+    otherwise the table is closed by repeating the first row there.
+
+    Raises
+    ------
+    TableError
+        If the rows are not as described, or the table does not close on itself.
+    """
+    x, y = _checked(table.rows)
+    excess = x[-1] - x[0] - period
+    if excess > 1e-9 * period:
+        raise TableError(
+            f"The table covers {math.degrees(x[-1] - x[0]):g} deg, more than its cycle of {math.degrees(period):g} deg."
+        )
+    if abs(excess) <= 1e-9 * period:
+        gap = abs(y[-1] - y[0])
+        if gap > CLOSING * max(np.ptp(y), np.abs(y).max(), 1e-300):
+            raise TableError(
+                f"The table does not close on itself: it begins with {y[0]:g} and ends, a cycle later, with {y[-1]:g}."
+            )
+        x[-1], y[-1] = x[0] + period, y[0]
+    else:
+        x, y = np.append(x, x[0] + period), np.append(y, y[0])
+    jumps = np.nonzero(np.diff(x) == 0.0)[0]
+    if len(jumps):
+        # Begin at a jump, so that every smooth part lies whole within the period.
+        first = int(jumps[0]) + 1
+        x = np.concatenate([x[first:], x[1:first] + period])
+        y = np.concatenate([y[first:], y[1:first]])
+        return Curve(_pieces(x, y, table.interpolation), period)
+    if table.interpolation == "linear":
+        return Curve(_pieces(x, y, "linear"), period)
+    before, after = x[-4:-1] - period, x[1:4] + period
+    wide = _smooth(np.concatenate([before, x, after]), np.concatenate([y[-4:-1], y, y[1:4]]))
+    begin = len(before)
+    return Curve(PPoly(wide.c[:, begin : begin + len(x) - 1], x), period)
+
+
+@cache
+def over_stroke(table: Table) -> Curve:
+    """The table as a function of the stroke's fraction; its rows run from 0 to 1.
+
+    Raises
+    ------
+    TableError
+    """
+    x, y = _checked(table.rows)
+    if abs(x[0]) > 1e-9 or abs(x[-1] - 1.0) > 1e-9:
+        raise TableError(f"A table over the stroke runs from 0 to 1 of it, not from {x[0]:g} to {x[-1]:g}.")
+    x[0], x[-1] = 0.0, 1.0
+    return Curve(_pieces(x, y, table.interpolation), None)

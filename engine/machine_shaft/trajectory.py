@@ -1,0 +1,144 @@
+"""The tables of one case over the angle."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from engine.endings import ENDING_CODES, Ending
+from engine.machine_shaft.decomposition import Decomposition
+from engine.machine_shaft.machine import Columns, Machine, check_structure
+from engine.machine_shaft.panels import Points
+from engine.machine_shaft.simulate import attempts
+from engine.machine_shaft.spec import MachineSpec
+
+Floats = NDArray[np.float64]
+
+#: Name and SI unit of each column.
+COLUMNS: tuple[tuple[str, str], ...] = (
+    ("time", "s"),
+    ("omega", "rad/s"),
+    ("acceleration", "rad/s^2"),
+    ("energy", "J"),
+    ("inertia", "kg*m^2"),
+    ("inertia.slope", "kg*m^2/rad"),
+    ("drive_torque", "N*m"),
+    ("resisting_torque", "N*m"),
+    ("power", "W"),
+    ("s1", "rad^2/s^2"),
+    ("s2", "rad^2/s^2"),
+    ("s3", "rad^2/s^2"),
+    ("s4", "rad^2/s^2"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """Values of one case over the angle.
+
+    Attributes
+    ----------
+    angles : array, shape (m,)
+        Angles in rad that were asked for; none if the case has no motion.
+    names, units : tuples
+        Name and SI unit of each column.
+    values : array, shape (m, columns)
+    phi_c : tuple of float
+        All angles in rad at which T = T_mean, ascending.
+    ending : Ending
+    """
+
+    angles: Floats
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: Floats
+    phi_c: tuple[float, ...]
+    ending: Ending
+
+
+def trajectory(model: MachineSpec, columns: Mapping[str, ArrayLike], angles: ArrayLike) -> Trajectory:
+    """Solve one case and tabulate it.
+
+    Parameters
+    ----------
+    model : MachineSpec
+    columns : mapping
+        As for ``simulate``, scalars only.
+    angles : array, shape (m,)
+        Angles of the shaft in rad, within 0 .. cycle. At a jump the value before it is given.
+
+    Returns
+    -------
+    Trajectory
+        s1 + s2 + s3 + s4 = omega^2 at every angle.
+
+    Raises
+    ------
+    MachineError
+        If the structure makes no machine.
+    ValueError
+        If an angle is outside the cycle, or a parameter is missing or unknown.
+    """
+    check_structure(model)
+    names, units = tuple(name for name, _ in COLUMNS), tuple(unit for _, unit in COLUMNS)
+    asked = np.ascontiguousarray(angles, dtype=np.float64)
+    cycle = 2.0 * np.pi * model.cycle
+    if asked.size and not (asked.min() >= 0.0 and asked.max() <= cycle * (1.0 + 1e-12)):
+        raise ValueError(f"angles must be within 0 .. {cycle:g} rad")
+    row = Columns.of(model, columns, 1)
+    none = Trajectory(np.empty(0), names, units, np.empty((0, len(names))), (), Ending.CANNOT_ASSEMBLE)
+    if not np.isnan(Machine(model, row).unassembled()[0]):
+        return none
+    *_, (_, solved) = attempts(model, row)
+    ending = Ending.QUADRATURE_NOT_REACHED if solved.rough.any() else ENDING_CODES[int(solved.endings[0])]
+    if ending is not Ending.OK:
+        return Trajectory(none.angles, names, units, none.values, (), ending)
+    table = _table(solved.decomposition, model.phi_c, np.minimum(asked, cycle))
+    values = np.column_stack([table[name] for name in names])
+    every = np.sort(np.mod(solved.decomposition.crossings.angle, cycle))
+    return Trajectory(asked, names, units, values, tuple(float(angle) for angle in every), ending)
+
+
+def _table(d: Decomposition, chosen: int | None, angles: Floats) -> dict[str, Floats]:
+    panels, cases = d.panels, np.zeros(len(angles), dtype=np.int64)
+    points = panels.locate(0, angles)
+
+    def at(values: Floats) -> Floats:
+        return panels.at_rows(values, cases, points)
+
+    phi_c, _ = d.reference(chosen)
+    works = []
+    for work in (d.drive, d.resistance):
+        before = panels.running_at(work.torque, work.ends, phi_c)
+        since = panels.running_at_rows(work.torque, work.ends, cases, points)
+        works.append(since - np.where(np.isnan(phi_c.angle), np.nan, before))
+    inertia, slope, drive, resistance = (
+        at(d.fields.inertia),
+        at(d.fields.slope),
+        at(d.drive.torque),
+        at(d.resistance.torque),
+    )
+    energy = d.start + panels.running_at_rows(d.total.torque, d.total.ends, cases, points)
+    square = 2.0 * energy / inertia
+    omega = np.sqrt(square)
+    return {
+        "time": _time(d, cases, points),
+        "omega": omega,
+        "acceleration": (drive + resistance - 0.5 * square * slope) / inertia,
+        "energy": energy,
+        "inertia": inertia,
+        "inertia.slope": slope,
+        "drive_torque": drive,
+        "resisting_torque": resistance,
+        "power": drive * omega,
+        "s1": 2.0 * d.least_energy / inertia,
+        "s2": 2.0 * (d.mean_energy - d.least_energy) / inertia,
+        "s3": 2.0 * works[0] / inertia,
+        "s4": 2.0 * works[1] / inertia,
+    }
+
+
+def _time(d: Decomposition, cases: NDArray[np.int64], points: Points) -> Floats:
+    pace = 1.0 / np.sqrt(d.squares)
+    return d.panels.running_at_rows(pace, d.panels.running(pace)[1], cases, points)

@@ -1,0 +1,184 @@
+"""What is wrong with a machine is said plainly: as an error of a base machine, as an ending of a case of a grid."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from engine.endings import ENDING_CODES, Ending
+from engine.machine_shaft.parameters import parameters
+from engine.machine_shaft.problems import (
+    AssemblyError,
+    ExpressionError,
+    InsufficientInertiaError,
+    MachineError,
+    MotorStalledError,
+    NegativeInertiaError,
+    QuadratureError,
+    StructureError,
+    TableError,
+    UnbalancedWorkError,
+)
+from engine.machine_shaft.results import result_infos
+from engine.machine_shaft.simulate import check, estimate_seconds, simulate
+from engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
+from engine.machine_shaft.tables import Table
+from engine.machine_shaft.trajectory import trajectory
+from tests.engine.machine_shaft.machines import NAMES, PRESS, PRESS_NUMBERS, RPM
+
+FLAT: dict[str, Any] = {"mean_speed": 10.0, "drive.inertia": 2.0}
+FOUR_BAR = {
+    **FLAT, "mechanism.four_bar.frame": 0.5, "mechanism.four_bar.crank": 0.1, "mechanism.four_bar.coupler": 0.4,
+    "mechanism.four_bar.rocker": 0.3,
+}  # fmt: skip
+
+
+def formula(text: str) -> MachineSpec:
+    return MachineSpec(mechanism=MechanismChoice("formula", formula=text))
+
+
+def test_insufficient_inertia_tells_the_least_mean_speed() -> None:
+    check(PRESS, PRESS_NUMBERS)
+    with pytest.raises(InsufficientInertiaError, match=r"least feasible mean speed is 4\.738") as error:
+        check(PRESS, PRESS_NUMBERS | {"mean_speed": 40 * RPM})
+    assert error.value.least_mean_speed == pytest.approx(4.738, abs=5e-4)
+    speeds = np.array([4.7, 4.8, 10.0])
+    batch = simulate(PRESS, PRESS_NUMBERS | {"mean_speed": speeds}, cases=3)
+    assert [ENDING_CODES[code] for code in batch.endings] == [Ending.INERTIA_INSUFFICIENT, Ending.OK, Ending.OK]
+    least = batch.values[:, NAMES.index("least_mean_speed")]
+    assert least == pytest.approx(error.value.least_mean_speed, rel=1e-12)
+    assert np.isnan(batch.values[0, NAMES.index("omega.max")])
+    table = trajectory(PRESS, PRESS_NUMBERS | {"mean_speed": 4.0}, [0.0, 1.0])
+    assert table.ending is Ending.INERTIA_INSUFFICIENT
+    assert table.values.shape == (0, len(table.names))
+
+
+CRANK_ROCKER = MachineSpec(mechanism=MechanismChoice("four_bar"))
+
+
+@pytest.mark.parametrize(
+    ("spec", "numbers", "degrees"),
+    [
+        (PRESS, PRESS_NUMBERS | {"mechanism.slider_crank.rod": 0.09}, math.degrees(math.asin(0.9))),
+        (PRESS, PRESS_NUMBERS | {"mechanism.slider_crank.offset": 0.35}, 180.0 + math.degrees(math.asin(0.5))),
+        (CRANK_ROCKER, FOUR_BAR | {"mechanism.four_bar.frame": 0.65}, math.degrees(math.acos(-0.0575 / 0.13))),
+        (CRANK_ROCKER, FOUR_BAR | {"mechanism.four_bar.coupler": 0.18}, math.degrees(math.acos(0.296))),
+    ],
+)
+def test_assembly_tells_the_angle(spec: MachineSpec, numbers: dict[str, Any], degrees: float) -> None:
+    with pytest.raises(AssemblyError, match="cannot be assembled at a shaft angle of") as error:
+        check(spec, numbers)
+    assert math.degrees(error.value.angle) == pytest.approx(degrees, abs=1e-6)
+    batch = simulate(spec, numbers, cases=1)
+    assert ENDING_CODES[batch.endings[0]] is Ending.CANNOT_ASSEMBLE
+    assert batch.values[0, NAMES.index("assembly.angle")] == error.value.angle
+    assert trajectory(spec, numbers, [0.0]).ending is Ending.CANNOT_ASSEMBLE
+
+
+@pytest.mark.parametrize("kind", ["whitworth", "crank_shaper"])
+def test_quick_returns_on_the_wrong_side_of_their_crank(kind: Any) -> None:
+    spec = MachineSpec(mechanism=MechanismChoice("quick_return", quick_return=kind))
+    wrong = 0.15 if kind == "whitworth" else 0.05
+    numbers = FLAT | {
+        "mechanism.quick_return.crank": 0.1, "mechanism.quick_return.pivot_distance": wrong,
+        "mechanism.quick_return.link_arm": 0.2, "mechanism.quick_return.rod": 0.5,
+    }  # fmt: skip
+    with pytest.raises(AssemblyError):
+        check(spec, numbers)
+
+
+def test_cam_that_takes_more_than_a_revolution() -> None:
+    spec = MachineSpec(mechanism=MechanismChoice("cam"))
+    numbers = FLAT | {"mechanism.cam.lift": 0.01, "mechanism.cam.rise_angle": 4.0, "mechanism.cam.fall_angle": 3.0}
+    with pytest.raises(AssemblyError, match="360 deg"):
+        check(spec, numbers)
+
+
+def test_other_base_errors() -> None:
+    with pytest.raises(NegativeInertiaError, match=r"falls to -0\.5"):
+        check(formula("2.5*sin(phi) "), FLAT)
+    with pytest.raises(NegativeInertiaError):
+        check(MachineSpec(), FLAT | {"drive.inertia": 0.0})
+    refused = MachineSpec(balance="refuse", operation=OperationChoice("torque", "constant"))
+    with pytest.raises(UnbalancedWorkError, match=r"does 6\.28319 J and the resistance -12\.5664 J"):
+        check(refused, FLAT | {"drive.torque": 1.0, "operation.value": 2.0})
+    motor = replace(refused, balance="motor", drive=Drive(motor="linear"))
+    with pytest.raises(MotorStalledError):
+        check(motor, {
+            "drive.inertia": 1.0, "operation.value": 5.0, "drive.motor.no_load_speed": 9.0,
+            "drive.motor.stall_torque": 4.0,
+        })  # fmt: skip
+    with pytest.raises(QuadratureError):
+        check(formula("1 + sin(3000*phi)^2/10"), FLAT)
+    with pytest.raises(ExpressionError, match="no finite number"):
+        check(formula("1 + sqrt(phi - 1)"), FLAT)
+
+
+def test_structures_that_make_no_machine() -> None:
+    open_table = Table(((0.0, 1.0), (2.0 * math.pi, 2.0)))
+    wrong = [
+        (replace(PRESS, cycle=4), StructureError), (replace(PRESS, balance="motor"), StructureError),
+        (replace(PRESS, phi_c=-1), StructureError), (replace(PRESS, constants=("sin",)), StructureError),
+        (replace(PRESS, mechanism=MechanismChoice("formula", formula="1")), StructureError),
+        (MachineSpec(mechanism=MechanismChoice("table")), StructureError),
+        (MachineSpec(mechanism=MechanismChoice("table", table=open_table)), TableError),
+        (MachineSpec(drive=Drive("table", table=open_table)), TableError), (formula("phi +"), ExpressionError),
+        (MachineSpec(operation=OperationChoice("torque", "formula", formula="x")), ExpressionError),
+        (MachineSpec(operation=OperationChoice("gas")), StructureError),
+        (MachineSpec(operation=OperationChoice("torque", "table")), StructureError),
+        (replace(PRESS, operation=OperationChoice("force", "steps", steps=33)), StructureError),
+        (replace(PRESS, constants=tuple(f"k{i}" for i in range(40))), StructureError),
+    ]  # fmt: skip
+    for spec, error in wrong:
+        with pytest.raises(error):
+            simulate(spec, {}, cases=0)
+        assert issubclass(error, MachineError)
+    with pytest.raises(TableError, match="does not close on itself"):
+        simulate(MachineSpec(mechanism=MechanismChoice("table", table=open_table)), FLAT, cases=1)
+
+
+def test_missing_unknown_and_misshapen_numbers() -> None:
+    with pytest.raises(ValueError, match=r"drive\.inertia is required"):
+        simulate(PRESS, {path: v for path, v in PRESS_NUMBERS.items() if path != "drive.inertia"}, cases=1)
+    with pytest.raises(ValueError, match=r"unknown parameters of this machine: shaft\.load"):
+        simulate(PRESS, PRESS_NUMBERS | {"shaft.load": 1.0}, cases=1)
+    with pytest.raises(ValueError, match="shape"):
+        simulate(PRESS, PRESS_NUMBERS | {"drive.inertia": np.ones(3)}, cases=2)
+    with pytest.raises(ValueError, match="angles must be within"):
+        trajectory(PRESS, PRESS_NUMBERS, [7.0])
+    assert simulate(PRESS, PRESS_NUMBERS, cases=0).values.shape == (0, len(NAMES))
+
+
+def test_structures_survive_json() -> None:
+    table = Table(((0.0, 1.0), (1.0, 2.0)), "linear")
+    spec = MachineSpec(
+        cycle=2, mean_speed_is="time", balance="scale", drive=Drive("table", table=table),
+        mechanism=MechanismChoice("cam", rise="polynomial_345"), constants=("a", "b"), phi_c=1,
+        operation=OperationChoice("force", "formula", over="stroke", formula="a*x"),
+    )  # fmt: skip
+    assert MachineSpec.from_json(json.loads(json.dumps(spec.to_json()))) == spec
+    assert MachineSpec.from_json({}) == MachineSpec()
+    with pytest.raises(TypeError):
+        MachineSpec.from_json({"wheels": 3})
+
+
+def test_catalogues_are_sound() -> None:
+    infos = result_infos()
+    assert len({info.column for info in infos}) == len(infos)
+    for kind in ("none", "slider_crank", "four_bar", "quick_return", "cam"):
+        for quantity in ("none", "torque", "force", "gas"):
+            choice = OperationChoice(quantity, "steps", steps=2)  # type: ignore[arg-type]
+            known = parameters(MachineSpec(mechanism=MechanismChoice(kind), operation=choice))  # type: ignore[arg-type]
+            assert len({p.path for p in known}) == len(known)
+            for p in known:
+                assert p.help
+                assert p.range_text()
+                assert p.default is None or p.accepts(p.default) or p.path == "wanted_irregularity"
+    assert 0.0 < estimate_seconds(PRESS) < 0.1
+    for ending in Ending:
+        assert ending.sentence
