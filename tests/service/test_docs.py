@@ -100,7 +100,7 @@ def test_the_reference_lists_every_result(model: str) -> None:
 
 
 def test_results_that_the_pages_name_exist() -> None:
-    names = {info.name for info in kernels.result_infos("vibration-drive", 8)}
+    names = {info.name for info in (*kernels.result_infos("vibration-drive", 8), *MACHINE_RESULTS)}
     names |= {re.sub(r"\d", "N", name) for name in names}
     pattern = r"\b((?:shaft|torque|power|fraction|balance|reset|runup|clutches)\.(?!md\b)[a-z_]+(?:\.[a-z_]+)*)\b"
     paths = {entry.path for entry in kernels.parameter_catalogue("vibration-drive")}
