@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from service.spec_fields import read_object
 from service.spec_messages import Report, did_you_mean, join
-from service.units import QuantityError, exact_number, parse_exact, split_quantity, to_float
+from service.units import PERIOD_NAMES, QuantityError, exact_number, parse_exact, split_quantity, to_float
 from worker.limits import MAX_RUN_PERIODS, MAX_TOLERANCE, MIN_TOLERANCE
 
 FIELDS: Final = ("duration", "window", "tolerance", "reset")
@@ -62,7 +62,7 @@ def _read_time(report: Report, pointer: str, value: object, *, positive: bool = 
         unit = "s"
         if isinstance(value, str):
             number, text = split_quantity(value)
-            if text in {"period", "periods"}:
+            if text in PERIOD_NAMES:
                 unit = "periods"
             elif not text:
                 raise QuantityError("a text needs its unit: periods or s")

@@ -22,6 +22,9 @@ import pint
 
 from worker.limits import MAX_QUANTITY_LENGTH
 
+#: Words that mean the period of the excitation, for times of a run.
+PERIOD_NAMES: Final = frozenset({"period", "periods", "cycle", "cycles"})
+
 #: The circle constant to 50 digits, so that its rounding never shows in a double.
 _TWO_PI: Final = "6.2831853071795864769252867665590057683943387987502"
 
@@ -36,9 +39,9 @@ _DEFINITIONS: Final = (
         "pound = 453.59237 * gram = lb",
     ),
     *("minute = 60 * second = min", "hour = 3600 * second = h = hr"),
-    f"turn = {_TWO_PI} * radian = _ = revolution = rev = cycle",
+    f"turn = {_TWO_PI} * radian = _ = revolution = rev = cycle = r",  # r: as IEC writes r/min on motors' plates
     *("degree = turn / 360 = deg = °", "arcminute = degree / 60 = arcmin", "arcsecond = degree / 3600 = arcsec"),
-    "revolution_per_minute = turn / minute = rpm",
+    *("revolution_per_minute = turn / minute = rpm", "revolution_per_second = turn / second = rps"),
     *("hertz = 1 / second = Hz", "newton = 1000 * gram * meter / second**2 = N", "joule = newton * meter = J"),
     *("watt = joule / second = W", "kilogram_force = 9.80665 * newton = kgf = kp"),
     "pound_force = 4.4482216152605 * newton = lbf",
@@ -220,7 +223,7 @@ def _measure(text: str) -> tuple[Fraction, dict[str, int]]:
     while position < len(spelled):
         match = _TOKEN.match(spelled, position)
         if match is None:
-            raise QuantityError(f"has a unit that cannot be read: '{text}'")
+            raise QuantityError(f"has a unit that cannot be read: '{text}'{_power_hint(spelled, position)}")
         tokens.append(f"^{match['power']}" if match["power"] else match[0].strip())
         position = match.end()
     tokens.reverse()
@@ -228,6 +231,13 @@ def _measure(text: str) -> tuple[Fraction, dict[str, int]]:
     if tokens:
         raise QuantityError(f"has a unit that cannot be read: '{text}'")
     return factor, {name: power for name, power in powers.items() if power}
+
+
+def _power_hint(text: str, position: int) -> str:
+    """What to write for "m2", when ``position`` is that of the digit; "" otherwise."""
+    name = re.search(r"[A-Za-zµ°]+$", text[:position])
+    power = re.match(r"-?[0-9](?![0-9.])", text[position:])
+    return f" (did you mean '{name[0]}^{power[0]}'?)" if name and power else ""
 
 
 @lru_cache(maxsize=64)

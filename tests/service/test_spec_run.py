@@ -16,6 +16,8 @@ from tests.service.spec_sample import parsed, problems
         ("60 periods", [60.0, "periods"]),
         ("1 period", [1.0, "periods"]),
         ("0.5periods", [0.5, "periods"]),
+        ("60 cycles", [60.0, "periods"]),
+        ("1 cycle", [1.0, "periods"]),
         ("2 s", [2.0, "s"]),
         ("500 ms", [0.5, "s"]),
         ("1 min", [60.0, "s"]),

@@ -33,6 +33,9 @@ ALL_UNITS = sorted({entry.unit.replace("^K", "^2") for model in models() for ent
         ("9000°/s", 25.0),
         ("0.025 kHz", 25.0),
         ("25 cycle/s", 25.0),
+        ("1500 r/min", 25.0),
+        ("25 r/s", 25.0),
+        ("25 rps", 25.0),
     ],
 )
 def test_a_revolution_is_one_period(text: str, hertz: float) -> None:
@@ -108,6 +111,10 @@ def test_the_example_of_each_unit_is_accepted(unit: str) -> None:
     [
         ("20 degC", "Hz", "unknown unit 'degC'"),
         ("20 hz", "Hz", "did you mean 'Hz'"),
+        ("1 kg m2", "kg*m^2", "did you mean 'm\\^2'"),
+        ("1 kg*mm2", "kg*m^2", "did you mean 'mm\\^2'"),
+        ("9.81 m/s2", "m/s^2", "did you mean 's\\^2'"),
+        ("25 s-1", "Hz", "did you mean 's\\^-1'"),
         ("2 N", "m", "no unit of this field; expected m"),
         ("5 Hz", "rad/s", "expected rad/s"),
         ("5 rad", "Hz", "expected Hz"),
