@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import typer
 
+from engine.machine_shaft.results import MACHINE_RESULTS
 from service.cli.app import app
 from service.presets import preset_names, preset_text
 from service.settings import table
