@@ -99,7 +99,14 @@ OK = Ending.OK.value
 
 #: Flag of a case some of whose clutches worked beyond the end of the measured data.
 WINDUP_OUT_OF_DATA = "windup_out_of_data"
+#: Flag of a case whose window shows no steady motion, and the share of the work from which on it is raised.
+NOT_SETTLED = "not_settled"
+SETTLED_SHARE = 0.01
 FLAG_SENTENCES: dict[str, str] = {
+    NOT_SETTLED: (
+        "The machine's own energy changed over the window by more than 1 % of the work done: the motion had not "
+        "settled, and means (the efficiency above all) are not those of steady running."
+    ),
     WINDUP_OUT_OF_DATA: "Some clutch was wound up beyond the measured data; its law was continued straight there.",
 }
 
@@ -260,6 +267,18 @@ def chunk_task(study: Study, first: int, count: int) -> ChunkTask:
     return ChunkTask(first, count, shape_of(study), run_of(study), columns)
 
 
+def _flags(names: list[str], values: NDArray[np.float64]) -> list[str]:
+    """Flags of every case, joined by commas."""
+    column = {name: values[:, index] for index, name in enumerate(names)}
+    beyond = np.column_stack([values for name, values in column.items() if name.endswith(".fraction.beyond_data")])
+    work = [np.abs(column[f"power.{kind}.mean"]) for kind in ("input", "loss", "useful")]
+    raised = {
+        NOT_SETTLED: np.abs(column["power.stored.mean"]) > SETTLED_SHARE * np.max(work, axis=0),
+        WINDUP_OUT_OF_DATA: np.any(beyond > 0.0, axis=1),
+    }
+    return [",".join(name for name, cases in raised.items() if cases[case]) for case in range(len(values))]
+
+
 def run_task(task: ChunkTask) -> ChunkResult:
     """Run the cases of a task.
 
@@ -271,12 +290,11 @@ def run_task(task: ChunkTask) -> ChunkResult:
     batch = simulate(task.columns, task.run, cases=task.count)
     names = [ending.value for ending in ENDING_CODES]
     infos = result_infos(task.shape.model, task.shape.pendulums)
-    beyond = [index for index, info in enumerate(infos) if info.name.endswith(".fraction.beyond_data")]
-    outside = np.any(batch.values[:, beyond] > 0.0, axis=1)
+    flags = _flags([info.name for info in infos], batch.values)
     return ChunkResult(
         first=task.first,
         endings=[names[code] for code in batch.endings.tolist()],
-        flags=[WINDUP_OUT_OF_DATA if flag else "" for flag in outside.tolist()],
+        flags=flags,
         # Adding zero makes a negative zero positive: databases do not keep its sign.
         values=np.ascontiguousarray(batch.values, dtype=np.float64) + 0.0,
     )

@@ -138,6 +138,7 @@ def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
     out["power.clutch.max"] = cases.shaft("power_max")
     out["power.input.mean"] = _over_pendulums(cases, out, "power.input")
     out["power.loss.mean"] = _over_pendulums(cases, out, "power.loss")
+    out["power.stored.mean"] = (cases.shaft("energy_2") - cases.shaft("energy_0")) / cases.length
     useful = cases.load * (cases.shaft("turn_2") - cases.shaft("turn_1"))
     supplied = out["power.input.mean"] * cases.length - cases.shaft("input_1")
     out["efficiency"] = np.where(cases.whole_periods > 0.5, _ratio(useful, supplied), np.nan)
@@ -155,13 +156,13 @@ def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
 def _balances(cases: _Cases, out: dict[str, Floats]) -> None:
     """Residuals of both balances of MODEL.md A4, each over the largest of its own terms.
 
-    The energy balance's terms include the largest kinetic energy in the window, so that a machine that only swings,
-    with next to no work done, is not judged against zero.
+    The terms include the largest kinetic energy and the largest angular momentum of the shaft in the window, so that a
+    machine that only swings or coasts, with next to no work done, is not judged against zero.
     """
     length = cases.length
     turn = cases.shaft("turn_2") - cases.shaft("turn_0")
     supplied = out["power.input.mean"] * length
-    stored = cases.shaft("energy_2") - cases.shaft("energy_0")
+    stored = out["power.stored.mean"] * length
     lost = out["power.loss.mean"] * length
     useful = cases.load * turn
     kinetic = 0.5 * cases.inertia * cases.shaft("speed_max") ** 2
@@ -176,7 +177,8 @@ def _balances(cases: _Cases, out: dict[str, Floats]) -> None:
     against = cases.load * cases.shaft("time_rotating")
     gained = cases.inertia * (cases.shaft("speed_2") - cases.shaft("speed_0"))
     held = cases.shaft("sum_held")
-    size = np.max(np.abs([impulse, against, gained, held]), axis=0)
+    carried = cases.inertia * cases.shaft("speed_max")
+    size = np.max(np.abs([impulse, against, gained, held, carried]), axis=0)
     residual = impulse - against - gained - held
     out["balance.momentum"] = np.where(
         size > 0.0, _ratio(np.abs(residual), size), np.where(np.isnan(size), np.nan, 0.0)

@@ -25,6 +25,7 @@ SHAFT = (
     ("power_clutch_max", REAL),
     ("power_input_mean", REAL),
     ("power_loss_mean", REAL),
+    ("power_stored_mean", REAL),
     ("efficiency", REAL),
     ("fraction_rotating", REAL),
     ("fraction_held", REAL),

@@ -84,9 +84,9 @@ CREATE TABLE studies (
 	deleted_at BIGINT, 
 	CONSTRAINT uq_studies_id UNIQUE (id)
 );
-INSERT INTO "studies" VALUES(1,'st_bc526346056c18ed','finished','vibration-drive',1,'finished',NULL,5,5,4,2,'1','242278c2082d86558346e89963dea2a63b81f996c2a74eabfa908152338d9350','{"sprag": 1, "name": "finished"}','{"model": "vibration-drive", "name": "finished", "base": {"excitation.frequency": 25.0, "excitation.amplitude_x": 0.002, "excitation.amplitude_y": 0.002, "pendulums.0.inertia": 0.001, "pendulums.0.mass": 0.5, "pendulums.0.arm": 0.03, "pendulums.0.spring_rate": 9000.0, "pendulums.0.spring_arm": 0.05, "pendulums.0.damping": 0.01, "pendulums.0.backlash": 0.005, "shaft.inertia": 0.002, "shaft.load": 0.1, "clutch.coefficients.0": 0.0, "clutch.coefficients.1": 200.0}, "run": {"duration": [3.0, "periods"], "window": null, "tolerance": 1e-09, "reset": "contact"}, "axes": [{"paths": ["shaft.load"], "values": [0.0, 0.001, 0.002, 0.003, 0.004]}], "combine": "grid"}','[]',6,1767225600000000,1767225600000000,1767225600000000,NULL);
-INSERT INTO "studies" VALUES(2,'st_ae1c149664e23614','running','vibration-drive',1,'running',NULL,5,2,2,2,'1','242278c2082d86558346e89963dea2a63b81f996c2a74eabfa908152338d9350','{"sprag": 1, "name": "running"}','{"model": "vibration-drive", "name": "running", "base": {"excitation.frequency": 25.0, "excitation.amplitude_x": 0.002, "excitation.amplitude_y": 0.002, "pendulums.0.inertia": 0.001, "pendulums.0.mass": 0.5, "pendulums.0.arm": 0.03, "pendulums.0.spring_rate": 9000.0, "pendulums.0.spring_arm": 0.05, "pendulums.0.damping": 0.01, "pendulums.0.backlash": 0.005, "shaft.inertia": 0.002, "shaft.load": 0.1, "clutch.coefficients.0": 0.0, "clutch.coefficients.1": 200.0}, "run": {"duration": [3.0, "periods"], "window": null, "tolerance": 1e-09, "reset": "contact"}, "axes": [{"paths": ["shaft.load"], "values": [0.0, 0.001, 0.002, 0.003, 0.004]}], "combine": "grid"}','["odd"]',3,1767225600000000,1767225600000000,NULL,NULL);
-INSERT INTO "studies" VALUES(3,'st_e3f737d84d58830e','queued','vibration-drive',1,'queued',NULL,5,0,0,2,'1','242278c2082d86558346e89963dea2a63b81f996c2a74eabfa908152338d9350','{"sprag": 1, "name": "queued"}','{"model": "vibration-drive", "name": "queued", "base": {"excitation.frequency": 25.0, "excitation.amplitude_x": 0.002, "excitation.amplitude_y": 0.002, "pendulums.0.inertia": 0.001, "pendulums.0.mass": 0.5, "pendulums.0.arm": 0.03, "pendulums.0.spring_rate": 9000.0, "pendulums.0.spring_arm": 0.05, "pendulums.0.damping": 0.01, "pendulums.0.backlash": 0.005, "shaft.inertia": 0.002, "shaft.load": 0.1, "clutch.coefficients.0": 0.0, "clutch.coefficients.1": 200.0}, "run": {"duration": [3.0, "periods"], "window": null, "tolerance": 1e-09, "reset": "contact"}, "axes": [{"paths": ["shaft.load"], "values": [0.0, 0.001, 0.002, 0.003, 0.004]}], "combine": "grid"}','[]',1,1767225600000000,NULL,NULL,NULL);
+INSERT INTO "studies" VALUES(1,'st_b38855af108f164c','finished','vibration-drive',1,'finished',NULL,5,5,4,2,'1','242278c2082d86558346e89963dea2a63b81f996c2a74eabfa908152338d9350','{"sprag": 1, "name": "finished"}','{"model": "vibration-drive", "name": "finished", "base": {"excitation.frequency": 25.0, "excitation.amplitude_x": 0.002, "excitation.amplitude_y": 0.002, "pendulums.0.inertia": 0.001, "pendulums.0.mass": 0.5, "pendulums.0.arm": 0.03, "pendulums.0.spring_rate": 9000.0, "pendulums.0.spring_arm": 0.05, "pendulums.0.damping": 0.01, "pendulums.0.backlash": 0.005, "shaft.inertia": 0.002, "shaft.load": 0.1, "clutch.coefficients.0": 0.0, "clutch.coefficients.1": 200.0}, "run": {"duration": [3.0, "periods"], "window": null, "tolerance": 1e-09, "reset": "contact"}, "axes": [{"paths": ["shaft.load"], "values": [0.0, 0.001, 0.002, 0.003, 0.004]}], "combine": "grid"}','[]',6,1767225600000000,1767225600000000,1767225600000000,NULL);
+INSERT INTO "studies" VALUES(2,'st_9e38546d293042cd','running','vibration-drive',1,'running',NULL,5,2,2,2,'1','242278c2082d86558346e89963dea2a63b81f996c2a74eabfa908152338d9350','{"sprag": 1, "name": "running"}','{"model": "vibration-drive", "name": "running", "base": {"excitation.frequency": 25.0, "excitation.amplitude_x": 0.002, "excitation.amplitude_y": 0.002, "pendulums.0.inertia": 0.001, "pendulums.0.mass": 0.5, "pendulums.0.arm": 0.03, "pendulums.0.spring_rate": 9000.0, "pendulums.0.spring_arm": 0.05, "pendulums.0.damping": 0.01, "pendulums.0.backlash": 0.005, "shaft.inertia": 0.002, "shaft.load": 0.1, "clutch.coefficients.0": 0.0, "clutch.coefficients.1": 200.0}, "run": {"duration": [3.0, "periods"], "window": null, "tolerance": 1e-09, "reset": "contact"}, "axes": [{"paths": ["shaft.load"], "values": [0.0, 0.001, 0.002, 0.003, 0.004]}], "combine": "grid"}','["odd"]',3,1767225600000000,1767225600000000,NULL,NULL);
+INSERT INTO "studies" VALUES(3,'st_cb676fa10a193ead','queued','vibration-drive',1,'queued',NULL,5,0,0,2,'1','242278c2082d86558346e89963dea2a63b81f996c2a74eabfa908152338d9350','{"sprag": 1, "name": "queued"}','{"model": "vibration-drive", "name": "queued", "base": {"excitation.frequency": 25.0, "excitation.amplitude_x": 0.002, "excitation.amplitude_y": 0.002, "pendulums.0.inertia": 0.001, "pendulums.0.mass": 0.5, "pendulums.0.arm": 0.03, "pendulums.0.spring_rate": 9000.0, "pendulums.0.spring_arm": 0.05, "pendulums.0.damping": 0.01, "pendulums.0.backlash": 0.005, "shaft.inertia": 0.002, "shaft.load": 0.1, "clutch.coefficients.0": 0.0, "clutch.coefficients.1": 200.0}, "run": {"duration": [3.0, "periods"], "window": null, "tolerance": 1e-09, "reset": "contact"}, "axes": [{"paths": ["shaft.load"], "values": [0.0, 0.001, 0.002, 0.003, 0.004]}], "combine": "grid"}','[]',1,1767225600000000,NULL,NULL,NULL);
 CREATE TABLE vibration_drive_1 (
 	study INTEGER NOT NULL, 
 	case_number INTEGER NOT NULL, 
@@ -106,6 +106,7 @@ CREATE TABLE vibration_drive_1 (
 	power_clutch_max DOUBLE, 
 	power_input_mean DOUBLE, 
 	power_loss_mean DOUBLE, 
+	power_stored_mean DOUBLE, 
 	efficiency DOUBLE, 
 	fraction_rotating DOUBLE, 
 	fraction_held DOUBLE, 
@@ -140,13 +141,13 @@ CREATE TABLE vibration_drive_1 (
  WITHOUT ROWID
 
 ;
-INSERT INTO "vibration_drive_1" VALUES(1,0,'ok','',0.0,1.0,2.0,3.0,4.0,5.0,6.0,7.0,8.0,9.0,10.0,11.0,12.0,13.0,14.0,15.0,16.0,17.0,18,19.0,20.0,21.0,22.0,23.0,24,25,26.0,27.0,28.0,29.0,30.0,31.0,32.0,33.0,34.0,35.0,36.0,37.0,38.0,39,40.0,41.0);
-INSERT INTO "vibration_drive_1" VALUES(1,1,'ok','',1000.0,1001.0,1002.0,1003.0,1004.0,1005.0,1006.0,1007.0,1008.0,1009.0,1010.0,1011.0,1012.0,1013.0,1014.0,1015.0,1016.0,1017.0,1018,1019.0,1020.0,1021.0,1022.0,1023.0,1024,1025,1026.0,1027.0,1028.0,1029.0,1030.0,1031.0,1032.0,1033.0,1034.0,1035.0,1036.0,1037.0,1038.0,1039,1040.0,1041.0);
-INSERT INTO "vibration_drive_1" VALUES(1,2,'ok','',2000.0,2001.0,2002.0,2003.0,2004.0,2005.0,2006.0,2007.0,2008.0,2009.0,2010.0,2011.0,2012.0,2013.0,2014.0,2015.0,2016.0,2017.0,2018,2019.0,2020.0,2021.0,2022.0,2023.0,2024,2025,2026.0,2027.0,2028.0,2029.0,2030.0,2031.0,2032.0,2033.0,2034.0,2035.0,2036.0,2037.0,2038.0,2039,2040.0,2041.0);
-INSERT INTO "vibration_drive_1" VALUES(1,3,'ok','',3000.0,3001.0,3002.0,3003.0,3004.0,3005.0,3006.0,3007.0,3008.0,3009.0,3010.0,3011.0,3012.0,3013.0,3014.0,3015.0,3016.0,3017.0,3018,3019.0,3020.0,3021.0,3022.0,3023.0,3024,3025,3026.0,3027.0,3028.0,3029.0,3030.0,3031.0,3032.0,3033.0,3034.0,3035.0,3036.0,3037.0,3038.0,3039,3040.0,3041.0);
-INSERT INTO "vibration_drive_1" VALUES(1,4,'crashed','',NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL);
-INSERT INTO "vibration_drive_1" VALUES(2,0,'ok','',0.0,1.0,2.0,3.0,4.0,5.0,6.0,7.0,8.0,9.0,10.0,11.0,12.0,13.0,14.0,15.0,16.0,17.0,18,19.0,20.0,21.0,22.0,23.0,24,25,26.0,27.0,28.0,29.0,30.0,31.0,32.0,33.0,34.0,35.0,36.0,37.0,38.0,39,40.0,41.0);
-INSERT INTO "vibration_drive_1" VALUES(2,1,'ok','',1000.0,1001.0,1002.0,1003.0,1004.0,1005.0,1006.0,1007.0,1008.0,1009.0,1010.0,1011.0,1012.0,1013.0,1014.0,1015.0,1016.0,1017.0,1018,1019.0,1020.0,1021.0,1022.0,1023.0,1024,1025,1026.0,1027.0,1028.0,1029.0,1030.0,1031.0,1032.0,1033.0,1034.0,1035.0,1036.0,1037.0,1038.0,1039,1040.0,1041.0);
+INSERT INTO "vibration_drive_1" VALUES(1,0,'ok','',0.0,1.0,2.0,3.0,4.0,5.0,6.0,7.0,8.0,9.0,10.0,11.0,12.0,13.0,14.0,15.0,16.0,17.0,18.0,19,20.0,21.0,22.0,23.0,24.0,25,26,27.0,28.0,29.0,30.0,31.0,32.0,33.0,34.0,35.0,36.0,37.0,38.0,39.0,40,41.0,42.0);
+INSERT INTO "vibration_drive_1" VALUES(1,1,'ok','',1000.0,1001.0,1002.0,1003.0,1004.0,1005.0,1006.0,1007.0,1008.0,1009.0,1010.0,1011.0,1012.0,1013.0,1014.0,1015.0,1016.0,1017.0,1018.0,1019,1020.0,1021.0,1022.0,1023.0,1024.0,1025,1026,1027.0,1028.0,1029.0,1030.0,1031.0,1032.0,1033.0,1034.0,1035.0,1036.0,1037.0,1038.0,1039.0,1040,1041.0,1042.0);
+INSERT INTO "vibration_drive_1" VALUES(1,2,'ok','',2000.0,2001.0,2002.0,2003.0,2004.0,2005.0,2006.0,2007.0,2008.0,2009.0,2010.0,2011.0,2012.0,2013.0,2014.0,2015.0,2016.0,2017.0,2018.0,2019,2020.0,2021.0,2022.0,2023.0,2024.0,2025,2026,2027.0,2028.0,2029.0,2030.0,2031.0,2032.0,2033.0,2034.0,2035.0,2036.0,2037.0,2038.0,2039.0,2040,2041.0,2042.0);
+INSERT INTO "vibration_drive_1" VALUES(1,3,'ok','',3000.0,3001.0,3002.0,3003.0,3004.0,3005.0,3006.0,3007.0,3008.0,3009.0,3010.0,3011.0,3012.0,3013.0,3014.0,3015.0,3016.0,3017.0,3018.0,3019,3020.0,3021.0,3022.0,3023.0,3024.0,3025,3026,3027.0,3028.0,3029.0,3030.0,3031.0,3032.0,3033.0,3034.0,3035.0,3036.0,3037.0,3038.0,3039.0,3040,3041.0,3042.0);
+INSERT INTO "vibration_drive_1" VALUES(1,4,'crashed','',NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL,NULL);
+INSERT INTO "vibration_drive_1" VALUES(2,0,'ok','',0.0,1.0,2.0,3.0,4.0,5.0,6.0,7.0,8.0,9.0,10.0,11.0,12.0,13.0,14.0,15.0,16.0,17.0,18.0,19,20.0,21.0,22.0,23.0,24.0,25,26,27.0,28.0,29.0,30.0,31.0,32.0,33.0,34.0,35.0,36.0,37.0,38.0,39.0,40,41.0,42.0);
+INSERT INTO "vibration_drive_1" VALUES(2,1,'ok','',1000.0,1001.0,1002.0,1003.0,1004.0,1005.0,1006.0,1007.0,1008.0,1009.0,1010.0,1011.0,1012.0,1013.0,1014.0,1015.0,1016.0,1017.0,1018.0,1019,1020.0,1021.0,1022.0,1023.0,1024.0,1025,1026,1027.0,1028.0,1029.0,1030.0,1031.0,1032.0,1033.0,1034.0,1035.0,1036.0,1037.0,1038.0,1039.0,1040,1041.0,1042.0);
 CREATE TABLE vibration_drive_2 (
 	study INTEGER NOT NULL, 
 	case_number INTEGER NOT NULL, 
@@ -166,6 +167,7 @@ CREATE TABLE vibration_drive_2 (
 	power_clutch_max DOUBLE, 
 	power_input_mean DOUBLE, 
 	power_loss_mean DOUBLE, 
+	power_stored_mean DOUBLE, 
 	efficiency DOUBLE, 
 	fraction_rotating DOUBLE, 
 	fraction_held DOUBLE, 
@@ -235,6 +237,7 @@ CREATE TABLE vibration_drive_3 (
 	power_clutch_max DOUBLE, 
 	power_input_mean DOUBLE, 
 	power_loss_mean DOUBLE, 
+	power_stored_mean DOUBLE, 
 	efficiency DOUBLE, 
 	fraction_rotating DOUBLE, 
 	fraction_held DOUBLE, 
@@ -320,6 +323,7 @@ CREATE TABLE vibration_drive_4 (
 	power_clutch_max DOUBLE, 
 	power_input_mean DOUBLE, 
 	power_loss_mean DOUBLE, 
+	power_stored_mean DOUBLE, 
 	efficiency DOUBLE, 
 	fraction_rotating DOUBLE, 
 	fraction_held DOUBLE, 
@@ -421,6 +425,7 @@ CREATE TABLE vibration_drive_5 (
 	power_clutch_max DOUBLE, 
 	power_input_mean DOUBLE, 
 	power_loss_mean DOUBLE, 
+	power_stored_mean DOUBLE, 
 	efficiency DOUBLE, 
 	fraction_rotating DOUBLE, 
 	fraction_held DOUBLE, 
@@ -538,6 +543,7 @@ CREATE TABLE vibration_drive_6 (
 	power_clutch_max DOUBLE, 
 	power_input_mean DOUBLE, 
 	power_loss_mean DOUBLE, 
+	power_stored_mean DOUBLE, 
 	efficiency DOUBLE, 
 	fraction_rotating DOUBLE, 
 	fraction_held DOUBLE, 
@@ -671,6 +677,7 @@ CREATE TABLE vibration_drive_7 (
 	power_clutch_max DOUBLE, 
 	power_input_mean DOUBLE, 
 	power_loss_mean DOUBLE, 
+	power_stored_mean DOUBLE, 
 	efficiency DOUBLE, 
 	fraction_rotating DOUBLE, 
 	fraction_held DOUBLE, 
@@ -820,6 +827,7 @@ CREATE TABLE vibration_drive_8 (
 	power_clutch_max DOUBLE, 
 	power_input_mean DOUBLE, 
 	power_loss_mean DOUBLE, 
+	power_stored_mean DOUBLE, 
 	efficiency DOUBLE, 
 	fraction_rotating DOUBLE, 
 	fraction_held DOUBLE, 
