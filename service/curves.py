@@ -150,7 +150,7 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
     x_axis = require_axis(study, "x", query.x)
     fixed = locate_axes(study, query.at)
     by_axes = {path: require_axis(study, "by", path) for path in dict.fromkeys(query.by)}
-    _no_axis_twice({query.x: x_axis}, by_axes, fixed)
+    _no_axis_twice({query.x: x_axis}, "by", by_axes, fixed)
     chooser = _zip_lines if study.combine == "zip" else _grid_lines
     x_values, lines = chooser(study, x_axis, by_axes, fixed, len(results))
     made = tuple(lines)
@@ -180,7 +180,7 @@ def draw_map(
         raise SelectionError([ErrorItem("a map needs a grid; the axes of this study go together (zip)", parameter="x")])
     x_axis, y_axis = require_axis(study, "x", x), require_axis(study, "y", y)
     fixed = locate_axes(study, at)
-    _no_axis_twice({x: x_axis}, {y: y_axis}, fixed)
+    _no_axis_twice({x: x_axis}, "y", {y: y_axis}, fixed)
     x_values, lines = _grid_lines(study, x_axis, {y: y_axis}, fixed, 1)
     rows = list(lines)
     cases = np.stack([row.cases for row in rows])
@@ -213,9 +213,9 @@ def _results(infos: Sequence[ResultInfo], parameter: str, names: Sequence[str]) 
     return tuple(info for name in names if (info := result_of(infos, name)) is not None)
 
 
-def _no_axis_twice(x: dict[str, int], by: dict[str, int], fixed: Fixed) -> None:
+def _no_axis_twice(x: dict[str, int], second: str, others: dict[str, int], fixed: Fixed) -> None:
     taken: dict[int, str] = {}
-    uses = [("x", path, axis) for path, axis in x.items()] + [("by", path, axis) for path, axis in by.items()]
+    uses = [("x", path, axis) for path, axis in x.items()] + [(second, path, axis) for path, axis in others.items()]
     uses += [("at", path, axis) for axis, (path, _) in fixed.items()]
     for parameter, path, axis in uses:
         if axis in taken:

@@ -17,13 +17,12 @@ from service.api.respond import choose_format, json_response
 from service.api.views import study_address
 from service.curves import PENDING
 from service.errors import ApiError, parameter_error, shown
-from service.exports import MEDIA_TYPES, row_json, rows_json
+from service.exports import MEDIA_TYPES, Format, row_json, rows_json
 from service.storage.records import CaseRow
 from worker import kernels
 from worker.limits import MAX_PAGE_SIZE, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 
 if TYPE_CHECKING:
-    from worker.kernels import Trajectory
     from worker.study import Study
 
 router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
@@ -95,10 +94,12 @@ async def get_trajectory(
     study_id: StudyId,
     case: CaseNumber,
     start: Annotated[
-        str | None, Query(alias="from", description="first time, in s or with a unit; by default 0", examples=["0"])
+        str | None,
+        Query(alias="from", description="first time, in s or with a unit (s, periods); by default 0", examples=["0"]),
     ] = None,
     end: Annotated[
-        str | None, Query(alias="to", description="last time; by default the end of the run", examples=["0.1 s"])
+        str | None,
+        Query(alias="to", description="last time, likewise; by default the end of the run", examples=["2.5 periods"]),
     ] = None,
     points: Annotated[
         int,
@@ -108,15 +109,17 @@ async def get_trajectory(
 ) -> Response:
     """Every variable, torque, power and state of one case over time. The case is run again for it."""
     chosen = choose_format(request, form, {"json": MEDIA_TYPES["json"], "csv": MEDIA_TYPES["csv"]})
-    study = await run_in_threadpool(_study_with, context, study_id, case)
-    first, last = trajectories.span(study, case, start, end)
-    made: Trajectory = await context.computer.run(kernels.run_trajectory, study, case, first, last, points)
-    if chosen == "csv":
-        content = await run_in_threadpool(trajectories.trajectory_csv, made)
-        name = f'attachment; filename="{study_id}-case-{case}.csv"'
-        return Response(content, media_type=MEDIA_TYPES["csv"], headers={"Content-Disposition": name})
-    data = trajectories.trajectory_json(made, case, study.case_parameters(case))
-    return await run_in_threadpool(json_response, data)
+    written: Format = "csv" if chosen == "csv" else "json"
+
+    def find() -> tuple[Study, tuple[float, float]]:
+        study = _study_with(context, study_id, case)
+        return study, trajectories.span(study, case, start, end)
+
+    study, (first, last) = await run_in_threadpool(find)
+    content = await context.computer.run(trajectories.trajectory_file, study, case, first, last, points, written)
+    name = f'attachment; filename="{study_id}-case-{case}.csv"'
+    headers = {"Content-Disposition": name} if written == "csv" else {}
+    return Response(content, media_type=MEDIA_TYPES[written], headers=headers)
 
 
 def _study_with(context: Context, study_id: str, case: int) -> Study:

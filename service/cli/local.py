@@ -94,8 +94,12 @@ def trajectory(
     case: Annotated[int, typer.Option("--case", min=0, metavar="N", help="Number of the case, from 0.")] = 0,
     file: OutputFile = None,
     form: Annotated[TableFormat | None, typer.Option("--format", help="Default: as FILE ends, else csv.")] = None,
-    start: Annotated[str | None, typer.Option("--from", metavar="TIME", help="First time, in s; default: 0.")] = None,
-    end: Annotated[str | None, typer.Option("--to", metavar="TIME", help="Last time, in s; default: the end.")] = None,
+    start: Annotated[
+        str | None, typer.Option("--from", metavar="TIME", help='First time, in s, or as "40 periods"; default: 0.')
+    ] = None,
+    end: Annotated[
+        str | None, typer.Option("--to", metavar="TIME", help="Last time, likewise; default: the end.")
+    ] = None,
     points: Annotated[
         int, typer.Option(min=MIN_TRAJECTORY_POINTS, max=MAX_TRAJECTORY_POINTS, help="Equally spaced times.")
     ] = 1000,

@@ -200,6 +200,8 @@ def test_a_map_has_rows_of_y(service: Service, grid: dict[str, Any]) -> None:
         fixed = {"excitation__frequency": frequency, "excitation__amplitude_y": 0.001}
         assert values == expected(study, rows, "torque.max", **fixed)
     assert np.shape(body["endings"]) == np.shape(body["cases"]) == (3, 3)
+    twice = ask(service, study_id, "x=shaft.load&y=shaft.load&z=torque.max&at=excitation.frequency=25", "map")
+    assert [item["parameter"] for item in twice.json()["errors"]] == ["y"]
     left = ask(service, study_id, "x=shaft.load&y=excitation.frequency&z=torque.max", "map")
     assert "left open" in left.json()["detail"]
 

@@ -257,13 +257,38 @@ def test_a_wrong_part_of_a_run_is_refused(service: Service, one_case: str, query
     assert service.computer.calls == []
 
 
-def test_numbers_that_are_none_are_null(service: Service, one_case: str) -> None:
+def test_a_part_of_a_run_may_be_told_in_periods(service: Service, one_case: str) -> None:
+    body = trajectory(service, one_case, "?points=5&from=1%20period&to=3.5%20periods").json()
+    assert (body["times"][0], body["times"][-1]) == (1 / 25.5, 3.5 / 25.5)
+    whole = trajectory(service, one_case, "?points=5&from=2%20periods&to=4%20periods").json()
+    assert whole["times"][-1] == 4 / 25.5
+    beyond = trajectory(service, one_case, "?points=5&to=4.1%20periods")
+    assert beyond.status_code == 422
+    assert beyond.json()["errors"][0]["parameter"] == "to"
+
+
+@pytest.mark.parametrize("form", ["json", "csv"])
+def test_instantaneous_values_are_written_where_they_are_computed(service: Service, one_case: str, form: str) -> None:
+    made = []
+
+    def compute(function: Any, *args: Any) -> Any:
+        made.append(function(*args))
+        return made[-1]
+
+    service.computer.answer = lambda *args: compute(service.computer.calls[-1][0], *args)
+    response = trajectory(service, one_case, f"?points=3&format={form}")
+    assert response.content == made[0]
+
+
+def test_numbers_that_are_none_are_null(service: Service, one_case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = kernels.run_trajectory
+
     def broken(study: Any, case: int, start: float, end: float, points: int) -> Any:
-        made = kernels.run_trajectory(study, case, start, end, points)
+        made = run(study, case, start, end, points)
         made.values[1:] = np.nan
         return made
 
-    service.computer.answer = broken
+    monkeypatch.setattr(kernels, "run_trajectory", broken)
     body = json.loads(trajectory(service, one_case, "?points=3").text, parse_constant=pytest.fail)
     assert next(iter(body["values"].values()))[1:] == [None, None]
     assert trajectory(service, one_case, "?points=3&format=csv").text.splitlines()[2].count(",,") > 3

@@ -117,6 +117,14 @@ def test_a_file_that_cannot_be_written(sprag: Sprag, examples: Path, tmp_path: P
     assert done.out == ""
 
 
+def test_a_part_of_a_run_in_periods(sprag: Sprag, examples: Path) -> None:
+    spec = examples / "one_pendulum.json"
+    done = sprag("trajectory", spec, "--points", "2", "--from", "40 periods", "--to", "9e9 periods")
+    assert done.code == 2
+    assert "--to: outside the run" in done.err
+    assert "--from" not in done.err
+
+
 def test_a_usage_error_names_the_help(sprag: Sprag) -> None:
     for arguments in (
         ["nonsense"],
