@@ -4,8 +4,10 @@ numba notices when the file of a cached function changes, but not when a functio
 hash of all of the engine's sources (and of the compiler's version) makes old code unreachable instead.
 """
 
+import contextlib
 import hashlib
 import os
+import stat
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -14,6 +16,7 @@ import numba
 
 #: Environment variable that moves the cache.
 CACHE_VARIABLE = "SPRAG_KERNEL_CACHE"
+_TEMPORARY_NAME = f"sprag-kernels-{os.getuid()}"
 
 
 @cache
@@ -36,11 +39,30 @@ def _writable(folder: Path) -> bool:
 
 @cache
 def cache_folder() -> Path:
-    """The folder, made if need be: under ``SPRAG_KERNEL_CACHE``, else the user's cache folder, else a temporary one."""
+    """The folder, made if need be: under ``SPRAG_KERNEL_CACHE``, else under the user's cache folder.
+
+    Where that cannot be written it is one of the user's own under the temporary folder, the same for every process.
+    """
     chosen = os.environ.get(CACHE_VARIABLE)
     base = os.environ.get("XDG_CACHE_HOME")
     root = Path(chosen) if chosen else (Path(base) if base else Path.home() / ".cache") / "sprag"
     folder = root / "kernels" / _engine_hash()
-    if not _writable(folder):
-        folder = Path(tempfile.mkdtemp(prefix="sprag-kernels-"))
+    return folder if _writable(folder) else _own_temporary_folder()
+
+
+def is_wanted(folder: Path) -> bool:
+    """Whether a cache folder is the one the user wants, not the stand-in for one that cannot be written."""
+    return not folder.is_relative_to(Path(tempfile.gettempdir()) / _TEMPORARY_NAME)
+
+
+def _own_temporary_folder() -> Path:
+    """A folder that nobody else can write to: what lies in it is run."""
+    root = Path(tempfile.gettempdir()) / _TEMPORARY_NAME
+    with contextlib.suppress(FileExistsError):
+        root.mkdir(mode=0o700)
+    status = root.lstat()
+    if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.getuid() or status.st_mode & 0o022:
+        return Path(tempfile.mkdtemp(prefix="sprag-kernels-"))
+    folder = root / _engine_hash()
+    folder.mkdir(exist_ok=True)
     return folder

@@ -1,0 +1,125 @@
+"""The compiler of lane loops against numpy, and the building blocks of straight-line code run through it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+
+from engine.taylor.lowering import lane_loops
+from engine.taylor.straight import LaneCode, exp2, horner, integral, log2, product, range_bounds, sincos
+
+LANES = 8
+
+
+def run(code: LaneCode, rows: list[list[float]], *, a: float = 0.0, b: float = 0.0) -> np.ndarray:
+    """Run one loop over a workspace whose rows are given; the workspace afterwards, one row a line."""
+    loops: Callable[[Any, float, float], None] = lane_loops(code.loop(), "first", "second")
+
+    @numba.njit
+    def call(W: np.ndarray, a: float, b: float) -> None:
+        loops(W, a, b)
+
+    workspace = np.array(rows, dtype=np.float64)
+    flat = np.ascontiguousarray(workspace).ravel()
+    call(flat, a, b)
+    return flat.reshape(workspace.shape)
+
+
+def lane_values(scale: float = 1.0) -> list[float]:
+    return (scale * np.linspace(-1.0, 1.3, LANES)).tolist()
+
+
+def test_arithmetic_selection_and_numbers_from_outside() -> None:
+    code = LaneCode(LANES)
+    x, y = code.load("x", 0), code.load("y", 1)
+    code.store(2, f"-{x}*{y} + {x}/{y} - 2.5*first")
+    code.store(3, f"{x} if {x} < {y} else second")
+    code.store(4, f"1.0 if ({x} == {y} or abs({x}) >= 1.0) else 0.0")
+    xs, ys = np.array(lane_values()), np.array(lane_values(-0.7)) + 0.11
+    ys[2] = xs[2]
+    out = run(code, [xs.tolist(), ys.tolist(), *([[0.0] * LANES] * 3)], a=3.0, b=-7.0)
+    np.testing.assert_allclose(out[2], -xs * ys + xs / ys - 7.5, rtol=1e-15)
+    np.testing.assert_array_equal(out[3], np.where(xs < ys, xs, -7.0))
+    np.testing.assert_array_equal(out[4], ((xs == ys) | (np.abs(xs) >= 1.0)).astype(float))
+
+
+def test_a_nan_fails_every_comparison() -> None:
+    code = LaneCode(LANES)
+    x = code.load("x", 0)
+    for row, sign in enumerate(("<", ">", "<=", ">=", "=="), start=1):
+        code.store(row, f"1.0 if {x} {sign} {x} else 0.0")
+    out = run(code, [[math.nan] * LANES, *([[9.0] * LANES] * 5)])
+    np.testing.assert_array_equal(out[1:], 0.0)
+
+
+def test_names_are_assigned_once() -> None:
+    code = LaneCode(LANES, "_t")
+    assert code.let("x", "1.0") == "x_t"
+    assert code.let("x", "2.0") != "x_t"
+
+
+def test_what_is_not_in_the_language_is_refused() -> None:
+    code = LaneCode(LANES)
+    code.store(0, "sorted(first)")
+    with pytest.raises(AssertionError):
+        run(code, [[0.0] * LANES])
+
+
+@pytest.mark.parametrize("scale", [1.0, 30.0, 4e4, 9e5])
+def test_sine_and_cosine_within_an_ulp_or_so(scale: float) -> None:
+    code = LaneCode(LANES)
+    s, c = sincos(code, code.load("x", 0), "q")
+    code.store(1, s)
+    code.store(2, c)
+    x = np.random.default_rng(7).uniform(-scale, scale, LANES)
+    out = run(code, [x.tolist(), [0.0] * LANES, [0.0] * LANES])
+    np.testing.assert_allclose(out[1], np.sin(x), rtol=0, atol=3e-16)
+    np.testing.assert_allclose(out[2], np.cos(x), rtol=0, atol=3e-16)
+
+
+def test_logarithm_and_power_of_two_are_inverse_and_near() -> None:
+    code = LaneCode(LANES)
+    x = code.load("x", 0)
+    code.store(1, log2(x))
+    code.store(2, exp2(f"({log2(x)})"))
+    xs = np.array([1e-300, 3e-12, 0.1, 1.0, 1.5, 2.0, 7e9, 1e300])
+    out = run(code, [xs.tolist(), [0.0] * LANES, [0.0] * LANES])
+    assert np.all(np.abs(out[1] - np.log2(xs)) < 0.09)
+    np.testing.assert_allclose(out[2], xs, rtol=1e-12)
+
+
+def test_series_products_values_and_integrals() -> None:
+    rng = np.random.default_rng(3)
+    a, b = rng.normal(size=(2, 5, LANES))
+    x = rng.uniform(0.1, 0.9, LANES)
+    code = LaneCode(LANES)
+    first, second = code.series("a", 0, 5), code.series("b", 5, 5)
+    code.store(11, product(first, second, 4))
+    code.store(12, horner(first, code.load("x", 10)))
+    code.store(13, integral(first, code.load("x", 10)))
+    out = run(code, [*a.tolist(), *b.tolist(), x.tolist(), *([[0.0] * LANES] * 3)])
+    for lane in range(LANES):
+        p = np.polynomial.Polynomial(a[:, lane])
+        np.testing.assert_allclose(out[11, lane], np.convolve(a[:, lane], b[:, lane])[4], rtol=1e-13, atol=1e-14)
+        np.testing.assert_allclose(out[12, lane], p(x[lane]), rtol=1e-13, atol=1e-14)
+        np.testing.assert_allclose(out[13, lane], p.integ()(x[lane]), rtol=1e-13, atol=1e-14)
+
+
+def test_bounds_hold_and_are_near() -> None:
+    rng = np.random.default_rng(5)
+    a = rng.normal(size=(8, LANES)) * 0.3 ** np.arange(8)[:, None]
+    code = LaneCode(LANES)
+    low, high = range_bounds(code, "a", code.series("a", 0, 8))
+    code.store(8, low)
+    code.store(9, high)
+    out = run(code, [*a.tolist(), [0.0] * LANES, [0.0] * LANES])
+    values = np.polynomial.polynomial.polyval(np.linspace(0.0, 1.0, 2001), a)
+    assert np.all(out[8] <= values.min(axis=1) + 1e-14)
+    assert np.all(out[9] >= values.max(axis=1) - 1e-14)
+    span = values.max(axis=1) - values.min(axis=1)
+    assert np.all(out[9] - out[8] <= span + np.abs(a[2:]).sum(axis=0))
