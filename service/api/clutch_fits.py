@@ -65,6 +65,11 @@ def _fit(data: object) -> ClutchFit:
     report = Report()
     found = dict(read_object(report, "", data, _FIELDS) or {})
     backlash = read_number(report, "/backlash", found.pop("backlash", 0.0), _backlash())
+    if backlash and found.get("angles_include_backlash") is not True:
+        report.problem(
+            "/backlash", "is taken off the angles only where they include it", backlash,
+            allowed="with `angles_include_backlash` true; else 0 or left out", unit="rad",
+        )  # fmt: skip
     clutch = None
     if not report.problems:
         # Without rows this would be taken for a law that lacks its coefficients.

@@ -45,11 +45,15 @@ def fit(
 
     Reads a text file of two columns, angle and torque, with or without a header that names the units.
     """
+    lost_motion = _quantity("--backlash", backlash, "rad")
+    if lost_motion and not angles_include_backlash:
+        problem = Problem("--backlash", "is taken off the angles only with --angles-include-backlash", backlash)
+        raise WrongInputError("an option is wrong", problems=[problem])
     measured = _measured(data)
     made = _fitted(
         measured,
         accuracy=_quantity("--accuracy", accuracy, "N*m"),
-        backlash=_quantity("--backlash", backlash, "rad"),
+        backlash=lost_motion,
         max_degree=max_degree,
         through_origin=not full,
         angles_include_backlash=angles_include_backlash,
@@ -57,7 +61,8 @@ def fit(
     if as_json:
         from service.fits import fit_json
 
-        write_json(fit_json(made))
+        report = fit_json(made)
+        write_json(report | {"warnings": [*measured.warnings, *report["warnings"]]})
     else:
         _report(measured, made)
 
@@ -93,7 +98,7 @@ def _fitted(measured: MeasuredData, *, accuracy: float, **options: Any) -> Clutc
         return fit_clutch(measured.rows, accuracy, **options)
     except ClutchFitError as error:
         if error.degrees:
-            raise WrongInputError(error.message, problems=_tried(error.degrees, accuracy)) from error
+            raise WrongInputError(error.summary, problems=_tried(error.degrees, accuracy)) from error
         where = _place(error.name, measured)
         problem = Problem(where, error.message, shorten(error.value), allowed=error.allowed)
         raise WrongInputError("no law can be fitted", problems=[problem]) from error
@@ -143,6 +148,7 @@ def _report(measured: MeasuredData, made: ClutchFit) -> None:
         f"degree {made.degree}, RMS {made.rms:.6g} N*m, largest residual {made.max_residual:.6g} N*m, "
         f"{'monotone' if made.monotone else 'not monotone'}\n"
         f"normal matrix: condition number {made.condition_number:.6g}, eigenvalues {eigenvalues}\n"
-        f'for a spec: "clutch": {{"coefficients": {list(made.coefficients)!r}}}\n'
+        f'for a spec: "clutch": {{"coefficients": {list(made.coefficients)!r}, '
+        f'"windup_limit": {made.windup_limit!r}}}\n'
     )
-    say(*(f"warning: {warning}" for warning in made.warnings))
+    say(*(f"warning: {warning}" for warning in (*measured.warnings, *made.warnings)))

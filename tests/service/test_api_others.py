@@ -53,6 +53,8 @@ def test_units_and_backlash_are_taken_off(service: Service) -> None:
         ({"max_degree": 99}, "/max_degree"),
         ({"through_origin": 1}, "/through_origin"),
         ({"backlash": -1}, "/backlash"),
+        ({"backlash": 0.001}, "/backlash"),
+        ({"backlash": 0.001, "angles_include_backlash": False}, "/backlash"),
         ({"coefficients": [0, 1]}, "/coefficients"),
         ({"datum": 1}, "/datum"),
     ],

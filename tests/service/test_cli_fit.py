@@ -33,6 +33,37 @@ def test_the_report_for_people_names_every_degree_row_and_the_law(sprag: Sprag, 
     assert done.err == ""
 
 
+def test_the_line_for_a_spec_keeps_the_end_of_the_data(sprag: Sprag, examples: Path) -> None:
+    done = sprag("fit", examples / "clutch_measured.csv", "--accuracy", "0.05")
+    line = next(line for line in done.out.splitlines() if line.startswith("for a spec: "))
+    clutch = json.loads("{" + line.removeprefix("for a spec: ") + "}")["clutch"]
+    kept = json.loads((examples / "clutch_fit.json").read_text())
+    assert clutch == {"coefficients": pytest.approx(kept["coefficients"]), "windup_limit": kept["windup_limit"]}
+
+
+def test_units_that_are_assumed_are_said(sprag: Sprag, tmp_path: Path) -> None:
+    data = tmp_path / "data.csv"
+    data.write_text("angle,torque\n1,3.6\n2,7.2\n3,10.8\n")
+    done = sprag("fit", data, "--accuracy", "0.1")
+    assert done.code == 0
+    assert "angles are taken in rad and torques are taken in N*m" in done.err
+    assert "172 degrees; was it in degrees?" not in done.out
+    assert "was it in degrees?" in done.err
+    assert len(sprag("fit", data, "--accuracy", "0.1", "--json").data["warnings"]) == 2
+
+
+def test_lost_motion_that_would_not_be_used_is_refused(sprag: Sprag, examples: Path) -> None:
+    done = sprag("fit", examples / "clutch_measured.csv", "--accuracy", "0.05", "--backlash", "0.1 deg")
+    assert done.code == 2
+    assert "--angles-include-backlash" in done.err
+
+
+def test_a_refusal_lists_each_degree_once(sprag: Sprag, examples: Path) -> None:
+    done = sprag("fit", examples / "clutch_measured.csv", "--accuracy", "1e-6", "--max-degree", "3")
+    assert done.err.count("degree 2") == 1
+    assert "farthest off at the row with windup" in done.err
+
+
 def test_an_accuracy_that_no_degree_reaches_tells_the_best_of_each(sprag: Sprag, examples: Path) -> None:
     done = sprag("fit", examples / "clutch_measured.csv", "--accuracy", "1e-6", "--max-degree", "3")
     assert done.code == 2

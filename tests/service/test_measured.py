@@ -29,6 +29,9 @@ def problems(text: str) -> list[str]:
         "angle (mrad)\ttorque (Nmm)\n10\t2500\n20\t5250\n",
         "winkel_mrad;moment_Ncm\n10,0;250,0\n20,0;525,0\n",
         '"angle_rad","torque_Nm"\n0.01,2.5\n0.02,5.25\n',
+        '"0.01","2.5"\n"0.02","5.25"\n',
+        "angle mrad,torque Nmm\n10,2500\n20,5250\n",
+        "rad,Nm\n0.01,2.5\n0.02,5.25\n",
         "0.01 2.5\r\n0.02 5.25\r\n",
         "angle [rad]  torque [N*m]\n0.01 2.5\n0.02 5.25\n",
     ],
@@ -44,6 +47,30 @@ def test_degrees_become_radians() -> None:
 def test_rows_know_their_lines() -> None:
     measured = parse_measured("# bench\nangle,torque\n0.01,2\n\n0.02,4\n", parse_quantity)
     assert measured.lines == (3, 5)
+
+
+@pytest.mark.parametrize("header", ["a,b", "x,y", "torque,angle", "phi,hysteresis"])
+def test_a_header_that_is_not_understood_is_refused(header: str) -> None:
+    assert all(line.startswith("line 1: column ") for line in problems(f"{header}\n0.01,2.5\n"))
+
+
+@pytest.mark.parametrize(
+    ("header", "says"),
+    [
+        ("", ["angles are taken in rad and torques are taken in N*m"]),
+        ("Angle,torque_Nm\n", ["not name every unit: angles are taken in rad;"]),
+        ("angle_rad,torque_Nm\n", []),
+    ],
+)
+def test_units_that_are_assumed_are_told(header: str, says: list[str]) -> None:
+    warnings = parse_measured(f"{header}0.01,2.5\n0.02,5.25\n", parse_quantity).warnings
+    assert len(warnings) == len(says)
+    assert all(part in warning for part, warning in zip(says, warnings, strict=True))
+
+
+def test_angles_that_are_rather_degrees_are_told() -> None:
+    assert "was it in degrees?" in parse_measured("1,2\n3,4\n", parse_quantity).warnings[1]
+    assert parse_measured("angle_rad,torque_Nm\n1,2\n3,4\n", parse_quantity).warnings == ()
 
 
 def test_every_wrong_row_is_told_with_its_line() -> None:
