@@ -38,6 +38,8 @@ __all__ = [
 ]
 
 _EPS = float(np.finfo(np.float64).eps)
+#: Terms of a law this many times larger than the torque they add up to follow the scatter of the data, not the clutch.
+_MAX_CANCELLATION = 30.0
 
 
 def fit_clutch(
@@ -87,11 +89,13 @@ def fit_clutch(
         reports.append(report)
         if report.max_residual <= accuracy and report.rank == degree + 1 - first_power:
             return _accepted(rows, law, tuple(reports), accuracy, first_power)
+    reached, tried, advice = _not_reached(rows, tuple(reports), accuracy, max_degree, first_power)
     raise ClutchFitError(
-        _not_reached(rows, tuple(reports), accuracy, max_degree, first_power),
+        f"{reached}; largest residuals: {tried}.{advice}",
         name="accuracy",
         value=accuracy,
         degrees=tuple(reports),
+        summary=f"{reached}.{advice}",
     )
 
 
@@ -205,11 +209,13 @@ def _accepted(
         rows_in_backlash=backlash_rows,
         monotone=checked.monotone,
         negative=False,
-        warnings=_data_warnings(rows, last, backlash_rows) + checked.warnings,
+        warnings=_data_warnings(rows, law, last, backlash_rows) + checked.warnings,
     )
 
 
-def _data_warnings(rows: Rows, report: DegreeReport, backlash_rows: tuple[int, ...]) -> tuple[str, ...]:
+def _data_warnings(
+    rows: Rows, law: NDArray[np.float64], report: DegreeReport, backlash_rows: tuple[int, ...]
+) -> tuple[str, ...]:
     warnings = []
     if backlash_rows:
         warnings.append(
@@ -221,13 +227,21 @@ def _data_warnings(rows: Rows, report: DegreeReport, backlash_rows: tuple[int, .
             f"degree {report.degree} has as many unknowns as the data has different windups, so the small residuals "
             "prove nothing; measure more rows"
         )
+    terms = float(np.abs(law * rows.limit ** np.arange(law.size)).sum())
+    cancellation = terms / float(np.abs(rows.torque[rows.fitted]).max())
+    if cancellation > _MAX_CANCELLATION:
+        warnings.append(
+            f"the terms of the law of degree {report.degree} are together {cancellation:.0f} times as large as the "
+            f"largest torque and all but cancel (condition number {report.condition_number:.2g}), so they follow the "
+            "scatter of the rows; check the backlash and the units, or allow a larger residual"
+        )
     return tuple(warnings)
 
 
 def _not_reached(
     rows: Rows, reports: tuple[DegreeReport, ...], accuracy: float, max_degree: int, first_power: int
-) -> str:
-    """The sentence for data that no tried degree fits well enough."""
+) -> tuple[str, str, str]:
+    """For data that no tried degree fits well enough: what is not reached, the residuals tried, what to do."""
     tried = ", ".join(
         f"{report.max_residual:.4g} N*m at degree {report.degree}"
         + ("" if report.rank == report.degree + 1 - first_power else " (not determined by these angles)")
@@ -237,20 +251,21 @@ def _not_reached(
     law, _ = _fit_degree(rows, np.arange(first_power, best.degree + 1))
     row = int(np.argmax(np.abs(rows.residuals(law))))
     reached = f"the accuracy of {accuracy:g} N*m is not reached up to degree {reports[-1].degree}"
-    text = f"{reached}; largest residuals: {tried}."
-    if reports[-1].degree < max_degree:
+    text = ""
+    out_of_rows = reports[-1].degree == rows.distinct - 1 + first_power
+    if out_of_rows:
         text += (
             f" Higher degrees have more unknowns than the data has different windups ({rows.distinct}); measure more."
         )
     text += (
-        f" The best, degree {best.degree}, is farthest off at row {row} (windup {rows.windup[row]:.6g} rad, torque "
-        f"{rows.torque[row]:.6g} N*m). Check that row, or allow a larger residual"
+        f" The best, degree {best.degree}, is farthest off at the row with windup {rows.windup[row]:.6g} rad and "
+        f"torque {rows.torque[row]:.6g} N*m. Check that row, or allow a larger residual"
     )
     if first_power and rows.windup[row] == 0.0:
         text += ", or fit without through_origin, since this row shows torque at zero windup"
-    elif reports[-1].degree == max_degree < HIGHEST_DEGREE:
+    elif max_degree < HIGHEST_DEGREE and not out_of_rows:
         text += f", or raise max_degree (up to {HIGHEST_DEGREE})"
-    return text + "."
+    return reached, tried, text + "."
 
 
 def _rms(residuals: NDArray[np.float64]) -> float:

@@ -78,8 +78,9 @@ def measured_rows(data: ArrayLike, backlash: float, accuracy: float, through_ori
     distinct = int(np.unique(windup[telling]).size)
     if distinct < 2 or windup.max() < MIN_WINDUP_RANGE:
         word = "positive " if through_origin else ""
+        plural = "" if distinct == 1 else "s"
         raise ClutchFitError(
-            f"has {distinct} different {word}windups, the largest {max(float(windup.max()), 0.0):.6g} rad"
+            f"has {distinct} different {word}windup{plural}, the largest {max(float(windup.max()), 0.0):.6g} rad"
             + (" once the backlash is taken off" if backlash else ""),
             name="data",
             value=distinct,

@@ -118,6 +118,7 @@ class ClutchFitError(ClutchError):
     """No law could be fitted: wrong input, accuracy not reached, or a law that is negative in its range.
 
     ``degrees`` holds the report of every degree that was tried, with its residuals; it is empty for wrong input.
+    ``summary`` is the message without the list of those residuals, for who shows the degrees beside it.
     """
 
     def __init__(
@@ -128,6 +129,8 @@ class ClutchFitError(ClutchError):
         value: object = None,
         allowed: str | None = None,
         degrees: tuple[DegreeReport, ...] = (),
+        summary: str | None = None,
     ) -> None:
         super().__init__(message, name=name, value=value, allowed=allowed)
         self.degrees = degrees
+        self.summary = message if summary is None else summary

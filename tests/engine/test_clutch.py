@@ -237,7 +237,34 @@ def test_an_unreached_accuracy_for_want_of_rows_says_so():
     with pytest.raises(ClutchFitError, match=r"more unknowns than the data has different windups \(3\)") as caught:
         fit_clutch(data, 0.1)
     assert len(caught.value.degrees) == 3
-    assert "farthest off at row" in caught.value.message
+    assert "farthest off at the row with windup" in caught.value.message
+
+
+def test_a_higher_degree_is_not_advised_where_the_rows_do_not_allow_one():
+    data = [[0.1, 1.0], [0.1, 1.5], [0.2, 2.0], [0.3, 3.0]]
+    with pytest.raises(ClutchFitError, match="measure more") as caught:
+        fit_clutch(data, 0.1, max_degree=3)
+    assert "raise max_degree" not in caught.value.message
+
+
+def test_the_summary_of_a_refusal_leaves_out_the_degrees():
+    with pytest.raises(ClutchFitError) as caught:
+        fit_clutch(noisy_rows(), 1e-3, max_degree=5)
+    assert "at degree 2" not in caught.value.summary
+    assert "raise max_degree" in caught.value.summary
+
+
+def test_one_windup_is_said_in_the_singular():
+    with pytest.raises(ClutchFitError, match="has 1 different positive windup, the largest"):
+        fit_clutch([[0.1, 1.0], [0.1, 1.1]], 1e-3)
+
+
+def test_a_law_whose_terms_cancel_is_told():
+    degrees = np.arange(0.25, 3.1, 0.25)
+    data = np.column_stack((np.radians(degrees), 3.5 * degrees + 0.1 * degrees**3))
+    assert fit_clutch(data, 0.05).warnings == ()
+    off = fit_clutch(data, 0.05, angles_include_backlash=True, backlash=math.radians(0.1))
+    assert any("all but cancel" in warning and "check the backlash" in warning for warning in off.warnings)
 
 
 def test_torque_at_zero_windup_is_named_when_it_is_in_the_way():
