@@ -2,27 +2,34 @@
 
 from __future__ import annotations
 
+import logging
 from contextlib import suppress
 from itertools import groupby
+from math import inf
 from typing import TYPE_CHECKING, assert_never
 
 from worker import dispatch
 from worker.dispatch import Dispatch
-from worker.ports import EpochLostError
+from worker.ports import EpochLostError, KernelError
 from worker.states import StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from worker.kernels import ChunkResult
-    from worker.ports import Chunk, Clock, Executor, Store
+    from worker.ports import ActiveStudy, Chunk, Clock, Executor, Store
     from worker.study import Study
+
+_LOG = logging.getLogger(__name__)
 
 #: Seconds between two looks at the store for new studies and wishes; also the longest wait for the executor.
 POLL_SECONDS = 0.2
 HEARTBEAT_SECONDS = 5.0
 #: Studies worked on side by side; the others wait in order of submission.
 OPEN_STUDIES = 8
+#: Seconds that a study waits for its kernel before it says so: one that lies in the cache is there sooner.
+NOTE_SECONDS = 3.0
+COMPILING = "The kernel of this study is being compiled, which happens once and can take a minute; other studies go on."
 
 
 class Dispatcher:
@@ -41,6 +48,9 @@ class Dispatcher:
         self._only = only
         self._machine = Dispatch(executor.capacity)
         self._studies: dict[int, Study] = {}
+        self._ids: dict[int, str] = {}
+        #: Studies that wait for their kernels, and when they began to; infinity once they say so.
+        self._compiling: dict[int, float] = {}
         self._epoch = 0
         self._next_poll = 0.0
         self._next_beat = 0.0
@@ -76,15 +86,52 @@ class Dispatcher:
         for study in self._store.active_studies():
             if self._only not in {None, study.number}:
                 continue
-            if study.state is StudyState.PAUSED:
-                self._handle(dispatch.Paused(study.number))
-            elif study.state is StudyState.CANCELLING:
-                self._handle(dispatch.Cancelled(study.number))
+            if study.state in {StudyState.PAUSED, StudyState.CANCELLING}:
+                if self._compiling.pop(study.number, None) is not None:
+                    self._forget(study.number)
+                wish = dispatch.Paused if study.state is StudyState.PAUSED else dispatch.Cancelled
+                self._handle(wish(study.number))
             elif study.number in self._machine.studies:
                 self._handle(dispatch.Offered(study.number))
-            elif len(self._machine.studies) < OPEN_STUDIES:
-                self._studies[study.number] = self._store.study_of(study.number)
+            elif self._may_open(study) and self._has_kernel(study):
                 self._handle(dispatch.Offered(study.number, self._store.open_chunks(study.number)))
+
+    def _may_open(self, study: ActiveStudy) -> bool:
+        """Studies that wait for kernels leave room for as many that have theirs."""
+        waits = study.number in self._compiling
+        return len(self._machine.studies) < OPEN_STUDIES and (waits or len(self._compiling) < OPEN_STUDIES)
+
+    def _has_kernel(self, study: ActiveStudy) -> bool:
+        """Whether the study can be run now; if not, its kernel is on the way or the study is held."""
+        number = study.number
+        if number not in self._studies:
+            self._studies[number] = self._store.study_of(number)
+            self._ids[number] = study.id
+        try:
+            ready = self._executor.ready(self._studies[number])
+        except KernelError as error:
+            self._compiling.pop(number, None)
+            self._hold(number, str(error))
+            return False
+        if ready:
+            self._compiling.pop(number, None)
+            return True
+        now = self._clock.monotonic()
+        if now - self._compiling.setdefault(number, now) >= NOTE_SECONDS:
+            self._store.note(self._epoch, number, COMPILING)
+            self._compiling[number] = inf
+        return False
+
+    def _hold(self, number: int, reason: str) -> None:
+        """Hold a study for a fault that is not its cases', and let the log know."""
+        self._store.fault(self._epoch, number, reason)
+        if self._only is None:  # who runs a single study is told by its state
+            _LOG.error("The study %s is held: %s", self._ids.get(number, number), reason)
+        self._forget(number)
+
+    def _forget(self, number: int) -> None:
+        self._studies.pop(number, None)
+        self._ids.pop(number, None)
 
     def _handle(self, event: dispatch.Event, result: ChunkResult | None = None) -> None:
         """Give the event to the state machine and do what it says."""
@@ -120,11 +167,10 @@ class Dispatcher:
             case dispatch.Stop(ticket=ticket):
                 self._executor.stop(ticket)
             case dispatch.Fault(study=number, reason=reason):
-                self._store.fault(self._epoch, number, reason)
-                self._studies.pop(number, None)
+                self._hold(number, reason)
             case dispatch.Settle(study=number):
                 self._store.settle(self._epoch, number)
-                self._studies.pop(number, None)
+                self._forget(number)
             case dispatch.Run():
                 self._start([instruction])
             case _:

@@ -55,6 +55,10 @@ class ExecutorError(Exception):
     """The executor cannot run anything any more; the message is one plain sentence for a user."""
 
 
+class KernelError(Exception):
+    """The kernel of a study cannot be had; the message says why."""
+
+
 class Store(Protocol):
     """The dispatcher's side of the database. Every write is one short transaction that first checks the epoch.
 
@@ -94,6 +98,9 @@ class Store(Protocol):
     def quarantine(self, epoch: int, chunk: Chunk, ending: str, detail: str) -> None:
         """Give every case of a claimed chunk ``ending`` without results and mark the chunk done."""
 
+    def note(self, epoch: int, number: int, reason: str) -> None:
+        """Say why a queued study does not run yet; its start takes the note away."""
+
     def fault(self, epoch: int, number: int, reason: str) -> None:
         """Hold the study with a reason and return its claims to waiting."""
 
@@ -127,8 +134,14 @@ class Executor(Protocol):
     def capacity(self) -> int:
         """Number of chunks worth having in flight at once."""
 
+    def ready(self, study: Study) -> bool:
+        """Whether the kernel of ``study`` is loaded; begins to load it where it is not, and returns at once.
+
+        Raises KernelError when it could not be compiled; the next call tries again.
+        """
+
     def submit(self, ticket: int, study: Study, chunk: Chunk) -> None:
-        """Start a chunk; returns at once."""
+        """Start a chunk of a study that is `ready`; returns at once."""
 
     def wait(self, timeout: float) -> list[Outcome]:
         """Outcomes that have come in; waits for the first at most ``timeout`` s, gives [] when none came."""

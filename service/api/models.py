@@ -47,7 +47,7 @@ class StudySummary(Body):
     model: str
     state: str
     state_meaning: str = Field(description="the state as a sentence")
-    reason: str | None = Field(description="why the study is held or failed")
+    reason: str | None = Field(description="why the study is held, waits or failed")
     cases: int = Field(description="number of cases")
     progress: Progress
     warnings: list[str] = Field(description="what is allowed but probably not meant")

@@ -277,6 +277,22 @@ def test_quarantine_is_an_ending_without_results(store: Store) -> None:
     assert "crashed" in (store.get_study(record.id).reason or "")
 
 
+def test_a_note_stands_while_a_study_is_queued(store: Store) -> None:
+    record = create(store)
+    epoch = store.take_over("test")
+    store.note(epoch, record.number, "wait for it")
+    noted = store.get_study(record.id)
+    assert (noted.state, noted.reason) == (StudyState.QUEUED, "wait for it")
+    assert noted.revision > record.revision
+    store.claim(epoch, store.open_chunks(record.number)[:1])
+    assert store.get_study(record.id).reason is None
+    store.note(epoch, record.number, "too late")
+    assert store.get_study(record.id).reason is None
+    store.take_over("another")
+    with pytest.raises(EpochLostError):
+        store.note(epoch, record.number, "not ours")
+
+
 def test_a_fault_holds_the_study_without_blame(store: Store) -> None:
     record = create(store)
     epoch = store.take_over("test")

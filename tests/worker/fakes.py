@@ -36,10 +36,10 @@ RUN = {"duration": [3.0, "periods"], "window": None, "tolerance": 1e-9, "reset":
 RESULTS = len(kernels.result_infos("vibration-drive", 1))
 
 
-def study(cases: int, name: str = "a study") -> Study:
+def study(cases: int, name: str = "a study", tolerance: float = 1e-9) -> Study:
     """A study of that many cases over the load."""
     loads = tuple((np.arange(cases) * 1e-3).tolist())
-    return Study("vibration-drive", name, dict(BASE), dict(RUN), (Axis(("shaft.load",), loads),))
+    return Study("vibration-drive", name, dict(BASE), RUN | {"tolerance": tolerance}, (Axis(("shaft.load",), loads),))
 
 
 def values(first: int, count: int) -> NDArray[np.float64]:
@@ -74,6 +74,28 @@ def load(shape: KernelShape) -> None:
     """No kernel is needed."""
 
 
+def load_when_told(shape: KernelShape, *, tolerance: float, fifo: str) -> None:
+    """The kernel of that tolerance is there when somebody writes into ``fifo``; the others at once."""
+    if shape.tolerance == tolerance:
+        with open(fifo, encoding="ascii") as told:
+            told.read()
+
+
+def load_never(shape: KernelShape) -> None:
+    """A compilation without end."""
+    signal.pause()
+
+
+def load_dies(shape: KernelShape) -> None:
+    """A compiler that takes its process with it."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def load_fails(shape: KernelShape) -> None:
+    """A compiler that gives up."""
+    raise ZeroDivisionError("no such kernel")
+
+
 def prepare() -> None:
     """Nothing needs to be ready."""
 
@@ -88,10 +110,14 @@ def pool(
     *,
     chunk_timeout: float = 60.0,
     run: Callable[[ChunkTask], ChunkResult] = run,
+    load: Callable[[KernelShape], None] = load,
     prepare: Callable[[], None] = prepare,
+    load_timeout: float = 60.0,
 ) -> ProcessPoolExecutor:
     """A process pool without the engine."""
-    return ProcessPoolExecutor(processes, chunk_timeout=chunk_timeout, run=run, load=load, prepare=prepare)
+    return ProcessPoolExecutor(
+        processes, chunk_timeout=chunk_timeout, run=run, load=load, prepare=prepare, load_timeout=load_timeout
+    )
 
 
 def faulty(**faults: frozenset[int]) -> partial[ChunkResult]:

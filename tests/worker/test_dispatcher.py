@@ -13,11 +13,12 @@ from service.storage.records import StudyRecord
 from service.storage.store import Store
 from tests.worker import fakes
 from worker.chunking import Chunking
-from worker.dispatcher import HEARTBEAT_SECONDS, POLL_SECONDS, Dispatcher
+from worker.dispatcher import COMPILING, HEARTBEAT_SECONDS, NOTE_SECONDS, POLL_SECONDS, Dispatcher
 from worker.executors.inline import InlineExecutor
 from worker.kernels import ChunkResult, ChunkTask
-from worker.ports import EpochLostError, Executor
+from worker.ports import EpochLostError, Executor, KernelError
 from worker.states import StudyState
+from worker.study import Study
 
 
 @pytest.fixture
@@ -96,13 +97,14 @@ def test_a_crash_and_a_hang_are_found_among_their_neighbours(store: Store) -> No
     assert (ended.state, ended.done, ended.ok) == (StudyState.FINISHED, 24, 22)
 
 
-def test_an_engine_fault_holds_the_study_until_it_is_resumed(store: Store) -> None:
+def test_an_engine_fault_holds_the_study_until_it_is_resumed(store: Store, caplog: pytest.LogCaptureFixture) -> None:
     record = submit(store)
     work(store, InlineExecutor(fakes.raising))
     held = store.get_study(record.id)
     assert (held.state, held.done) == (StudyState.PAUSED, 0)
     assert "engine fault" in (held.reason or "")
     assert "ZeroDivisionError: no such thing" in (held.reason or "")
+    assert caplog.messages == [f"The study {record.id} is held: {held.reason}"]
     store.resume_study(record.id)
     work(store, InlineExecutor(fakes.run))
     assert store.get_study(record.id).state is StudyState.FINISHED
@@ -208,6 +210,61 @@ def test_it_shows_that_it_is_alive_and_polls_when_it_is_time(store: Store) -> No
     Dispatcher(store, Quiet(), clock, owner="test").run(turn)
     assert max(np.diff(sorted(set(beats)))) <= HEARTBEAT_SECONDS + 1.01 * POLL_SECONDS
     assert len(set(beats)) >= 3
+
+
+class Cold(InlineExecutor):
+    """An executor whose kernel for the tolerance 1e-6 is compiled when `warm` says so."""
+
+    warm = False
+    broken = False
+
+    def ready(self, study: Study) -> bool:
+        """See the class."""
+        if self.broken:
+            raise KernelError("its kernel cannot be compiled")
+        return self.warm or study.run["tolerance"] != 1e-6
+
+
+def test_a_study_that_waits_for_its_kernel_says_so_and_holds_nobody_up(store: Store) -> None:
+    clock = fakes.HandClock()
+    executor = Cold(fakes.run)
+    slow = store.create_study({}, fakes.study(20, "slow", tolerance=1e-6))
+    fast = submit(store, 20)
+    seen: list[tuple[StudyState, str | None]] = []
+
+    def turn() -> bool:
+        record = store.get_study(slow.id)
+        seen.append((record.state, record.reason))
+        executor.warm = record.reason == COMPILING or executor.warm
+        if not executor.warm:
+            assert record.done == 0
+        clock.seconds += NOTE_SECONDS / 20
+        return not store.active_studies()
+
+    Dispatcher(store, executor, clock).run(turn)
+    assert seen[0] == (StudyState.QUEUED, None)
+    assert (StudyState.QUEUED, COMPILING) in seen
+    ended, other = store.get_study(slow.id), store.get_study(fast.id)
+    assert (ended.state, ended.reason, ended.ok) == (StudyState.FINISHED, None, 20)
+    assert other.finished_at is not None
+    assert ended.started_at is not None
+    assert other.finished_at < ended.started_at
+
+
+def test_a_kernel_that_cannot_be_had_holds_the_study_and_is_logged(
+    store: Store, caplog: pytest.LogCaptureFixture
+) -> None:
+    record = submit(store, 4)
+    executor = Cold(fakes.run)
+    executor.broken = True
+    work(store, executor)
+    held = store.get_study(record.id)
+    assert (held.state, held.reason, held.done) == (StudyState.PAUSED, "its kernel cannot be compiled", 0)
+    assert caplog.messages == [f"The study {record.id} is held: its kernel cannot be compiled"]
+    store.resume_study(record.id)
+    executor.broken = False
+    work(store, executor)
+    assert store.get_study(record.id).state is StudyState.FINISHED
 
 
 @pytest.mark.parametrize("size", [1, 7, 40])

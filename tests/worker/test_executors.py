@@ -6,6 +6,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import psutil
@@ -15,7 +16,9 @@ from tests.worker import fakes
 from worker import kernels
 from worker.executors.inline import InlineExecutor
 from worker.executors.process_pool import MAX_BROKEN_POOLS, SPARE_CHUNKS, ProcessPoolExecutor
-from worker.ports import Chunk, Executor, ExecutorError, Fate, Outcome
+from worker.kernels import KernelShape
+from worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
+from worker.study import Study
 
 DEADLINE = 60.0
 
@@ -97,12 +100,49 @@ def test_chunks_are_stopped_running_or_not(start: Callable[..., ProcessPoolExecu
     assert gather(pool, 1)[1].fate is Fate.DONE
 
 
-def test_a_chunk_is_stopped_before_its_kernel_is_there(start: Callable[..., ProcessPoolExecutor]) -> None:
+def loaded(pool: ProcessPoolExecutor, study: Study) -> bool:
+    """Whether the kernel is there once the pool has had time to load it; raises KernelError."""
+    return any(pool.ready(study) or pool.wait(DEADLINE) for _ in range(4))
+
+
+def test_a_kernel_is_loaded_before_its_study_is_ready(start: Callable[..., ProcessPoolExecutor]) -> None:
     pool = start(1)
-    submit(pool, 2)
-    pool.stop(0)
-    outcomes = gather(pool, 2)
-    assert [outcomes[0].fate, outcomes[1].fate] == [Fate.STOPPED, Fate.DONE]
+    assert not pool.ready(fakes.study(4))
+    assert loaded(pool, fakes.study(4))
+    assert pool.ready(fakes.study(9))
+    assert not pool.ready(fakes.study(4, tolerance=1e-6))
+
+
+def test_chunks_are_run_while_a_kernel_compiles(start: Callable[..., ProcessPoolExecutor], tmp_path: Path) -> None:
+    fifo = tmp_path / "told"
+    os.mkfifo(fifo)
+    slow = fakes.study(4, tolerance=1e-6)
+    pool = start(2, load=partial(fakes.load_when_told, tolerance=1e-6, fifo=str(fifo)))
+    assert not pool.ready(slow)
+    assert not pool.ready(fakes.study(4)), "half of the processes at most compile"
+    submit(pool, 4)
+    assert {outcome.fate for outcome in gather(pool, 4).values()} == {Fate.DONE}
+    assert not pool.ready(slow)
+    fifo.write_text("now")
+    assert loaded(pool, slow)
+    assert loaded(pool, fakes.study(4))
+
+
+@pytest.mark.parametrize(
+    ("load", "message"),
+    [
+        (fakes.load_never, "not compiled within 0.3 s"),
+        (fakes.load_dies, "process that compiled its kernel died"),
+        (fakes.load_fails, "ZeroDivisionError: no such kernel"),
+    ],
+)
+def test_a_kernel_that_does_not_come_is_not_taken_for_loaded(
+    start: Callable[..., ProcessPoolExecutor], load: Callable[[KernelShape], None], message: str
+) -> None:
+    pool = start(1, load=load, load_timeout=0.3)
+    for _ in range(2):
+        with pytest.raises(KernelError, match=message):
+            loaded(pool, fakes.study(4))
 
 
 def test_an_exception_is_told_as_a_crash(start: Callable[..., ProcessPoolExecutor]) -> None:
@@ -159,6 +199,7 @@ def test_one_process_warms_the_cache_and_the_engine_gives_the_same_everywhere() 
     whole = kernels.run_chunk(study, 0, 20)
     pool = ProcessPoolExecutor(2, chunk_timeout=DEADLINE)
     try:
+        assert loaded(pool, study)
         for executor, size in ((InlineExecutor(), 20), (InlineExecutor(), 3), (pool, 7), (pool, 1)):
             firsts = range(0, 20, size)
             for first in firsts:

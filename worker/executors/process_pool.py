@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from multiprocessing import get_context
 from queue import Empty, SimpleQueue
 from time import monotonic
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from pebble import ProcessExpired, ProcessFuture, ProcessPool
 
 from worker import kernels
-from worker.ports import Chunk, ExecutorError, Fate, Outcome
+from worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
 from worker.processes import single_threaded_children, start_pool_process
 
 if TYPE_CHECKING:
@@ -27,8 +28,10 @@ R = TypeVar("R")
 SPARE_CHUNKS = 2
 #: Pools that may break one after the other, with no chunk done between, before the executor gives up.
 MAX_BROKEN_POOLS = 3
-#: Seconds at least in which a kernel must be compiled.
-LOAD_SECONDS = 300.0
+#: Seconds in which a kernel must be compiled: many times what the largest takes on a slow, busy machine.
+LOAD_SECONDS = 3600.0
+#: Times that the compilation of a kernel may come to nothing before its studies are held.
+MAX_LOADS = 2
 #: Seconds between two looks whether the pool still lives.
 LOOK_SECONDS = 0.2
 #: Seconds for the processes of a closed pool to be gone.
@@ -38,8 +41,8 @@ CLOSE_SECONDS = 10.0
 class ProcessPoolExecutor:
     """An `Executor` on a pool of ``processes`` processes.
 
-    The first chunk that needs a kernel waits until one process has compiled it into the cache on disk, so that the
-    others load it instead of all compiling the same.
+    A kernel is compiled by one process into the cache on disk, so that the others load it instead of all compiling the
+    same; at most half of the processes compile, and the others run chunks meanwhile.
 
     Parameters
     ----------
@@ -50,6 +53,8 @@ class ProcessPoolExecutor:
     run, load, prepare : functions
         What a process does with a chunk, with a new kernel, and when it starts; importable by name. Other than the
         engine's in tests.
+    load_timeout : float
+        Seconds after which the compilation of a kernel is given up.
     """
 
     def __init__(
@@ -60,17 +65,19 @@ class ProcessPoolExecutor:
         run: Callable[[kernels.ChunkTask], kernels.ChunkResult] = kernels.run_task,
         load: Callable[[kernels.KernelShape], None] = kernels.load,
         prepare: Callable[[], None] = kernels.prepare,
+        load_timeout: float = LOAD_SECONDS,
     ) -> None:
         self._processes = processes
         self._timeout = chunk_timeout
         self._run = run
         self._load = load
         self._prepare = prepare
+        self._load_timeout = load_timeout
         self._futures: dict[int, ProcessFuture[kernels.ChunkResult]] = {}
         self._loaded: set[kernels.KernelShape] = set()
         self._loading: dict[kernels.KernelShape, ProcessFuture[None]] = {}
-        self._held: dict[kernels.KernelShape, dict[int, kernels.ChunkTask]] = {}
-        self._ready: SimpleQueue[Outcome | kernels.KernelShape] = SimpleQueue()
+        self._failed_loads: Counter[kernels.KernelShape] = Counter()
+        self._ready: SimpleQueue[Outcome | None] = SimpleQueue()
         self._broken = 0
         single_threaded_children()
         self._pool = self._new_pool()
@@ -92,18 +99,46 @@ class ProcessPoolExecutor:
         """Number of chunks worth having in flight at once."""
         return self._processes + SPARE_CHUNKS
 
+    def ready(self, study: Study) -> bool:
+        """Whether the kernel of ``study`` is loaded; begins to load it where it is not."""
+        shape = kernels.shape_of(study)
+        loading = self._loading.get(shape)
+        if loading is not None and loading.done():
+            del self._loading[shape]
+            self._take_load(shape, loading)
+        if shape in self._loaded:
+            return True
+        if shape not in self._loading and len(self._loading) < max(1, self._processes // 2):
+            self._loading[shape] = begun = self._schedule(self._load, shape, self._load_timeout)
+            begun.add_done_callback(lambda _: self._ready.put(None))
+        return False
+
+    def _take_load(self, shape: kernels.KernelShape, loading: ProcessFuture[None]) -> None:
+        """Note a kernel that is there; raise KernelError when it failed too often."""
+        if loading.cancelled():  # with its pool
+            return
+        error = loading.exception()
+        if error is None:
+            self._loaded.add(shape)
+            self._broken = 0
+            return
+        if not self._pool.active:
+            return
+        self._failed_loads[shape] += 1
+        if self._failed_loads[shape] < MAX_LOADS and isinstance(error, ProcessExpired):
+            return
+        del self._failed_loads[shape]
+        if isinstance(error, TimeoutError):
+            raise KernelError(f"its kernel was not compiled within {self._load_timeout:g} s")
+        if isinstance(error, ProcessExpired):
+            raise KernelError(f"the process that compiled its kernel died (exit code {error.exitcode})")
+        raise KernelError(f"its kernel cannot be compiled ({type(error).__name__}: {error})")
+
     def submit(self, ticket: int, study: Study, chunk: Chunk) -> None:
-        """Start a chunk, or hold it until its kernel is loaded; returns at once."""
-        task = kernels.chunk_task(study, chunk.first, chunk.count)
-        if task.shape in self._loaded:
-            self._start(ticket, task)
-        elif task.shape in self._held:
-            self._held[task.shape][ticket] = task
-        else:
-            self._held[task.shape] = {ticket: task}
-            loading = self._schedule(self._load, task.shape, max(LOAD_SECONDS, self._timeout))
-            self._loading[task.shape] = loading
-            loading.add_done_callback(lambda _: self._ready.put(task.shape))
+        """Start a chunk; returns at once."""
+        future = self._schedule(self._run, kernels.chunk_task(study, chunk.first, chunk.count), self._timeout)
+        self._futures[ticket] = future
+        future.add_done_callback(lambda done: self._ready.put(self._outcome(ticket, done)))
 
     def _living_pool(self) -> ProcessPool:
         """The pool; a new one when it broke, which takes more than the death of a process at work.
@@ -130,11 +165,6 @@ class ProcessPoolExecutor:
                 continue
             return future
 
-    def _start(self, ticket: int, task: kernels.ChunkTask) -> None:
-        future = self._schedule(self._run, task, self._timeout)
-        self._futures[ticket] = future
-        future.add_done_callback(lambda done: self._ready.put(self._outcome(ticket, done)))
-
     def _outcome(self, ticket: int, future: Future[kernels.ChunkResult]) -> Outcome:
         if future.cancelled():
             return Outcome(ticket, Fate.STOPPED, detail="stopped")
@@ -151,7 +181,10 @@ class ProcessPoolExecutor:
         return Outcome(ticket, Fate.CRASHED, detail=f"{type(error).__name__}: {error}")
 
     def wait(self, timeout: float) -> list[Outcome]:
-        """Outcomes that have come in; waits for the first at most ``timeout`` s, gives [] when none came."""
+        """Outcomes that have come in; waits for the first at most ``timeout`` s, gives [] when none came.
+
+        It also comes back when a kernel was loaded.
+        """
         found: list[Outcome] = []
         deadline = monotonic() + timeout
         while not found:
@@ -159,31 +192,23 @@ class ProcessPoolExecutor:
                 self._living_pool()
             left = max(0.0, deadline - monotonic())
             try:
-                self._sort(self._ready.get(timeout=min(left, LOOK_SECONDS)), found)
-                while True:
-                    self._sort(self._ready.get_nowait(), found)
+                came = self._ready.get(timeout=min(left, LOOK_SECONDS))
+                if came is None:
+                    break
+                self._sort(came, found)
+                while (more := self._ready.get_nowait()) is not None:
+                    self._sort(more, found)
             except Empty:
                 if left == 0.0:
                     break
         return found
 
-    def _sort(self, item: Outcome | kernels.KernelShape, found: list[Outcome]) -> None:
-        if isinstance(item, Outcome):
-            self._futures.pop(item.ticket, None)
-            found.append(item)
-            return
-        # Loaded or not: where it failed, the chunks will say so themselves.
-        self._loaded.add(item)
-        self._loading.pop(item, None)
-        for ticket, task in self._held.pop(item, {}).items():
-            self._start(ticket, task)
+    def _sort(self, outcome: Outcome, found: list[Outcome]) -> None:
+        self._futures.pop(outcome.ticket, None)
+        found.append(outcome)
 
     def stop(self, ticket: int) -> None:
         """Stop a chunk, with its process when it runs."""
-        for held in self._held.values():
-            if held.pop(ticket, None) is not None:
-                self._ready.put(Outcome(ticket, Fate.STOPPED, detail="stopped"))
-                return
         if future := self._futures.get(ticket):
             future.cancel()  # type: ignore[no-untyped-call]
 
