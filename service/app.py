@@ -107,4 +107,4 @@ def create_app(
 
 def chunking(settings: Settings) -> Chunking:
     """How studies are cut into chunks under ``settings``."""
-    return Chunking(settings.chunk_cases, settings.pool_processes)
+    return Chunking(settings.chunk_cases, settings.pool_processes, settings.chunk_timeout)

@@ -63,7 +63,7 @@ def run_here(
     """
     with tempfile.TemporaryDirectory(prefix="sprag-") as folder:
         url = database_url or f"sqlite:///{Path(folder) / 'run.sqlite3'}"
-        with Store.open(url, chunking=Chunking(chunk_cases, max(processes, 1))) as store:
+        with Store.open(url, chunking=Chunking(chunk_cases, max(processes, 1), chunk_timeout)) as store:
             record = store.create_study(spec, study, warnings=warnings)
             settings = WorkerSettings(url, processes, chunk_timeout)
             watch = _Watch(store, record.id, on_progress)

@@ -10,6 +10,7 @@ from worker import kernels
 
 if TYPE_CHECKING:
     from service.spec import ParsedSpec
+    from worker.chunking import Chunking
     from worker.study import Study
 
 _FIRST_CASES = 5
@@ -23,14 +24,14 @@ def estimated_bytes(study: Study) -> int:
     return study.cases * (_ROW_BYTES + _NUMBER_BYTES * len(kernels.study_results(study)))
 
 
-def preview_json(parsed: ParsedSpec, processes: int) -> dict[str, Any]:
-    """What ``parsed`` would be as a study run on that many processes, as JSON data.
+def preview_json(parsed: ParsedSpec, chunking: Chunking) -> dict[str, Any]:
+    """What ``parsed`` would be as a study that is cut and run so, as JSON data.
 
     ``estimated_seconds`` (wall time) and ``estimated_bytes`` (in the database) are rough.
     """
     study = parsed.study
     # A study of fewer cases than processes still takes the time of one case.
-    rounds = max(study.cases / processes, 1.0)
+    rounds = max(study.cases / chunking.processes, 1.0)
     first = range(min(_FIRST_CASES, study.cases))
     return {
         "model": study.model,
@@ -42,7 +43,7 @@ def preview_json(parsed: ParsedSpec, processes: int) -> dict[str, Any]:
         "results": len(kernels.study_results(study)),
         "estimated_seconds": rounds * kernels.estimate_seconds_per_case(study),
         "estimated_bytes": estimated_bytes(study),
-        "warnings": list(parsed.warnings),
+        "warnings": [*parsed.warnings, *chunking.warnings(study)],
         "fits": {pointer: fit_json(fit) for pointer, fit in parsed.fits.items()},
         "first_cases": [
             {"case": case, "parameters": values} for case, values in zip(first, study.values_with(first), strict=True)

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Work of one chunk on one core, in s: what a crash can cost, against what a commit costs.
 CHUNK_SECONDS = 1.0
+#: Share of the chunk's time limit that its estimated work may take: estimates are rough and machines differ.
+TIMEOUT_SHARE = 0.1
 #: The engine runs cases side by side; fewer than these waste it.
 MIN_CASES = 16
 #: Chunks for each process that a study is cut into if it has the cases, so that all processes end about together.
@@ -25,26 +27,46 @@ MAX_CHUNKS = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Chunking:
-    """Settings: ``cases`` of one chunk (0: about `CHUNK_SECONDS` of work) and ``processes`` of the pool."""
+    """Settings: ``cases`` of one chunk (0: about `CHUNK_SECONDS` of work), ``processes`` of the pool.
+
+    ``timeout`` is the time in s after which a chunk is killed.
+    """
 
     cases: int = 0
     processes: int = 1
+    timeout: float = math.inf
 
     def cases_of(self, study: Study) -> int:
         """Cases of one chunk of ``study``."""
         if self.cases:
             return chunk_cases(study.cases, 0.0, self.processes, fixed=self.cases)
-        return chunk_cases(study.cases, kernels.estimate_seconds_per_case(study), self.processes)
+        seconds = kernels.estimate_seconds_per_case(study)
+        return chunk_cases(study.cases, seconds, self.processes, timeout=self.timeout)
+
+    def warnings(self, study: Study) -> tuple[str, ...]:
+        """What is to be said of ``study`` before it is run: that a case of it may never come to its end."""
+        seconds = kernels.estimate_seconds_per_case(study)
+        if seconds <= self.timeout:
+            return ()
+        return (
+            f"One case takes about {seconds:.3g} s, and {self.timeout:g} s are allowed (SPRAG_CHUNK_TIMEOUT): cases "
+            "will probably end as timed_out.",
+        )
 
 
-def chunk_cases(cases: int, seconds_per_case: float, processes: int, fixed: int = 0) -> int:
-    """Cases of one chunk of a study of ``cases`` cases: ``fixed``, or else by the time of one case (s)."""
+def chunk_cases(cases: int, seconds_per_case: float, processes: int, fixed: int = 0, timeout: float = math.inf) -> int:
+    """Cases of one chunk of a study of ``cases`` cases: ``fixed``, or else by the time of one case (s).
+
+    The chunk then takes far less than ``timeout`` (s), if a single case does.
+    """
     least = math.ceil(cases / MAX_CHUNKS)
     if fixed:
         return min(max(fixed, least), cases)
     by_time = CHUNK_SECONDS / seconds_per_case if seconds_per_case > 0.0 else float(cases)
     to_feed = math.ceil(cases / (CHUNKS_PER_PROCESS * processes))
-    return min(max(int(min(by_time, to_feed)), MIN_CASES, least), cases)
+    in_time = TIMEOUT_SHARE * timeout / seconds_per_case if seconds_per_case > 0.0 else float(cases)
+    wanted = max(int(min(by_time, to_feed)), MIN_CASES)
+    return min(max(int(min(wanted, in_time)), 1, least), cases)
 
 
 def spans(cases: int, size: int) -> Iterator[tuple[int, int]]:

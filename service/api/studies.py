@@ -62,7 +62,7 @@ def create_study(context: Ctx, received: SpecBody, idempotency_key: IdempotencyK
     record = context.store.create_study(
         parsed.spec,
         parsed.study,
-        warnings=parsed.warnings,
+        warnings=(*parsed.warnings, *context.store.chunking.warnings(parsed.study)),
         idempotency_key=idempotency_key,
         body_hash=hashlib.sha256(canonical).hexdigest(),
     )
@@ -84,7 +84,7 @@ def _require_room(store: Store, parsed: ParsedSpec) -> None:
 )
 def preview_study(context: Ctx, received: SpecBody) -> Response:
     """What a study would be: cases, time, size, warnings and fitted clutch laws. Nothing is submitted."""
-    return json_response(preview_json(_parsed(received), context.settings.pool_processes))
+    return json_response(preview_json(_parsed(received), context.store.chunking))
 
 
 @router.get("/studies", response_model=m.StudyPage, responses=problems("invalid-parameter"))

@@ -69,9 +69,10 @@ def _say_warnings(parsed: ParsedSpec) -> None:
 def preview(spec: SpecFile, processes: Processes = None, as_json: JsonFlag = False) -> None:
     """Tell what a study would be: number of cases, time, size, first cases. Nothing is run."""
     from service.preview import preview_json
+    from worker.chunking import Chunking
 
-    parsed = read_study(spec)
-    made = preview_json(parsed, read_settings(processes=processes).pool_processes)
+    settings = read_settings(processes=processes)
+    made = preview_json(read_study(spec), Chunking(0, settings.pool_processes, settings.chunk_timeout))
     if as_json:
         write_json(made)
         return
@@ -86,7 +87,7 @@ def preview(spec: SpecFile, processes: Processes = None, as_json: JsonFlag = Fal
     ]
     if rows:
         show_table("Axes", columns, rows)
-    _say_warnings(parsed)
+    say(*(f"warning: {warning}" for warning in made["warnings"]))
 
 
 def trajectory(
@@ -106,11 +107,15 @@ def trajectory(
     as_json: JsonFlag = False,
 ) -> None:
     """Write the instantaneous values of one case: angles, speeds, torques, powers, states."""
+    from worker.kernels import OK
+
     study = read_study(spec).study
     with output(file) as write:
         made = _trajectory(study, case, start, end, points)
         write(_trajectory_bytes(made, study, case, table_format(form, file, as_json)))
     say(f"case {case}: {made.ending}, {points} times")
+    if made.ending != OK:
+        raise typer.Exit(ExitCode.NOT_ALL_OK)
 
 
 def _trajectory(study: Study, case: int, start: str | None, end: str | None, points: int) -> Trajectory:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
@@ -139,6 +140,14 @@ def test_a_preview_submits_nothing(service: Service, spec: dict[str, Any]) -> No
     assert body["estimated_seconds"] > 0
     assert body["estimated_bytes"] > 0
     assert service.get("/studies")["studies"] == []
+
+
+def test_preview_and_submission_warn_of_cases_that_take_too_long(service: Service, spec: dict[str, Any]) -> None:
+    service.store.chunking = replace(service.store.chunking, timeout=1e-9)
+    for path, status in ((f"{STUDIES}:preview", 200), (STUDIES, 202)):
+        response = service.http.post(path, json=spec)
+        assert response.status_code == status
+        assert "SPRAG_CHUNK_TIMEOUT" in response.json()["warnings"][-1]
 
 
 def test_a_preview_of_many_cases_is_quick_and_small(service: Service, spec: dict[str, Any]) -> None:

@@ -41,6 +41,21 @@ def test_size_by_the_time_of_a_case(cases: int, seconds: float, processes: int, 
     assert chunk_cases(cases, seconds, processes) == size
 
 
+@pytest.mark.parametrize(
+    ("seconds", "timeout", "size"), [(85.0, 600.0, 1), (10.0, 600.0, 6), (700.0, 600.0, 1), (1e-3, 600.0, 128)]
+)
+def test_a_chunk_stays_far_from_its_time_limit(seconds: float, timeout: float, size: int) -> None:
+    assert chunk_cases(1024, seconds, 2, timeout=timeout) == size
+
+
+def test_a_case_that_does_not_fit_the_time_limit_is_warned_of() -> None:
+    study = fakes.study(64)
+    (warning,) = Chunking(0, 2, timeout=1e-9).warnings(study)
+    assert "1e-09 s are allowed (SPRAG_CHUNK_TIMEOUT)" in warning
+    assert Chunking(0, 2, timeout=600.0).warnings(study) == ()
+    assert Chunking(0, 2, timeout=1e-9).cases_of(study) == 1
+
+
 def test_a_million_cases_are_a_few_hundred_chunks() -> None:
     assert len(range(0, 10**6, chunk_cases(10**6, 3e-4, 16))) == pytest.approx(300, rel=0.01)
 
