@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from service.catalogue import result_of, unit_of, unknown_result
 from service.errors import ErrorItem
-from service.selection import Fixed, SelectionError, listed, locate_axes, require_axis
+from service.selection import Fixed, SelectionError, axis_name, held_text, listed, locate_axes, require_axis
 from worker.limits import MAX_CURVE_VALUES
 
 if TYPE_CHECKING:
@@ -54,10 +54,15 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The cases of all curves, chosen from the study alone; ``units`` (SI) of every path that is drawn or fixed."""
+    """The cases of all curves, chosen from the study alone; ``units`` (SI) of every path that is drawn or fixed.
+
+    For people: ``names`` of the drawn paths with those tied to them, and ``held``, the fixed ones with their values.
+    """
 
     x: str
     units: dict[str, str]
+    names: dict[str, str]
+    held: tuple[str, ...]
     x_values: tuple[float, ...]
     results: tuple[ResultInfo, ...]
     lines: tuple[Line, ...]
@@ -102,11 +107,16 @@ class Curves:
 
 @dataclass(frozen=True, slots=True)
 class Map:
-    """One result over two axes; ``values``, ``endings`` and ``cases`` have the shape (y values, x values)."""
+    """One result over two axes; ``values``, ``endings`` and ``cases`` have the shape (y values, x values).
+
+    ``names`` and ``held`` are for people, as those of `Selection`; ``units`` and ``names`` belong to x and y.
+    """
 
     x: str
     y: str
     units: tuple[str, str]
+    names: tuple[str, str]
+    held: tuple[str, ...]
     x_values: tuple[float, ...]
     y_values: tuple[float, ...]
     at: dict[str, float]
@@ -155,7 +165,12 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
     x_values, lines = chooser(study, x_axis, by_axes, fixed, len(results))
     made = tuple(lines)
     units = {path: unit_of(study.model, path) for path in (query.x, *made[0].by, *made[0].at)}
-    return Selection(query.x, units, x_values, results, made)
+    names = {path: axis_name(study, path) for path in (query.x, *made[0].by)}
+    return Selection(query.x, units, names, _held(study, made[0]), x_values, results, made)
+
+
+def _held(study: Study, line: Line) -> tuple[str, ...]:
+    return tuple(held_text(study, path, value) for path, value in line.at.items())
 
 
 def draw(selection: Selection, fetch: Fetch) -> Curves:
@@ -191,6 +206,8 @@ def draw_map(
         x,
         y,
         (unit_of(study.model, x), unit_of(study.model, y)),
+        (axis_name(study, x), axis_name(study, y)),
+        _held(study, rows[0]),
         x_values,
         tuple(row.by[y] for row in rows),
         rows[0].at,

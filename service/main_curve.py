@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
+from service.catalogue import unit_of
 from service.curves import CurveQuery
+from service.selection import axis_name, held_text
 
 if TYPE_CHECKING:
     from worker.kernels import ResultInfo
-    from worker.study import Study
+    from worker.study import Axis, Study
 
 #: Axes a designer draws along, and then those told apart by colour, first choice first.
 _ALONG: Final = ("shaft.load", "excitation.frequency")
@@ -19,7 +22,10 @@ _MOST_CURVES: Final = 8
 
 
 def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
-    """What to draw for ``study``; None when nothing varies. Axes not drawn are held at the value in their middle."""
+    """What to draw for ``study``; None when nothing varies.
+
+    Axes not drawn are held at the value of the base where they have it, else at the value in their middle.
+    """
     varying = [axis for axis in study.axes if len(axis) > 1]
     if not varying:
         return None
@@ -32,8 +38,35 @@ def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
     few = [axis for axis in others if len(axis) <= _MOST_CURVES]
     by = next((path for path in _APART for axis in few if path in axis.paths), few[0].paths[0] if few else None)
     held = [axis for axis in others if by not in axis.paths]
-    at = tuple((axis.paths[0], repr(sorted(axis.values)[len(axis) // 2])) for axis in held)
+    at = tuple((axis.paths[0], repr(_usual(study, axis))) for axis in held)
     return CurveQuery(x, y if by is None else y[:1], () if by is None else (by,), at)
+
+
+def _usual(study: Study, axis: Axis) -> float:
+    base = study.base.get(axis.paths[0])
+    index = None if base is None else axis.index_of(base)
+    return sorted(axis.values)[len(axis) // 2] if index is None else axis.values[index]
+
+
+def drawn_numbers(study: Study, query: CurveQuery) -> int:
+    """How many numbers the curves of ``query`` (from `main_query`) have."""
+    if study.combine == "zip":
+        return study.cases * len(query.y)
+    axes = [axis for path in (query.x, *query.by) for axis in study.axes if path in axis.paths]
+    return math.prod(map(len, axes)) * len(query.y)
+
+
+def caption(study: Study, query: CurveQuery) -> str:
+    """What the curves of ``query`` show, as a sentence without its full stop."""
+    by = ", ".join(_with_unit(study, path) for path in query.by)
+    held = [held_text(study, path, float(value)) for path, value in query.at]
+    first = f"{', '.join(query.y)} against {_with_unit(study, query.x)}" + (f", a curve for each {by}" if by else "")
+    return "; ".join([first, *held])
+
+
+def _with_unit(study: Study, path: str) -> str:
+    unit = unit_of(study.model, path)
+    return axis_name(study, path) + ("" if unit == "1" else f" ({unit})")
 
 
 def query_pairs(query: CurveQuery, **more: str) -> list[tuple[str, str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import itertools
+import math
 import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
@@ -27,9 +28,20 @@ MEDIA_TYPES: Final[dict[Picture, str]] = {"svg": "image/svg+xml", "png": "image/
 #: What one picture can show; more would take minutes to draw and nobody could read it.
 MAX_PICTURE_CURVES: Final = 200
 MAX_PICTURE_POINTS: Final = 100_000
-#: Curves that have a colour and an entry in the legend each.
+#: Curves that have an entry in the legend each; more have a block each of a colour bar, so many of them with a label.
 _LEGEND_CURVES: Final = 10
-_STYLES: Final[tuple[Literal["-", "--", ":", "-."], ...]] = ("-", "--", ":", "-.")
+_BAR_LABELS: Final = 24
+#: How results of one unit are told apart: style of the line, and marker where there is none.
+_STYLES: Final[tuple[tuple[Literal["-", "--", ":", "-."], str], ...]] = (
+    ("-", "o"),
+    ("--", "s"),
+    (":", "^"),
+    ("-.", "D"),
+)
+#: Characters on a line of a title.
+_TITLE_WIDTH: Final = 100
+#: Points of a map that are marked each.
+_MARKED_POINTS: Final = 600
 _STYLE: Final[dict[Any, Any]] = {
     "svg.hashsalt": "sprag",
     "svg.fonttype": "path",
@@ -67,8 +79,10 @@ def draw_curves(curves: Curves, title: str, picture: Picture) -> bytes:
         plots = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (unit, infos) in zip(plots, groups.items(), strict=True):
             _paint_curves(axes, curves, infos, unit)
-        plots[-1].set_xlabel(_label(curves.selection.x, curves.selection.units[curves.selection.x]))
-        figure.suptitle(_short(title), fontsize=11)
+        chosen = curves.selection
+        plots[-1].set_xlabel(_label(chosen.names[chosen.x], chosen.units[chosen.x]))
+        _explain(figure, list(plots), curves)
+        _head(figure, title, chosen.held)
 
     return _render(paint, picture, (8.0, 1.2 + 3.6 * len(groups)))
 
@@ -83,10 +97,18 @@ def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
             _edges(drawn.x_values), _edges(drawn.y_values), np.ma.masked_invalid(drawn.values), cmap="viridis"
         )
         axes.grid(visible=False)
-        axes.set_xlabel(_label(drawn.x, drawn.units[0]))
-        axes.set_ylabel(_label(drawn.y, drawn.units[1]))
+        axes.set_facecolor("0.85")
+        if drawn.values.size <= _MARKED_POINTS:
+            points = np.meshgrid(drawn.x_values, drawn.y_values)
+            axes.plot(*(part.reshape(-1) for part in points), ".", color="0.3", markersize=2.5, clip_on=False)
+        for axis, values in ((axes.xaxis, drawn.x_values), (axes.yaxis, drawn.y_values)):
+            if len(values) == 1:
+                axis.set_ticks(values)
+        axes.set_xlabel(_label(drawn.names[0], drawn.units[0]))
+        axes.set_ylabel(_label(drawn.names[1], drawn.units[1]))
         figure.colorbar(mesh, label=_label(drawn.result.name, drawn.result.unit))
-        figure.suptitle(_short(title), fontsize=11)
+        missing = int(np.isnan(drawn.values).sum())
+        _head(figure, title, (*drawn.held, f"grey: {missing} cases without a result") if missing else drawn.held)
 
     return _render(paint, picture, (8.0, 6.0))
 
@@ -110,14 +132,41 @@ def _render(paint: Callable[[Figure], None], picture: Picture, size: tuple[float
 
 
 def _paint_curves(axes: Axes, curves: Curves, infos: list[ResultInfo], unit: str) -> None:
-    """Colour tells the curves apart, the style of the line the results."""
+    """Colour tells the curves apart, the style of the line and the marker the results."""
+    from matplotlib.lines import Line2D
+
     colours = _colours(len(curves.curves))
     for curve, colour in zip(curves.curves, colours, strict=True):
-        for info, style in zip(infos, itertools.cycle(_STYLES), strict=False):
-            y = curve.y[info.name]
-            axes.plot(curve.line.x, y, color=colour, linestyle=style, marker="o", markersize=3.0, linewidth=1.4)
-    axes.set_ylabel(_label(infos[0].name, unit) if len(infos) == 1 else unit)
-    _explain(axes, curves, infos, colours)
+        # A line tells how x leads to y; points of a zip that go to and fro are not on one.
+        joined = bool(np.all(np.diff(curve.line.x) > 0.0))
+        for info, (style, marker) in zip(infos, itertools.cycle(_STYLES), strict=False):
+            axes.plot(
+                curve.line.x,
+                curve.y[info.name],
+                color=colour,
+                linestyle=style if joined else "none",
+                marker=marker,
+                markersize=3.0 if joined else 4.5,
+                linewidth=1.4,
+            )
+    if len(infos) == 1:
+        axes.set_ylabel(_label(infos[0].name, unit))
+        return
+    axes.set_ylabel("dimensionless" if unit == "1" else unit)
+    handles = [
+        Line2D([], [], color="0.3", linestyle=style, marker=marker, markersize=3.0, label=info.name)
+        for info, (style, marker) in zip(infos, itertools.cycle(_STYLES), strict=False)
+    ]
+    # Above the plot, where it hides no point.
+    axes.legend(
+        handles=handles,
+        fontsize=8,
+        ncols=min(len(handles), 3),
+        frameon=False,
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.2,
+    )
 
 
 def _colours(count: int) -> list[Any]:
@@ -129,24 +178,49 @@ def _colours(count: int) -> list[Any]:
     return [colormaps["viridis"](number / (count - 1)) for number in range(count)]
 
 
-def _explain(axes: Axes, curves: Curves, infos: list[ResultInfo], colours: list[Any]) -> None:
-    """A legend for the styles and for a few colours; of many curves only the first, the middle and the last."""
-    from matplotlib.lines import Line2D
+def _explain(figure: Figure, plots: list[Axes], curves: Curves) -> None:
+    """What the colours mean, beside the plots: every curve in a legend, or in a colour bar where there are many."""
+    chosen = curves.selection
+    paths = list(curves.curves[0].line.by)
+    if not paths:
+        return
+    meaning = ",\n".join(_label(chosen.names[path].replace(" = ", " =\n"), chosen.units[path]) for path in paths)
+    texts = [", ".join(f"{value:.6g}" for value in curve.line.by.values()) for curve in curves.curves]
+    colours = _colours(len(texts))
+    if len(texts) <= _LEGEND_CURVES:
+        from matplotlib.lines import Line2D
 
-    lines = [curve.line for curve in curves.curves]
-    shown = range(len(lines)) if len(lines) <= _LEGEND_CURVES else (0, len(lines) // 2, len(lines) - 1)
-    units = curves.selection.units
-    handles = [
-        Line2D([], [], color="0.3", linestyle=style, label=info.name)
-        for info, style in zip(infos, itertools.cycle(_STYLES), strict=False)
-        if len(infos) > 1
-    ]
-    for number in shown:
-        values = [f"{path} = {_label(f'{value:.6g}', units[path], '')}" for path, value in lines[number].by.items()]
-        if values:
-            handles.append(Line2D([], [], color=colours[number], label=", ".join(values)))
-    if handles:
-        axes.legend(handles=handles, fontsize=8)
+        handles = [
+            Line2D([], [], color=colour, marker="o", markersize=3.0, label=text)
+            for colour, text in zip(colours, texts, strict=True)
+        ]
+        figure.legend(handles=handles, title=meaning, loc="outside right upper", fontsize=8, title_fontsize=8)
+        return
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap, Normalize
+
+    # One block of colour for each curve, its number in the middle: values need not be evenly spaced, nor be numbers.
+    blocks = ScalarMappable(Normalize(-0.5, len(texts) - 0.5), ListedColormap(colours))
+    bar = figure.colorbar(blocks, ax=plots, aspect=30 * len(plots))
+    labelled = range(0, len(texts), math.ceil(len(texts) / _BAR_LABELS))
+    bar.set_ticks(list(labelled), labels=[texts[number] for number in labelled])
+    bar.ax.tick_params(labelsize=8, length=0)
+    bar.set_label(meaning.replace(" =\n", " = "), fontsize=8)
+
+
+def _head(figure: Figure, title: str, held: tuple[str, ...]) -> None:
+    """The title, and below it what is held at which value, broken between two of these only."""
+    lines = [_short(title)] if title else []
+    line = ""
+    for text in held:
+        if line and len(line) + len(text) > _TITLE_WIDTH:
+            lines.append(f"{line};")
+            line = ""
+        line = f"{line}; {text}" if line else text
+    if line:
+        lines.append(line)
+    if lines:
+        figure.suptitle("\n".join(lines), fontsize=10)
 
 
 def _label(name: str, unit: str, brackets: str = "()") -> str:
@@ -163,10 +237,12 @@ def _short(title: str) -> str:
 
 
 def _edges(values: tuple[float, ...]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Borders of the cells around ascending values, one more than there are values."""
+    """Borders of the cells around ascending values, one more than there are values.
+
+    The outer cells end at the outer values, so that nothing is drawn where nothing was computed.
+    """
     middle = np.array(values)
     if middle.size == 1:
         half = abs(float(middle[0])) * 0.05 or 0.5
         return np.array([middle[0] - half, middle[0] + half])
-    inner = (middle[1:] + middle[:-1]) / 2.0
-    return np.concatenate([[2 * middle[0] - inner[0]], inner, [2 * middle[-1] - inner[-1]]])
+    return np.concatenate([middle[:1], (middle[1:] + middle[:-1]) / 2.0, middle[-1:]])

@@ -55,6 +55,19 @@ def require_axis(study: Study, parameter: str, path: str) -> int:
     )
 
 
+def axis_name(study: Study, path: str) -> str:
+    """``path`` with the paths tied to it: ``excitation.amplitude_x = excitation.amplitude_y``."""
+    position = study.axis_of(path)
+    tied = () if position is None else study.axes[position].paths
+    return " = ".join(dict.fromkeys((path, *tied)))
+
+
+def held_text(study: Study, path: str, value: float) -> str:
+    """A parameter held at ``value`` (SI) as people read it: ``excitation.frequency = 25 Hz``."""
+    unit = unit_of(study.model, path)
+    return f"{axis_name(study, path)} = {value:.6g}" + ("" if unit == "1" else f" {unit}")
+
+
 def locate_axes(study: Study, at: Sequence[tuple[str, str]]) -> Fixed:
     """The axes and the positions on them that pairs of path and value (as text) name.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from functools import lru_cache, partial
 from importlib.resources import files
 from typing import Any, Final
@@ -18,7 +19,7 @@ from service.api.curves import picture_response
 from service.api.respond import entity_tag, json_response, not_modified, tagged
 from service.curves import draw, select
 from service.errors import PROBLEM_TYPES, ApiError
-from service.main_curve import main_query, query_pairs
+from service.main_curve import caption, drawn_numbers, main_query, query_pairs
 from service.web import apidoc
 from worker import kernels
 
@@ -40,12 +41,18 @@ def _templates() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters["number"] = _number
+    environment.filters["spec"] = _spec
     environment.filters["moment"] = lambda text: text[:19].replace("T", " ") + " UTC" if text else "–"
     return environment
 
 
 def _number(value: float | None) -> str:
     return "–" if value is None else f"{value:,}" if isinstance(value, int) else f"{value:.6g}"
+
+
+def _spec(spec: dict[str, Any]) -> str:
+    """A spec as it was given: keys in their order, every character itself; escaped with the rest of the page."""
+    return json.dumps(spec, ensure_ascii=False, indent=2)
 
 
 def _page(name: str, **values: Any) -> Response:
@@ -72,8 +79,10 @@ def study_page(context: Ctx, study_id: StudyId) -> Response:
         "study.html",
         study=shown,
         refresh=None if record.state.terminal else _REFRESH,
-        query=query,
         curves=curves,
+        caption=None if query is None else caption(study, query),
+        numbers=0 if query is None else drawn_numbers(study, query),
+        most_numbers=plots.MAX_PICTURE_POINTS,
         picture=f"/studies/{study_id}/curve.svg?revision={record.revision}",
         only_row=None if first is None else first.results.items(),
         units={info.name: info.unit for info in kernels.study_results(study)},

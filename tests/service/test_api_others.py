@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import json
 import re
 from html.parser import HTMLParser
 from typing import TYPE_CHECKING, Any
@@ -155,6 +157,30 @@ def test_pages_load_nothing_from_elsewhere_and_lead_nowhere_wrong(service: Servi
             assert service.http.get(path or page).status_code == 200, address
             if anchor and path in ("", page):
                 assert anchor in loads.anchors
+
+
+def test_a_study_page_names_values_with_units_and_shows_the_spec_as_given(
+    service: Service, spec: dict[str, Any]
+) -> None:
+    spec["name"] = "a < b \u00b5"
+    spec["axes"] = [
+        {"path": "excitation.frequency", "linspace": ["16 Hz", "34 Hz", 19]},
+        {"path": "shaft.load", "values": [0.1, 0.2]},
+    ]
+    text, _ = read_page(service, f"/studies/{service.submit(spec)}")
+    assert "against shaft.load (N*m); excitation.frequency = 25 Hz." in text
+    shown = text.split("<summary>Spec</summary><pre>")[1].split("</pre>")[0]
+    assert "a &lt; b \u00b5" in shown
+    assert json.loads(html.unescape(shown)) == spec
+    assert list(json.loads(html.unescape(shown))) == list(spec)
+
+
+def test_a_study_page_without_a_picture_of_too_many_points(service: Service, spec: dict[str, Any]) -> None:
+    spec["axes"] = [{"path": "shaft.load", "linspace": [0, 1, 60_000]}]
+    text, loads = read_page(service, f"/studies/{service.submit(spec)}")
+    assert "120,000 values are more than one picture can show" in text
+    assert "curve.svg" not in text
+    assert "/docs#get_curves" in loads.linked
 
 
 def test_a_study_page_shows_how_far_it_is_and_its_curve(service: Service) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from service.curves import select
-from service.main_curve import main_query, query_pairs
+from service.main_curve import caption, drawn_numbers, main_query, query_pairs
 from service.spec import parse_spec
 from worker import kernels
 
@@ -56,6 +56,20 @@ def test_further_axes_are_held_in_their_middle(spec: dict[str, Any]) -> None:
     many = query_of(spec, axes=[axis("shaft.load", 5), axis("excitation.frequency", 30)])
     assert many is not None
     assert many.by == ()
+
+
+def test_a_further_axis_is_held_at_the_value_of_the_base(spec: dict[str, Any]) -> None:
+    tied = {"path": ["excitation.amplitude_x", "excitation.amplitude_y"], "values": ["1 mm", "2 mm"]}
+    axes = [{"path": "excitation.frequency", "linspace": ["20 Hz", "35 Hz", 16]}, tied, axis("shaft.load", 5)]
+    query = query_of(spec, axes=axes)
+    assert query is not None
+    assert query.at == (("excitation.frequency", "25.0"),)
+    study = parse_spec({**spec, "axes": axes}).study
+    assert drawn_numbers(study, query) == 10
+    assert caption(study, query) == (
+        "shaft.speed.mean against shaft.load (N*m), "
+        "a curve for each excitation.amplitude_x = excitation.amplitude_y (m); excitation.frequency = 25 Hz"
+    )
 
 
 def test_zipped_axes_are_drawn_along_the_load(spec: dict[str, Any]) -> None:
