@@ -1,9 +1,9 @@
 """The engine against heyoka and scipy: speed and error on the workloads W1 and W2, on one pinned core, in one run.
 
     pip install -e '.[benchmark]'
-    python benchmarks/engine.py [--reference PATH] [--repeats 5] [--core K]    compare
-    python benchmarks/engine.py --scaling                                      processes and pendulums
-    python benchmarks/engine.py --start                                        compilation and cold starts
+    python -m benchmarks.engine [--reference PATH] [--repeats 5] [--core K]    compare
+    python -m benchmarks.engine --scaling                                      processes and pendulums
+    python -m benchmarks.engine --start                                        compilation and cold starts
 
 Every tool runs all cases of a workload (scipy a handful) ``--repeats`` times, in turn; the least time counts. Rates
 are by processor time, which other work on the machine disturbs least; rates by the clock on the wall stand beside them.
@@ -15,24 +15,17 @@ from __future__ import annotations
 
 import argparse
 import platform
-import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-# Run as a script this file would be found as the package ``engine``.
-sys.path[:] = [
-    str(Path(__file__).resolve().parents[1]),
-    *(entry for entry in sys.path if Path(entry).resolve() != Path(__file__).resolve().parent),
-]
-
-from benchmarks import scaling, start  # noqa: E402
-from benchmarks.breakdown import print_breakdown  # noqa: E402
-from benchmarks.peers.scipy_drive import ScipyDrive  # noqa: E402
-from benchmarks.peers.sprag_drive import SpragDrive  # noqa: E402
-from benchmarks.workloads import (  # noqa: E402
+from benchmarks import scaling, start
+from benchmarks.breakdown import print_breakdown
+from benchmarks.peers.scipy_drive import ScipyDrive
+from benchmarks.peers.sprag_drive import SpragDrive
+from benchmarks.workloads import (
     CASES,
     COMPARED,
     PERIODS,

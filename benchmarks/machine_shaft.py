@@ -2,7 +2,7 @@
 
 All in one run of this program, in turn; the ratios are to the first line.
 
-    python benchmarks/machine_shaft.py [--cases 2000] [--repeats 3]
+    python -m benchmarks.machine_shaft [--cases 2000] [--repeats 3]
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Error of the mean speed against cases per second, for tolerances 1e-4 to 1e-13: this engine, heyoka and scipy.
 
     pip install -e '.[benchmark]'
-    python benchmarks/work_precision.py [--reference PATH] [--repeats 3] [--core K]
+    python -m benchmarks.work_precision [--reference PATH] [--repeats 3] [--core K]
 
 Writes docs/figures/work_precision.svg and, beside it, the same numbers as work_precision.csv. Rates are of all cases of
 W1 (scipy: of a few), by processor time on one pinned core, the least of the repeats; errors are over its reference
@@ -12,21 +12,16 @@ from __future__ import annotations
 
 import argparse
 import csv
-import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-# Run as a script this folder would hide the package ``engine`` behind ``benchmarks/engine.py``.
-ROOT = Path(__file__).resolve().parents[1]
-sys.path[:] = [str(ROOT), *(entry for entry in sys.path if Path(entry).resolve() != ROOT / "benchmarks")]
-
-from benchmarks.peers.heyoka_drive import HeyokaDrive  # noqa: E402
-from benchmarks.peers.scipy_drive import ScipyDrive  # noqa: E402
-from benchmarks.peers.sprag_drive import SpragDrive  # noqa: E402
-from benchmarks.workloads import (  # noqa: E402
+from benchmarks.peers.heyoka_drive import HeyokaDrive
+from benchmarks.peers.scipy_drive import ScipyDrive
+from benchmarks.peers.sprag_drive import SpragDrive
+from benchmarks.workloads import (
     CASES,
     REFERENCE,
     W1,
@@ -38,6 +33,7 @@ from benchmarks.workloads import (  # noqa: E402
     take_turns,
 )
 
+ROOT = Path(__file__).resolve().parents[1]
 FIGURES = ROOT / "docs" / "figures"
 EXPONENTS = range(4, 14)
 TOOLS = {"this engine": SpragDrive, "heyoka, batches of 8": HeyokaDrive, "scipy DOP853": ScipyDrive}
