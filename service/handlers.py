@@ -21,6 +21,9 @@ from worker.states import TransitionError
 
 _log = logging.getLogger("sprag.service")
 
+#: What the patterns of texts mean, for people.
+_PATTERNS = {r"^[!-~]+$": "printable ASCII characters without blanks"}
+
 #: Fault of the store -> kind of problem; the first that matches, so the special ones come first.
 _STORE_PROBLEMS: tuple[tuple[type[storage.StoreError], str], ...] = (
     (storage.StudyNotFound, "study-not-found"),
@@ -101,8 +104,11 @@ def _parameter_item(fault: dict[str, Any]) -> ErrorItem:
     _place, *name = fault["loc"]
     bounds = fault.get("ctx", {})
     value = fault.get("input")
+    message = str(fault["msg"]).removeprefix("Value error, ")
+    if "pattern" in bounds:
+        message = "has characters that are not allowed here"
     return ErrorItem(
-        str(fault["msg"]).lower(),
+        message[:1].lower() + message[1:],
         parameter=str(name[0]) if name else _place,
         value=shown(value) if isinstance(value, str) else None,
         allowed=_allowed(bounds),
@@ -110,8 +116,10 @@ def _parameter_item(fault: dict[str, Any]) -> ErrorItem:
 
 
 def _allowed(bounds: dict[str, Any]) -> str | None:
-    signs = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<", "expected": "one of", "pattern": "a text like"}
+    signs = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<", "expected": "one of"}
     parts = [f"{signs[name]} {value}" for name, value in bounds.items() if name in signs]
+    if "pattern" in bounds:
+        parts.append(_PATTERNS.get(bounds["pattern"], f"a text like {bounds['pattern']}"))
     return " and ".join(parts) or None
 
 

@@ -121,6 +121,11 @@ def _check_times(
             )  # fmt: skip
             return
         if run["window"] is None:
+            if duration / 3.0 < 1.0 - _ROUNDING:
+                report.warn(
+                    f"/run/duration: the window, its last third, is shorter than one excitation period at "
+                    f"{frequency:.6g} Hz ({duration / 3.0:.3g} periods), so means over it depend on where it lies"
+                )
             continue
         start, end = (in_periods(time, frequency) for time in run["window"])
         if not start < end * (1.0 - _ROUNDING):

@@ -43,7 +43,8 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
     if not any(any(_values(study, f"excitation.amplitude_{axis}")) for axis in "xy"):
         report.warn("/base/excitation: both amplitudes are 0, so the base does not move")
     if min(_values(study, "excitation.frequency")) < 0.1:
-        report.warn("/base/excitation/frequency: below 0.1 Hz, which is slow for a vibration drive")
+        where = _pointer(study, "excitation.frequency")
+        report.warn(f"{where}: below 0.1 Hz, which is slow for a vibration drive")
     pendulums = sum(path.startswith("pendulums.") and path.endswith(".mass") for path in study.base)
     for index in range(pendulums):
         _stability(report, study, index)
@@ -61,7 +62,15 @@ def _plausible(report: Report, study: Study, path: str) -> None:
     limit, unit, question = entry
     largest = max(_values(study, path), key=abs)
     if abs(largest) > limit:
-        report.warn(f"{path}: {largest:g} {unit} is more than {limit:.4g} {unit}; {question}")
+        report.warn(f"{_pointer(study, path)}: {largest:g} {unit} is more than {limit:.4g} {unit}; {question}")
+
+
+def _pointer(study: Study, path: str) -> str:
+    """Where the values of ``path`` stand in the spec: its axis, which is told with the path, or the base."""
+    for position, axis in enumerate(study.axes):
+        if path in axis.paths:
+            return f"/axes/{position} ({path})"
+    return "/base/" + path.replace(".", "/")
 
 
 def _stability(report: Report, study: Study, index: int) -> None:

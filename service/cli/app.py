@@ -8,11 +8,12 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from typing import Annotated
 
 import typer
 
 from service.cli import database, demo, doctor, fit, local, processes, remote
-from service.cli.console import CommandFailureError, ExitCode, TroubleError, say
+from service.cli.console import CommandFailureError, ExitCode, TroubleError, say, write_text
 
 #: Set to anything to see where a fault of the program lies.
 DEBUG_VARIABLE = "SPRAG_DEBUG"
@@ -25,6 +26,24 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        write_text(f"sprag {version('sprag')}\n")
+        raise typer.Exit
+
+
+@app.callback()
+def _every_command(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """What stands before the name of a command; typer shows the application's own help instead of this."""
+
 
 _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
     "Run here": {

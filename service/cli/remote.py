@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 #: Seconds between two looks at a study that is being watched.
 _POLL_SECONDS = 0.25
 _ENDED = {state.value for state in TERMINAL}
+#: A parameter with its sign, as the service's messages write it: "by=", "at=shaft.load=0.2".
+_PARAMETER_IN_TEXT = re.compile(r"(?<![\w.-])(x|y|by|at)=(?=(\w?))")
 _PICTURES = ("svg", "png", "pdf")
 
 
@@ -66,19 +69,29 @@ def connection(server: str, token: str | None) -> Iterator[ServiceClient]:
 
 def refusal(error: RefusedError) -> CommandFailureError:
     """The failure of the command that the service's refusal means."""
-    if error.status in (401, 403, 421) or error.status >= 500:
+    if error.status == 401:
+        return TroubleError(f"{error} Give the service's token with --token or in SPRAG_TOKEN.")
+    if error.status in (403, 421) or error.status >= 500:
         return TroubleError(str(error))
     problems = [
         Problem(
-            str(item.get("pointer") or item.get("parameter") or ""),
-            str(item.get("message", "is wrong")),
+            _option(item["parameter"]) if item.get("parameter") else str(item.get("pointer") or ""),
+            _PARAMETER_IN_TEXT.sub(
+                lambda found: f"{_option(found[1])}{found[2] and ' '}", str(item.get("message", "is wrong"))
+            ),
             item.get("value"),
             allowed=item.get("allowed"),
             unit=item.get("unit"),
         )
         for item in error.errors
     ]
-    return WrongInputError(str(error), problems=problems)
+    title = error.problem.get("title")
+    return WrongInputError(str(title) if problems and title else str(error), problems=problems)
+
+
+def _option(parameter: object) -> str:
+    """A parameter of a request as the command line calls it."""
+    return "--" + str(parameter).replace("_", "-")
 
 
 def submit(

@@ -28,5 +28,5 @@ def read_settings(**options: object) -> Settings:
         for item in error.errors(include_url=False):
             name = str(item["loc"][0]) if item["loc"] else ""
             value = None if name == "token" else shorten(item.get("input"))
-            problems.append(Problem(ENV_PREFIX + name.upper(), item["msg"], value))
+            problems.append(Problem(ENV_PREFIX + name.upper(), item["msg"].removeprefix("Value error, "), value))
         raise WrongInputError("a setting is wrong", problems=problems) from error

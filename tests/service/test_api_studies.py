@@ -72,7 +72,11 @@ def test_a_useless_idempotency_key_is_refused(service: Service, key: str) -> Non
     headers = {"Idempotency-Key": key.encode("latin-1")}
     response = service.http.post(STUDIES, json=SPEC, headers=headers)
     assert response.status_code == 422
-    assert response.json()["errors"][0]["parameter"] == "Idempotency-Key"
+    (error,) = response.json()["errors"]
+    assert error["parameter"] == "Idempotency-Key"
+    assert "[!-~]" not in response.text
+    if key in ("a b", "caf\u00e9"):
+        assert error["allowed"] == "printable ASCII characters without blanks"
 
 
 def test_studies_are_listed_in_pages_newest_first(service: Service, spec: dict[str, Any]) -> None:

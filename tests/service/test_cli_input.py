@@ -4,12 +4,18 @@ import errno
 import json
 import os
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from engine.endings import Ending
+from engine.vibration_drive.simulate import Trajectory
 from tests.wrong_specs import WRONG, changed
+from worker import kernels
+from worker.study import Study
 
 Sprag = Callable[..., Any]
 
@@ -123,6 +129,27 @@ def test_a_part_of_a_run_in_periods(sprag: Sprag, examples: Path) -> None:
     assert done.code == 2
     assert "--to: outside the run" in done.err
     assert "--from" not in done.err
+
+
+def test_a_motion_that_does_not_end_well_is_told_by_the_exit_code(
+    sprag: Sprag, examples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = {"ending": Ending.OK}
+
+    def instead(_study: Study, _case: int, start: float, end: float, _points: int) -> Trajectory:
+        return Trajectory(np.array([start, end]), ("speed",), ("rad/s",), np.zeros((2, 1)), {}, made["ending"])
+
+    monkeypatch.setattr(kernels, "run_trajectory", instead)
+    command = ["trajectory", examples / "one_pendulum.json", "--points", "2", "-o", tmp_path / "motion.csv"]
+    assert sprag(*command).code == 0
+    made["ending"] = Ending.DIVERGED
+    assert sprag(*command).code == 1
+    assert (tmp_path / "motion.csv").exists()
+
+
+def test_the_version(sprag: Sprag) -> None:
+    done = sprag("--version")
+    assert (done.code, done.out) == (0, f"sprag {version('sprag')}\n")
 
 
 def test_a_usage_error_names_the_help(sprag: Sprag) -> None:

@@ -128,3 +128,15 @@ def test_the_studies_that_come_with_the_program_are_the_examples() -> None:
     for name in preset_names():
         file, text = preset_text(name)
         assert (ROOT / "examples" / file).read_text() == text
+
+
+def test_the_waiting_loop_of_the_readme_ends_in_every_state_that_a_study_does_not_leave_by_itself() -> None:
+    (pattern,) = re.findall(r"grep -qE '(.+?)'", (ROOT / "README.md").read_text())
+    for state in StudyState:
+        stays = state.terminal or state is StudyState.PAUSED
+        assert (re.search(pattern, f'{{"id":"x","state":"{state}","model":"m"}}') is not None) is stays, state
+
+
+def test_benchmarks_are_called_as_modules() -> None:
+    for page in [*PAGES, *(ROOT / "benchmarks").rglob("*.py")]:
+        assert not re.search(r"python benchmarks/", page.read_text()), page

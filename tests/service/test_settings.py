@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 from pydantic import ValidationError
 
+from service.cli.console import WrongInputError
+from service.cli.settings import read_settings
 from service.settings import Settings, available_cores, default_database_path, table
 
 if TYPE_CHECKING:
@@ -67,6 +69,13 @@ def test_loopback_is_recognised(settings: Settings, host: str, loopback: bool) -
 def test_wrong_settings_are_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(ValidationError):
         Settings(**wrong)  # type: ignore[arg-type]
+
+
+def test_commands_say_what_is_wrong_with_a_setting(settings: Settings) -> None:
+    with pytest.raises(WrongInputError) as caught:
+        read_settings(token="short")
+    (problem,) = caught.value.problems
+    assert str(problem).startswith("SPRAG_TOKEN: a token needs at least 16 ASCII characters")
 
 
 def test_the_table_has_every_setting_with_its_help() -> None:

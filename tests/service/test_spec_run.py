@@ -124,6 +124,14 @@ def test_a_window_shorter_than_a_period_is_said() -> None:
     assert "shorter than one excitation period at 25 Hz" in warning
 
 
+def test_a_run_whose_last_third_is_shorter_than_a_period_is_said() -> None:
+    (warning,) = parsed({"/run": {"duration": "0.5 periods"}, "/axes": []}).warnings
+    assert warning.startswith(
+        "/run/duration: the window, its last third, is shorter than one excitation period at 25 Hz"
+    )
+    assert parsed({"/run": {"duration": "3 periods"}, "/axes": []}).warnings == ()
+
+
 def test_the_extremes_of_tolerance_and_reset() -> None:
     for tolerance in (1e-14, 1e-4):
         assert parsed({"/run/tolerance": tolerance, "/run/reset": "literal"}).study.run["tolerance"] == tolerance
