@@ -39,12 +39,12 @@ def list_cases(
     page_token: Annotated[str | None, Query(description="`next_page_token` of the page before")] = None,
     ending: Annotated[str | None, Query(description="only cases with this ending", examples=["ok"])] = None,
 ) -> Response:
-    """Finished cases, in order of their numbers."""
+    """Finished cases, in order of their numbers; of a cancelled study also those that were never run."""
     if ending is not None and ending not in kernels.ENDING_SENTENCES:
         raise parameter_error("ending", "there is no such ending", shown(ending), ", ".join(kernels.ENDING_SENTENCES))
     after = _after(page_token)
     # One more than the page, which tells whether there is another.
-    block = context.store.case_rows(study_id, after_case=after, limit=page_size + 1, ending=ending)
+    block = context.store.case_page(study_id, after_case=after, limit=page_size + 1, ending=ending)
     rows = list(rows_json(context.store.study(study_id), block))
     token = str(rows[page_size - 1]["case"]) if len(rows) > page_size else None
     return json_response({"cases": rows[:page_size], "next_page_token": token})

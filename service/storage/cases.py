@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,8 +11,10 @@ import sqlalchemy as sa
 
 from service.storage.part import Part
 from service.storage.records import CaseColumns, CaseRow, RowBlock
-from service.storage.tables import STUDIES, results_table
+from service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
 from worker import kernels
+from worker.kernels import WorkerEnding
+from worker.states import StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -31,33 +34,46 @@ class _Rows:
     number: int
     table: sa.Table
     infos: tuple[kernels.ResultInfo, ...]
+    cases: int
+    cancelled: bool
 
 
 class Cases(Part):
-    """Rows of finished cases."""
+    """Rows of finished cases; and the cases that a cancelled study never ran, which have no rows in the database."""
 
     def _rows(self, connection: sa.Connection, study_id: str) -> _Rows:
-        row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.model, STUDIES.c.pendulums)
+        c = STUDIES.c
+        row = self._row(connection, study_id, c.number, c.model, c.pendulums, c.cases, c.state)
         return _Rows(
-            row.number, results_table(row.model, row.pendulums), kernels.result_infos(row.model, row.pendulums)
+            row.number,
+            results_table(row.model, row.pendulums),
+            kernels.result_infos(row.model, row.pendulums),
+            row.cases,
+            row.state == StudyState.CANCELLED.value,
         )
 
-    def case_rows(
+    def case_rows(self, study_id: str, after_case: int = -1, limit: int = BLOCK_ROWS) -> RowBlock:
+        """At most ``limit`` finished cases with numbers above ``after_case``, in order; raises StudyNotFound."""
+        with self.session.read() as connection:
+            rows = self._rows(connection, study_id)
+            return _block(rows.infos, _read(connection, rows, after_case, limit, None))
+
+    def case_page(
         self, study_id: str, after_case: int = -1, limit: int = BLOCK_ROWS, ending: str | None = None
     ) -> RowBlock:
-        """At most ``limit`` finished cases with numbers above ``after_case``, in order; raises StudyNotFound.
+        """The same, and the cases that a cancelled study never ran in their places among them.
 
         With ``ending`` only the cases that ended so.
         """
+        cancelled: str = WorkerEnding.CANCELLED.value
         with self.session.read() as connection:
             rows = self._rows(connection, study_id)
-            c = rows.table.c
-            query = sa.select(c.case_number, c.ending, c.flags, *(c[info.column] for info in rows.infos)).where(
-                c.study == rows.number, c.case_number > after_case
-            )
-            if ending is not None:
-                query = query.where(c.ending == ending)
-            found = connection.execute(query.order_by(c.case_number).limit(limit)).all()
+            found = [] if ending == cancelled else _read(connection, rows, after_case, limit, ending)
+            if rows.cancelled and ending in {None, cancelled}:
+                nothing = [None] * len(rows.infos)
+                left = itertools.islice(_never_run(connection, rows, after_case), limit)
+                found = [*found, *((case, cancelled, "", *nothing) for case in left)]
+                found = sorted(found, key=lambda row: int(row[0]))[:limit]
         return _block(rows.infos, found)
 
     def iter_rows(self, study_id: str, block: int = BLOCK_ROWS) -> Iterator[RowBlock]:
@@ -69,7 +85,7 @@ class Cases(Part):
 
     def case_row(self, study_id: str, case: int) -> CaseRow | None:
         """One case, None while it is not finished; raises StudyNotFound."""
-        found = self.case_rows(study_id, case - 1, 1)
+        found = self.case_page(study_id, case - 1, 1)
         return next(found.rows()) if len(found) and found.cases[0] == case else None
 
     def rows_for_cases(self, study_id: str, cases: ArrayLike, names: Sequence[str]) -> CaseColumns:
@@ -96,11 +112,47 @@ class Cases(Part):
                     endings[at] = np.array(ended, dtype=object)
                     for index, column in enumerate(results):
                         values[at, index] = np.array(column, dtype=np.float64)
+        if rows.cancelled:
+            endings[[ending is None for ending in endings]] = WorkerEnding.CANCELLED.value
         return CaseColumns(
             wanted,
             endings[position].tolist(),
             {name: values[position, index] for index, name in enumerate(names)},
         )
+
+
+def _read(
+    connection: sa.Connection, rows: _Rows, after_case: int, limit: int, ending: str | None
+) -> Sequence[Sequence[Any]]:
+    """Rows of the database: number, ending, flags, results."""
+    c = rows.table.c
+    query = sa.select(c.case_number, c.ending, c.flags, *(c[info.column] for info in rows.infos)).where(
+        c.study == rows.number, c.case_number > after_case
+    )
+    if ending is not None:
+        ended = connection.execute(
+            sa.select(ENDINGS.c.cases).where(ENDINGS.c.study == rows.number, ENDINGS.c.ending == ending)
+        ).scalar_one_or_none()
+        # The rows are not ordered by ending: without the count, a rare one would have every row of the study read.
+        if not ended:
+            return []
+        query, limit = query.where(c.ending == ending), min(limit, ended)
+    return connection.execute(query.order_by(c.case_number).limit(limit)).all()
+
+
+def _never_run(connection: sa.Connection, rows: _Rows, after_case: int) -> Iterator[int]:
+    """Cases above ``after_case`` that are in no chunk that is done, in order."""
+    c = CHUNKS.c
+    done = connection.execute(
+        sa.select(c["first"], c["count"])
+        .where(c.study == rows.number, c.state == "done", c["first"] + c["count"] > after_case + 1)
+        .order_by(c["first"])
+    )
+    reached = after_case + 1
+    for first, count in done:
+        yield from range(reached, first)
+        reached = max(reached, first + count)
+    yield from range(reached, rows.cases)
 
 
 def _conditions(column: sa.ColumnElement[Any], cases: NDArray[np.int64]) -> Iterator[sa.ColumnElement[bool]]:

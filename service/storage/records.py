@@ -127,7 +127,7 @@ class CaseColumns:
     ----------
     cases : int64 array, shape (m,)
     endings : list, length m
-        None where the case has no row yet.
+        None where the case has no row yet, "cancelled" where it will not get one.
     values : dict of float64 arrays, each shape (m,)
         By result name; NaN for null and for missing rows.
     """

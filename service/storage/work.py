@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 
 _WAITING = {"state": "waiting", "epoch": None, "claimed_at": None}
 _TERMINAL = [state.value for state in TERMINAL]
+#: Only studies that have not ended have claims; by study the chunks have an index.
+CLAIMED = (CHUNKS.c.state == "claimed") & CHUNKS.c.study.in_(
+    sa.select(STUDIES.c.number).where(STUDIES.c.state.not_in(_TERMINAL))
+)
 
 
 class Work(Part):
@@ -40,7 +44,7 @@ class Work(Part):
                 connection.execute(sa.insert(DISPATCHER).values(id=1, **values))
             else:
                 connection.execute(sa.update(DISPATCHER).values(values))
-            connection.execute(sa.update(CHUNKS).where(CHUNKS.c.state == "claimed").values(_WAITING))
+            connection.execute(sa.update(CHUNKS).where(CLAIMED).values(_WAITING))
         return epoch
 
     def dispatcher(self) -> DispatcherRecord | None:
@@ -66,7 +70,7 @@ class Work(Part):
         """Return every claim of this epoch to waiting."""
         with self.session.write() as connection:
             self._own(connection, epoch)
-            connection.execute(sa.update(CHUNKS).where(CHUNKS.c.state == "claimed").values(_WAITING))
+            connection.execute(sa.update(CHUNKS).where(CLAIMED).values(_WAITING))
 
     def active_studies(self) -> list[ActiveStudy]:
         """Studies that have not ended, in order of submission."""

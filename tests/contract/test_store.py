@@ -9,11 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sqlalchemy as sa
 
 from service.storage import session
 from service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyNotFound
 from service.storage.records import StudyRecord
 from service.storage.store import Store
+from service.storage.tables import CHUNKS
+from service.storage.work import CLAIMED
 from tests.worker import fakes
 from worker import kernels
 from worker.chunking import Chunking
@@ -329,6 +332,64 @@ def test_settling_waits_for_open_chunks_unless_cancelled(store: Store) -> None:
     assert store.open_chunks(record.number) == []
     assert store.settle(epoch, record.number) is StudyState.CANCELLED
     assert len(store.case_rows(record.id)) == 10
+
+
+def test_cases_that_a_cancelled_study_never_ran_are_cancelled(store: Store) -> None:
+    record = create(store, 35)
+    epoch = store.take_over("test")
+    for chunk in store.open_chunks(record.number)[1::2]:  # 10 .. 19 and 30 .. 34
+        store.claim(epoch, [chunk])
+        store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+    assert store.case_row(record.id, 0) is None
+    store.cancel_study(record.id)
+    assert store.case_page(record.id, ending="cancelled").cases.tolist() == []
+    store.settle(epoch, record.number)
+    row = store.case_row(record.id, 25)
+    assert row is not None
+    assert (row.ending, row.flags, set(row.results.values())) == ("cancelled", (), {None})
+    ran = [*range(10, 20), *range(30, 35)]
+    never = [case for case in range(35) if case not in ran]
+    assert store.case_page(record.id, ending="cancelled").cases.tolist() == never
+    assert store.case_page(record.id, 4, 17, ending="cancelled").cases.tolist() == never[5:22]
+    assert store.case_page(record.id, ending="ok").cases.tolist() == ran
+    page = store.case_page(record.id, 5, 20)
+    assert page.cases.tolist() == list(range(6, 26))
+    assert page.endings == ["cancelled"] * 4 + ["ok"] * 10 + ["cancelled"] * 6
+    np.testing.assert_array_equal(page.values[4:14], fakes.values(10, 10))
+    assert store.rows_for_cases(record.id, [34, 0, 12], []).endings == ["ok", "cancelled", "ok"]
+    assert np.concatenate([block.cases for block in store.iter_rows(record.id, 4)]).tolist() == ran
+    assert store.case_row(record.id, 35) is None
+
+
+def test_an_ending_that_no_case_has_is_not_searched_for(store: Store) -> None:
+    record = create(store, 25)
+    epoch = store.take_over("test")
+    for chunk, ending in zip(store.open_chunks(record.number), ("ok", "diverged", "ok"), strict=True):
+        store.claim(epoch, [chunk])
+        store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count, ending))
+    assert store.case_page(record.id, 4, 100, "diverged").cases.tolist() == list(range(10, 20))
+    assert store.case_page(record.id, 12, 3, "diverged").cases.tolist() == [13, 14, 15]
+    asked: list[str] = []
+
+    def note(*given: object) -> None:
+        asked.append(str(given[2]))
+
+    sa.event.listen(sa.Engine, "before_cursor_execute", note)
+    try:
+        assert len(store.case_page(record.id, ending="crashed")) == 0
+    finally:
+        sa.event.remove(sa.Engine, "before_cursor_execute", note)
+    assert asked
+    assert not [statement for statement in asked if "vibration_drive_1" in statement]
+
+
+def test_claims_are_returned_without_reading_every_chunk(store: Store) -> None:
+    statement = sa.update(CHUNKS).where(CLAIMED).values(state="waiting")
+    text = str(statement.compile(dialect=store.session.dialect, compile_kwargs={"literal_binds": True}))
+    with store.session.write() as connection:
+        plan = " ".join(str(row[3]) for row in connection.exec_driver_sql(f"EXPLAIN QUERY PLAN {text}"))
+    assert "SCAN chunks" not in plan
+    assert "SEARCH chunks USING" in plan
 
 
 def test_a_cancelled_study_whose_last_chunk_came_through_is_finished(store: Store) -> None:

@@ -33,6 +33,21 @@ def results_of(rows: ChunkResult, case: int) -> dict[str, float | None]:
     return {info.name: None if math.isnan(value) else value for info, value in zip(infos, values, strict=True)}
 
 
+def test_cases_that_a_cancelled_study_never_ran_are_told_as_cancelled(service: Service) -> None:
+    study_id = service.submit()
+    service.fill(study_id, range(6))
+    service.store.cancel_study(study_id)
+    record = service.store.get_study(study_id)
+    service.store.settle(service.store.take_over("test"), record.number)
+    page = service.get(f"/studies/{study_id}/cases", ending="cancelled")
+    m.CasePage.model_validate(page)
+    assert [case["case"] for case in page["cases"]] == list(range(6, record.cases))
+    case = service.get(f"/studies/{study_id}/cases/6")
+    assert (case["ending"], set(case["results"].values())) == ("cancelled", {None})
+    assert case["ending_meaning"] == "The study was cancelled before this case was run."
+    assert len(service.get(f"/studies/{study_id}/cases")["cases"]) == record.cases
+
+
 def test_cases_come_in_pages(service: Service) -> None:
     study_id = service.submit()
     rows = service.fill(study_id, range(6))
