@@ -7,6 +7,9 @@ extremum get a second look (``lanes.look``).
 from engine.taylor.straight import LaneCode, horner, larger, range_bounds, smaller
 from engine.vibration_drive.layout import Layout
 
+#: Margin that says the step itself is too long, not that a guard is near.
+TOO_LONG = -1e308
+
 
 class _Watch:
     """Code of one lane loop that lowers the lane's ``margin`` and raises its ``excess``."""
@@ -106,7 +109,7 @@ def pendulum_bounds(layout: Layout, index: int) -> str:
     torque_end = code.let("torque_end", " + ".join(torque))
     law = horner(force, code.let("u_end", " + ".join(u)))
     defect = code.let("defect", f"abs({law} - {torque_end})*(1.0 - {code.row(row('locked'))})")
-    watch.margin = code.let("margin", f"{watch.margin} if {defect} <= {code.row(row('allowed'))} else -1.0")
+    watch.margin = code.let("margin", f"{watch.margin} if {defect} <= {code.row(row('allowed'))} else {TOO_LONG!r}")
     phi = watch.primitive("p", code.load("phi_start", row("phi")), w)
     watch.peak(range_bounds(code, "p", phi), block, row("phi_max"), row("phi_min"))
     watch.peak(range_bounds(code, "w", w), block, row("speed_max"), row("speed_min"))

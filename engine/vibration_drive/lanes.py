@@ -11,6 +11,7 @@ from engine.taylor.roots import evaluate
 from engine.vibration_drive import states as ev
 from engine.vibration_drive.advance import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR
 from engine.vibration_drive.automaton import Clutch, Shaft
+from engine.vibration_drive.bounds import TOO_LONG
 from engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS
 from engine.vibration_drive.events import locate, transit
 from engine.vibration_drive.layout import Layout
@@ -297,8 +298,9 @@ def look(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, stack: Floats) -
     """Before ``advance``: the scalar second look at one lane's step, for events and extrema that the bounds could not
     exclude.
     """
-    if not W[lay.margin * lay.lanes + lane] > 0.0:
+    if W[lay.margin * lay.lanes + lane] == TOO_LONG:
         shorten(W, lay, lane, g)
+    if not W[lay.margin * lay.lanes + lane] > 0.0:
         locate(W, Z, lay, lane, g, stack)
     # A state that is left at once lasts no time and has no extrema.
     if W[lay.x * lay.lanes + lane] > 0.0 and not W[lay.excess * lay.lanes + lane] <= 0.0:
