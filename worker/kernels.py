@@ -76,6 +76,7 @@ __all__ = [
     "coefficients",
     "estimate_seconds_per_case",
     "fit_clutch",
+    "kernel_source",
     "load",
     "models",
     "parameter_catalogue",
@@ -350,6 +351,14 @@ def load(shape: KernelShape) -> None:
     from engine.vibration_drive.simulate import warm_up as engine_warm_up
 
     engine_warm_up(shape.pendulums, shape.coefficients, shape.tolerance)
+
+
+def kernel_source(pendulums: int, coefficients: int, tolerance: float) -> str:
+    """Text of the generated kernel of vibration drives of that shape, for this machine; nothing is compiled."""
+    from engine.vibration_drive.kernel import lane_count, order_for, source
+    from engine.vibration_drive.layout import make_layout
+
+    return source(make_layout(pendulums, coefficients, order_for(tolerance), lane_count()))
 
 
 def warm_up(study: Study) -> None:

@@ -11,14 +11,19 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
-from service.cli.console import TroubleError, console, write_json
+from service.cli.console import TroubleError, WrongInputError, console, write_json, write_text
 from service.cli.options import Database, JsonFlag
 from service.cli.settings import read_settings
+from service.spec_messages import Problem
+from worker.limits import MAX_TOLERANCE, MIN_TOLERANCE
 
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sqlalchemy", "pebble", "fastapi", "uvicorn")
+#: The kernel that is printed unless its shape is given.
+_KERNEL = {"pendulums": 1, "coefficients": 4, "tolerance": 1e-9}
 #: A study of a million cases of one pendulum takes about half of it.
 _LEAST_FREE_BYTES = 1_000_000_000
 
@@ -32,8 +37,30 @@ class Finding:
     detail: str
 
 
-def doctor(db: Database = None, as_json: JsonFlag = False) -> None:
+def doctor(
+    db: Database = None,
+    kernel: Annotated[
+        bool, typer.Option("--kernel", help="Print the generated source of a kernel instead, for readers.")
+    ] = False,
+    pendulums: Annotated[int | None, typer.Option(min=1, help="Pendulums of that kernel; default: 1.")] = None,
+    coefficients: Annotated[int | None, typer.Option(min=1, help="Its clutch coefficients; default: 4.")] = None,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(min=MIN_TOLERANCE, max=MAX_TOLERANCE, help="Tolerance it is for; default: 1e-9."),
+    ] = None,
+    as_json: JsonFlag = False,
+) -> None:
     """Look at versions, database, disk, kernel cache and known values of the engine; exit code 3 when one is wrong."""
+    shape = {"pendulums": pendulums, "coefficients": coefficients, "tolerance": tolerance}
+    given = {name: value for name, value in shape.items() if value is not None}
+    if kernel:
+        _show_kernel(_KERNEL | given, as_json)
+        return
+    if given:
+        problems = [
+            Problem(f"--{name}", "belongs to --kernel, which is not given", value) for name, value in given.items()
+        ]
+        raise WrongInputError("an option is wrong", problems=problems)
     findings = list(examine(db))
     sound = all(finding.ok for finding in findings)
     if as_json:
@@ -46,6 +73,20 @@ def doctor(db: Database = None, as_json: JsonFlag = False) -> None:
             screen.print(f"{finding.subject}: {finding.detail}", markup=False, soft_wrap=True)
     if not sound:
         raise typer.Exit(TroubleError.code)
+
+
+def _show_kernel(shape: dict[str, Any], as_json: bool) -> None:
+    from worker.kernels import MAX_COEFFICIENTS, MAX_PENDULUMS, kernel_source
+
+    for name, most in (("pendulums", MAX_PENDULUMS), ("coefficients", MAX_COEFFICIENTS)):
+        if shape[name] > most:
+            problem = Problem(f"--{name}", "there is no such kernel", shape[name], allowed=f"1 .. {most}")
+            raise WrongInputError("an option is wrong", problems=[problem])
+    text = kernel_source(**shape)
+    if as_json:
+        write_json({**shape, "source": text})
+    else:
+        write_text(text)
 
 
 def examine(db: str | None) -> Iterator[Finding]:

@@ -163,3 +163,22 @@ def test_a_usage_error_names_the_help(sprag: Sprag) -> None:
         assert done.code == 2
         assert "--help" in done.err
     assert json.loads(sprag("run", "--json").err)["exit_code"] == 2
+
+
+def test_the_source_of_a_kernel_is_shown(sprag: Sprag) -> None:
+    done = sprag("doctor", "--kernel")
+    assert done.code == 0
+    assert done.out.startswith('"""Generated kernel: 1 pendulum(s), 4 clutch coefficients, order 14')
+    compile(done.out, "kernel", "exec")
+    other = sprag("doctor", "--kernel", "--pendulums", 2, "--coefficients", 3, "--tolerance", 1e-6, "--json").data
+    assert (other["pendulums"], other["coefficients"], other["tolerance"]) == (2, 3, 1e-6)
+    assert other["source"].startswith('"""Generated kernel: 2 pendulum(s), 3 clutch coefficients, order 10')
+
+
+@pytest.mark.parametrize(
+    "options", [["--pendulums", "2"], ["--kernel", "--pendulums", "9"], ["--kernel", "--tolerance", "1"]]
+)
+def test_a_kernel_that_there_is_not(sprag: Sprag, options: list[str]) -> None:
+    done = sprag("doctor", *options)
+    assert done.code == 2
+    assert options[-2] in done.err
