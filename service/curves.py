@@ -10,7 +10,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 #: Ending of a point whose case has not been computed yet.
 PENDING = "pending"
+
+#: Parameters without which a picture tells nobody what it shows.
+_OPERATING_POINT: Final = ("excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y", "shaft.load")
 
 #: Results of cases, aligned with them: (case numbers, result names) -> columns.
 Fetch = Callable[[NDArray[np.int64], Sequence[str]], "CaseColumns"]
@@ -56,7 +59,8 @@ class Line:
 class Selection:
     """The cases of all curves, chosen from the study alone; ``units`` (SI) of every path that is drawn or fixed.
 
-    For people: ``names`` of the drawn paths with those tied to them, and ``held``, the fixed ones with their values.
+    For people: ``names`` of the drawn paths with those tied to them, and ``held``, the fixed ones with their values,
+    also those of the operating point that vary nowhere.
     """
 
     x: str
@@ -170,7 +174,11 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
 
 
 def _held(study: Study, line: Line) -> tuple[str, ...]:
-    return tuple(held_text(study, path, value) for path, value in line.at.items())
+    """The fixed axes, then what of the operating point varies nowhere."""
+    varying = study.axis_paths
+    always = [path for path in _OPERATING_POINT if path in study.base and path not in varying]
+    fixed = [*line.at.items(), *((path, study.base[path]) for path in always)]
+    return tuple(held_text(study, path, value) for path, value in fixed)
 
 
 def draw(selection: Selection, fetch: Fetch) -> Curves:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from functools import lru_cache, partial
 from importlib.resources import files
 from typing import Any, Final
@@ -10,6 +11,7 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Request
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
 from starlette.responses import Response
 
 from service import plots
@@ -42,6 +44,7 @@ def _templates() -> Environment:
     )
     environment.filters["number"] = _number
     environment.filters["spec"] = _spec
+    environment.filters["marked"] = _marked
     environment.filters["moment"] = lambda text: text[:19].replace("T", " ") + " UTC" if text else "–"
     return environment
 
@@ -53,6 +56,11 @@ def _number(value: float | None) -> str:
 def _spec(spec: dict[str, Any]) -> str:
     """A spec as it was given: keys in their order, every character itself; escaped with the rest of the page."""
     return json.dumps(spec, ensure_ascii=False, indent=2)
+
+
+def _marked(text: str) -> Markup:
+    """A sentence of the documentation; what stands between backticks is code."""
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))  # noqa: S704 - escaped just before
 
 
 def _page(name: str, **values: Any) -> Response:

@@ -175,6 +175,13 @@ def test_a_study_page_names_values_with_units_and_shows_the_spec_as_given(
     assert list(json.loads(html.unescape(shown))) == list(spec)
 
 
+def test_pages_show_code_as_code(service: Service) -> None:
+    for page in ("/docs", "/problems/invalid-spec"):
+        text, _ = read_page(service, page)
+        assert "`" not in text
+        assert "<code>errors</code> lists" in text
+
+
 def test_a_study_page_without_a_picture_of_too_many_points(service: Service, spec: dict[str, Any]) -> None:
     spec["axes"] = [{"path": "shaft.load", "linspace": [0, 1, 60_000]}]
     text, loads = read_page(service, f"/studies/{service.submit(spec)}")

@@ -75,7 +75,8 @@ def test_long_titles_are_broken_between_values(spec: dict[str, Any], figures: li
     assert first == "A study"
     assert lines == [
         "pendulums.0.mass = 1 kg; pendulums.0.inertia = 1 kg*m^2; pendulums.0.spring_rate = 1 N/m;",
-        "pendulums.0.damping = 1 N*m*s/rad",
+        "pendulums.0.damping = 1 N*m*s/rad; excitation.frequency = 25 Hz; excitation.amplitude_x = 0.002 m;",
+        "excitation.amplitude_y = 0.002 m",
     ]
 
 
@@ -129,5 +130,5 @@ def test_cases_without_a_result_are_grey(spec: dict[str, Any], figures: list[Fig
     study = parse_spec(spec).study
     made = draw_map(study, kernels.study_results(study), "shaft.load", "excitation.frequency", SPEED, (), nothing)
     plots.draw_map(made, "", "png")
-    assert figures[0].get_suptitle() == "grey: 2 cases without a result"
+    assert figures[0].get_suptitle().endswith(" = 0.002 m; grey: 2 cases without a result")
     assert figures[0].axes[0].get_yticks().tolist() == [25.0]
