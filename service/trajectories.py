@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from service.curves import numbers
 from service.errors import parameter_error, shown, to_bytes
 from service.exports import table_csv
-from service.units import QuantityError, parse_quantity, split_quantity, to_float
+from service.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
 from worker import kernels
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def span(study: Study, case: int, start: str | None, end: str | None) -> tuple[f
 def _time(name: str, text: str, frequency: float) -> float:
     try:
         number, unit = split_quantity(text)
-        if unit in {"period", "periods"}:
+        if unit in PERIOD_NAMES:
             return to_float(number) / frequency
         return parse_quantity(text, "s") if unit else to_float(number)
     except QuantityError as error:

@@ -273,7 +273,7 @@ def test_a_wrong_part_of_a_run_is_refused(service: Service, one_case: str, query
 
 
 def test_a_part_of_a_run_may_be_told_in_periods(service: Service, one_case: str) -> None:
-    body = trajectory(service, one_case, "?points=5&from=1%20period&to=3.5%20periods").json()
+    body = trajectory(service, one_case, "?points=5&from=1%20period&to=3.5%20cycles").json()
     assert (body["times"][0], body["times"][-1]) == (1 / 25.5, 3.5 / 25.5)
     whole = trajectory(service, one_case, "?points=5&from=2%20periods&to=4%20periods").json()
     assert whole["times"][-1] == 4 / 25.5
