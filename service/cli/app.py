@@ -133,7 +133,7 @@ def _invoke(arguments: Sequence[str]) -> int:
 def _usage(error: typer.TyperException, as_json: bool) -> int:
     """The command line itself is wrong."""
     context = getattr(error, "ctx", None)
-    message = error.format_message()
+    message = error.format_message().replace(": Value error, ", ": ")
     if as_json:
         say(json.dumps({"error": message, "exit_code": int(ExitCode.WRONG_INPUT)}, ensure_ascii=False))
     elif message:

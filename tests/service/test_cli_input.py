@@ -147,6 +147,12 @@ def test_a_motion_that_does_not_end_well_is_told_by_the_exit_code(
     assert (tmp_path / "motion.csv").exists()
 
 
+def test_a_wrong_choice_is_told_without_the_names_of_libraries(sprag: Sprag, examples: Path) -> None:
+    done = sprag("run", examples / "one_pendulum.json", "--format", "xml")
+    assert done.code == 2
+    assert "Invalid value for '--format': 'xml' is not one of" in done.err
+
+
 def test_the_version(sprag: Sprag) -> None:
     done = sprag("--version")
     assert (done.code, done.out) == (0, f"sprag {version('sprag')}\n")
