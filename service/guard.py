@@ -70,6 +70,9 @@ class Guard:
             raise ApiError("cross-site", "A page of another site may not change anything here.")
         if self._token is not None and scope["path"] not in OPEN_PATHS:
             self._check_token(self._token, headers.getlist("authorization"), api=scope["path"].startswith(API_PREFIX))
+        if "\n" in scope["path"]:
+            # The patterns of the routes end in "$", which a line feed at the very end would slip past.
+            raise ApiError("not-found", "There is nothing at this address: it has a line feed in it.")
         length = headers.get("content-length", "0")
         if not (length.isascii() and length.isdigit()):
             raise ApiError("bad-request", "Content-Length is no number.")

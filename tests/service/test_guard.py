@@ -41,6 +41,19 @@ def every_route(app: Any) -> list[tuple[str, str]]:
     ]
 
 
+def test_an_address_with_a_line_feed_is_another_address(service: Service) -> None:
+    study_id = service.submit()
+    service.fill(study_id)
+    for method, path in (
+        ("GET", f"/api/v1/studies/{study_id}"),
+        ("GET", f"/api/v1/studies/{study_id}/cases/0"),
+        ("GET", "/api/v1/studies"),
+        ("DELETE", f"/api/v1/studies/{study_id}"),
+    ):
+        assert service.http.request(method, path + "%0a").status_code == 404, (method, path)
+    assert service.get(f"/studies/{study_id}")["id"] == study_id
+
+
 def test_no_route_is_open_without_the_token(guarded: httpx.Client, service: Service) -> None:
     routes = every_route(service.app)
     assert len(routes) > 20
