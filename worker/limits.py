@@ -42,3 +42,6 @@ MAX_PAGE_SIZE: Final = 1_000
 #: Instants of one trajectory.
 MIN_TRAJECTORY_POINTS: Final = 2
 MAX_TRAJECTORY_POINTS: Final = 20_000
+
+#: Seconds in which a kernel must be compiled: many times what the largest takes on a slow, busy machine.
+LOAD_SECONDS = 3600.0

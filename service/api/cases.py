@@ -116,6 +116,7 @@ async def get_trajectory(
         return study, trajectories.span(study, case, start, end)
 
     study, (first, last) = await run_in_threadpool(find)
+    await context.computer.load(kernels.shape_of(study))
     content = await context.computer.run(trajectories.trajectory_file, study, case, first, last, points, written)
     name = f'attachment; filename="{study_id}-case-{case}.csv"'
     headers = {"Content-Disposition": name} if written == "csv" else {}

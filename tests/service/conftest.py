@@ -19,7 +19,7 @@ from service.app import chunking, create_app
 from service.settings import Settings
 from service.storage.store import Store
 from worker import kernels
-from worker.kernels import ChunkResult
+from worker.kernels import ChunkResult, KernelShape
 from worker.study import Study
 
 API = "/api/v1"
@@ -45,12 +45,17 @@ class InThread:
 
     def __init__(self) -> None:
         self.calls: list[tuple[Any, ...]] = []
+        self.loads: list[KernelShape] = []
         self.answer: Callable[..., Any] | None = None
 
     async def run(self, function: Any, *args: Any, **kwargs: Any) -> Any:
         """The value of the function, or of ``answer`` in its place."""
         self.calls.append((function, *args))
         return (self.answer or function)(*args, **kwargs)
+
+    async def load(self, shape: KernelShape) -> None:
+        """Note the kernel: functions load what they need."""
+        self.loads.append(shape)
 
     def close(self) -> None:
         """Nothing to close."""

@@ -293,6 +293,7 @@ def test_instantaneous_values_are_written_where_they_are_computed(service: Servi
     service.computer.answer = lambda *args: compute(service.computer.calls[-1][0], *args)
     response = trajectory(service, one_case, f"?points=3&format={form}")
     assert response.content == made[0]
+    assert service.computer.loads == [kernels.KernelShape("vibration-drive", 1, 4, 1e-9)]
 
 
 def test_numbers_that_are_none_are_null(service: Service, one_case: str, monkeypatch: pytest.MonkeyPatch) -> None:

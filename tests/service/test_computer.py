@@ -6,12 +6,16 @@ import math
 import os
 import time
 from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 from service.computer import MAX_WAITING, ProcessComputer
 from service.errors import ApiError
+from tests.worker import fakes
+from worker import kernels
 
 if TYPE_CHECKING:
     from anyio.from_thread import BlockingPortal
@@ -36,6 +40,39 @@ def test_it_computes_elsewhere_and_survives_crashes(computer: ProcessComputer, p
     with pytest.raises(ValueError, match=r"math domain|nonnegative"):
         portal.call(computer.run, math.sqrt, -1.0)
     assert portal.call(computer.run, math.sqrt, 4.0) == 2.0
+
+
+SHAPE = kernels.KernelShape("vibration-drive", 1, 2, 1e-9)
+
+
+def test_a_kernel_takes_longer_than_a_computation_may_and_outlives_its_request(
+    tmp_path: Path, portal: BlockingPortal
+) -> None:
+    begun, told = tmp_path / "begun", tmp_path / "told"
+    os.mkfifo(begun)
+    os.mkfifo(told)
+    computer = ProcessComputer(timeout=0.01, load=partial(fakes.load_between, begun=str(begun), told=str(told)))
+    try:
+        left = portal.start_task_soon(computer.load, SHAPE)
+        begun.read_text()  # waits until it compiles
+        left.cancel()
+        again = portal.start_task_soon(computer.load, SHAPE)
+        told.write_text("now")
+        assert again.result(timeout=60) is None
+        portal.call(computer.load, SHAPE)  # compiling again would wait for ever
+    finally:
+        computer.close()
+
+
+def test_a_kernel_that_fails_is_told_and_tried_again(portal: BlockingPortal) -> None:
+    computer = ProcessComputer(timeout=60.0, load=fakes.load_dies)
+    try:
+        for _ in range(2):
+            with pytest.raises(ApiError) as died:
+                portal.call(computer.load, SHAPE)
+            assert died.value.problem == "not-computed"
+    finally:
+        computer.close()
 
 
 def test_it_takes_only_so_many_at_once(computer: ProcessComputer, portal: BlockingPortal) -> None:

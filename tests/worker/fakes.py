@@ -81,6 +81,14 @@ def load_when_told(shape: KernelShape, *, tolerance: float, fifo: str) -> None:
             told.read()
 
 
+def load_between(shape: KernelShape, *, begun: str, told: str) -> None:
+    """Say into ``begun`` that the compilation began; the kernel is there when somebody writes into ``told``."""
+    with open(begun, "w", encoding="ascii") as say:
+        say.write("begun")
+    with open(told, encoding="ascii") as wait:
+        wait.read()
+
+
 def load_never(shape: KernelShape) -> None:
     """A compilation without end."""
     signal.pause()

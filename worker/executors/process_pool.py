@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from pebble import ProcessExpired, ProcessFuture, ProcessPool
 
 from worker import kernels
+from worker.limits import LOAD_SECONDS
 from worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
 from worker.processes import single_threaded_children, start_pool_process
 
@@ -28,8 +29,6 @@ R = TypeVar("R")
 SPARE_CHUNKS = 2
 #: Pools that may break one after the other, with no chunk done between, before the executor gives up.
 MAX_BROKEN_POOLS = 3
-#: Seconds in which a kernel must be compiled: many times what the largest takes on a slow, busy machine.
-LOAD_SECONDS = 3600.0
 #: Times that the compilation of a kernel may come to nothing before its studies are held.
 MAX_LOADS = 2
 #: Seconds between two looks whether the pool still lives.
