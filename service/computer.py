@@ -17,7 +17,7 @@ from pebble import ProcessExpired, ProcessPool
 from service.errors import ApiError
 from worker import kernels
 from worker.limits import LOAD_SECONDS
-from worker.processes import start_pool_process
+from worker.processes import interrupts_held_back, start_pool_process
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -97,7 +97,8 @@ class ProcessComputer:
                     initargs=(os.getpid(), kernels.prepare),
                     context=get_context("spawn"),
                 )
-            future: Future[R] = self._pool.schedule(function, args=args, kwargs=kwargs, timeout=timeout)
+            with interrupts_held_back():  # the first one starts the process
+                future: Future[R] = self._pool.schedule(function, args=args, kwargs=kwargs, timeout=timeout)
             return future
 
     def close(self) -> None:

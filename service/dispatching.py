@@ -16,7 +16,7 @@ from service.storage.part import SystemClock
 from service.storage.store import Store
 from worker.dispatcher import Dispatcher
 from worker.ports import EpochLostError, ExecutorError, StoreError
-from worker.processes import end_with_parent
+from worker.processes import end_with_parent, ignore_interrupts, interrupts_held_back
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -110,12 +110,14 @@ def start_dispatcher_process(settings: WorkerSettings) -> SpawnProcess:
     process = get_context("spawn").Process(
         target=_child, args=(settings, os.getpid()), name="sprag-dispatcher", daemon=False
     )
-    process.start()
+    with interrupts_held_back():
+        process.start()
     return process
 
 
 def _child(settings: WorkerSettings, parent: int) -> None:
     flag = stop_on_signals()
+    ignore_interrupts()
     end_with_parent(parent, signal.SIGTERM)
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     try:

@@ -63,15 +63,21 @@ class Supervisor(threading.Thread):
         Starts the child.
     delays : (first, longest)
         Seconds before it is started again.
+    leaving : Event
+        Set when everything is about to end: a child that ends then has only got the same signal.
     """
 
     def __init__(
-        self, start: Callable[[], Child], delays: tuple[float, float] = (_FIRST_DELAY, _LONGEST_DELAY)
+        self,
+        start: Callable[[], Child],
+        delays: tuple[float, float] = (_FIRST_DELAY, _LONGEST_DELAY),
+        leaving: threading.Event | None = None,
     ) -> None:
         super().__init__(name="sprag-supervisor", daemon=True)
         self._start_child = start
         self._first, self._longest = delays
         self._ending = threading.Event()
+        self._leaving = leaving or self._ending
         self._child: Child | None = None
 
     def run(self) -> None:
@@ -85,8 +91,11 @@ class Supervisor(threading.Thread):
             if self._ending.is_set():
                 break
             delay = self._first if time.monotonic() - born > _LONG_LIFE else delay
-            _LOG.error("The worker ended (exit code %s); it is started again in %g s.", child.exitcode, delay)
-            self._ending.wait(delay)
+            # The signal that ended it may be on its way to this process too.
+            if self._leaving.wait(self._first) or self._ending.is_set():
+                break
+            _LOG.error("The worker ended (exit code %s); it is started again.", child.exitcode)
+            self._ending.wait(delay - self._first)
             delay = min(2.0 * delay, self._longest)
         self._end_child()
 
@@ -146,7 +155,9 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
         timeout_graceful_shutdown=_GRACE_SECONDS,
         lifespan="on",
     )
-    supervisor = Supervisor(lambda: start_dispatcher_process(worker_settings(settings)))
+    supervisor = Supervisor(
+        lambda: start_dispatcher_process(worker_settings(settings)), leaving=app.state.context.ending
+    )
     with listener, _outlived_signals():
         supervisor.start()
         try:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 #: Libraries that would start threads of their own; the pool has a process for each core already.
 _THREAD_VARIABLES = (
@@ -38,9 +40,30 @@ def end_with_parent(parent: int, number: signal.Signals) -> None:
         os.kill(os.getpid(), number)
 
 
-def start_pool_process(parent: int, prepare: Callable[[], None]) -> None:
-    """First thing a pool process does. Interrupts at the terminal are the parent's to handle; a stop is at once."""
+@contextmanager
+def interrupts_held_back() -> Iterator[None]:
+    """Processes and threads started inside begin with SIGINT blocked: Ctrl-C reaches a child's imports too otherwise.
+
+    The child calls `ignore_interrupts` when it has come so far.
+    """
+    # It would lift the block when it starts, which is with the first child.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def ignore_interrupts() -> None:
+    """Interrupts at the terminal are the parent's to handle, which ends this process in order."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
+def start_pool_process(parent: int, prepare: Callable[[], None]) -> None:
+    """First thing a pool process does. A stop is at once."""
+    ignore_interrupts()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     end_with_parent(parent, signal.SIGKILL)
     prepare()

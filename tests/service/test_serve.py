@@ -72,6 +72,20 @@ def test_a_dead_child_is_replaced_and_the_last_one_ended() -> None:
     assert not supervisor.is_alive()
 
 
+def test_a_child_that_ends_with_everything_else_is_not_replaced(caplog: pytest.LogCaptureFixture) -> None:
+    nursery, leaving = Nursery(), threading.Event()
+    supervisor = Supervisor(nursery, delays=(60.0, 60.0), leaving=leaving)
+    supervisor.start()
+    assert nursery.born.acquire(timeout=10)
+    nursery.children[0].die(0)
+    leaving.set()
+    supervisor.join(10)
+    assert not supervisor.is_alive()
+    supervisor.stop()
+    assert len(nursery.children) == 1
+    assert caplog.messages == []
+
+
 def test_a_child_that_does_not_end_is_killed() -> None:
     nursery = Nursery(obedient=False)
     supervisor = Supervisor(nursery)

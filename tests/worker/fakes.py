@@ -108,6 +108,11 @@ def prepare() -> None:
     """Nothing needs to be ready."""
 
 
+def interrupt() -> None:
+    """Ctrl-C while a process starts."""
+    os.kill(os.getpid(), signal.SIGINT)
+
+
 def broken() -> None:
     """A process that dies as soon as it starts."""
     os._exit(7)

@@ -14,7 +14,7 @@ from pebble import ProcessExpired, ProcessFuture, ProcessPool
 from worker import kernels
 from worker.limits import LOAD_SECONDS
 from worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
-from worker.processes import single_threaded_children, start_pool_process
+from worker.processes import interrupts_held_back, single_threaded_children, start_pool_process
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -88,8 +88,10 @@ class ProcessPoolExecutor:
             initargs=(os.getpid(), self._prepare),
             context=get_context("spawn"),
         )
-        # Asking starts the processes: they get ready while the first study is on its way.
-        if not pool.active:
+        with interrupts_held_back():
+            # Asking starts the processes: they get ready while the first study is on its way.
+            active = pool.active
+        if not active:
             raise ExecutorError("the processes of the pool cannot be started")
         return pool
 
