@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import itertools
 import math
-import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from service.errors import ErrorItem
 from service.selection import SelectionError
+from service.turns import Turns
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,8 +59,9 @@ _METADATA: Final[dict[Picture, dict[str, str | None]]] = {
     "png": {"Software": "Sprag"},
     "pdf": {"CreationDate": None, "Creator": "Sprag", "Producer": "Sprag"},
 }
-#: matplotlib keeps its style and its fonts in globals, so that only one picture is drawn at a time.
-_ONE_AT_A_TIME = threading.Lock()
+#: matplotlib keeps its style and its fonts in globals, so that only one picture is drawn at a time. Each that waits
+#: holds one of the 40 threads that all requests share.
+_TURNS = Turns("pictures", 16)
 
 
 def draw_curves(curves: Curves, title: str, picture: Picture) -> bytes:
@@ -124,7 +125,7 @@ def _render(paint: Callable[[Figure], None], picture: Picture, size: tuple[float
     from matplotlib.figure import Figure
 
     buffer = io.BytesIO()
-    with _ONE_AT_A_TIME, mpl.rc_context(_STYLE):
+    with _TURNS.take(), mpl.rc_context(_STYLE):
         figure = Figure(figsize=size, layout="constrained")
         paint(figure)
         figure.savefig(buffer, format=picture, dpi=120, metadata=_METADATA[picture])
