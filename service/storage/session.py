@@ -84,6 +84,8 @@ class Session:
             ) from None
         if self.url.get_backend_name() != "sqlite":
             raise DatabaseError(f"databases of kind {self.url.get_backend_name()!r} are not supported; use sqlite")
+        if self.url.query:
+            raise DatabaseError(f"a database URL takes no options here ({', '.join(sorted(self.url.query))})")
         if self.url.database in (None, "", ":memory:"):
             raise DatabaseError("the database must be a file: several processes work on it")
         self.path = Path(str(self.url.database)).absolute()

@@ -29,6 +29,7 @@ def url(tmp_path: Path) -> str:
         ("postgresql://host/db", "kind 'postgresql' are not supported"),
         ("sqlite://", "must be a file"),
         ("sqlite:///:memory:", "must be a file"),
+        ("sqlite:///rel.db?mode=ro", r"takes no options here \(mode\)"),
         ("sqlite:////dev/null/x/sprag.sqlite3", "cannot be made"),
     ],
 )
