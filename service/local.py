@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from service.dispatching import STANDBY_SECONDS, WorkerSettings, owner_name, pool
+from service.leftovers import marked, sweep
 from service.storage.lock import DispatcherLock
 from service.storage.part import SystemClock
 from service.storage.store import Store
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from worker.ports import Executor
     from worker.study import Study
 
+_FOLDER_PREFIX = "sprag-run-"
 #: Seconds between two reports of progress.
 REPORT_SECONDS = 0.25
 
@@ -61,7 +63,8 @@ def run_here(
     work on the database given, that one runs the study and this process waits. ``processes`` 0 runs the cases in this
     process, which suits a few; 1 and more start a pool. Raises StoreError and ExecutorError, each with one sentence.
     """
-    with tempfile.TemporaryDirectory(prefix="sprag-") as folder:
+    sweep(Path(tempfile.gettempdir()).glob(f"{_FOLDER_PREFIX}*"))
+    with tempfile.TemporaryDirectory(prefix=_FOLDER_PREFIX) as folder, marked(Path(folder)):
         url = database_url or f"sqlite:///{Path(folder) / 'run.sqlite3'}"
         with Store.open(url, chunking=Chunking(chunk_cases, max(processes, 1), chunk_timeout)) as store:
             record = store.create_study(spec, study, warnings=warnings)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import glob
 import os
 import sys
 import tempfile
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Literal
 
 from service.cli.console import CommandFailureError, TroubleError, WrongInputError
+from service.leftovers import mark, sweep
 from service.spec_messages import SpecError
 from worker.limits import MAX_BODY_BYTES
 
@@ -133,8 +135,11 @@ def output(path: str | None) -> Iterator[Write]:
 
 
 def _replaced(target: Path) -> Iterator[Write]:
+    prefix = f".{target.name[:100]}."
     with _told(target):
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:100]}.", suffix=".part")
+        sweep(target.parent.glob(f"{glob.escape(prefix)}*.part"))
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=prefix, suffix=".part")
+        mark(handle)
     try:
         file = os.fdopen(handle, "wb")
         with _closed(file, target):
