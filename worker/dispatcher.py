@@ -115,6 +115,7 @@ class Dispatcher:
             return False
         if ready:
             self._compiling.pop(number, None)
+            self._store.note(self._epoch, number, None)  # it may be that of a dispatcher before this one
             return True
         now = self._clock.monotonic()
         if now - self._compiling.setdefault(number, now) >= NOTE_SECONDS:

@@ -98,8 +98,8 @@ class Store(Protocol):
     def quarantine(self, epoch: int, chunk: Chunk, ending: str, detail: str) -> None:
         """Give every case of a claimed chunk ``ending`` without results and mark the chunk done."""
 
-    def note(self, epoch: int, number: int, reason: str) -> None:
-        """Say why a queued study does not run yet; its start takes the note away."""
+    def note(self, epoch: int, number: int, reason: str | None) -> None:
+        """Say why a queued or running study does not go on; None takes the note away."""
 
     def fault(self, epoch: int, number: int, reason: str) -> None:
         """Hold the study with a reason and return its claims to waiting."""

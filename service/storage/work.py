@@ -212,12 +212,17 @@ class Work(Part):
             result = ChunkResult(chunk.first, [ending] * chunk.count, [""] * chunk.count, nothing)
             self._store(connection, chunk, result, detail)
 
-    def note(self, epoch: int, number: int, reason: str) -> None:
-        """Say why a queued study does not run yet; its start takes the note away."""
-        waits = (STUDIES.c.number == number) & (STUDIES.c.state == StudyState.QUEUED.value)
+    def note(self, epoch: int, number: int, reason: str | None) -> None:
+        """Say why a queued or running study does not go on; None takes the note away."""
+        going = STUDIES.c.state.in_([StudyState.QUEUED.value, StudyState.RUNNING.value])
+        new = STUDIES.c.reason.is_distinct_from(reason)
         with self.session.write() as connection:
             self._own(connection, epoch)
-            connection.execute(sa.update(STUDIES).where(waits).values(reason=reason, revision=STUDIES.c.revision + 1))
+            connection.execute(
+                sa.update(STUDIES)
+                .where(STUDIES.c.number == number, going, new)
+                .values(reason=reason, revision=STUDIES.c.revision + 1)
+            )
 
     def fault(self, epoch: int, number: int, reason: str) -> None:
         """Hold the study with a reason and return its claims to waiting, without blame for the cases."""

@@ -280,7 +280,7 @@ def test_quarantine_is_an_ending_without_results(store: Store) -> None:
     assert "crashed" in (store.get_study(record.id).reason or "")
 
 
-def test_a_note_stands_while_a_study_is_queued(store: Store) -> None:
+def test_a_note_stands_until_it_is_taken_away_or_the_study_starts(store: Store) -> None:
     record = create(store)
     epoch = store.take_over("test")
     store.note(epoch, record.number, "wait for it")
@@ -289,6 +289,14 @@ def test_a_note_stands_while_a_study_is_queued(store: Store) -> None:
     assert noted.revision > record.revision
     store.claim(epoch, store.open_chunks(record.number)[:1])
     assert store.get_study(record.id).reason is None
+    store.note(epoch, record.number, "once more")
+    assert store.get_study(record.id).reason == "once more"
+    store.note(epoch, record.number, None)
+    cleared = store.get_study(record.id)
+    assert cleared.reason is None
+    store.note(epoch, record.number, None)
+    assert store.get_study(record.id).revision == cleared.revision
+    store.pause_study(record.id)
     store.note(epoch, record.number, "too late")
     assert store.get_study(record.id).reason is None
     store.take_over("another")

@@ -251,6 +251,26 @@ def test_a_study_that_waits_for_its_kernel_says_so_and_holds_nobody_up(store: St
     assert other.finished_at < ended.started_at
 
 
+def test_a_running_study_whose_kernel_must_be_compiled_anew_says_so_too(store: Store) -> None:
+    record = store.create_study({}, fakes.study(20, tolerance=1e-6))
+    epoch = store.take_over("before an upgrade")
+    store.claim(epoch, store.open_chunks(record.number)[:1])
+    clock, executor = fakes.HandClock(), Cold(fakes.run)
+    seen: list[tuple[StudyState, str | None]] = []
+
+    def turn() -> bool:
+        now = store.get_study(record.id)
+        seen.append((now.state, now.reason))
+        executor.warm = now.reason == COMPILING or executor.warm
+        clock.seconds += NOTE_SECONDS / 5
+        return not store.active_studies()
+
+    Dispatcher(store, executor, clock).run(turn)
+    assert (StudyState.RUNNING, COMPILING) in seen
+    assert (StudyState.RUNNING, None) in seen[seen.index((StudyState.RUNNING, COMPILING)) :]
+    assert seen[-1] == (StudyState.FINISHED, None)
+
+
 def test_a_kernel_that_cannot_be_had_holds_the_study_and_is_logged(
     store: Store, caplog: pytest.LogCaptureFixture
 ) -> None:
