@@ -8,7 +8,9 @@ so reading a catalogue loads no compiler.
 from __future__ import annotations
 
 import math
+import platform
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, cast
@@ -76,6 +78,7 @@ __all__ = [
     "coefficients",
     "estimate_seconds_per_case",
     "fit_clutch",
+    "is_compiled",
     "kernel_source",
     "load",
     "models",
@@ -351,6 +354,19 @@ def load(shape: KernelShape) -> None:
     from engine.vibration_drive.simulate import warm_up as engine_warm_up
 
     engine_warm_up(shape.pendulums, shape.coefficients, shape.tolerance)
+    with suppress(OSError):
+        _mark(shape).touch()
+
+
+def is_compiled(shape: KernelShape) -> bool:
+    """Whether `load` has put the kernel of that shape into the on-disk cache, on this machine and for this engine."""
+    return _mark(shape).exists()
+
+
+def _mark(shape: KernelShape) -> Path:
+    # Code for one machine is none for another with the same home.
+    parts = (shape.model, shape.pendulums, shape.coefficients, repr(shape.tolerance), platform.node())
+    return cache_folder() / f"{'-'.join(map(str, parts))}.ready"
 
 
 def kernel_source(pendulums: int, coefficients: int, tolerance: float) -> str:

@@ -74,6 +74,11 @@ def load(shape: KernelShape) -> None:
     """No kernel is needed."""
 
 
+def nothing_compiled(shape: KernelShape) -> bool:
+    """The cache on disk is empty."""
+    return False
+
+
 def load_when_told(shape: KernelShape, *, tolerance: float, fifo: str) -> None:
     """The kernel of that tolerance is there when somebody writes into ``fifo``; the others at once."""
     if shape.tolerance == tolerance:
@@ -124,12 +129,19 @@ def pool(
     chunk_timeout: float = 60.0,
     run: Callable[[ChunkTask], ChunkResult] = run,
     load: Callable[[KernelShape], None] = load,
+    compiled: Callable[[KernelShape], bool] = nothing_compiled,
     prepare: Callable[[], None] = prepare,
     load_timeout: float = 60.0,
 ) -> ProcessPoolExecutor:
     """A process pool without the engine."""
     return ProcessPoolExecutor(
-        processes, chunk_timeout=chunk_timeout, run=run, load=load, prepare=prepare, load_timeout=load_timeout
+        processes,
+        chunk_timeout=chunk_timeout,
+        run=run,
+        load=load,
+        compiled=compiled,
+        prepare=prepare,
+        load_timeout=load_timeout,
     )
 
 

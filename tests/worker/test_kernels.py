@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -115,3 +116,14 @@ def test_a_trajectory_is_that_of_the_case() -> None:
     trajectory = kernels.run_trajectory(study, 2, 0.0, end, 11)
     np.testing.assert_allclose(trajectory.times, np.linspace(0.0, end, 11))
     assert trajectory.values.shape == (11, len(trajectory.names))
+
+
+def test_a_kernel_counts_as_compiled_once_it_was_loaded(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(kernels, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr("engine.vibration_drive.simulate.warm_up", lambda *_: None)
+    shape = kernels.KernelShape("vibration-drive", 2, 3, 1e-9)
+    assert not kernels.is_compiled(shape)
+    kernels.load(shape)
+    assert kernels.is_compiled(shape)
+    assert not kernels.is_compiled(replace(shape, tolerance=1e-8))
+    assert not kernels.is_compiled(replace(shape, coefficients=4))

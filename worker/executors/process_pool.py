@@ -52,6 +52,8 @@ class ProcessPoolExecutor:
     run, load, prepare : functions
         What a process does with a chunk, with a new kernel, and when it starts; importable by name. Other than the
         engine's in tests.
+    compiled : function
+        Whether a kernel lies in the cache on disk already, so that nobody has to wait for it.
     load_timeout : float
         Seconds after which the compilation of a kernel is given up.
     """
@@ -63,6 +65,7 @@ class ProcessPoolExecutor:
         chunk_timeout: float,
         run: Callable[[kernels.ChunkTask], kernels.ChunkResult] = kernels.run_task,
         load: Callable[[kernels.KernelShape], None] = kernels.load,
+        compiled: Callable[[kernels.KernelShape], bool] = kernels.is_compiled,
         prepare: Callable[[], None] = kernels.prepare,
         load_timeout: float = LOAD_SECONDS,
     ) -> None:
@@ -70,6 +73,7 @@ class ProcessPoolExecutor:
         self._timeout = chunk_timeout
         self._run = run
         self._load = load
+        self._compiled = compiled
         self._prepare = prepare
         self._load_timeout = load_timeout
         self._futures: dict[int, ProcessFuture[kernels.ChunkResult]] = {}
@@ -107,7 +111,7 @@ class ProcessPoolExecutor:
         if loading is not None and loading.done():
             del self._loading[shape]
             self._take_load(shape, loading)
-        if shape in self._loaded:
+        if shape in self._loaded or (loading is None and self._compiled(shape)):
             return True
         if shape not in self._loading and len(self._loading) < max(1, self._processes // 2):
             self._loading[shape] = begun = self._schedule(self._load, shape, self._load_timeout)
