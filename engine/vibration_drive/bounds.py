@@ -1,7 +1,7 @@
 """Bounds of every watched quantity over a step: how far guards keep from their bands, how far extrema may be exceeded.
 
 They are made in the vector loops, from the stored series; only lanes whose bounds cannot exclude an event or a new
-extremum get a second look (``lanes.look``).
+extremum get a second look (``lanes.look_for_events``, ``window.collect_peaks``).
 """
 
 from engine.taylor.straight import LaneCode, horner, larger, range_bounds, smaller

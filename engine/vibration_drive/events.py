@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.jit import compiled
+from engine.taylor.batch import HARD, NONE, RESULT, SLOTS, STATUS, put, slot_start, take
 from engine.taylor.roots import RECIPROCAL, first_root
 from engine.vibration_drive.automaton import CLUTCH_TARGET, Band
 from engine.vibration_drive.layout import Layout
@@ -69,17 +70,63 @@ def _guard(W: Floats, lay: Layout, lane: int, i: int, band: int, g: Floats) -> N
 
 
 @compiled
-def locate(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, stack: Floats) -> None:
-    """Find the first event of a lane in the part x of its step; if there is one, end the part there and note it.
+def _offer(W: Floats, Z: Ints, lay: Layout, lane: int, x: float, pendulum: int, target: int) -> None:
+    """Note an event at the part ``x`` of a lane's step if it is the first so far; the part that is taken ends there."""
+    first = W[lay.x * lay.lanes + lane]
+    if Z[lane, EVENT_PENDULUM] == NO_EVENT and first == 1.0:
+        first = 1.5
+    if x < first:
+        Z[lane, EVENT_PENDULUM] = pendulum
+        Z[lane, EVENT_TARGET] = target
+        Z[lane, EVENT_SMOOTH] = 1 if x > 0.0 else 0
+        W[lay.x * lay.lanes + lane] = x
+        if x < 1.0:
+            W[lay.at_stop * lay.lanes + lane] = 0.0
+
+
+@compiled
+def _enter(
+    W: Floats,
+    Z: Ints,
+    lay: Layout,
+    lane: int,
+    pendulum: int,
+    target: int,
+    g: Floats,
+    blocks: Floats,
+    meta: Ints,
+    used: int,
+) -> int:
+    """Put a guard's polynomial on the list of those whose first root is wanted; the length of the list then.
+
+    Leading zeros are roots that have been dealt with. What is not positive after them is an event at once.
+    """
+    first = 0
+    while first <= lay.order and g[first] == 0.0:
+        first += 1
+    if first > lay.order:
+        return used
+    if not g[first] > 0.0:
+        _offer(W, Z, lay, lane, 0.0, pendulum, target)
+        return used
+    if first > 0:
+        for k in range(lay.order + 1):
+            g[k] = g[k + first] if k + first <= lay.order else 0.0
+    put(blocks, lay.order, used, g)
+    meta[used, 0] = lane
+    meta[used, 1] = pendulum
+    meta[used, 2] = target
+    return used + 1
+
+
+@compiled
+def collect_guards(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks: Floats, meta: Ints, used: int) -> int:
+    """List the guards of a lane that its step may violate; the length of the list then.
 
     Of events at the same time the shaft's comes first, then the pendulum with the lowest index; the others are found
     violated at the start of the next step and follow at once.
     """
     lanes = lay.lanes
-    whole = W[lay.x * lanes + lane]
-    best = 1.5 if whole == 1.0 else whole
-    pendulum = NO_EVENT
-    target = 0
     fresh = W[lay.steps * lanes + lane] == Z[lane, SKIP_STEP]
     shaft = Z[lane, SHAFT_STATE]
     if not W[(lay.m_sum_high if shaft == HELD else lay.m_speed_low) * lanes + lane] > 0.0:
@@ -92,9 +139,8 @@ def locate(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, stack: Floats)
         elif fresh:
             for k in range(Z[lane, SKIP_SHAFT]):
                 g[k] = 0.0
-        x = first_root(g, lay.order, stack)
-        if x < best:
-            best, pendulum, target = x, OF_SHAFT, (ROTATING if shaft == HELD else HELD)
+        target = ROTATING if shaft == HELD else HELD
+        used = _enter(W, Z, lay, lane, OF_SHAFT, target, g, blocks, meta, used)
     literal = Z[lane, LITERAL]
     for i in range(lay.n):
         state = Z[lane, i]
@@ -105,16 +151,25 @@ def locate(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, stack: Floats)
             if fresh and band // 2 < 2:
                 for k in range(Z[lane, (SKIP_W if band // 2 == 0 else SKIP_U) + i]):
                     g[k] = 0.0
+            used = _enter(W, Z, lay, lane, i, CLUTCH_TARGET[literal, state, band], g, blocks, meta, used)
+    return used
+
+
+@compiled
+def settle_guards(
+    W: Floats, Z: Ints, lay: Layout, g: Floats, stack: Floats, blocks: Floats, meta: Ints, used: int
+) -> None:
+    """After the vector loops over the list: note each lane's first event."""
+    for slot in range(used):
+        start = slot_start(lay.order, slot)
+        status = blocks[start + (lay.order + STATUS) * SLOTS]
+        if status == NONE:
+            continue
+        x = blocks[start + (lay.order + RESULT) * SLOTS]
+        if status == HARD:
+            take(blocks, lay.order, slot, g)
             x = first_root(g, lay.order, stack)
-            if x < best:
-                best, pendulum, target = x, i, CLUTCH_TARGET[literal, state, band]
-    Z[lane, EVENT_PENDULUM] = pendulum
-    if pendulum != NO_EVENT:
-        Z[lane, EVENT_TARGET] = target
-        Z[lane, EVENT_SMOOTH] = 1 if best > 0.0 else 0
-        W[lay.x * lanes + lane] = best
-        if best < 1.0:
-            W[lay.at_stop * lanes + lane] = 0.0
+        _offer(W, Z, lay, meta[slot, 0], x, meta[slot, 1], meta[slot, 2])
 
 
 @compiled

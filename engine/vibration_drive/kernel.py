@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.cache import cache_folder
+from engine.taylor.batch import ROWS, SLOTS, peaks_loop, roots_loop
 from engine.vibration_drive.advance import pendulum_advance, shaft_advance
 from engine.vibration_drive.bounds import pendulum_bounds, shaft_bounds
 from engine.vibration_drive.equations import series_loop
@@ -33,8 +34,10 @@ import numpy as np
 
 from engine.jit import compiled
 from engine.taylor.lowering import lane_loops
-from engine.vibration_drive.lanes import load_case, look, next_stop, record, settle
+from engine.vibration_drive.events import settle_guards
+from engine.vibration_drive.lanes import load_case, look_for_events, next_stop, record, settle
 from engine.vibration_drive.layout import Layout, as_record
+from engine.vibration_drive.window import collect_peaks, settle_peaks
 
 LAYOUT = {layout!r}
 RECORD = as_record(LAYOUT)
@@ -50,10 +53,18 @@ advance = lane_loops("""
 {advance}
 """, "most_steps", "unused")
 
+# First roots of listed guards, and largest values of listed quantities.
+find_roots = lane_loops("""
+{roots}
+""", "unused", "unused_too")
+find_peaks = lane_loops("""
+{peaks}
+""", "unused", "unused_too")
+
 
 @compiled
 def integrate(
-    lay, cases, tolerance, log2_tolerance, literal, most_steps, most_events, W, Z, g, stack, turns, sums,
+    lay, cases, tolerance, log2_tolerance, literal, most_steps, most_events, W, Z, g, stack, blocks, meta, turns, sums,
     times, samples, states,
 ):
     """Run every case, filling a lane again the moment its case ends; the number of samples recorded (of case 0)."""
@@ -72,9 +83,21 @@ def integrate(
         if running == 0:
             return recorded
         step(W, tolerance, log2_tolerance)
+        used = 0
         for lane in range({lanes}):
-            if busy[lane] and (not W[{margin} + lane] > 0.0 or not W[{excess} + lane] <= 0.0):
-                look(W, Z, lay, lane, g, stack)
+            if busy[lane] and not W[{margin} + lane] > 0.0:
+                used = look_for_events(W, Z, lay, lane, g, blocks, meta, used)
+        for start in range(0, (used + {slots} - 1) // {slots} * {block}, {block}):
+            find_roots(blocks[start : start + {block}], 0.0, 0.0)
+        settle_guards(W, Z, lay, g, stack, blocks, meta, used)
+        used = 0
+        for lane in range({lanes}):
+            # A state that is left at once lasts no time and has no extrema.
+            if busy[lane] and not W[{excess} + lane] <= 0.0 and W[{x} + lane] > 0.0:
+                used = collect_peaks(W, lay, lane, g, blocks, meta, used)
+        for start in range(0, (used + {slots} - 1) // {slots} * {block}, {block}):
+            find_peaks(blocks[start : start + {block}], 0.0, 0.0)
+        settle_peaks(W, lay, g, stack, blocks, meta, used)
         if recorded < times.shape[0]:
             recorded = record(W, Z, lay, 0, times, recorded, g, samples, states)
         advance(W, float(most_steps), 0.0)
@@ -93,8 +116,8 @@ class Kernel(Protocol):
 
     def integrate(
         self, lay: Layout, cases: Floats, tolerance: float, log2_tolerance: float, literal: int,
-        most_steps: int, most_events: int, W: Floats, Z: Ints, g: Floats, stack: Floats, turns: Floats, sums: Floats,
-        times: Floats, samples: Floats, states: Ints,
+        most_steps: int, most_events: int, W: Floats, Z: Ints, g: Floats, stack: Floats, blocks: Floats, meta: Ints,
+        turns: Floats, sums: Floats, times: Floats, samples: Floats, states: Ints,
     ) -> int: ...  # fmt: skip
 
 
@@ -121,7 +144,9 @@ def source(layout: Layout) -> str:
     return _MODULE.format(
         n=layout.n, coefficients=layout.coefficients, order=layout.order, lanes=layout.lanes, layout=layout,
         margin=layout.margin * layout.lanes, excess=layout.excess * layout.lanes,
-        attention=layout.attention * layout.lanes,
+        attention=layout.attention * layout.lanes, x=layout.x * layout.lanes,
+        slots=SLOTS, block=SLOTS * (layout.order + ROWS),
+        roots=roots_loop(layout.order), peaks=peaks_loop(layout.order),
         step="\n".join(step), advance="\n".join(advance),
     )  # fmt: skip
 

@@ -13,10 +13,10 @@ from engine.vibration_drive.advance import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR
 from engine.vibration_drive.automaton import Clutch, Shaft
 from engine.vibration_drive.bounds import TOO_LONG
 from engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS
-from engine.vibration_drive.events import locate, transit
+from engine.vibration_drive.events import collect_guards, transit
 from engine.vibration_drive.layout import Layout
 from engine.vibration_drive.states import law, set_clutch, set_shaft
-from engine.vibration_drive.window import energy, primitive, sample, series, update_extrema, watch_extrema
+from engine.vibration_drive.window import energy, primitive, sample, series, watch_extrema
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -294,17 +294,13 @@ def shorten(W: Floats, lay: Layout, lane: int, g: Floats) -> None:
 
 
 @compiled
-def look(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, stack: Floats) -> None:
-    """Before ``advance``: the scalar second look at one lane's step, for events and extrema that the bounds could not
-    exclude.
-    """
+def look_for_events(
+    W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks: Floats, meta: Ints, used: int
+) -> int:
+    """The second look at a lane whose bounds cannot exclude an event: list its doubtful guards, return the length."""
     if W[lay.margin * lay.lanes + lane] == TOO_LONG:
         shorten(W, lay, lane, g)
-    if not W[lay.margin * lay.lanes + lane] > 0.0:
-        locate(W, Z, lay, lane, g, stack)
-    # A state that is left at once lasts no time and has no extrema.
-    if W[lay.x * lay.lanes + lane] > 0.0 and not W[lay.excess * lay.lanes + lane] <= 0.0:
-        update_extrema(W, lay, lane, g, stack)
+    return collect_guards(W, Z, lay, lane, g, blocks, meta, used)
 
 
 @compiled

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from engine.endings import ENDING_CODES, Ending
 from engine.run import Run
+from engine.taylor.batch import blocks_for
 from engine.taylor.roots import MAX_DEGREE, work_stack
 from engine.vibration_drive.automaton import Clutch, Shaft
 from engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count
@@ -80,11 +81,15 @@ def _integrate(
     periods = int(max((run.duration.in_periods(f) for f in frequency), default=0.0)) + 2
     samples = np.empty((len(times), _SHAFT_SAMPLES + n * _PENDULUM_SAMPLES))
     states = np.zeros((len(times), 1 + n), dtype=np.int64)
+    # Guards (7 a pendulum and shaft at most) and extrema (13) that all lanes together can list in a step.
+    listed = lay.lanes * (5 + 8 * n)
     done = module.integrate(
         module.RECORD, matrix, run.tolerance, math.log2(run.tolerance), int(run.reset == "literal"),
         run.max_steps, run.max_events_per_period,
         np.zeros(lay.rows * lay.lanes), np.zeros((lay.lanes, LANE_INTEGERS), dtype=np.int64),
-        np.zeros(MAX_DEGREE + 1), work_stack(), np.zeros((lay.lanes, periods)), sums, times, samples, states,
+        np.zeros(MAX_DEGREE + 1), work_stack(),
+        blocks_for(listed, lay.order), np.zeros((listed, 3), dtype=np.int64),
+        np.zeros((lay.lanes, periods)), sums, times, samples, states,
     )  # fmt: skip
     return module, matrix, sums, samples, states, done
 

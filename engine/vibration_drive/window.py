@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.jit import compiled
+from engine.taylor.batch import HARD, KNOWN, RESULT, SLOTS, STATUS, slot_start, take
 from engine.taylor.roots import RECIPROCAL, evaluate, largest
 from engine.vibration_drive.automaton import Clutch
 from engine.vibration_drive.layout import Layout
@@ -48,22 +49,36 @@ def primitive(W: Floats, lay: Layout, lane: int, start: float, row: int, minus: 
 
 
 @compiled
-def _update(W: Floats, lay: Layout, lane: int, row: int, block: int, sign: float, g: Floats, stack: Floats) -> None:
-    """Move the extremum kept at ``row`` (a maximum for ``sign`` 1, a minimum for -1) if the step's ``g`` can exceed it.
+def _enter(
+    W: Floats,
+    lay: Layout,
+    lane: int,
+    row: int,
+    block: int,
+    sign: float,
+    g: Floats,
+    blocks: Floats,
+    meta: Ints,
+    used: int,
+) -> int:
+    """Put ``g`` on the list of polynomials whose largest value is wanted if it can exceed the extremum kept at ``row``.
 
-    ``block`` rows further stands by how much it may.
+    The extremum is a maximum for ``sign`` 1, a minimum for -1; ``block`` rows further stands by how much the step may
+    exceed it. Returns the length of the list.
     """
-    if W[(row + block) * lay.lanes + lane] <= 0.0:
-        return
+    at = row * lay.lanes + lane
+    if W[at + block * lay.lanes] <= 0.0:
+        return used
     x = W[lay.x * lay.lanes + lane]
-    p = g
-    if sign < 0.0 or x < 1.0:
-        p = stack[-1]
-        power = sign
-        for k in range(lay.order + 1):
-            p[k] = g[k] * power
-            power *= x
-    W[row * lay.lanes + lane] = sign * largest(p, lay.order, sign * W[row * lay.lanes + lane], stack)
+    start = slot_start(lay.order, used)
+    power = sign
+    for k in range(lay.order + 1):
+        blocks[start + k * SLOTS] = g[k] * power
+        power *= x
+    blocks[start + (lay.order + KNOWN) * SLOTS] = sign * W[at]
+    meta[used, 0] = at
+    meta[used, 1] = int(sign)
+    return used + 1
 
 
 @compiled
@@ -76,48 +91,62 @@ def _exceeds(W: Floats, lay: Layout, lane: int, first: int, last: int) -> bool:
 
 
 @compiled
-def update_extrema(W: Floats, lay: Layout, lane: int, g: Floats, stack: Floats) -> None:
-    """Extrema of every watched quantity over the part of the step that is taken, by its polynomials (nothing is
-    sampled).
+def collect_peaks(W: Floats, lay: Layout, lane: int, g: Floats, blocks: Floats, meta: Ints, used: int) -> int:
+    """List every watched quantity of a lane that may exceed its extremum in the part of the step that is taken.
+
+    The list holds the quantities' polynomials; nothing is sampled. Returns its length.
     """
     lanes = lay.lanes
     block = lay.x_speed_max - lay.speed_max
     if _exceeds(W, lay, lane, lay.x_speed_max, lay.x_speed_min):
         series(W, lay, lane, lay.speed, g)
-        _update(W, lay, lane, lay.speed_max, block, 1.0, g, stack)
-        _update(W, lay, lane, lay.speed_min, block, -1.0, g, stack)
+        used = _enter(W, lay, lane, lay.speed_max, block, 1.0, g, blocks, meta, used)
+        used = _enter(W, lay, lane, lay.speed_min, block, -1.0, g, blocks, meta, used)
     if _exceeds(W, lay, lane, lay.x_acc_max, lay.x_acc_max):
         rate(W, lay, lane, lay.speed, g)
-        _update(W, lay, lane, lay.acc_max, block, 1.0, g, stack)
+        used = _enter(W, lay, lane, lay.acc_max, block, 1.0, g, blocks, meta, used)
     if _exceeds(W, lay, lane, lay.x_sum_max, lay.x_sum_max):
         series(W, lay, lane, lay.sum, g)
-        _update(W, lay, lane, lay.sum_max, block, 1.0, g, stack)
+        used = _enter(W, lay, lane, lay.sum_max, block, 1.0, g, blocks, meta, used)
     if _exceeds(W, lay, lane, lay.x_power_max, lay.x_power_max):
         series(W, lay, lane, lay.power, g)
-        _update(W, lay, lane, lay.power_max, block, 1.0, g, stack)
+        used = _enter(W, lay, lane, lay.power_max, block, 1.0, g, blocks, meta, used)
     block = lay.p_x_phi_max - lay.p_phi_max
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
         speed = base + lay.p_speed
         if _exceeds(W, lay, lane, base + lay.p_x_phi_max, base + lay.p_x_phi_min):
             primitive(W, lay, lane, W[(base + lay.p_phi) * lanes + lane], speed, -1, g)
-            _update(W, lay, lane, base + lay.p_phi_max, block, 1.0, g, stack)
-            _update(W, lay, lane, base + lay.p_phi_min, block, -1.0, g, stack)
+            used = _enter(W, lay, lane, base + lay.p_phi_max, block, 1.0, g, blocks, meta, used)
+            used = _enter(W, lay, lane, base + lay.p_phi_min, block, -1.0, g, blocks, meta, used)
         if _exceeds(W, lay, lane, base + lay.p_x_speed_max, base + lay.p_x_speed_min):
             series(W, lay, lane, speed, g)
-            _update(W, lay, lane, base + lay.p_speed_max, block, 1.0, g, stack)
-            _update(W, lay, lane, base + lay.p_speed_min, block, -1.0, g, stack)
+            used = _enter(W, lay, lane, base + lay.p_speed_max, block, 1.0, g, blocks, meta, used)
+            used = _enter(W, lay, lane, base + lay.p_speed_min, block, -1.0, g, blocks, meta, used)
         if _exceeds(W, lay, lane, base + lay.p_x_acc_max, base + lay.p_x_acc_min):
             rate(W, lay, lane, speed, g)
-            _update(W, lay, lane, base + lay.p_acc_max, block, 1.0, g, stack)
-            _update(W, lay, lane, base + lay.p_acc_min, block, -1.0, g, stack)
+            used = _enter(W, lay, lane, base + lay.p_acc_max, block, 1.0, g, blocks, meta, used)
+            used = _enter(W, lay, lane, base + lay.p_acc_min, block, -1.0, g, blocks, meta, used)
         if _exceeds(W, lay, lane, base + lay.p_x_torque_max, base + lay.p_x_torque_max):
             series(W, lay, lane, base + lay.p_torque, g)
-            _update(W, lay, lane, base + lay.p_torque_max, block, 1.0, g, stack)
+            used = _enter(W, lay, lane, base + lay.p_torque_max, block, 1.0, g, blocks, meta, used)
         # A free clutch has u <= 0 (it opens with w <= 0), so that only real windup can exceed the initial maximum 0.
         if _exceeds(W, lay, lane, base + lay.p_x_u_max, base + lay.p_x_u_max):
             primitive(W, lay, lane, W[(base + lay.p_u) * lanes + lane], speed, lay.speed, g)
-            _update(W, lay, lane, base + lay.p_u_max, block, 1.0, g, stack)
+            used = _enter(W, lay, lane, base + lay.p_u_max, block, 1.0, g, blocks, meta, used)
+    return used
+
+
+@compiled
+def settle_peaks(W: Floats, lay: Layout, g: Floats, stack: Floats, blocks: Floats, meta: Ints, used: int) -> None:
+    """After the vector loops over the list: keep the new extrema."""
+    for slot in range(used):
+        start = slot_start(lay.order, slot)
+        value = blocks[start + (lay.order + RESULT) * SLOTS]
+        if blocks[start + (lay.order + STATUS) * SLOTS] == HARD:
+            take(blocks, lay.order, slot, g)
+            value = largest(g, lay.order, blocks[start + (lay.order + KNOWN) * SLOTS], stack)
+        W[meta[slot, 0]] = meta[slot, 1] * value
 
 
 @compiled
