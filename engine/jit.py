@@ -22,3 +22,9 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """
     jitted = numba.njit(cache=True, error_model="numpy")(function)
     return cast(Callable[P, R], jitted)
+
+
+def inlined(function: Callable[P, R]) -> Callable[P, R]:
+    """The same for a short function: its callers take its code in instead of passing it their many arrays."""
+    jitted = numba.njit(cache=True, error_model="numpy", forceinline=True)(function)
+    return cast(Callable[P, R], jitted)

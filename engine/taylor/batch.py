@@ -7,7 +7,7 @@ and iterations that do not settle, are marked ``HARD`` and left to the functions
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.jit import compiled
+from engine.jit import inlined
 from engine.taylor.straight import LaneCode, larger, smaller
 
 #: Polynomials in a block.
@@ -20,13 +20,13 @@ _ROOT_ITERATIONS = 5
 _PEAK_ITERATIONS = 4
 
 
-@compiled
+@inlined
 def slot_start(order: int, slot: int) -> int:
     """Place of a slot's first coefficient in the flat array of all blocks; the next row is ``SLOTS`` further."""
     return (slot // SLOTS) * (order + ROWS) * SLOTS + slot % SLOTS
 
 
-@compiled
+@inlined
 def put(blocks: NDArray[np.float64], order: int, slot: int, g: NDArray[np.float64]) -> None:
     """Write the coefficients ``g`` of one polynomial into a slot."""
     start = slot_start(order, slot)
@@ -34,7 +34,7 @@ def put(blocks: NDArray[np.float64], order: int, slot: int, g: NDArray[np.float6
         blocks[start + k * SLOTS] = g[k]
 
 
-@compiled
+@inlined
 def take(blocks: NDArray[np.float64], order: int, slot: int, g: NDArray[np.float64]) -> None:
     """Read the coefficients of a slot back into ``g``."""
     start = slot_start(order, slot)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.jit import compiled
+from engine.jit import compiled, inlined
 from engine.taylor.batch import HARD, NONE, RESULT, SLOTS, STATUS, put, slot_start, take
 from engine.taylor.roots import RECIPROCAL, first_root
 from engine.vibration_drive.automaton import CLUTCH_TARGET, Band
@@ -45,7 +45,7 @@ _ROUNDING = 1e-12
 _BANDS = len(Band)
 
 
-@compiled
+@inlined
 def _guard(W: Floats, lay: Layout, lane: int, i: int, band: int, g: Floats) -> None:
     """Write the polynomial (in fractions of the step) that is positive while a guard of pendulum ``i`` holds."""
     lanes = lay.lanes
@@ -69,7 +69,7 @@ def _guard(W: Floats, lay: Layout, lane: int, i: int, band: int, g: Floats) -> N
     g[0] -= sign * edge
 
 
-@compiled
+@inlined
 def _offer(W: Floats, Z: Ints, lay: Layout, lane: int, x: float, pendulum: int, target: int) -> None:
     """Note an event at the part ``x`` of a lane's step if it is the first so far; the part that is taken ends there."""
     first = W[lay.x * lay.lanes + lane]
@@ -84,7 +84,7 @@ def _offer(W: Floats, Z: Ints, lay: Layout, lane: int, x: float, pendulum: int, 
             W[lay.at_stop * lay.lanes + lane] = 0.0
 
 
-@compiled
+@inlined
 def _enter(
     W: Floats,
     Z: Ints,

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.jit import compiled
+from engine.jit import compiled, inlined
 from engine.taylor.batch import HARD, KNOWN, RESULT, SLOTS, STATUS, slot_start, take
 from engine.taylor.roots import RECIPROCAL, evaluate, largest
 from engine.vibration_drive.automaton import Clutch
@@ -18,14 +18,14 @@ Ints = NDArray[np.int64]
 _ENGAGED, _BEYOND = int(Clutch.ENGAGED), int(Clutch.BEYOND)
 
 
-@compiled
+@inlined
 def series(W: Floats, lay: Layout, lane: int, row: int, g: Floats) -> None:
     """Copy a stored series into ``g`` (shape (order + 1,)), in fractions of the planned step."""
     for k in range(lay.order + 1):
         g[k] = W[(row + k) * lay.lanes + lane]
 
 
-@compiled
+@inlined
 def rate(W: Floats, lay: Layout, lane: int, row: int, g: Floats) -> None:
     """Like ``series``, but its time derivative; one order less, so the highest coefficient is zero."""
     per_h = 1.0 / W[lay.h * lay.lanes + lane]
@@ -34,7 +34,7 @@ def rate(W: Floats, lay: Layout, lane: int, row: int, g: Floats) -> None:
     g[lay.order] = 0.0
 
 
-@compiled
+@inlined
 def primitive(W: Floats, lay: Layout, lane: int, start: float, row: int, minus: int, g: Floats) -> None:
     """Like ``series``, but its time integral from the value ``start``; the series at row ``minus`` (if >= 0) is
     subtracted first.
@@ -48,7 +48,7 @@ def primitive(W: Floats, lay: Layout, lane: int, start: float, row: int, minus: 
         g[k + 1] = h * value * RECIPROCAL[k + 1]
 
 
-@compiled
+@inlined
 def _enter(
     W: Floats,
     lay: Layout,
@@ -81,7 +81,7 @@ def _enter(
     return used + 1
 
 
-@compiled
+@inlined
 def _exceeds(W: Floats, lay: Layout, lane: int, first: int, last: int) -> bool:
     """Whether any of the excesses at rows ``first`` .. ``last`` is positive."""
     found = False
