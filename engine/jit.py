@@ -1,9 +1,11 @@
 """The one door to numba: a decorator that keeps the signature for the type checker."""
 
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
+from numba.core import cgutils
+from numba.extending import intrinsic
 
 from engine.cache import cache_folder
 
@@ -28,3 +30,22 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
     """The same for a short function: its callers take its code in instead of passing it their many arrays."""
     jitted = numba.njit(cache=True, error_model="numpy", forceinline=True)(function)
     return cast(Callable[P, R], jitted)
+
+
+@intrinsic
+def _unmanaged(typing_context: Any, array: Any) -> Any:  # noqa: ARG001
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        make = context.make_array(signature.args[0])
+        given, bare = make(context, builder, arguments[0]), make(context, builder)
+        for field in ("data", "shape", "strides", "itemsize", "nitems"):
+            setattr(bare, field, getattr(given, field))
+        for field in ("meminfo", "parent"):
+            setattr(bare, field, cgutils.get_null_value(getattr(given, field).type))  # type: ignore[no-untyped-call]
+        return bare._getvalue()
+
+    return array(array), generate
+
+
+#: ``unmanaged(array)`` is the same array without its reference count, for compiled code whose caller keeps it alive.
+#: numba counts references at many calls, atomically; of functions of a hundred nanoseconds that was most of the time.
+unmanaged = cast(Callable[[Any], Any], _unmanaged)

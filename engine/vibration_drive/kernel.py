@@ -32,7 +32,7 @@ _MODULE = '''"""Generated kernel: {n} pendulum(s), {coefficients} clutch coeffic
 
 import numpy as np
 
-from engine.jit import compiled
+from engine.jit import compiled, unmanaged
 from engine.taylor.lowering import lane_loops
 from engine.vibration_drive.events import settle_guards
 from engine.vibration_drive.lanes import load_case, look_for_events, next_stop, record, settle
@@ -68,6 +68,11 @@ def integrate(
     times, samples, states,
 ):
     """Run every case, filling a lane again the moment its case ends; the number of samples recorded (of case 0)."""
+    cases, turns, sums, times = unmanaged(cases), unmanaged(turns), unmanaged(sums), unmanaged(times)
+    W, Z, g, stack, blocks, meta = (
+        unmanaged(W), unmanaged(Z), unmanaged(g), unmanaged(stack), unmanaged(blocks), unmanaged(meta)
+    )
+    samples, states = unmanaged(samples), unmanaged(states)
     running = 0
     queue = 0
     recorded = 0
