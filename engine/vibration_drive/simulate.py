@@ -227,8 +227,8 @@ def warm_up(pendulums: int, coefficients: int, tolerance: float) -> None:
 def estimate_seconds(pendulums: int, coefficients: int, tolerance: float, periods: float) -> float:
     """Rough time of one case on one core, in s: about 20 steps a period, events and extrema included.
 
-    Measured at 0.17 us a step for one pendulum, 0.25 for two and 0.7 for eight (benchmarks/engine.py), with half as much
-    again for slower machines.
+    Measured at 0.17 us a step for one pendulum, 0.25 for two and 0.7 for eight (benchmarks/engine.py), with half as
+    much again for slower machines.
     """
     order = order_for(tolerance)
     step = 1.25e-7 * (1 + pendulums) * (0.6 + 0.4 * (order / 14.0) ** 2) * (0.8 + 0.05 * max(4, coefficients))
