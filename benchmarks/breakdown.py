@@ -45,12 +45,17 @@ def _restore(W: Any, saved: Any, times: int) -> None:
         W[:] = saved
 
 
-@numba.njit
-def _step_and_advance(W: Any, saved: Any, times: int, step: Any, rest: Any, advance: Any) -> None:
-    for _ in range(times):
-        W[:] = saved
-        step(W, *rest)
-        advance(W)
+def _stepper(step: Any, advance: Any) -> Any:
+    """A compiled loop over the lane loops of one kernel, which can only be called from compiled code."""
+
+    @numba.njit
+    def step_and_advance(W: Any, saved: Any, times: int, tolerance: float, log2_tolerance: float) -> None:
+        for _ in range(times):
+            W[:] = saved
+            step(W, tolerance, log2_tolerance)
+            advance(W, 1e9, 0.0)
+
+    return step_and_advance
 
 
 def _seconds(function: Any, *arguments: Any) -> float:
@@ -78,8 +83,8 @@ def stepping(workload: Workload, tolerance: float) -> tuple[float, int, int]:
         module.simulate(workload.columns(cases), Run(tolerance=tolerance, max_steps=_MID_RUN), cases=len(cases))
     spy = spies[-1]
     W, saved = spy.arguments["W"], spy.arguments["W"].copy()
-    rest = tuple(spy.arguments[name] for name in list(inspect.signature(spy.step.py_func).parameters)[1:])
-    stepped = _seconds(_step_and_advance, W, saved, _LOOPS, spy.step, rest, spy.advance)
+    limits = (spy.arguments["tolerance"], spy.arguments["log2_tolerance"])
+    stepped = _seconds(_stepper(spy.step, spy.advance), W, saved, _LOOPS, *limits)
     lanes = spy.LAYOUT.lanes
     return (stepped - _seconds(_restore, W, saved, _LOOPS)) / lanes, spy.LAYOUT.order, lanes
 
