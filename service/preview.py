@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from service.catalogue import axes_json
 from service.fits import fit_json
 from worker import kernels
+from worker.chunking import work_of
 
 if TYPE_CHECKING:
     from service.spec import ParsedSpec
@@ -41,7 +42,7 @@ def preview_json(parsed: ParsedSpec, chunking: Chunking) -> dict[str, Any]:
         "combine": study.combine,
         "axes": axes_json(study),
         "results": len(kernels.study_results(study)),
-        "estimated_seconds": rounds * kernels.estimate_seconds_per_case(study),
+        "estimated_seconds": work_of(rounds) * kernels.estimate_seconds_per_case(study),
         "estimated_bytes": estimated_bytes(study),
         "warnings": [*parsed.warnings, *chunking.warnings(study)],
         "fits": {pointer: fit_json(fit) for pointer, fit in parsed.fits.items()},

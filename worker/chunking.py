@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 CHUNK_SECONDS = 1.0
 #: Share of the chunk's time limit that its estimated work may take: estimates are rough and machines differ.
 TIMEOUT_SHARE = 0.1
+#: The same for chunks too short to fill the engine, of which a smaller part is hardly faster.
+SHORT_SHARE = 0.5
 #: The engine runs cases side by side; fewer than these waste it.
 MIN_CASES = 16
 #: Chunks for each process that a study is cut into if it has the cases, so that all processes end about together.
@@ -45,13 +47,22 @@ class Chunking:
 
     def warnings(self, study: Study) -> tuple[str, ...]:
         """What is to be said of ``study`` before it is run: that a case of it may never come to its end."""
-        seconds = kernels.estimate_seconds_per_case(study)
+        seconds = kernels.estimate_seconds_per_case(study) * work_of(1)
         if seconds <= self.timeout:
             return ()
         return (
             f"One case takes about {seconds:.3g} s, and {self.timeout:g} s are allowed (SPRAG_CHUNK_TIMEOUT): cases "
             "will probably end as timed_out.",
         )
+
+
+def work_of(cases: float) -> float:
+    """Work of running that many cases together, in units of a case among many.
+
+    The engine's lanes cost about the same whether or not a case is in them: one case alone takes half as long as a full
+    set.
+    """
+    return max(cases, 0.5 * (MIN_CASES + cases))
 
 
 def chunk_cases(cases: int, seconds_per_case: float, processes: int, fixed: int = 0, timeout: float = math.inf) -> int:
@@ -64,9 +75,13 @@ def chunk_cases(cases: int, seconds_per_case: float, processes: int, fixed: int 
         return min(max(fixed, least), cases)
     by_time = CHUNK_SECONDS / seconds_per_case if seconds_per_case > 0.0 else float(cases)
     to_feed = math.ceil(cases / (CHUNKS_PER_PROCESS * processes))
-    in_time = TIMEOUT_SHARE * timeout / seconds_per_case if seconds_per_case > 0.0 else float(cases)
     wanted = max(int(min(by_time, to_feed)), MIN_CASES)
-    return min(max(int(min(wanted, in_time)), 1, least), cases)
+    if seconds_per_case > 0.0:
+        in_time = max(TIMEOUT_SHARE * timeout / seconds_per_case, float(MIN_CASES))
+        if MIN_CASES * seconds_per_case > SHORT_SHARE * timeout:
+            in_time = 2.0 * SHORT_SHARE * timeout / seconds_per_case - MIN_CASES
+        wanted = int(min(wanted, in_time))
+    return min(max(wanted, 1, least), cases)
 
 
 def spans(cases: int, size: int) -> Iterator[tuple[int, int]]:

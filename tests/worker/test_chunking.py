@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.worker import fakes
-from worker.chunking import CHUNK_SECONDS, MAX_CHUNKS, MIN_CASES, Chunking, chunk_cases, spans
+from worker.chunking import CHUNK_SECONDS, MAX_CHUNKS, MIN_CASES, Chunking, chunk_cases, spans, work_of
 
 
 @given(cases=st.integers(1, 10_000), size=st.integers(1, 600))
@@ -42,10 +42,13 @@ def test_size_by_the_time_of_a_case(cases: int, seconds: float, processes: int, 
 
 
 @pytest.mark.parametrize(
-    ("seconds", "timeout", "size"), [(85.0, 600.0, 1), (10.0, 600.0, 6), (700.0, 600.0, 1), (1e-3, 600.0, 128)]
+    ("seconds", "timeout", "size"),
+    [(85.0, 600.0, 1), (25.0, 600.0, 8), (10.0, 600.0, 16), (700.0, 600.0, 1), (1e-3, 600.0, 128)],
 )
 def test_a_chunk_stays_far_from_its_time_limit(seconds: float, timeout: float, size: int) -> None:
     assert chunk_cases(1024, seconds, 2, timeout=timeout) == size
+    # Half of the limit, if a case alone does not take more.
+    assert seconds * work_of(size) <= max(0.5 * timeout, seconds * work_of(1))
 
 
 def test_a_case_that_does_not_fit_the_time_limit_is_warned_of() -> None:
