@@ -113,7 +113,7 @@ def trajectory(
     with output(file) as write:
         made = _trajectory(study, case, start, end, points)
         write(_trajectory_bytes(made, study, case, table_format(form, file, as_json)))
-    say(f"case {case}: {made.ending}, {points} times")
+    say(f"case {case}: {made.ending}, {points} points in time")
     if made.ending != OK:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
 
