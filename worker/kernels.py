@@ -387,3 +387,10 @@ def cache_folder() -> Path:
     from engine.cache import cache_folder as engine_cache_folder
 
     return engine_cache_folder()
+
+
+def cache_is_wanted() -> bool:
+    """Whether that folder is the one the user wants, not the stand-in for one that cannot be written."""
+    from engine.cache import is_wanted
+
+    return is_wanted(cache_folder())

@@ -83,7 +83,6 @@ def _pendulum(index: int) -> tuple[ResultInfo, ...]:
 
 
 SHAFT_RESULTS: tuple[ResultInfo, ...] = _shaft()
-PENDULUM_RESULTS_PER_PENDULUM = len(_pendulum(0))
 
 
 def result_infos(pendulums: int) -> tuple[ResultInfo, ...]:

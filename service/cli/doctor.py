@@ -148,12 +148,14 @@ def _disk(location: Path) -> tuple[bool, str]:
 
 
 def _cache() -> tuple[bool, str]:
-    from worker.kernels import cache_folder
+    from worker.kernels import cache_folder, cache_is_wanted
 
     folder = cache_folder()
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.NamedTemporaryFile(dir=folder, prefix=".doctor-") as probe:
         probe.write(b"x")
+    if not cache_is_wanted():
+        return False, f"the folder wanted cannot be written, kernels are kept in {folder}: set SPRAG_KERNEL_CACHE"
     return os.access(folder, os.W_OK | os.X_OK), str(folder)
 
 
