@@ -9,7 +9,7 @@ import csv
 import io
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from service.catalogue import unit_of
 from service.errors import to_bytes
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from worker.study import Study
 
 Format = Literal["csv", "json"]
-FORMATS: Final[tuple[Format, ...]] = get_args(Format)
 MEDIA_TYPES: Final[dict[Format, str]] = {"csv": "text/csv; charset=utf-8", "json": "application/json"}
 
 #: A spreadsheet takes a cell that begins like this for a formula.
