@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import get_context
-from typing import Any, ParamSpec, Protocol, TypeVar
-
-from pebble import ProcessExpired, ProcessPool
+from typing import Protocol, TypeVar, TypeVarTuple
 
 from service.errors import ApiError
 from worker import kernels
+from worker.child_pool import ChildPool, Job
+from worker.child_process import ProcessDiedError, ProcessStartError
 from worker.limits import LOAD_SECONDS
-from worker.processes import interrupts_held_back, start_pool_process
 
-P = ParamSpec("P")
+Args = TypeVarTuple("Args")
 R = TypeVar("R")
 
 #: Computations that may wait for the process; more are refused at once rather than late.
@@ -29,7 +24,7 @@ MAX_WAITING = 8
 class Computes(Protocol):
     """Runs functions of the engine for the service."""
 
-    async def run(self, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+    async def run(self, function: Callable[[*Args], R], *args: *Args) -> R:
         """The function's value; ApiError when it takes too long or its process dies."""
 
     async def load(self, shape: kernels.KernelShape) -> None:
@@ -53,23 +48,28 @@ class ProcessComputer:
     def __init__(self, timeout: float, load: Callable[[kernels.KernelShape], None] = kernels.load) -> None:
         self._timeout = timeout
         self._load = load
-        self._loads: dict[kernels.KernelShape, Future[None]] = {}
-        self._pool: ProcessPool | None = None
+        self._loads: dict[kernels.KernelShape, Job[None]] = {}
+        self._pool: ChildPool | None = None
         self._waiting = 0
         self._lock = threading.Lock()
 
-    async def run(self, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+    async def run(self, function: Callable[[*Args], R], *args: *Args) -> R:
         """The function's value. Function, arguments and value must be picklable."""
         with self._turn(self._timeout):
-            return await asyncio.wrap_future(self._schedule(self._timeout, function, *args, **kwargs))
+            job = self._schedule(self._timeout, function, *args)
+            try:
+                return await asyncio.wrap_future(job.future)
+            except asyncio.CancelledError:  # nobody waits for it any more
+                job.stop()
+                raise
 
     async def load(self, shape: kernels.KernelShape) -> None:
         """Have a kernel ready. The compilation goes on when its request is gone, so that the next one finds it."""
         with self._turn(LOAD_SECONDS):
             loading = self._loads.get(shape)
-            if loading is None or (loading.done() and (loading.cancelled() or loading.exception() is not None)):
+            if loading is None or (loading.future.done() and loading.future.exception() is not None):
                 loading = self._loads[shape] = self._schedule(LOAD_SECONDS, self._load, shape)
-            await asyncio.shield(asyncio.wrap_future(loading))
+            await asyncio.shield(asyncio.wrap_future(loading.future))
 
     @contextmanager
     def _turn(self, timeout: float) -> Iterator[None]:
@@ -81,30 +81,22 @@ class ProcessComputer:
             yield
         except TimeoutError as error:
             raise ApiError("timed-out", f"The computation did not end within {timeout:g} s.") from error
-        except ProcessExpired as error:
+        except ProcessDiedError as error:
             raise ApiError("not-computed", "The process that ran the computation died.") from error
-        except BrokenProcessPool as error:
+        except ProcessStartError as error:
             raise ApiError("unavailable", "The process for computations cannot be started.") from error
         finally:
             self._waiting -= 1
 
-    def _schedule(self, timeout: float, function: Callable[..., R], *args: Any, **kwargs: Any) -> Future[R]:
+    def _schedule(self, timeout: float, function: Callable[[*Args], R], *args: *Args) -> Job[R]:
         with self._lock:
-            if self._pool is None or not self._pool.active:
-                self._pool = ProcessPool(
-                    max_workers=1,
-                    initializer=start_pool_process,
-                    initargs=(os.getpid(), kernels.prepare),
-                    context=get_context("spawn"),
-                )
-            with interrupts_held_back():  # the first one starts the process
-                future: Future[R] = self._pool.schedule(function, args=args, kwargs=kwargs, timeout=timeout)
-            return future
+            if self._pool is None:
+                self._pool = ChildPool(1, kernels.prepare)
+            return self._pool.schedule(timeout, function, *args)
 
     def close(self) -> None:
         """End the process, whatever it is doing."""
         with self._lock:
             if self._pool is not None:
-                self._pool.stop()  # type: ignore[no-untyped-call]
-                self._pool.join()
+                self._pool.close()
                 self._pool = None

@@ -21,7 +21,7 @@ from service.cli.settings import read_settings
 from service.spec_messages import Problem
 from worker.limits import MAX_TOLERANCE, MIN_TOLERANCE
 
-_LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sqlalchemy", "pebble", "fastapi", "uvicorn")
+_LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sqlalchemy", "fastapi", "uvicorn")
 #: The kernel that is printed unless its shape is given.
 _KERNEL = {"pendulums": 1, "coefficients": 4, "tolerance": 1e-9}
 #: A study of a million cases of one pendulum takes about half of it.

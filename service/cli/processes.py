@@ -12,7 +12,9 @@ from service.cli.console import TroubleError, WrongInputError, say, write_json
 from service.cli.options import ChunkCases, Database, JsonFlag, Processes
 from service.cli.settings import read_settings
 
-Host = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Address to listen on; default: this machine only.")]
+Host = Annotated[
+    str | None, typer.Option("--host", metavar="ADDRESS", help="Address to listen on; default: this machine only.")
+]
 Port = Annotated[int | None, typer.Option(min=0, max=65535, help="Port to listen on; 0: any free one.")]
 
 

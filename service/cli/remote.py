@@ -98,7 +98,7 @@ def submit(
     spec: SpecFile,
     wait: Annotated[bool, typer.Option("--wait", help="Wait until the study has ended.")] = False,
     key: Annotated[
-        str | None, typer.Option(metavar="KEY", help="Idempotency key: the same key submits the study once.")
+        str | None, typer.Option("--key", metavar="KEY", help="Idempotency key: the same key submits the study once.")
     ] = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
