@@ -84,7 +84,7 @@ def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
     "/{case:case}/trajectory",
     response_model=m.Trajectory,
     responses={
-        **files("Instantaneous values, as JSON or CSV.", MEDIA_TYPES.values()),
+        **files("Instantaneous values, as JSON or CSV.", (MEDIA_TYPES["json"], MEDIA_TYPES["csv"])),
         **problems(*_CASE_PROBLEMS, "not-computed", "timed-out", "unavailable"),
     },
 )

@@ -127,22 +127,29 @@ def get_map(
     "/results",
     response_class=Response,
     responses={
-        **files("All finished cases, as a table or as JSON.", exports.MEDIA_TYPES.values()),
+        **files("All finished cases, in the format asked for.", exports.MEDIA_TYPES.values()),
         **problems("invalid-parameter", "study-not-found"),
         **documented_304(),
     },
 )
-def get_results(context: Ctx, request: Request, study_id: StudyId, form: Form = None) -> Response:
-    """Every finished case with all its results, in order of the cases."""
-    chosen = choose_format(request, form, _JSON | exports.MEDIA_TYPES)
+def get_results(
+    context: Ctx,
+    request: Request,
+    study_id: StudyId,
+    form: Annotated[str | None, Query(alias="format", description=", ".join(exports.FORMATS), examples=["csv"])] = None,
+) -> Response:
+    """Every finished case with all its results, in order of the cases: as a table, a labelled grid, or JSON."""
+    chosen = choose_format(request, form, _JSON | {str(name): media for name, media in exports.MEDIA_TYPES.items()})
 
     def make(record: StudyRecord) -> Response:
         study = context.store.study(study_id)
         about = {"study": study_id, "name": record.name, "model": record.model, "engine_version": record.engine_version}
         blocks = context.store.iter_rows(study_id)
         source = exports.Source(study, kernels.study_results(study), blocks, about)
-        form: exports.Format = "csv" if chosen == "csv" else "json"
-        return streamed(exports.export(source, form), exports.MEDIA_TYPES[form], f"{study_id}.{form}")
+        form = next(form for form in exports.FORMATS if form == chosen)
+        return streamed(
+            exports.export(source, form), exports.MEDIA_TYPES[form], f"{study_id}.{exports.SUFFIXES[form][0]}"
+        )
 
     return _conditional(context, request, study_id, chosen, make)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
@@ -42,9 +43,14 @@ def tagged(response: Response, tag: str) -> Response:
 
 
 def streamed(pieces: Iterable[bytes], media_type: str, filename: str) -> StreamingResponse:
-    """A file sent piece by piece; the pieces are made in a thread, so that the service goes on answering."""
+    """A file sent piece by piece; the pieces are made in a thread, so that the service goes on answering.
+
+    The first is made here, so that what goes wrong before it still becomes a problem document.
+    """
     headers = {"Content-Disposition": f'attachment; filename="{filename}"', "Vary": "Accept"}
-    return StreamingResponse(iterate_in_threadpool(pieces), media_type=media_type, headers=headers)
+    rest = iter(pieces)
+    whole = itertools.chain([next(rest, b"")], rest)
+    return StreamingResponse(iterate_in_threadpool(whole), media_type=media_type, headers=headers)
 
 
 def choose_format(request: Request, wanted: str | None, media_types: Mapping[str, str]) -> str:

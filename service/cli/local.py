@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -28,11 +29,20 @@ from worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from service.exports import Format
     from service.local import LocalRun
     from service.settings import Settings
     from service.spec import ParsedSpec
     from worker.kernels import Trajectory
     from worker.study import Study
+
+
+class ValueFormat(StrEnum):
+    """Formats of instantaneous values."""
+
+    CSV = "csv"
+    JSON = "json"
+
 
 #: A pool of processes starts in about two seconds.
 _NO_POOL_SECONDS = 1.0
@@ -94,7 +104,7 @@ def trajectory(
     spec: SpecFile,
     case: Annotated[int, typer.Option("--case", min=0, metavar="N", help="Number of the case, from 0.")] = 0,
     file: OutputFile = None,
-    form: Annotated[TableFormat | None, typer.Option("--format", help="Default: as FILE ends, else csv.")] = None,
+    form: Annotated[ValueFormat | None, typer.Option("--format", help="Default: as FILE ends, else csv.")] = None,
     start: Annotated[
         str | None, typer.Option("--from", metavar="TIME", help='First time, in s, or as "40 periods"; default: 0.')
     ] = None,
@@ -112,7 +122,8 @@ def trajectory(
     study = read_study(spec).study
     with output(file) as write:
         made = _trajectory(study, case, start, end, points)
-        write(_trajectory_bytes(made, study, case, table_format(form, file, as_json)))
+        as_text = as_json or (file or "").lower().endswith(".json") if form is None else form is ValueFormat.JSON
+        write(_trajectory_bytes(made, study, case, as_text))
     say(f"case {case}: {made.ending}, {points} points in time")
     if made.ending != OK:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
@@ -136,11 +147,11 @@ def _trajectory(study: Study, case: int, start: str | None, end: str | None, poi
     return run_trajectory(study, case, first, last, points)
 
 
-def _trajectory_bytes(made: Trajectory, study: Study, case: int, form: str) -> bytes:
+def _trajectory_bytes(made: Trajectory, study: Study, case: int, as_json: bool) -> bytes:
     from service.errors import to_bytes
     from service.trajectories import trajectory_csv, trajectory_json
 
-    if form == "csv":
+    if not as_json:
         return trajectory_csv(made)
     return to_bytes(trajectory_json(made, case, study.case_parameters(case))) + b"\n"
 
@@ -222,7 +233,7 @@ def _pool_size(study: Study, settings: Settings, asked: int | None) -> int:
     return settings.pool_processes
 
 
-def _rows(done: LocalRun, study: Study, form: str) -> Iterator[bytes]:
+def _rows(done: LocalRun, study: Study, form: Format) -> Iterator[bytes]:
     """The rows of a finished study, as the service exports them."""
     from service.exports import Source, export
     from worker.kernels import study_results
@@ -230,4 +241,4 @@ def _rows(done: LocalRun, study: Study, form: str) -> Iterator[bytes]:
     record = done.record
     about = {"study": record.id, "name": record.name, "model": record.model, "engine_version": record.engine_version}
     source = Source(study, study_results(study), done.store.iter_rows(record.id), about)
-    return export(source, "csv" if form == "csv" else "json")
+    return export(source, form)

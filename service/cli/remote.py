@@ -30,6 +30,7 @@ from worker.states import TERMINAL, StudyState
 
 if TYPE_CHECKING:
     from service.client import RefusedError, ServiceClient
+    from service.exports import Format
 
 #: Seconds between two looks at a study that is being watched.
 _POLL_SECONDS = 0.25
@@ -40,10 +41,15 @@ _PICTURES = ("svg", "png", "pdf")
 
 
 class TableFormat(StrEnum):
-    """Formats of case rows."""
+    """Formats of case rows, as `service.exports` has them."""
 
-    JSON = "json"
     CSV = "csv"
+    JSON = "json"
+    JSONL = "jsonl"
+    PARQUET = "parquet"
+    ARROW = "arrow"
+    XLSX = "xlsx"
+    NETCDF = "netcdf"
 
 
 @contextmanager
@@ -245,11 +251,13 @@ def export(
         say(f"{file}: {written} bytes")
 
 
-def table_format(form: TableFormat | None, file: str | None, as_json: bool) -> str:
+def table_format(form: TableFormat | None, file: str | None, as_json: bool) -> Format:
     """The format of case rows that was asked for: by name, by ``--json``, or by the ending of the file's name."""
+    from service.exports import FORMATS, format_of
+
     if form is not None:
-        return form.value
-    return "json" if as_json or (file or "").lower().endswith(".json") else "csv"
+        return next(known for known in FORMATS if known == form.value)
+    return "json" if as_json else format_of(file or "") or "csv"
 
 
 def curve(

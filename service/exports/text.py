@@ -1,44 +1,22 @@
-"""All rows of a study as a file: CSV for tables, JSON for programs; written piece by piece, however many there are.
-
-Floats are written so that reading them gives the same double back. A row never depends on how the cases were batched.
-"""
+"""Rows as text: CSV for tables, JSON and JSON lines for programs. A row never depends on how the cases were batched."""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final
 
 from service.catalogue import unit_of
 from service.errors import to_bytes
 
 if TYPE_CHECKING:
+    from service.exports.source import Source
     from service.storage.records import CaseRow, RowBlock
-    from worker.kernels import ResultInfo
     from worker.study import Study
-
-Format = Literal["csv", "json"]
-MEDIA_TYPES: Final[dict[Format, str]] = {"csv": "text/csv; charset=utf-8", "json": "application/json"}
 
 #: A spreadsheet takes a cell that begins like this for a formula.
 _FORMULA_STARTS: Final = ("=", "+", "-", "@", "\t", "\r")
-
-
-@dataclass(frozen=True, slots=True)
-class Source:
-    """What is exported: a study, the description of its results, and where its rows come from, in order of cases."""
-
-    study: Study
-    infos: tuple[ResultInfo, ...]
-    blocks: Iterable[RowBlock]
-    about: dict[str, Any]
-
-
-def export(source: Source, form: Format) -> Iterator[bytes]:
-    """The file in pieces of about one block of rows."""
-    return csv_pieces(source) if form == "csv" else json_pieces(source)
 
 
 def row_json(row: CaseRow, parameters: dict[str, float]) -> dict[str, Any]:
@@ -78,6 +56,17 @@ def json_pieces(source: Source) -> Iterator[bytes]:
             yield separator + b",\n".join(piece)
             separator = b",\n"
     yield b"\n]}\n"
+
+
+def json_lines_pieces(source: Source) -> Iterator[bytes]:
+    """One flat object a line, with the same names as the columns of `csv_pieces`; null for what is missing."""
+    study = source.study
+    for block in source.blocks:
+        columns = {path: column.tolist() for path, column in study.columns(block.cases).items()}
+        for index, row in enumerate(block.rows()):
+            parameters = {path: column[index] for path, column in columns.items()}
+            flat = {"case": row.case, **parameters, "ending": row.ending, "flags": list(row.flags), **row.results}
+            yield to_bytes(flat) + b"\n"
 
 
 def csv_pieces(source: Source) -> Iterator[bytes]:

@@ -1,0 +1,70 @@
+"""What is exported: a study, its rows, and what each column of the table means."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from service.catalogue import parameter_of, unit_of
+
+if TYPE_CHECKING:
+    from service.storage.records import RowBlock
+    from worker.kernels import ResultInfo
+    from worker.study import Study
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """What is exported: a study, the description of its results, and where its rows come from, in order of cases."""
+
+    study: Study
+    infos: tuple[ResultInfo, ...]
+    blocks: Iterable[RowBlock]
+    about: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """One number of the machine, as a table of inputs shows it; ``varies`` tells that the axes change it."""
+
+    path: str
+    value: float | None
+    unit: str
+    description: str
+    varies: bool
+
+
+def description_of(study: Study, path: str) -> str:
+    """What a flat SPEC path means, as a few words; "" where the catalogue does not have it."""
+    entry = parameter_of(study.model, path)
+    return "" if entry is None else entry.help
+
+
+def inputs(study: Study) -> tuple[Input, ...]:
+    """Every number of the study: the base's, and what varies, which has no single value."""
+    varying = study.axis_paths
+    paths = dict.fromkeys((*varying, *study.base))
+    return tuple(
+        Input(
+            path,
+            None if path in varying else study.base[path],
+            unit_of(study.model, path),
+            description_of(study, path),
+            path in varying,
+        )
+        for path in paths
+    )
+
+
+def run_texts(study: Study) -> dict[str, str]:
+    """The settings of the run as people read them."""
+    return {name: _text(value) for name, value in study.run.items() if value is not None}
+
+
+def _text(value: object) -> str:
+    if isinstance(value, list | tuple):
+        if len(value) == 2 and isinstance(value[1], str):
+            return f"{value[0]:g} {value[1]}"
+        return " to ".join(map(_text, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
