@@ -16,6 +16,8 @@ import httpx
 _API = "/api/v1"
 #: Seconds to wait for an answer; curves of a large study are read from disk first.
 _TIMEOUT = httpx.Timeout(60.0, connect=10.0)
+#: A whole study may take minutes to be written before its first byte comes.
+_FILE_TIMEOUT = httpx.Timeout(None, connect=10.0)
 
 Query = Sequence[tuple[str, str]]
 
@@ -124,7 +126,7 @@ class ServiceClient:
     def download(self, path: str, query: Query = ()) -> Iterator[bytes]:
         """The bytes of a document under the API, such as ``/studies/ID/results`` with ``format=csv``, as they come."""
         try:
-            with self._http.stream("GET", _API + path, params=list(query)) as response:
+            with self._http.stream("GET", _API + path, params=list(query), timeout=_FILE_TIMEOUT) as response:
                 if response.is_error:
                     response.read()
                     raise _refusal(response)
@@ -139,6 +141,18 @@ class ServiceClient:
     def picture(self, study_id: str, query: Query, form: str) -> Iterator[bytes]:
         """The picture of curves as "svg", "png" or "pdf"."""
         return self.download(f"{_study(study_id)}/curves", [*query, ("format", form)])
+
+    def map(self, study_id: str, query: Query) -> dict[str, Any]:
+        """One result over two axes."""
+        return self._json("GET", f"{_study(study_id)}/map", params=list(query))
+
+    def map_picture(self, study_id: str, query: Query, form: str) -> Iterator[bytes]:
+        """The picture of a map as "svg", "png" or "pdf"."""
+        return self.download(f"{_study(study_id)}/map", [*query, ("format", form)])
+
+    def report(self, study_id: str, form: str) -> Iterator[bytes]:
+        """The study as a document, "html" or "pdf"."""
+        return self.download(f"{_study(study_id)}/report", [("format", form)])
 
     def _json(self, method: str, path: str, **arguments: Any) -> dict[str, Any]:
         try:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import io
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
@@ -69,23 +71,35 @@ def draw_curves(curves: Curves, title: str, picture: Picture) -> bytes:
 
     Raises SelectionError when there are more curves or points than one picture can show.
     """
+    require_drawable(curves)
+    return _render(partial(paint_curves, curves=curves, title=title), picture, (8.0, 1.2 + 3.6 * len(_groups(curves))))
+
+
+def require_drawable(curves: Curves) -> None:
+    """Raise SelectionError when there are more curves or points than one picture can show."""
     points = sum(len(curve.endings) for curve in curves.curves) * len(curves.selection.results)
     _check_size("curves", len(curves.curves), MAX_PICTURE_CURVES)
     _check_size("points", points, MAX_PICTURE_POINTS)
+
+
+def _groups(curves: Curves) -> dict[str, list[ResultInfo]]:
+    """The results by their units, each group a plot."""
     groups: dict[str, list[ResultInfo]] = {}
     for info in curves.selection.results:
         groups.setdefault(info.unit, []).append(info)
+    return groups
 
-    def paint(figure: Figure) -> None:
-        plots = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
-        for axes, (unit, infos) in zip(plots, groups.items(), strict=True):
-            _paint_curves(axes, curves, infos, unit)
-        chosen = curves.selection
-        plots[-1].set_xlabel(_label(chosen.names[chosen.x], chosen.units[chosen.x]))
-        _explain(figure, list(plots), curves)
-        _head(figure, title, chosen.held)
 
-    return _render(paint, picture, (8.0, 1.2 + 3.6 * len(groups)))
+def paint_curves(figure: Figure, curves: Curves, title: str) -> None:
+    """Draw the curves into an empty figure; for use inside `painting`."""
+    groups = _groups(curves)
+    plots = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, (unit, infos) in zip(plots, groups.items(), strict=True):
+        _paint_curves(axes, curves, infos, unit)
+    chosen = curves.selection
+    plots[-1].set_xlabel(_label(chosen.names[chosen.x], chosen.units[chosen.x]))
+    _explain(figure, list(plots), curves)
+    _head(figure, title, chosen.held)
 
 
 def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
@@ -120,12 +134,20 @@ def _check_size(what: str, count: int, most: int) -> None:
         raise SelectionError([ErrorItem(message, parameter="format", allowed=f"<= {most} {what}")])
 
 
-def _render(paint: Callable[[Figure], None], picture: Picture, size: tuple[float, float]) -> bytes:
+@contextmanager
+def painting() -> Iterator[None]:
+    """The one turn in which matplotlib draws, with the style of every picture."""
     import matplotlib as mpl
+
+    with _TURNS.take(), mpl.rc_context(_STYLE):
+        yield
+
+
+def _render(paint: Callable[[Figure], None], picture: Picture, size: tuple[float, float]) -> bytes:
     from matplotlib.figure import Figure
 
     buffer = io.BytesIO()
-    with _TURNS.take(), mpl.rc_context(_STYLE):
+    with painting():
         figure = Figure(figsize=size, layout="constrained")
         paint(figure)
         figure.savefig(buffer, format=picture, dpi=120, metadata=_METADATA[picture])
@@ -230,11 +252,16 @@ def _label(name: str, unit: str, brackets: str = "()") -> str:
 
 def _short(title: str) -> str:
     """``title`` as the font can write it, and not wider than a picture."""
+    text = writable(title)
+    return text if len(text) <= 80 else text[:79] + "…"
+
+
+def writable(text: str, family: str | None = None) -> str:
+    """``text`` with a square for every character that the font does not have; lines stay lines."""
     from matplotlib.font_manager import FontProperties, findfont, get_font
 
-    glyphs = get_font(findfont(FontProperties())).get_charmap()
-    text = "".join(character if ord(character) in glyphs else "\N{WHITE SQUARE}" for character in title)
-    return text if len(text) <= 80 else text[:79] + "…"
+    glyphs = get_font(findfont(FontProperties(family=family))).get_charmap()
+    return "".join(c if c == "\n" or ord(c) in glyphs else "\N{WHITE SQUARE}" for c in text)
 
 
 def _edges(values: tuple[float, ...]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

@@ -176,10 +176,13 @@ def _listen(settings: Settings) -> socket.socket:
     host = settings.host.strip("[]")
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        return socket.create_server((host, settings.port), family=family, backlog=2048)
+        listener = socket.create_server((host, settings.port), family=family, backlog=2048)
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise AddressError(f"The service cannot listen on {settings.host} port {settings.port}: {reason}.") from error
+    # Connections inherit it. Without it the body of a small answer waits 40 ms for the client's word on its head.
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return listener
 
 
 def _address(settings: Settings, listener: socket.socket) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from fastapi import APIRouter, Depends, Query, Request
 from starlette.responses import Response
 
-from service import exports, plots
+from service import exports, plots, report
 from service.api import models as m
 from service.api.context import Ctx, StudyId
 from service.api.document import files, problems
@@ -18,6 +18,7 @@ from service.api.requests import strict_query
 from service.api.respond import choose_format, entity_tag, json_response, not_modified, streamed, tagged
 from service.curves import CurveQuery, Curves, draw, draw_map, select
 from service.errors import parameter_error, shown
+from service.report.content import report_of
 from worker import kernels
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ _MAP_FORMATS = _JSON | _PICTURES
 _PROBLEMS = ("invalid-parameter", "invalid-selection", "study-not-found")
 #: matplotlib puts its styles into the picture, which the pages' policy forbids; a picture can do nothing else.
 _PICTURE_POLICY = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
+
+_REPORT_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; sandbox allow-modals"
 
 XPath = Annotated[str, Query(description="path of the axis along the curve", examples=["shaft.load"])]
 Fixed = Annotated[
@@ -150,6 +153,35 @@ def get_results(
         return streamed(
             exports.export(source, form), exports.MEDIA_TYPES[form], f"{study_id}.{exports.SUFFIXES[form][0]}"
         )
+
+    return _conditional(context, request, study_id, chosen, make)
+
+
+@router.get(
+    "/report",
+    response_class=Response,
+    responses={
+        **files("The study as a document to be printed.", report.MEDIA_TYPES.values()),
+        **problems("invalid-parameter", "study-not-found"),
+        **documented_304(),
+    },
+)
+def get_report(
+    context: Ctx,
+    request: Request,
+    study_id: StudyId,
+    form: Annotated[
+        str | None, Query(alias="format", description=" or ".join(report.REPORT_FORMATS), examples=["pdf"])
+    ] = None,
+) -> Response:
+    """A study as a printable page or a PDF: inputs, endings, ranges of all results, curves."""
+    chosen = choose_format(request, form, {str(name): media for name, media in report.MEDIA_TYPES.items()})
+
+    def make(_record: StudyRecord) -> Response:
+        form = next(form for form in report.REPORT_FORMATS if form == chosen)
+        content = report.write_report(report_of(context.store, study_id), form)
+        headers = {"Content-Security-Policy": _REPORT_POLICY} if form == "html" else {}
+        return Response(content, media_type=report.MEDIA_TYPES[form], headers=headers)
 
     return _conditional(context, request, study_id, chosen, make)
 

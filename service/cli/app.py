@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from service.cli import database, demo, doctor, fit, local, processes, remote
+from service.cli import database, demo, doctor, fit, local, pictures, processes, remote
 from service.cli.console import CommandFailureError, ExitCode, TroubleError, say, write_text
 
 #: Set to anything to see where a fault of the program lies.
@@ -68,8 +68,9 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "pause": remote.pause,
         "resume": remote.resume,
         "cancel": remote.cancel,
-        "curve": remote.curve,
+        "curve": pictures.curve,
         "export": remote.export,
+        "map": pictures.draw_map,
     },
 }
 for _title, _commands in _COMMANDS.items():

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from service.exports import Format
     from service.local import LocalRun
+    from service.report import ReportFormat
     from service.settings import Settings
     from service.spec import ParsedSpec
     from worker.kernels import Trajectory
@@ -194,7 +195,7 @@ def run(
     chunk: ChunkCases = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Run a study here, without a service: rows on standard output or in FILE, progress on standard error."""
+    """Run a study here, without a service: rows or a report to standard output or FILE, progress on standard error."""
     from service.local import run_here
 
     parsed = read_study(spec)
@@ -233,12 +234,16 @@ def _pool_size(study: Study, settings: Settings, asked: int | None) -> int:
     return settings.pool_processes
 
 
-def _rows(done: LocalRun, study: Study, form: Format) -> Iterator[bytes]:
-    """The rows of a finished study, as the service exports them."""
+def _rows(done: LocalRun, study: Study, form: Format | ReportFormat) -> Iterator[bytes]:
+    """The rows of a finished study as the service exports them, or its report."""
     from service.exports import Source, export
+    from service.report import write_report
+    from service.report.content import report_of
     from worker.kernels import study_results
 
     record = done.record
+    if form == "html" or form == "pdf":  # noqa: PLR1714 - so that the types are told apart
+        return iter([write_report(report_of(done.store, record.id), form)])
     about = {"study": record.id, "name": record.name, "model": record.model, "engine_version": record.engine_version}
     source = Source(study, study_results(study), done.store.iter_rows(record.id), about)
     return export(source, form)

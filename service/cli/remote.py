@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
@@ -16,7 +16,6 @@ from service.cli.console import (
     ExitCode,
     TroubleError,
     WrongInputError,
-    cell_text,
     progress_bar,
     progress_text,
     say,
@@ -31,17 +30,17 @@ from worker.states import TERMINAL, StudyState
 if TYPE_CHECKING:
     from service.client import RefusedError, ServiceClient
     from service.exports import Format
+    from service.report import ReportFormat
 
 #: Seconds between two looks at a study that is being watched.
 _POLL_SECONDS = 0.25
 _ENDED = {state.value for state in TERMINAL}
 #: A parameter with its sign, as the service's messages write it: "by=", "at=shaft.load=0.2".
 _PARAMETER_IN_TEXT = re.compile(r"(?<![\w.-])(x|y|by|at)=(?=(\w?))")
-_PICTURES = ("svg", "png", "pdf")
 
 
 class TableFormat(StrEnum):
-    """Formats of case rows, as `service.exports` has them."""
+    """Formats of a whole study: case rows as `service.exports` writes them, and documents as `service.report` does."""
 
     CSV = "csv"
     JSON = "json"
@@ -50,6 +49,8 @@ class TableFormat(StrEnum):
     ARROW = "arrow"
     XLSX = "xlsx"
     NETCDF = "netcdf"
+    HTML = "html"
+    PDF = "pdf"
 
 
 @contextmanager
@@ -243,77 +244,26 @@ def export(
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Write all case rows of a study to a file or to standard output."""
+    """Write all case rows of a study, or a report of it, to a file or to standard output."""
+    from service.exports import Format
+
     chosen = table_format(form, file, as_json)
     with connection(server, token) as client:
-        written = write_pieces(file, client.results(study_id, chosen))
+        table = chosen in get_args(Format)
+        pieces = client.results(study_id, chosen) if table else client.report(study_id, chosen)
+        written = write_pieces(file, pieces)
     if file not in (None, "-"):
         say(f"{file}: {written} bytes")
 
 
-def table_format(form: TableFormat | None, file: str | None, as_json: bool) -> Format:
-    """The format of case rows that was asked for: by name, by ``--json``, or by the ending of the file's name."""
+def table_format(form: TableFormat | None, file: str | None, as_json: bool) -> Format | ReportFormat:
+    """The format that was asked for: by name, by ``--json``, or by the ending of the file's name."""
     from service.exports import FORMATS, format_of
+    from service.report import REPORT_FORMATS
 
     if form is not None:
-        return next(known for known in FORMATS if known == form.value)
-    return "json" if as_json else format_of(file or "") or "csv"
-
-
-def curve(
-    study_id: StudyId,
-    x: Annotated[str, typer.Option("--x", metavar="PATH", help="Axis along the curve, such as shaft.load.")],
-    y: Annotated[list[str], typer.Option("--y", metavar="RESULT", help="Result to draw; may be given again.")],
-    by: Annotated[
-        list[str] | None, typer.Option("--by", metavar="PATH", help="Axis with one curve for each value.")
-    ] = None,
-    at: Annotated[
-        list[str] | None, typer.Option("--at", metavar="PATH=VALUE", help="Value at which another axis is held.")
-    ] = None,
-    file: Annotated[
-        str | None, typer.Option("-o", "--output", metavar="FILE", help="Picture to write: .svg, .png or .pdf.")
-    ] = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
-) -> None:
-    """Show results against an axis as a table, and write them as a picture."""
-    picture = (file or "").rpartition(".")[2].lower()
-    if file is not None and picture not in _PICTURES:
-        raise WrongInputError(
-            "an option is wrong",
-            problems=[
-                Problem("--output", "no kind of picture", file, allowed="a name that ends in .svg, .png or .pdf")
-            ],
-        )
-    query = [("x", x), *(("y", name) for name in y), *(("by", path) for path in by or ())]
-    query += [("at", item) for item in at or ()]
-    with connection(server, token) as client:
-        found = client.curves(study_id, query)
-        if file is not None:
-            write_pieces(file, client.picture(study_id, query, picture))
+        return next(known for known in (*FORMATS, *REPORT_FORMATS) if known == form.value)
     if as_json:
-        write_json(found)
-    else:
-        show_curves(found)
-    if file is not None:
-        say(f"picture: {file}")
-
-
-def show_curves(found: dict[str, Any]) -> None:
-    """One table for each curve: the axis, then every result against it."""
-    from worker.kernels import OK
-
-    x = found["x"]
-    columns = [(_heading(x["path"], x["unit"]), True)]
-    columns += [(_heading(name, result["unit"]), True) for name, result in found["results"].items()]
-    columns.append(("ending", False))
-    for drawn in found["curves"]:
-        held = {**drawn["by"], **drawn["at"]}
-        title = ", ".join(f"{path} = {cell_text(value)}" for path, value in held.items())
-        rows = zip(drawn["x"], *drawn["y"].values(), drawn["endings"], strict=True)
-        show_table(title, columns, [(*row[:-1], "" if row[-1] == OK else row[-1]) for row in rows])
-
-
-def _heading(name: str, unit: str) -> str:
-    return name if unit == "1" else f"{name} [{unit}]"
+        return "json"
+    ending = (file or "").rpartition(".")[2].lower()
+    return next((known for known in REPORT_FORMATS if known == ending), None) or format_of(file or "") or "csv"

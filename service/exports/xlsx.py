@@ -25,7 +25,7 @@ _HEAD_ROWS: Final = 2
 _LONGEST_TEXT: Final = 32_767
 
 
-class _ExactSheet(Worksheet):
+class _ExactSheet(Worksheet):  # type: ignore[misc]
     """A sheet whose numbers have all their digits: the library writes 16, and a double may need 17."""
 
     def _xml_number_element(self, number: float, attributes: Any = ()) -> None:

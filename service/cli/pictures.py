@@ -1,0 +1,119 @@
+"""Commands that draw what a running service has: curve, map."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from service.cli.console import WrongInputError, cell_text, say, show_table, write_json
+from service.cli.files import write_pieces
+from service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
+from service.cli.remote import connection
+from service.spec_messages import Problem
+
+_PICTURES = ("svg", "png", "pdf")
+
+
+def file_format(file: str, allowed: tuple[str, ...], what: str) -> str:
+    """The format that the name of ``file`` ends in; raises WrongInputError when it is none of ``allowed``."""
+    form = file.rpartition(".")[2].lower()
+    if form not in allowed:
+        names = ", ".join(f".{name}" for name in allowed[:-1]) + f" or .{allowed[-1]}"
+        raise WrongInputError(
+            "an option is wrong",
+            problems=[Problem("--output", f"no kind of {what}", file, allowed=f"a name that ends in {names}")],
+        )
+    return form
+
+
+def curve(
+    study_id: StudyId,
+    x: Annotated[str, typer.Option("--x", metavar="PATH", help="Axis along the curve, such as shaft.load.")],
+    y: Annotated[list[str], typer.Option("--y", metavar="RESULT", help="Result to draw; may be given again.")],
+    by: Annotated[
+        list[str] | None, typer.Option("--by", metavar="PATH", help="Axis with one curve for each value.")
+    ] = None,
+    at: Annotated[
+        list[str] | None, typer.Option("--at", metavar="PATH=VALUE", help="Value at which another axis is held.")
+    ] = None,
+    file: Annotated[
+        str | None, typer.Option("-o", "--output", metavar="FILE", help="Picture to write: .svg, .png or .pdf.")
+    ] = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Show results against an axis as a table, and write them as a picture."""
+    picture = "" if file is None else file_format(file, _PICTURES, "picture")
+    query = [("x", x), *(("y", name) for name in y), *(("by", path) for path in by or ())]
+    query += [("at", item) for item in at or ()]
+    with connection(server, token) as client:
+        found = client.curves(study_id, query)
+        if file is not None:
+            write_pieces(file, client.picture(study_id, query, picture))
+    if as_json:
+        write_json(found)
+    else:
+        show_curves(found)
+    if file is not None:
+        say(f"picture: {file}")
+
+
+def draw_map(
+    study_id: StudyId,
+    x: Annotated[str, typer.Option("--x", metavar="PATH", help="Axis to the right, such as shaft.load.")],
+    y: Annotated[str, typer.Option("--y", metavar="PATH", help="Axis upwards, such as excitation.frequency.")],
+    z: Annotated[str, typer.Option("--z", metavar="RESULT", help="Result to draw.")],
+    at: Annotated[
+        list[str] | None, typer.Option("--at", metavar="PATH=VALUE", help="Value at which another axis is held.")
+    ] = None,
+    file: Annotated[
+        str | None, typer.Option("-o", "--output", metavar="FILE", help="Picture to write: .svg, .png or .pdf.")
+    ] = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Show one result over two axes as a table, and write it as a picture."""
+    picture = "" if file is None else file_format(file, _PICTURES, "picture")
+    query = [("x", x), ("y", y), ("z", z), *(("at", item) for item in at or ())]
+    with connection(server, token) as client:
+        found = client.map(study_id, query)
+        if file is not None:
+            write_pieces(file, client.map_picture(study_id, query, picture))
+    if as_json:
+        write_json(found)
+    else:
+        _show_map(found)
+    if file is not None:
+        say(f"picture: {file}")
+
+
+def _show_map(found: dict[str, Any]) -> None:
+    """A line for each value of y, a column for each of x."""
+    held = ", ".join(f"{path} = {cell_text(value)}" for path, value in found["at"].items())
+    title = _heading(found["z"]["name"], found["z"]["unit"]) + (f"; {held}" if held else "")
+    corner = f"{_heading(found['y']['path'], found['y']['unit'])} \\ {_heading(found['x']['path'], found['x']['unit'])}"
+    columns = [(corner, True), *((cell_text(value), True) for value in found["x"]["values"])]
+    rows = [(y, *row) for y, row in zip(found["y"]["values"], found["z"]["values"], strict=True)]
+    show_table(title, columns, rows)
+
+
+def show_curves(found: dict[str, Any]) -> None:
+    """One table for each curve: the axis, then every result against it."""
+    from worker.kernels import OK
+
+    x = found["x"]
+    columns = [(_heading(x["path"], x["unit"]), True)]
+    columns += [(_heading(name, result["unit"]), True) for name, result in found["results"].items()]
+    columns.append(("ending", False))
+    for drawn in found["curves"]:
+        held = {**drawn["by"], **drawn["at"]}
+        title = ", ".join(f"{path} = {cell_text(value)}" for path, value in held.items())
+        rows = zip(drawn["x"], *drawn["y"].values(), drawn["endings"], strict=True)
+        show_table(title, columns, [(*row[:-1], "" if row[-1] == OK else row[-1]) for row in rows])
+
+
+def _heading(name: str, unit: str) -> str:
+    return name if unit == "1" else f"{name} [{unit}]"
