@@ -50,6 +50,17 @@ def cache_folder() -> Path:
     return folder if _writable(folder) else _own_temporary_folder()
 
 
+def discard() -> None:
+    """Remove everything that lies in the cache; it is made again where it is needed.
+
+    The folders stay, since other processes may be about to write into them. What cannot be removed stays too.
+    """
+    for folder, _folders, files in os.walk(cache_folder()):
+        for name in files:
+            with contextlib.suppress(OSError):
+                os.unlink(os.path.join(folder, name))
+
+
 def is_wanted(folder: Path) -> bool:
     """Whether a cache folder is the one the user wants, not the stand-in for one that cannot be written."""
     return not folder.is_relative_to(Path(tempfile.gettempdir()) / _TEMPORARY_NAME)

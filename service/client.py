@@ -94,10 +94,11 @@ class ServiceClient:
     def __exit__(self, *_: object) -> None:
         self._http.close()
 
-    def create_study(self, spec: object, key: str | None = None) -> dict[str, Any]:
+    def create_study(self, spec: object, key: str | None = None, priority: int = 0) -> dict[str, Any]:
         """Submit a study; the same ``key`` submits it once, however often it is sent."""
         headers = {"Idempotency-Key": key or uuid.uuid4().hex}
-        return self._json("POST", "/studies", json=spec, headers=headers)
+        query = [("priority", str(priority))] if priority else []
+        return self._json("POST", "/studies", json=spec, headers=headers, params=query)
 
     def preview(self, spec: object) -> dict[str, Any]:
         """Number of cases, estimated time and size of a study that is not submitted."""
@@ -111,9 +112,9 @@ class ServiceClient:
         """A page of studies, newest first."""
         return self._json("GET", "/studies", params=list(query))
 
-    def act(self, study_id: str, verb: str) -> dict[str, Any]:
-        """Ask for a change of a study: "cancel", "pause" or "resume"."""
-        return self._json("POST", f"{_study(study_id)}:{verb}")
+    def act(self, study_id: str, verb: str, query: Query = ()) -> dict[str, Any]:
+        """Ask for a change of a study: "cancel", "pause", "resume", "retry" or "prioritize"."""
+        return self._json("POST", f"{_study(study_id)}:{verb}", params=list(query))
 
     def curves(self, study_id: str, query: Query) -> dict[str, Any]:
         """Curves of results against one axis."""

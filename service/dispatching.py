@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from service.storage.lock import DispatcherLock
 from service.storage.part import SystemClock
 from service.storage.store import Store
+from worker import kernels
 from worker.dispatcher import Dispatcher
 from worker.ports import EpochLostError, ExecutorError, StoreError
 from worker.processes import end_with_parent, ignore_interrupts, interrupts_held_back
@@ -66,12 +67,19 @@ def pool(settings: WorkerSettings) -> Executor:
     return ProcessPoolExecutor(settings.processes, chunk_timeout=settings.chunk_timeout)
 
 
+def renewed_pool(settings: WorkerSettings) -> Executor:
+    """A new pool whose processes compile every kernel anew: what lay in the cache is thrown away."""
+    kernels.discard_compiled()
+    return pool(settings)
+
+
 def run_dispatcher(
     settings: WorkerSettings,
     stopping: Callable[[], bool],
     *,
     say: Callable[[str], None] = _LOG.info,
     executor: Callable[[WorkerSettings], Executor] = pool,
+    renewed: Callable[[WorkerSettings], Executor] = renewed_pool,
 ) -> None:
     """Run every study of the database until ``stopping()``. Waits as a standby while another dispatcher is at work.
 
@@ -88,7 +96,10 @@ def run_dispatcher(
         try:
             store.purge()
             say(f"worker with {settings.processes} processes at work on {store.session.path}")
-            Dispatcher(store, executor(settings), SystemClock(), owner=owner_name()).run(stopping)
+            dispatcher = Dispatcher(
+                store, executor(settings), SystemClock(), owner=owner_name(), renew=lambda: renewed(settings)
+            )
+            dispatcher.run(stopping)
         finally:
             lock.release()
 

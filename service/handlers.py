@@ -29,6 +29,7 @@ _STORE_PROBLEMS: tuple[tuple[type[storage.StoreError], str], ...] = (
     (storage.StudyNotFound, "study-not-found"),
     (storage.IdempotencyConflict, "idempotency-conflict"),
     (storage.StudyBusy, "wrong-state"),
+    (storage.NothingToRetry, "wrong-state"),
     (storage.DatabaseFullError, "storage-full"),
     (storage.StoreError, "unavailable"),
 )

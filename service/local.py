@@ -6,10 +6,11 @@ import tempfile
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from service.dispatching import STANDBY_SECONDS, WorkerSettings, owner_name, pool
+from service.dispatching import STANDBY_SECONDS, WorkerSettings, owner_name, pool, renewed_pool
 from service.leftovers import marked, sweep
 from service.storage.lock import DispatcherLock
 from service.storage.part import SystemClock
@@ -75,9 +76,10 @@ def run_here(
                 if lock.take():
                     try:
                         runner = executor or (pool(settings) if processes else InlineExecutor())
-                        Dispatcher(store, runner, SystemClock(), owner=owner_name(), only=record.number).run(
-                            watch.ended
-                        )
+                        renew = None if executor or not processes else partial(renewed_pool, settings)
+                        Dispatcher(
+                            store, runner, SystemClock(), owner=owner_name(), only=record.number, renew=renew
+                        ).run(watch.ended)
                     finally:
                         lock.release()
                 else:

@@ -3,8 +3,10 @@
 A chunk whose process dies or runs out of time is run once more, then split in two until the case is found; a case that
 fails alone twice is given its ending and left aside, a crashed one only when a success or the end of the study shows
 that it was not the engine. Three chunks that share no case and crash with no success of the study between them show a
-fault of the engine, not of the cases: the study is held with the reason, nobody quarantined. Chunks that overlap count
-once, because one bad case explains the crash of every chunk around it.
+fault of the engine, not of the cases, and so do cases that crash alone when nothing of the study ever came through.
+The first time everything is begun again with kernels compiled anew, since those in the cache may be damaged; the second
+time the study is held with the reason. Nobody is quarantined. Chunks that overlap count once, because one bad case
+explains the crash of every chunk around it.
 """
 
 from __future__ import annotations
@@ -27,10 +29,14 @@ FAULT_CRASHES = 3
 
 @dataclass(frozen=True, slots=True)
 class Offered:
-    """A study may be run; ``chunks`` are those not done. For a study that is being worked on it only ends a pause."""
+    """A study may be run; ``chunks`` are those not done. Of two studies the one of higher ``priority`` goes first.
+
+    For a study that is being worked on it only ends a pause and tells the priority.
+    """
 
     study: int
     chunks: Sequence[Chunk] = ()
+    priority: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +69,20 @@ class Ended:
     detail: str = ""
 
 
-Event = Offered | Paused | Cancelled | Refused | Ended
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """The kernel of a study cannot be had."""
+
+    study: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """What is in flight is of no use any more: the store cannot take it. Every study has to be offered again."""
+
+
+Event = Offered | Paused | Cancelled | Refused | Ended | Broken | Lost
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,13 +143,24 @@ class Fault:
 
 
 @dataclass(frozen=True, slots=True)
+class Renew:
+    """Begin everything again with new processes, and kernels compiled anew; every study has to be offered again.
+
+    It is for the sake of ``study``, whose failures do not count; comes once for each study before its `Fault`.
+    """
+
+    study: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class Settle:
     """Nothing of the study is waiting or in flight: bring it to its end."""
 
     study: int
 
 
-Instruction = Run | Commit | PutBack | Split | Quarantine | Stop | Fault | Settle
+Instruction = Run | Commit | PutBack | Split | Quarantine | Stop | Fault | Renew | Settle
 
 
 @dataclass(slots=True)
@@ -138,9 +168,12 @@ class _Open:
     """A study that is being worked on."""
 
     waiting: deque[Chunk]
+    priority: int = 0
     running: dict[int, Chunk] = field(default_factory=dict)
     held: bool = False
     cancelled: bool = False
+    #: Whether some chunk of it came through: then the engine works.
+    proven: bool = False
     crashed: list[Chunk] = field(default_factory=list)
     #: Cases to be quarantined as crashed once a success, or the end of the study, shows that it was not the engine.
     suspects: list[Quarantine] = field(default_factory=list)
@@ -173,6 +206,8 @@ class Dispatch:
         self._open: dict[int, _Open] = {}
         self._study_of: dict[int, int] = {}
         self._next_ticket = 1
+        #: Studies for whose sake everything was begun again.
+        self._renewed: set[int] = set()
 
     @property
     def in_flight(self) -> int:
@@ -198,6 +233,10 @@ class Dispatch:
                 found = self._refused(event)
             case Ended():
                 found = self._ended(event)
+            case Broken():
+                found = self._fault(event.study, event.reason)
+            case Lost():
+                found = self._drop_all()
             case _:
                 assert_never(event)
         return found + self._fill()
@@ -207,6 +246,7 @@ class Dispatch:
         if known is None:
             known = self._open[event.study] = _Open(deque(event.chunks))
         known.held = False
+        known.priority = event.priority
         return self._settled(event.study, known)
 
     def _paused(self, event: Paused) -> list[Instruction]:
@@ -243,6 +283,7 @@ class Dispatch:
         found: list[Instruction]
         if event.fate is Fate.DONE:
             known.crashed.clear()
+            known.proven = True
             found = [Commit(event.ticket, chunk), *known.suspects]
             known.suspects.clear()
         elif known.cancelled:
@@ -261,7 +302,8 @@ class Dispatch:
         if crashed:
             known.crashed.append(chunk)
             if disjoint(known.crashed) >= FAULT_CRASHES:
-                return self._fault(number, known, event.detail)
+                reason = f"engine fault: {FAULT_CRASHES} different chunks crashed with no success between them"
+                return self._fault(number, f"{reason} ({event.detail})" if event.detail else reason)
         failed = replace(chunk, failures=chunk.failures + 1)
         if failed.failures < MAX_FAILURES:
             known.waiting.appendleft(failed)
@@ -275,11 +317,21 @@ class Dispatch:
         known.waiting.extendleft(reversed(parts))
         return [Split(chunk, parts, event.detail)]
 
-    def _fault(self, number: int, known: _Open, detail: str) -> list[Instruction]:
-        stops: list[Instruction] = [Stop(ticket) for ticket in known.running]
-        del self._open[number]
-        reason = f"engine fault: {FAULT_CRASHES} different chunks crashed with no success between them"
-        return [*stops, Fault(number, f"{reason} ({detail})" if detail else reason)]
+    def _fault(self, number: int, reason: str) -> list[Instruction]:
+        """The engine is at fault, not the cases: begin again, or the second time hold the study."""
+        if number not in self._renewed:
+            self._renewed.add(number)
+            return [*self._drop_all(), Renew(number, reason)]
+        self._renewed.remove(number)
+        known = self._open.pop(number, None)
+        stops: list[Instruction] = [] if known is None else [Stop(ticket) for ticket in known.running]
+        return [*stops, Fault(number, reason)]
+
+    def _drop_all(self) -> list[Instruction]:
+        stops: list[Instruction] = [Stop(ticket) for ticket in self._study_of]
+        self._open.clear()
+        self._study_of.clear()
+        return stops
 
     def _take(self, ticket: int) -> tuple[int, _Open, Chunk] | None:
         """Take a ticket out of flight; None when its study is not worked on any more."""
@@ -292,22 +344,30 @@ class Dispatch:
         """Let go of a study with nothing in flight: for good when nothing waits, till it is offered again when held."""
         if known.running or (known.waiting and not known.held):
             return []
+        if known.suspects and not (known.waiting or known.cancelled or known.proven) and number not in self._renewed:
+            return self._fault(number, f"engine fault: no case came through ({known.suspects[-1].detail})")
         del self._open[number]
         if known.waiting:
             return [PutBack(suspect.chunk, suspect.detail) for suspect in known.suspects]
+        self._renewed.discard(number)
         quarantined = [] if known.cancelled else known.suspects
         return [*quarantined, Settle(number)]
 
     def _fill(self) -> list[Instruction]:
-        """Start waiting chunks while there is room: of the study with the fewest in flight, the oldest of equals."""
+        """Start waiting chunks while there is room.
+
+        Those of the highest priority; of equals the study with the fewest in flight; of equals the oldest.
+        """
         found: list[Instruction] = []
         while len(self._study_of) < self.capacity:
             ready = [
-                (len(known.running), number) for number, known in self._open.items() if known.waiting and not known.held
+                (-known.priority, len(known.running), number)
+                for number, known in self._open.items()
+                if known.waiting and not known.held
             ]
             if not ready:
                 break
-            number = min(ready)[1]
+            number = min(ready)[2]
             known = self._open[number]
             ticket, self._next_ticket = self._next_ticket, self._next_ticket + 1
             chunk = known.waiting.popleft()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, assert_never
 
 from worker import dispatch
 from worker.dispatch import Dispatch
-from worker.ports import EpochLostError, KernelError
+from worker.ports import EpochLostError, KernelError, StoreFullError
 from worker.states import StudyState
 
 if TYPE_CHECKING:
@@ -29,28 +29,44 @@ HEARTBEAT_SECONDS = 5.0
 OPEN_STUDIES = 8
 #: Seconds that a study waits for its kernel before it says so: one that lies in the cache is there sooner.
 NOTE_SECONDS = 3.0
+#: Seconds before a store that took nothing is tried again: doubled each time, back to the first after a success.
+FULL_SECONDS = (2.0, 60.0)
 COMPILING = "The kernel of this study is being compiled, which happens once and can take a minute; other studies go on."
 
 
 class Dispatcher:
     """Runs every study of a store, or only study number ``only``.
 
-    The caller sees to it that there is one dispatcher at a time (a lock); the epoch makes sure of it.
+    The caller sees to it that there is one dispatcher at a time (a lock); the epoch makes sure of it. ``renew`` gives a
+    new executor that compiles its kernels anew, in the place of one whose chunks all crash.
     """
 
     def __init__(
-        self, store: Store, executor: Executor, clock: Clock, *, owner: str = "dispatcher", only: int | None = None
+        self,
+        store: Store,
+        executor: Executor,
+        clock: Clock,
+        *,
+        owner: str = "dispatcher",
+        only: int | None = None,
+        renew: Callable[[], Executor] | None = None,
     ) -> None:
         self._store = store
         self._executor = executor
         self._clock = clock
         self._owner = owner
         self._only = only
+        self._renew = renew
         self._machine = Dispatch(executor.capacity)
         self._studies: dict[int, Study] = {}
         self._ids: dict[int, str] = {}
         #: Studies that wait for their kernels, and when they began to; infinity once they say so.
         self._compiling: dict[int, float] = {}
+        self._priorities: dict[int, int] = {}
+        #: Why the store took nothing when it was last asked to; claims are still to be returned then.
+        self._full: str | None = None
+        self._full_delay = FULL_SECONDS[0]
+        self._try_again = 0.0
         self._epoch = 0
         self._next_poll = 0.0
         self._next_beat = 0.0
@@ -66,24 +82,63 @@ class Dispatcher:
                 self.step()
         finally:
             self._executor.close()
-            with suppress(EpochLostError):  # whoever took over has returned the claims already
+            # Whoever took over, or will, returns the claims.
+            with suppress(EpochLostError, StoreFullError):
                 self._store.release(self._epoch)
 
     def step(self) -> None:
-        """One turn: look for new studies and wishes when it is time, then take what the executor has done."""
+        """One turn: look for new studies and wishes when it is time, then take what the executor has done.
+
+        When the store takes nothing, what is in hand is dropped: it is computed again when there is room.
+        """
         now = self._clock.monotonic()
-        if now >= self._next_beat:
-            self._store.heartbeat(self._epoch)
-            self._next_beat = now + HEARTBEAT_SECONDS
-        if now >= self._next_poll:
-            self._poll()
-            self._next_poll = now + POLL_SECONDS
-        for outcome in self._executor.wait(POLL_SECONDS):
-            self._handle(dispatch.Ended(outcome.ticket, outcome.fate, outcome.detail), outcome.result)
+        try:
+            if now >= self._next_beat:
+                self._store.heartbeat(self._epoch)
+                self._next_beat = now + HEARTBEAT_SECONDS
+            if now >= self._next_poll:
+                self._next_poll = now + POLL_SECONDS
+                self._poll()
+            for outcome in self._executor.wait(POLL_SECONDS):
+                self._handle(dispatch.Ended(outcome.ticket, outcome.fate, outcome.detail), outcome.result)
+        except StoreFullError as error:
+            self._store_is_full(str(error))
+
+    def _store_is_full(self, reason: str) -> None:
+        if self._full is None:
+            self._try_again = self._clock.monotonic() + self._full_delay
+            self._full_delay = min(2.0 * self._full_delay, FULL_SECONDS[1])
+        self._full = reason
+        self._handle(dispatch.Lost())
+        for number in list(self._studies):
+            self._forget(number)
+
+    def _has_room(self, studies: Sequence[ActiveStudy]) -> bool:
+        """Hold every study while there is no room, and let them go on when there is; False when any has changed."""
+        shortage = self._store.shortage()
+        if self._full is not None:
+            self._store.release(self._epoch)
+            shortage = shortage or f"{self._full}; it is tried again from time to time"
+        going = any(study.state in {StudyState.QUEUED, StudyState.RUNNING} for study in studies)
+        if shortage is not None or self._clock.monotonic() < self._try_again:
+            if going:
+                self._store.hold(self._epoch, shortage or "no room")
+                if self._only is None:
+                    _LOG.error("Every study is held: %s", shortage)
+            self._full = None
+            return not going
+        if any(study.waits_for_room for study in studies):
+            self._store.let_go(self._epoch)
+            return False
+        return True
 
     def _poll(self) -> None:
         """Tell the state machine what the store says of every study; what it knows already changes nothing."""
-        for study in self._store.active_studies():
+        studies = self._store.active_studies()
+        if not self._has_room(studies):
+            studies = self._store.active_studies()
+        for study in studies:
+            self._priorities[study.number] = study.priority
             if self._only not in {None, study.number}:
                 continue
             if study.state in {StudyState.PAUSED, StudyState.CANCELLING}:
@@ -92,14 +147,20 @@ class Dispatcher:
                 wish = dispatch.Paused if study.state is StudyState.PAUSED else dispatch.Cancelled
                 self._handle(wish(study.number))
             elif study.number in self._machine.studies:
-                self._handle(dispatch.Offered(study.number))
+                self._handle(dispatch.Offered(study.number, priority=study.priority))
             elif self._may_open(study) and self._has_kernel(study):
-                self._handle(dispatch.Offered(study.number, self._store.open_chunks(study.number)))
+                chunks = self._store.open_chunks(study.number)
+                self._handle(dispatch.Offered(study.number, chunks, study.priority))
 
     def _may_open(self, study: ActiveStudy) -> bool:
-        """Studies that wait for kernels leave room for as many that have theirs."""
-        waits = study.number in self._compiling
-        return len(self._machine.studies) < OPEN_STUDIES and (waits or len(self._compiling) < OPEN_STUDIES)
+        """Studies that wait for kernels, or have a lower priority, leave room for as many others."""
+        if study.number in self._compiling:
+            return True
+        rivals = (self._machine.studies, self._compiling)
+        return all(
+            sum(self._priorities.get(number, 0) >= study.priority for number in group) < OPEN_STUDIES
+            for group in rivals
+        )
 
     def _has_kernel(self, study: ActiveStudy) -> bool:
         """Whether the study can be run now; if not, its kernel is on the way or the study is held."""
@@ -111,7 +172,7 @@ class Dispatcher:
             ready = self._executor.ready(self._studies[number])
         except KernelError as error:
             self._compiling.pop(number, None)
-            self._hold(number, str(error))
+            self._handle(dispatch.Broken(number, str(error)))
             return False
         if ready:
             self._compiling.pop(number, None)
@@ -133,6 +194,23 @@ class Dispatcher:
     def _forget(self, number: int) -> None:
         self._studies.pop(number, None)
         self._ids.pop(number, None)
+        self._compiling.pop(number, None)
+
+    def _begin_again(self, number: int, reason: str) -> None:
+        """New processes and new kernels: those in the cache may be damaged."""
+        if self._renew is None:
+            self._store.begin_again(self._epoch, number)
+            self._handle(dispatch.Broken(number, reason))
+            return
+        _LOG.error(
+            "The study %s: %s. The kernels are compiled anew, and its cases run again.",
+            self._ids.get(number, number), reason,
+        )  # fmt: skip
+        self._executor.close()
+        self._executor = self._renew()
+        self._store.begin_again(self._epoch, number)
+        for known in list(self._studies):
+            self._forget(known)
 
     def _handle(self, event: dispatch.Event, result: ChunkResult | None = None) -> None:
         """Give the event to the state machine and do what it says."""
@@ -159,6 +237,7 @@ class Dispatcher:
                 if result is None:
                     raise ValueError(f"the executor gave no result for {chunk}")
                 self._store.commit(self._epoch, chunk, result)
+                self._full_delay = FULL_SECONDS[0]
             case dispatch.PutBack(chunk=chunk, detail=detail):
                 self._store.put_back(self._epoch, chunk, detail)
             case dispatch.Split(chunk=chunk, parts=parts, detail=detail):
@@ -168,7 +247,10 @@ class Dispatcher:
             case dispatch.Stop(ticket=ticket):
                 self._executor.stop(ticket)
             case dispatch.Fault(study=number, reason=reason):
-                self._hold(number, reason)
+                in_vain = "" if self._renew is None else "; it was so again with kernels compiled anew"
+                self._hold(number, f"{reason}{in_vain}")
+            case dispatch.Renew(study=number, reason=reason):
+                self._begin_again(number, reason)
             case dispatch.Settle(study=number):
                 self._store.settle(self._epoch, number)
                 self._forget(number)

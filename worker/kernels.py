@@ -76,6 +76,7 @@ __all__ = [
     "check_law",
     "chunk_task",
     "coefficients",
+    "discard_compiled",
     "estimate_seconds_per_case",
     "fit_clutch",
     "is_compiled",
@@ -289,8 +290,10 @@ def run_task(task: ChunkTask) -> ChunkResult:
     A physical failure is an ending in the result, never an exception; what is raised here is a fault of the program.
     """
     from engine.endings import ENDING_CODES
+    from engine.faults import inject
     from engine.vibration_drive.simulate import simulate
 
+    inject(task.columns, task.count)
     batch = simulate(task.columns, task.run, cases=task.count)
     names = [ending.value for ending in ENDING_CODES]
     infos = result_infos(task.shape.model, task.shape.pendulums)
@@ -387,6 +390,13 @@ def cache_folder() -> Path:
     from engine.cache import cache_folder as engine_cache_folder
 
     return engine_cache_folder()
+
+
+def discard_compiled() -> None:
+    """Throw away every compiled kernel of this engine that lies in the cache on disk, because some may be damaged."""
+    from engine.cache import discard
+
+    discard()
 
 
 def cache_is_wanted() -> bool:

@@ -43,5 +43,8 @@ MAX_PAGE_SIZE: Final = 1_000
 MIN_TRAJECTORY_POINTS: Final = 2
 MAX_TRAJECTORY_POINTS: Final = 20_000
 
+#: Priorities of studies lie between this and its negative.
+MAX_PRIORITY: Final = 100
+
 #: Seconds in which a kernel must be compiled: many times what the largest takes on a slow, busy machine.
 LOAD_SECONDS = 3600.0

@@ -36,15 +36,24 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class ActiveStudy:
-    """A study that has not come to its end, as the dispatcher's poll sees it."""
+    """A study that has not come to its end, as the dispatcher's poll sees it.
+
+    Higher ``priority`` goes first. ``waits_for_room`` tells a paused study that goes on by itself.
+    """
 
     number: int
     id: str
     state: StudyState
+    priority: int = 0
+    waits_for_room: bool = False
 
 
 class StoreError(Exception):
     """The store refuses; the message is one plain sentence for a user."""
+
+
+class StoreFullError(StoreError):
+    """The store takes nothing more at present: no room, or its disk fails. It may be over later."""
 
 
 class EpochLostError(StoreError):
@@ -63,6 +72,7 @@ class Store(Protocol):
     """The dispatcher's side of the database. Every write is one short transaction that first checks the epoch.
 
     A method that takes ``epoch`` raises EpochLostError, and changes nothing, when the epoch is no longer the latest.
+    Any method may raise StoreFullError, and has changed nothing then.
     """
 
     def take_over(self, owner: str) -> int:
@@ -72,7 +82,7 @@ class Store(Protocol):
         """Note that the dispatcher is alive. Raises alarms when missing, never decides ownership."""
 
     def active_studies(self) -> list[ActiveStudy]:
-        """Studies that have not ended, in order of submission."""
+        """Studies that have not ended, those of the highest priority first, then in order of submission."""
 
     def study_of(self, number: int) -> Study:
         """The study to compute."""
@@ -103,6 +113,18 @@ class Store(Protocol):
 
     def fault(self, epoch: int, number: int, reason: str) -> None:
         """Hold the study with a reason and return its claims to waiting."""
+
+    def begin_again(self, epoch: int, number: int) -> None:
+        """Return every claim of this epoch to waiting, and take all blame from the study's chunks."""
+
+    def shortage(self) -> str | None:
+        """Why there is no room for more rows, as a sentence; None where there is."""
+
+    def hold(self, epoch: int, reason: str) -> None:
+        """Pause every study that is queued or running, with the reason, until `let_go`."""
+
+    def let_go(self, epoch: int) -> None:
+        """Queue again every study that `hold` paused and nobody has touched since."""
 
     def settle(self, epoch: int, number: int) -> StudyState:
         """Bring a study without open claims to its end: cancelled when that was asked for, else finished or failed."""

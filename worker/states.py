@@ -44,6 +44,7 @@ class StudyEvent(StrEnum):
     PAUSE = "pause"
     RESUME = "resume"
     CANCEL = "cancel"
+    RETRY = "retry"
     START = "start"
     FAULT = "fault"
     CANCEL_DONE = "cancel_done"
@@ -61,6 +62,8 @@ TRANSITIONS: dict[tuple[StudyState, StudyEvent], StudyState] = {
     (_S.QUEUED, _E.CANCEL): _S.CANCELLING,
     (_S.RUNNING, _E.CANCEL): _S.CANCELLING,
     (_S.PAUSED, _E.CANCEL): _S.CANCELLING,
+    (_S.FINISHED, _E.RETRY): _S.QUEUED,
+    (_S.FAILED, _E.RETRY): _S.QUEUED,
     (_S.QUEUED, _E.START): _S.RUNNING,
     (_S.RUNNING, _E.FAULT): _S.PAUSED,
     (_S.QUEUED, _E.FAULT): _S.PAUSED,

@@ -51,6 +51,7 @@ class StudySummary(Body):
     cases: int = Field(description="number of cases")
     progress: Progress
     warnings: list[str] = Field(description="what is allowed but probably not meant")
+    priority: int = Field(description="of the studies that wait, those of the highest priority go first")
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None

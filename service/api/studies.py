@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Query, Request
@@ -17,11 +16,13 @@ from service.api.document import body, problems
 from service.api.document import not_modified as documented_304
 from service.api.requests import Body, read_body, strict_query
 from service.api.respond import entity_tag, json_response, not_modified, tagged
-from service.errors import ApiError
+from service.errors import ApiError, parameter_error
 from service.preview import estimated_bytes, preview_json
 from service.spec import ParsedSpec, load_spec, parse_spec
+from service.storage.room import RESERVE_BYTES
 from service.storage.store import Store
-from worker.limits import MAX_PAGE_SIZE
+from worker.kernels import ENDING_SENTENCES, OK, WorkerEnding
+from worker.limits import MAX_PAGE_SIZE, MAX_PRIORITY
 from worker.states import StudyState
 
 router = APIRouter(tags=["studies"], dependencies=[Depends(strict_query)])
@@ -41,6 +42,15 @@ IdempotencyKey = Annotated[
         examples=["0b6e9a52-feeder"],
     ),
 ]
+Priority = Annotated[
+    int,
+    Query(
+        ge=-MAX_PRIORITY,
+        le=MAX_PRIORITY,
+        description="of the studies that wait, those of the highest priority go first",
+        examples=[10],
+    ),
+]
 
 
 def _parsed(received: Body) -> ParsedSpec:
@@ -54,29 +64,38 @@ def _parsed(received: Body) -> ParsedSpec:
     responses=problems(*_BODY_PROBLEMS, "idempotency-conflict", "storage-full"),
     openapi_extra=_SPEC_BODY,
 )
-def create_study(context: Ctx, received: SpecBody, idempotency_key: IdempotencyKey = None) -> Response:
+def create_study(
+    context: Ctx, received: SpecBody, idempotency_key: IdempotencyKey = None, priority: Priority = 0
+) -> Response:
     """Submit a study. It is queued, and its cases are run in the order of their numbers."""
     parsed = _parsed(received)
-    _require_room(context.store, parsed)
-    canonical = json.dumps(parsed.spec, sort_keys=True).encode("ascii")
-    record = context.store.create_study(
+    body_hash = hashlib.sha256(json.dumps(parsed.spec, sort_keys=True).encode("ascii")).hexdigest()
+    known = context.store.study_of_key(idempotency_key, body_hash) if idempotency_key else None
+    if known is None:
+        _require_room(context.store, parsed)
+    record = known or context.store.create_study(
         parsed.spec,
         parsed.study,
         warnings=(*parsed.warnings, *context.store.chunking.warnings(parsed.study)),
         idempotency_key=idempotency_key,
-        body_hash=hashlib.sha256(canonical).hexdigest(),
+        body_hash=body_hash,
+        priority=priority,
     )
     return json_response(views.summary(record), 202, {"Location": views.study_address(record.id)})
 
 
 def _require_room(store: Store, parsed: ParsedSpec) -> None:
     """Refuse a study whose results would not fit on the disk."""
-    needed, free = estimated_bytes(parsed.study), shutil.disk_usage(store.session.path.parent).free
-    if needed > free:
+    needed, left = estimated_bytes(parsed.study), max(store.room() - RESERVE_BYTES, 0)
+    if needed > left:
         raise ApiError(
             "storage-full",
-            f"The results would take about {needed / 1e9:.3g} GB; the database's disk has {free / 1e9:.3g} GB left.",
+            f"The results would take about {_size(needed)}; the database has room for {_size(left)} more.",
         )
+
+
+def _size(count: int) -> str:
+    return f"{count / 1e9:.3g} GB" if count >= 1e8 else f"{count / 1e6:.3g} MB"
 
 
 @router.post(
@@ -153,3 +172,35 @@ def _verb(name: str, sentence: str) -> None:
 _verb("cancel", "Stop a study for good: the cases that are done are kept, the others are not run.")
 _verb("pause", "Hold a study: no new cases are started until it is resumed.")
 _verb("resume", "Go on with a study that is held.")
+
+
+@router.post(
+    "/studies/{study_id:study}:retry",
+    status_code=202,
+    response_model=m.StudySummary,
+    responses=problems("invalid-parameter", "study-not-found", "wrong-state"),
+)
+def retry_study(
+    context: Ctx,
+    study_id: StudyId,
+    ending: Annotated[
+        list[str] | None, Query(description="only cases that ended so; may be given again", examples=[["chatter"]])
+    ] = None,
+) -> Response:
+    """Run the cases of an ended study that did not end ok again, and no others."""
+    known = [name for name in ENDING_SENTENCES if name not in {OK, WorkerEnding.CANCELLED}]
+    for name in ending or ():
+        if name not in known:
+            raise parameter_error("ending", "no ending of a failed case", name, ", ".join(known))
+    return json_response(views.summary(context.store.retry_study(study_id, ending)), 202)
+
+
+@router.post(
+    "/studies/{study_id:study}:prioritize",
+    status_code=202,
+    response_model=m.StudySummary,
+    responses=problems("invalid-parameter", "study-not-found"),
+)
+def prioritize_study(context: Ctx, study_id: StudyId, priority: Priority) -> Response:
+    """Give a study another priority."""
+    return json_response(views.summary(context.store.prioritize_study(study_id, priority)), 202)

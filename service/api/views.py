@@ -37,6 +37,7 @@ def summary(record: StudyRecord) -> dict[str, Any]:
         "cases": record.cases,
         "progress": {"total": record.cases, "done": record.done, "ok": record.ok},
         "warnings": list(record.warnings),
+        "priority": record.priority,
         "created_at": timestamp(record.created_at),
         "started_at": timestamp(record.started_at),
         "finished_at": timestamp(record.finished_at),

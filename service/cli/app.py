@@ -68,6 +68,8 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "pause": remote.pause,
         "resume": remote.resume,
         "cancel": remote.cancel,
+        "retry": remote.retry,
+        "prioritize": remote.prioritize,
         "curve": pictures.curve,
         "export": remote.export,
         "map": pictures.draw_map,

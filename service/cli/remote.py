@@ -1,4 +1,4 @@
-"""Commands that talk to a running service: submit, watch, list, pause, resume, cancel, export, curve."""
+"""Commands that talk to a running service: submit, watch, list, pause, resume, cancel, retry, export, curve."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ from service.cli.console import (
 from service.cli.files import read_spec, write_pieces
 from service.cli.options import DEFAULT_SERVER, JsonFlag, OutputFile, Server, SpecFile, StudyId, Token
 from service.spec_messages import Problem
+from worker.limits import MAX_PRIORITY
 from worker.states import TERMINAL, StudyState
 
 if TYPE_CHECKING:
-    from service.client import RefusedError, ServiceClient
+    from service.client import Query, RefusedError, ServiceClient
     from service.exports import Format
     from service.report import ReportFormat
 
@@ -37,6 +38,11 @@ _POLL_SECONDS = 0.25
 _ENDED = {state.value for state in TERMINAL}
 #: A parameter with its sign, as the service's messages write it: "by=", "at=shaft.load=0.2".
 _PARAMETER_IN_TEXT = re.compile(r"(?<![\w.-])(x|y|by|at)=(?=(\w?))")
+
+PriorityOption = Annotated[
+    int,
+    typer.Option(min=-MAX_PRIORITY, max=MAX_PRIORITY, help="The highest goes first of those that wait."),
+]
 
 
 class TableFormat(StrEnum):
@@ -107,6 +113,7 @@ def submit(
     key: Annotated[
         str | None, typer.Option("--key", metavar="KEY", help="Idempotency key: the same key submits the study once.")
     ] = None,
+    priority: PriorityOption = 0,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -114,7 +121,7 @@ def submit(
     """Submit a study to the service and print its id."""
     data = read_spec(spec)
     with connection(server, token) as client:
-        study = client.create_study(data, key)
+        study = client.create_study(data, key, priority)
         say(*(f"warning: {warning}" for warning in study.get("warnings", ())))
         if wait:
             study = follow(client, study["id"])
@@ -215,9 +222,9 @@ def _pages(client: ServiceClient, state: StudyState | None, limit: int) -> Itera
             return
 
 
-def _act(study_id: str, verb: str, server: str, token: str | None, as_json: bool) -> None:
+def _act(study_id: str, verb: str, server: str, token: str | None, as_json: bool, query: Query = ()) -> None:
     with connection(server, token) as client:
-        study = client.act(study_id, verb)
+        study = client.act(study_id, verb, query)
     _show_study(study, as_json)
 
 
@@ -234,6 +241,33 @@ def pause(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = Non
 def resume(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
     """Go on with a study that is held."""
     _act(study_id, "resume", server, token, as_json)
+
+
+def retry(
+    study_id: StudyId,
+    ending: Annotated[
+        list[str] | None,
+        typer.Option("--ending", metavar="ENDING", help="Only cases that ended so; may be given again."),
+    ] = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Run the cases of an ended study that did not end ok again, and no others."""
+    _act(study_id, "retry", server, token, as_json, [("ending", name) for name in ending or ()])
+
+
+def prioritize(
+    study_id: StudyId,
+    priority: Annotated[
+        int, typer.Argument(min=-MAX_PRIORITY, max=MAX_PRIORITY, help="The new priority; 0 unless given before.")
+    ],
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Give a study another priority: of the studies that wait, the highest goes first."""
+    _act(study_id, "prioritize", server, token, as_json, [("priority", str(priority))])
 
 
 def export(

@@ -1,12 +1,13 @@
 """What can go wrong with the database, each in one plain sentence."""
 
-from worker.ports import StoreError
+from worker.ports import StoreError, StoreFullError
 
 __all__ = [
     "DatabaseBusyError",
     "DatabaseError",
     "DatabaseFullError",
     "IdempotencyConflict",
+    "NothingToRetry",
     "PageTokenError",
     "SchemaError",
     "StoreError",
@@ -27,7 +28,7 @@ class DatabaseBusyError(DatabaseError):
     """Another process kept the database for longer than the busy timeout."""
 
 
-class DatabaseFullError(DatabaseError):
+class DatabaseFullError(DatabaseError, StoreFullError):
     """The disk has no room, or does not take what is written."""
 
 
@@ -41,6 +42,10 @@ class StudyNotFound(StoreError):  # noqa: N818 - the name callers read
 
 class StudyBusy(StoreError):  # noqa: N818
     """The study has not come to its end, so it cannot be deleted."""
+
+
+class NothingToRetry(StoreError):  # noqa: N818
+    """The study has no case that could be run again as asked."""
 
 
 class IdempotencyConflict(StoreError):  # noqa: N818

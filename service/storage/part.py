@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 
 from service.storage.errors import StudyNotFound
-from service.storage.tables import STUDIES
+from service.storage.tables import DISPATCHER, STUDIES
+from worker.ports import EpochLostError
 from worker.states import StudyEvent, StudyState, follow
 
 if TYPE_CHECKING:
@@ -61,8 +62,17 @@ class Part:
             raise StudyNotFound(study_id)
         return found
 
+    def _own(self, connection: sa.Connection, epoch: int) -> None:
+        """Raise EpochLostError when the epoch is not the latest any more."""
+        latest = connection.execute(sa.select(DISPATCHER.c.epoch).with_for_update()).scalar_one_or_none()
+        if latest != epoch:
+            raise EpochLostError(f"another dispatcher has taken over (epoch {latest}, this one has {epoch})")
+
     def _move(self, connection: sa.Connection, number: int, event: StudyEvent, reason: str | None = None) -> StudyState:
-        """Take the study through ``event``; raises TransitionError where the table of states has no such step."""
+        """Take the study through ``event``; raises TransitionError where the table of states has no such step.
+
+        It waits for nothing by itself afterwards.
+        """
         before = StudyState(
             connection.execute(
                 sa.select(STUDIES.c.state).where(STUDIES.c.number == number).with_for_update()
@@ -71,10 +81,17 @@ class Part:
         after = follow(before, event)
         if after is before:
             return after
-        values: dict[str, Any] = {"state": after.value, "revision": STUDIES.c.revision + 1, "reason": reason}
+        values: dict[str, Any] = {
+            "state": after.value,
+            "revision": STUDIES.c.revision + 1,
+            "reason": reason,
+            "waits_for": None,
+        }
         if after is StudyState.RUNNING:
             values["started_at"] = sa.func.coalesce(STUDIES.c.started_at, self._now())
         if after.terminal:
             values["finished_at"] = self._now()
+        elif before.terminal:
+            values["finished_at"] = None
         connection.execute(sa.update(STUDIES).where(STUDIES.c.number == number).values(values))
         return after

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from service.storage.part import moment, optional_moment
+from worker.states import StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from datetime import datetime
 
     import numpy as np
+    import sqlalchemy as sa
     from numpy.typing import NDArray
 
     from worker.kernels import ResultInfo
-    from worker.states import StudyState
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +27,7 @@ class StudyRecord:
 
     ``number`` counts studies in order of submission; ``id`` is the public name. ``done`` counts cases with an ending,
     ``ok`` those that ended ok. ``reason`` says why the study is held or failed. ``revision`` rises with every change of
-    the record or its rows: together with ``id`` it makes an ETag.
+    the record or its rows: together with ``id`` it makes an ETag. Studies of higher ``priority`` go first.
     """
 
     number: int
@@ -40,6 +44,7 @@ class StudyRecord:
     engine_version: str
     physics_hash: str
     warnings: tuple[str, ...]
+    priority: int
     revision: int
     created_at: datetime
     started_at: datetime | None
@@ -162,3 +167,28 @@ class CheckReport:
 def split_flags(flags: str) -> tuple[str, ...]:
     """The stored flags of one case as a tuple of names."""
     return tuple(flags.split(",")) if flags else ()
+
+
+def record_of(row: sa.Row[Any]) -> StudyRecord:
+    """The record in a row of `RECORD_COLUMNS`."""
+    return StudyRecord(
+        number=row.number,
+        id=row.id,
+        name=row.name,
+        model=row.model,
+        pendulums=row.pendulums,
+        state=StudyState(row.state),
+        reason=row.reason,
+        cases=row.cases,
+        done=row.done,
+        ok=row.ok,
+        chunk_cases=row.chunk_cases,
+        engine_version=row.engine_version,
+        physics_hash=row.physics_hash,
+        warnings=tuple(json.loads(row.warnings)),
+        priority=row.priority,
+        revision=row.revision,
+        created_at=moment(row.created_at),
+        started_at=optional_moment(row.started_at),
+        finished_at=optional_moment(row.finished_at),
+    )

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 
 from service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy
-from service.storage.part import Part, moment, optional_moment
+from service.storage.part import Part
 from service.storage.progress import RECENT_CHUNKS, FinishedChunk, estimate
-from service.storage.records import Progress, StudyPage, StudyRecord
+from service.storage.records import Progress, StudyPage, StudyRecord, record_of
 from service.storage.tables import CHUNKS, ENDINGS, IDEMPOTENCY_KEYS, RECORD_COLUMNS, STUDIES, results_table
 from worker import kernels
 from worker.chunking import Chunking, spans
@@ -50,6 +50,7 @@ class Studies(Part):
         idempotency_key: str | None = None,
         body_hash: str = "",
         warnings: Sequence[str] = (),
+        priority: int = 0,
     ) -> StudyRecord:
         """Accept a study: the study and its chunks in one transaction.
 
@@ -72,6 +73,7 @@ class Studies(Part):
             "spec": json.dumps(spec, allow_nan=False),
             "study": json.dumps(study.to_json(), allow_nan=False),
             "warnings": json.dumps(list(warnings)),
+            "priority": priority,
             "revision": 1,
             "created_at": self._now(),
         }
@@ -94,12 +96,12 @@ class Studies(Part):
                         key=idempotency_key, body_hash=body_hash, study=number, created_at=values["created_at"]
                     )
                 )
-            return _record(connection.execute(sa.select(*RECORD_COLUMNS).where(STUDIES.c.number == number)).one())
+            return record_of(connection.execute(sa.select(*RECORD_COLUMNS).where(STUDIES.c.number == number)).one())
 
     def get_study(self, study_id: str) -> StudyRecord:
         """The study of that id; raises StudyNotFound."""
         with self.session.read() as connection:
-            return _record(self._row(connection, study_id, *RECORD_COLUMNS))
+            return record_of(self._row(connection, study_id, *RECORD_COLUMNS))
 
     def spec(self, study_id: str) -> dict[str, Any]:
         """The user's own spec, as it was given; raises StudyNotFound."""
@@ -134,7 +136,7 @@ class Studies(Part):
             query = query.where(STUDIES.c.state == state.value)
         with self.session.read() as connection:
             rows = connection.execute(query.order_by(STUDIES.c.number.desc()).limit(size + 1)).all()
-        records = tuple(_record(row) for row in rows[:size])
+        records = tuple(record_of(row) for row in rows[:size])
         return StudyPage(records, str(records[-1].number) if len(rows) > size else None)
 
     def progress(self, study_id: str) -> Progress:
@@ -161,7 +163,7 @@ class Studies(Part):
         return Progress(state, row.cases, row.done, row.ok, dict(endings), rate, left if going else None)
 
     def pause_study(self, study_id: str) -> StudyRecord:
-        """Hold the study; raises StudyNotFound, TransitionError when it has ended."""
+        """Hold the study until it is resumed; raises StudyNotFound, TransitionError when it has ended."""
         return self._wish(study_id, StudyEvent.PAUSE)
 
     def resume_study(self, study_id: str) -> StudyRecord:
@@ -174,9 +176,31 @@ class Studies(Part):
 
     def _wish(self, study_id: str, event: StudyEvent) -> StudyRecord:
         with self.session.write() as connection:
+            row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.waits_for)
+            self._move(connection, row.number, event)
+            if event is StudyEvent.PAUSE and row.waits_for is not None:  # it was paused, but not by the user
+                connection.execute(
+                    sa.update(STUDIES)
+                    .where(STUDIES.c.number == row.number)
+                    .values(waits_for=None, reason=None, revision=STUDIES.c.revision + 1)
+                )
+            return record_of(self._row(connection, study_id, *RECORD_COLUMNS))
+
+    def prioritize_study(self, study_id: str, priority: int) -> StudyRecord:
+        """Give the study another priority: of studies that wait, the highest goes first; raises StudyNotFound."""
+        with self.session.write() as connection:
             number = self._row(connection, study_id, STUDIES.c.number).number
-            self._move(connection, number, event)
-            return _record(self._row(connection, study_id, *RECORD_COLUMNS))
+            connection.execute(
+                sa.update(STUDIES)
+                .where(STUDIES.c.number == number, STUDIES.c.priority != priority)
+                .values(priority=priority, revision=STUDIES.c.revision + 1)
+            )
+            return record_of(self._row(connection, study_id, *RECORD_COLUMNS))
+
+    def study_of_key(self, idempotency_key: str, body_hash: str) -> StudyRecord | None:
+        """The study that was submitted with that key; raises IdempotencyConflict when its body was another."""
+        with self.session.read() as connection:
+            return _study_of_key(connection, idempotency_key, body_hash)
 
     def delete_study(self, study_id: str) -> None:
         """Delete an ended study with its rows; raises StudyNotFound, StudyBusy when it has not ended."""
@@ -223,33 +247,10 @@ def _study_of_key(connection: sa.Connection, key: str, body_hash: str) -> StudyR
         return None
     if row.body_hash != body_hash:
         raise IdempotencyConflict(f"the idempotency key {key!r} was already used with another body")
-    return _record(row)
+    return record_of(row)
 
 
 def _number_of(token: str) -> int:
     if not (token.isascii() and token.isdigit() and len(token) < 19):
         raise PageTokenError(f"{token[:40]!r} is no page token of this list")
     return int(token)
-
-
-def _record(row: sa.Row[Any]) -> StudyRecord:
-    return StudyRecord(
-        number=row.number,
-        id=row.id,
-        name=row.name,
-        model=row.model,
-        pendulums=row.pendulums,
-        state=StudyState(row.state),
-        reason=row.reason,
-        cases=row.cases,
-        done=row.done,
-        ok=row.ok,
-        chunk_cases=row.chunk_cases,
-        engine_version=row.engine_version,
-        physics_hash=row.physics_hash,
-        warnings=tuple(json.loads(row.warnings)),
-        revision=row.revision,
-        created_at=moment(row.created_at),
-        started_at=optional_moment(row.started_at),
-        finished_at=optional_moment(row.finished_at),
-    )

@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from worker import kernels
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0001"
+HEAD_REVISION = "0003"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -43,11 +43,20 @@ STUDIES = sa.Table(
     sa.Column("finished_at", sa.BigInteger),
     # Set at once when a study is deleted; its rows then go in short transactions, and this row goes last.
     sa.Column("deleted_at", sa.BigInteger),
+    # Of two studies the one with the higher number goes first.
+    sa.Column("priority", sa.Integer, nullable=False, server_default="0"),
+    # What a paused study waits for by itself (`WAITS_FOR_ROOM`); NULL where it waits for somebody to resume it.
+    sa.Column("waits_for", sa.String(12)),
     sqlite_autoincrement=True,
 )
 
+#: What a study waits for that the dispatcher holds while the disk is full.
+WAITS_FOR_ROOM = "room"
+
 #: The columns of a `StudyRecord`: without the texts that can be long.
-RECORD_COLUMNS = tuple(column for column in STUDIES.c if column.name not in {"spec", "study", "deleted_at"})
+RECORD_COLUMNS = tuple(
+    column for column in STUDIES.c if column.name not in {"spec", "study", "deleted_at", "waits_for"}
+)
 
 CHUNKS = sa.Table(
     "chunks",

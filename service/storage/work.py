@@ -12,10 +12,18 @@ import sqlalchemy as sa
 
 from service.storage.part import Part, moment
 from service.storage.records import DispatcherRecord
-from service.storage.tables import CHUNKS, DISPATCHER, ENDINGS, KEY_COLUMNS, STUDIES, results_table
+from service.storage.tables import (
+    CHUNKS,
+    DISPATCHER,
+    ENDINGS,
+    KEY_COLUMNS,
+    STUDIES,
+    WAITS_FOR_ROOM,
+    results_table,
+)
 from worker import kernels
 from worker.kernels import ChunkResult
-from worker.ports import ActiveStudy, Chunk, EpochLostError
+from worker.ports import ActiveStudy, Chunk
 from worker.states import TERMINAL, StudyEvent, StudyState
 from worker.study import Study
 
@@ -55,11 +63,6 @@ class Work(Part):
             return None
         return DispatcherRecord(row.epoch, row.owner, moment(row.started_at), moment(row.heartbeat_at))
 
-    def _own(self, connection: sa.Connection, epoch: int) -> None:
-        latest = connection.execute(sa.select(DISPATCHER.c.epoch).with_for_update()).scalar_one_or_none()
-        if latest != epoch:
-            raise EpochLostError(f"another dispatcher has taken over (epoch {latest}, this one has {epoch})")
-
     def heartbeat(self, epoch: int) -> None:
         """Note that the dispatcher is alive."""
         with self.session.write() as connection:
@@ -73,13 +76,18 @@ class Work(Part):
             connection.execute(sa.update(CHUNKS).where(CLAIMED).values(_WAITING))
 
     def active_studies(self) -> list[ActiveStudy]:
-        """Studies that have not ended, in order of submission."""
+        """Studies that have not ended, those of the highest priority first, then in order of submission."""
         c = STUDIES.c
         with self.session.read() as connection:
             rows = connection.execute(
-                sa.select(c.number, c.id, c.state).where(c.state.not_in(_TERMINAL)).order_by(c.number)
+                sa.select(c.number, c.id, c.state, c.priority, c.waits_for)
+                .where(c.state.not_in(_TERMINAL))
+                .order_by(c.priority.desc(), c.number)
             ).all()
-        return [ActiveStudy(row.number, row.id, StudyState(row.state)) for row in rows]
+        return [
+            ActiveStudy(row.number, row.id, StudyState(row.state), row.priority, row.waits_for == WAITS_FOR_ROOM)
+            for row in rows
+        ]
 
     def study_of(self, number: int) -> Study:
         """The study to compute."""
@@ -236,6 +244,15 @@ class Work(Part):
             state = connection.execute(sa.select(STUDIES.c.state).where(STUDIES.c.number == number)).scalar_one()
             if StudyState(state) in {StudyState.QUEUED, StudyState.RUNNING}:
                 self._move(connection, number, StudyEvent.FAULT, reason)
+
+    def begin_again(self, epoch: int, number: int) -> None:
+        """Return every claim of this epoch to waiting, and take all blame from the study's chunks."""
+        with self.session.write() as connection:
+            self._own(connection, epoch)
+            connection.execute(sa.update(CHUNKS).where(CLAIMED).values(_WAITING))
+            connection.execute(
+                sa.update(CHUNKS).where(CHUNKS.c.study == number, CHUNKS.c.state != "done").values(failures=0)
+            )
 
     def settle(self, epoch: int, number: int) -> StudyState:
         """Bring a study without open claims to its end: cancelled when that was asked for, else finished or failed."""

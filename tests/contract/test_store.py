@@ -5,6 +5,7 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -76,7 +77,8 @@ def test_a_study_comes_back_as_it_was_given(store: Store) -> None:
 
 
 def test_unknown_studies_are_not_found(store: Store) -> None:
-    for ask in (store.get_study, store.spec, store.study, store.progress, store.cancel_study, store.delete_study):
+    asked = (store.get_study, store.spec, store.study, store.progress, store.cancel_study, store.delete_study)
+    for ask in (*asked, partial(store.prioritize_study, priority=1)):
         with pytest.raises(StudyNotFound, match="st_nothing"):
             ask("st_nothing")
     with pytest.raises(StudyNotFound):
@@ -220,6 +222,9 @@ def test_a_new_epoch_takes_over_and_the_old_one_can_do_nothing(store: Store) -> 
         lambda: store.split(old, chunk, [], ""),
         lambda: store.quarantine(old, chunk, "crashed", ""),
         lambda: store.fault(old, record.number, ""),
+        lambda: store.begin_again(old, record.number),
+        lambda: store.hold(old, "no room"),
+        lambda: store.let_go(old),
         lambda: store.settle(old, record.number),
         lambda: store.heartbeat(old),
         lambda: store.release(old),
@@ -316,6 +321,57 @@ def test_a_fault_holds_the_study_without_blame(store: Store) -> None:
     assert store.open_chunks(record.number) == chunks
     assert store.resume_study(record.id).reason is None
     assert store.claim(epoch, chunks) == chunks
+
+
+def test_to_begin_again_returns_every_claim_and_takes_the_blame_from_one_study(store: Store) -> None:
+    record, other = create(store), create(store)
+    epoch = store.take_over("test")
+    for study in (record, other):
+        chunks = store.open_chunks(study.number)
+        store.claim(epoch, chunks)
+        store.put_back(epoch, Chunk(study.number, 0, 10, failures=1), "")
+    store.begin_again(epoch, record.number)
+    assert store.get_study(record.id).state is StudyState.RUNNING
+    assert [chunk.failures for chunk in store.open_chunks(record.number)] == [0, 0, 0]
+    assert [chunk.failures for chunk in store.open_chunks(other.number)] == [1, 0, 0]
+    for study in (record, other):
+        assert len(store.claim(epoch, store.open_chunks(study.number))) == 3
+
+
+def test_studies_are_held_while_there_is_no_room_and_go_on_unless_somebody_chose_otherwise(store: Store) -> None:
+    queued, running, paused, stays, cancelled = (create(store, name=str(number)) for number in range(5))
+    epoch = store.take_over("test")
+    store.claim(epoch, store.open_chunks(running.number)[:1])
+    store.pause_study(paused.id)
+    store.hold(epoch, "the disk is full")
+    for study in (queued, running, stays, cancelled):
+        held = store.get_study(study.id)
+        assert (held.state, held.reason) == (StudyState.PAUSED, "the disk is full")
+    assert [study.waits_for_room for study in store.active_studies()] == [True, True, False, True, True]
+    assert store.pause_study(stays.id).reason is None
+    store.cancel_study(cancelled.id)
+    store.let_go(epoch)
+    states = {study.number: study.state for study in store.active_studies()}
+    assert states == {
+        queued.number: StudyState.QUEUED,
+        running.number: StudyState.QUEUED,
+        paused.number: StudyState.PAUSED,
+        stays.number: StudyState.PAUSED,
+        cancelled.number: StudyState.CANCELLING,
+    }
+    assert store.get_study(queued.id).reason is None
+
+
+def test_the_highest_priority_comes_first(store: Store) -> None:
+    low, usual, high, late = (store.create_study(SPEC, fakes.study(5), priority=priority) for priority in (-1, 0, 5, 0))
+    order = [low.number, usual.number, high.number, late.number]
+    active = store.active_studies()
+    assert [study.number for study in active] == [order[2], order[1], order[3], order[0]]
+    assert [study.priority for study in active] == [5, 0, 0, -1]
+    changed = store.prioritize_study(low.id, 9)
+    assert (changed.priority, changed.revision) == (9, low.revision + 1)
+    assert store.prioritize_study(low.id, 9).revision == changed.revision
+    assert store.active_studies()[0].number == low.number
 
 
 @pytest.mark.parametrize(("ending", "state"), [("ok", StudyState.FINISHED), ("diverged", StudyState.FAILED)])

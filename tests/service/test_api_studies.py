@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from dataclasses import replace
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
@@ -12,6 +11,8 @@ import pytest
 
 from service.api import models as m
 from service.api.examples import SPEC, SPEC_TOML
+from service.storage.room import RESERVE_BYTES
+from service.storage.store import Store
 
 if TYPE_CHECKING:
     from conftest import Service
@@ -176,8 +177,46 @@ def test_an_unknown_study_is_a_problem(service: Service, path: str) -> None:
 def test_a_study_that_does_not_fit_on_the_disk_is_refused(
     service: Service, spec: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    full = shutil._ntuple_diskusage(10**9, 10**9 - 10_000, 10_000)
-    monkeypatch.setattr("service.api.studies.shutil.disk_usage", lambda _: full)
+    accepted = service.submit(None, **{"Idempotency-Key": "before"})
+    monkeypatch.setattr(Store, "room", lambda _: RESERVE_BYTES + 10_000)
     response = service.http.post(STUDIES, json={**spec, "axes": [{"path": "shaft.load", "linspace": [0, 1, 1000]}]})
     assert (response.status_code, response.json()["type"]) == (507, "/problems/storage-full")
+    assert "room for 0.01 MB more" in response.json()["detail"]
     assert service.submit()
+    monkeypatch.setattr(Store, "room", lambda _: 0)
+    assert service.http.post(STUDIES, json=SPEC).status_code == 507
+    assert service.submit(None, **{"Idempotency-Key": "before"}) == accepted, "it was accepted before"
+
+
+def test_failed_cases_are_run_again(service: Service) -> None:
+    study_id = service.submit()
+    address = f"{STUDIES}/{study_id}:retry"
+    assert service.http.post(address).status_code == 409
+    service.fill(study_id)
+    unknown = service.http.post(address, params={"ending": "bored"})
+    assert unknown.status_code == 422
+    assert "timed_out" in unknown.json()["errors"][0]["allowed"]
+    none = service.http.post(address, params={"ending": ["crashed", "timed_out"]})
+    assert (none.status_code, none.json()["type"]) == (409, "/problems/wrong-state")
+    assert "ended as crashed or timed_out" in none.json()["detail"]
+    again = service.http.post(address, params={"ending": ["chatter"]})
+    m.StudySummary.model_validate(again.json())
+    assert (again.status_code, again.json()["state"]) == (202, "queued")
+    assert again.json()["progress"] == {"total": 9, "done": 8, "ok": 8}
+    assert [row["case"] for row in service.get(f"/studies/{study_id}/cases")["cases"]] == [0, 1, 2, 3, 5, 6, 7, 8]
+    service.fill(study_id)
+    assert service.get(f"/studies/{study_id}")["progress"]["done"] == 9
+
+
+def test_priorities_are_given_and_changed(service: Service) -> None:
+    made = service.http.post(STUDIES, json=SPEC, params={"priority": 7})
+    assert (made.status_code, made.json()["priority"]) == (202, 7)
+    address = f"{STUDIES}/{made.json()['id']}:prioritize"
+    changed = service.http.post(address, params={"priority": -3})
+    assert (changed.status_code, changed.json()["priority"]) == (202, -3)
+    assert service.get(f"/studies/{made.json()['id']}")["priority"] == -3
+    for value in ("101", "high", ""):
+        refused = service.http.post(address, params={"priority": value})
+        assert refused.status_code == 422
+        assert refused.json()["errors"][0]["parameter"] == "priority"
+    assert service.http.post(address).status_code == 422

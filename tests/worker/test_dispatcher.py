@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partialmethod
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,10 @@ from service.storage.records import StudyRecord
 from service.storage.store import Store
 from tests.worker import fakes
 from worker.chunking import Chunking
-from worker.dispatcher import COMPILING, HEARTBEAT_SECONDS, NOTE_SECONDS, POLL_SECONDS, Dispatcher
+from worker.dispatcher import COMPILING, HEARTBEAT_SECONDS, NOTE_SECONDS, OPEN_STUDIES, POLL_SECONDS, Dispatcher
 from worker.executors.inline import InlineExecutor
 from worker.kernels import ChunkResult, ChunkTask
-from worker.ports import EpochLostError, Executor, KernelError
+from worker.ports import EpochLostError, Executor, KernelError, Outcome, StoreFullError
 from worker.states import StudyState
 from worker.study import Study
 
@@ -108,6 +109,142 @@ def test_an_engine_fault_holds_the_study_until_it_is_resumed(store: Store, caplo
     store.resume_study(record.id)
     work(store, InlineExecutor(fakes.run))
     assert store.get_study(record.id).state is StudyState.FINISHED
+
+
+def test_kernels_are_compiled_anew_once_before_a_study_is_held(store: Store, caplog: pytest.LogCaptureFixture) -> None:
+    record, other = submit(store), submit(store, 8)
+    renewals: list[str] = []
+
+    def renew(run: Callable[[ChunkTask], ChunkResult]) -> Callable[[], Executor]:
+        def renewed() -> Executor:
+            renewals.append("once")
+            return InlineExecutor(run)
+
+        return renewed
+
+    Dispatcher(store, InlineExecutor(fakes.raising), SystemClock(), renew=renew(fakes.run)).run(
+        lambda: not store.active_studies()
+    )
+    assert renewals == ["once"]
+    assert "The kernels are compiled anew" in caplog.messages[0]
+    for study, cases in ((record, 20), (other, 8)):
+        assert endings(store, study) == dict.fromkeys(range(cases), "ok")
+        assert store.get_study(study.id).reason is None
+    last = submit(store)
+    Dispatcher(store, InlineExecutor(fakes.raising), SystemClock(), renew=renew(fakes.raising)).run(
+        lambda: store.get_study(last.id).state is StudyState.PAUSED
+    )
+    assert renewals == ["once", "once"]
+    held = store.get_study(last.id)
+    assert held.done == 0
+    assert (held.reason or "").endswith(
+        "(ZeroDivisionError: no such thing); it was so again with kernels compiled anew"
+    )
+
+
+class Prompt(InlineExecutor):
+    """An executor that never waits: the clock is the test's."""
+
+    def wait(self, timeout: float) -> list[Outcome]:
+        """See the class."""
+        return super().wait(0.0)
+
+
+class Tank:
+    """A store's disk that a test fills and empties: stands before `Store`."""
+
+    def __init__(self, store: Store) -> None:
+        self.store = store
+        self.full = False
+        self.short: str | None = None
+        self.failures = 0
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self.store, name)
+
+    def _write(self, name: str, *given: object) -> object:
+        if self.full:
+            self.failures += 1
+            raise StoreFullError("the disk is full")
+        return getattr(self.store, name)(*given)
+
+    def shortage(self) -> str | None:
+        """See `Store`."""
+        return self.short
+
+    commit = partialmethod(_write, "commit")
+    claim = partialmethod(_write, "claim")
+    release = partialmethod(_write, "release")
+    hold = partialmethod(_write, "hold")
+    heartbeat = partialmethod(_write, "heartbeat")
+
+
+def test_studies_are_held_before_the_disk_is_full_and_go_on_by_themselves(store: Store) -> None:
+    tank, clock, record = Tank(store), fakes.HandClock(), submit(store)
+    seen: list[tuple[StudyState, str | None, int]] = []
+
+    def turn() -> bool:
+        clock.seconds += POLL_SECONDS
+        now = store.get_study(record.id)
+        seen.append((now.state, now.reason, now.done))
+        if now.done >= 8:
+            tank.short = "no room" if len(seen) < 30 else None
+        return now.state.terminal
+
+    Dispatcher(tank, Prompt(fakes.run), clock).run(turn)  # type: ignore[arg-type]
+    held = [done for state, reason, done in seen if (state, reason) == (StudyState.PAUSED, "no room")]
+    assert len(held) > 10
+    assert set(held) <= {8, 12}, "what was being run is stored, nothing else is started"
+    assert seen[-1][0] is StudyState.FINISHED
+    assert seen[-1][1] is None
+    assert endings(store, record) == dict.fromkeys(range(20), "ok")
+
+
+def test_a_store_that_takes_nothing_is_tried_again_and_nothing_is_lost(store: Store) -> None:
+    tank, clock, record, paused = Tank(store), fakes.HandClock(), submit(store), submit(store)
+    store.pause_study(paused.id)
+    seen: list[tuple[float, StudyState, str | None]] = []
+
+    def turn() -> bool:
+        clock.seconds += POLL_SECONDS
+        now = store.get_study(record.id)
+        seen.append((clock.seconds, now.state, now.reason))
+        if now.done >= 8 and len(seen) < 40:
+            tank.full = not tank.full if len(seen) > 30 else len(seen) > 3
+        elif len(seen) >= 40:
+            tank.full = False
+        return now.state.terminal
+
+    Dispatcher(tank, Prompt(fakes.run), clock).run(turn)  # type: ignore[arg-type]
+    assert tank.failures > 3
+    reasons = {reason for _, state, reason in seen if state is StudyState.PAUSED}
+    assert reasons == {"the disk is full; it is tried again from time to time"}
+    assert endings(store, record) == dict.fromkeys(range(20), "ok")
+    assert store.get_study(paused.id).state is StudyState.PAUSED
+
+
+def test_the_highest_priority_goes_first_however_many_wait(store: Store) -> None:
+    low = [submit(store, 16) for _ in range(OPEN_STUDIES + 2)]
+    ended: list[str] = []
+
+    def run(task: ChunkTask) -> ChunkResult:
+        if not ended:
+            urgent = store.create_study({}, fakes.study(8), priority=3)
+            store.prioritize_study(low[-1].id, 2)
+            ended.append(urgent.id)
+        return fakes.run(task)
+
+    clock = fakes.HandClock()
+
+    def turn() -> bool:
+        clock.seconds += POLL_SECONDS
+        return not store.active_studies()
+
+    Dispatcher(store, Prompt(run), clock).run(turn)
+    finished = {study.id: study.finished_at for study in store.list_studies().studies}
+    assert None not in finished.values()
+    order = sorted(finished, key=lambda study: finished[study])  # type: ignore[arg-type,return-value]
+    assert order[:2] == [ended[0], low[-1].id]
 
 
 def test_cancelling_keeps_what_is_done(store: Store) -> None:

@@ -5,8 +5,9 @@ import pytest
 from worker.states import ALREADY, TERMINAL, TRANSITIONS, StudyEvent, StudyState, TransitionError, follow
 
 
-def test_ends_are_ends() -> None:
-    assert not [state for state, _ in TRANSITIONS if state in TERMINAL]
+def test_ends_are_ends_unless_failed_cases_are_run_again() -> None:
+    assert {event for state, event in TRANSITIONS if state in TERMINAL} == {StudyEvent.RETRY}
+    assert StudyState.CANCELLED not in {state for state, _ in TRANSITIONS}
 
 
 def test_every_state_is_reached_and_every_other_leads_to_an_end() -> None:

@@ -1,0 +1,157 @@
+"""Running the failed cases of a study again, and no others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise, starmap
+from typing import TYPE_CHECKING, Any
+
+import sqlalchemy as sa
+
+from service.storage.errors import NothingToRetry
+from service.storage.part import Part
+from service.storage.records import StudyRecord, record_of
+from service.storage.tables import CHUNKS, ENDINGS, RECORD_COLUMNS, STUDIES, results_table
+from worker import kernels
+from worker.chunking import MAX_CHUNKS
+from worker.states import StudyEvent, StudyState, follow
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+
+#: First case and number of cases that follow one another.
+Run = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class _Done:
+    """A finished chunk; times in microseconds."""
+
+    first: int
+    count: int
+    claimed_at: int
+    finished_at: int
+    detail: str | None
+
+
+class Retries(Part):
+    """Failed cases back to waiting."""
+
+    def retry_study(self, study_id: str, endings: Collection[str] | None = None) -> StudyRecord:
+        """Let the cases of an ended study that did not end ok, or that have one of ``endings``, be run again.
+
+        Every other row stays as it is. Raises StudyNotFound, TransitionError when the study has not ended or was
+        cancelled, and NothingToRetry when there is no such case.
+        """
+        c = STUDIES.c
+        while True:
+            with self.session.read() as connection:
+                row = self._row(connection, study_id, c.number, c.model, c.pendulums, c.state, c.revision, c.cases)
+                follow(StudyState(row.state), StudyEvent.RETRY)
+                counts = _failed(connection, row.number, endings)
+                if not counts:
+                    raise NothingToRetry(_nothing(endings))
+                runs = _runs(connection, row, tuple(counts))
+            with self.session.write() as connection:
+                now = self._row(connection, study_id, c.revision)
+                if now.revision != row.revision:  # it was run again, or deleted and not yet gone, in between
+                    continue
+                _give_back(connection, row, runs, counts)
+                self._move(connection, row.number, StudyEvent.RETRY)
+                return record_of(self._row(connection, study_id, *RECORD_COLUMNS))
+
+
+def _nothing(endings: Collection[str] | None) -> str:
+    if endings is None:
+        return "every case of the study ended ok: there is nothing to run again"
+    return f"no case of the study ended as {' or '.join(sorted(endings))}: there is nothing to run again"
+
+
+def _failed(connection: sa.Connection, number: int, endings: Collection[str] | None) -> dict[str, int]:
+    """Cases of each ending that are to be run again."""
+    c = ENDINGS.c
+    found = connection.execute(sa.select(c.ending, c.cases).where(c.study == number, c.ending != kernels.OK)).all()
+    return {ending: cases for ending, cases in found if cases and (endings is None or ending in endings)}
+
+
+def _runs(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...]) -> list[Run]:
+    """The cases with those endings as runs, in order."""
+    c = results_table(row.model, row.pendulums).c
+    # Cases that follow one another have the same difference to their place among the cases found.
+    place = sa.func.row_number().over(order_by=c.case_number)
+    found = (
+        sa.select(c.case_number, (c.case_number - place).label("same"))
+        .where(c.study == row.number, c.ending.in_(endings))
+        .subquery()
+    )
+    first = sa.func.min(found.c.case_number).label("first")
+    query = sa.select(first, sa.func.count()).group_by(found.c.same).order_by(first).limit(MAX_CHUNKS + 1)
+    runs = [(int(number), int(count)) for number, count in connection.execute(query)]
+    if len(runs) > MAX_CHUNKS:
+        raise NothingToRetry(
+            f"the failed cases lie in more than {MAX_CHUNKS} places: choose fewer by their ending, or submit them as "
+            "a study of their own"
+        )
+    return runs
+
+
+def _give_back(connection: sa.Connection, row: sa.Row[Any], runs: Sequence[Run], counts: dict[str, int]) -> None:
+    """Take the rows away and cut the chunks so that exactly these cases are waiting."""
+    table = results_table(row.model, row.pendulums)
+    for first, count in runs:
+        connection.execute(
+            sa.delete(table).where(
+                table.c.study == row.number, table.c.case_number >= first, table.c.case_number < first + count
+            )
+        )
+    _cut(connection, row.number, runs)
+    connection.execute(sa.delete(ENDINGS).where(ENDINGS.c.study == row.number, ENDINGS.c.ending.in_(tuple(counts))))
+    connection.execute(
+        sa.update(STUDIES).where(STUDIES.c.number == row.number).values(done=STUDIES.c.done - sum(counts.values()))
+    )
+
+
+def _cut(connection: sa.Connection, number: int, runs: Sequence[Run]) -> None:
+    c = CHUNKS.c
+    chunks = connection.execute(
+        sa.select(c["first"], c["count"], c.claimed_at, c.finished_at, c.detail)
+        .where(c.study == number)
+        .order_by(c["first"])
+    ).all()
+    gone: list[dict[str, int]] = []
+    made: list[dict[str, Any]] = []
+    at = 0
+    for chunk in starmap(_Done, chunks):
+        end = chunk.first + chunk.count
+        while at < len(runs) and sum(runs[at]) <= chunk.first:
+            at += 1
+        inside = []
+        for first, count in runs[at:]:
+            if first >= end:
+                break
+            inside.append((max(first, chunk.first), min(first + count, end)))
+        if inside:
+            gone.append({"gone": chunk.first})
+            made += _pieces(number, chunk, inside)
+    connection.execute(sa.delete(CHUNKS).where(c.study == number, c["first"] == sa.bindparam("gone")), gone)
+    connection.execute(sa.insert(CHUNKS), made)
+
+
+def _pieces(number: int, chunk: _Done, inside: Sequence[Run]) -> list[dict[str, Any]]:
+    """A finished chunk as pieces that wait (from, to: ``inside``) and pieces that stay done in between.
+
+    Those share the time it took by their numbers of cases, so that what is told of speed stays right.
+    """
+    waiting = {first for first, _ in inside}
+    borders = sorted({chunk.first, chunk.first + chunk.count, *(border for part in inside for border in part)})
+    pace = (chunk.finished_at - chunk.claimed_at) / chunk.count
+    pieces = []
+    for first, end in pairwise(borders):
+        piece: dict[str, Any] = {"study": number, "first": first, "count": end - first, "failures": 0}
+        if first in waiting:
+            piece |= {"state": "waiting", "claimed_at": None, "finished_at": None, "detail": None}
+        else:
+            begin, finish = (chunk.claimed_at + round(pace * (border - chunk.first)) for border in (first, end))
+            piece |= {"state": "done", "claimed_at": begin, "finished_at": finish, "detail": chunk.detail}
+        pieces.append(piece)
+    return pieces

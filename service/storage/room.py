@@ -1,0 +1,93 @@
+"""How much the database can still take, and holding the studies while that is not enough.
+
+A study is held before the disk is full, while there is room to say so. Where others take the last room in between, a
+write fails; the dispatcher then drops what it has in hand and tries to say so until it can.
+"""
+
+from __future__ import annotations
+
+import resource
+import shutil
+from typing import TYPE_CHECKING
+
+import sqlalchemy as sa
+
+from service.storage.part import Part
+from service.storage.tables import STUDIES, WAITS_FOR_ROOM
+from worker.states import StudyEvent, StudyState
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from service.storage.session import Session
+
+#: Bytes kept free for the chunks that are being run, and for saying that nothing more is.
+RESERVE_BYTES = 4 * 1024 * 1024
+GOES_ON = "the study goes on by itself when there is room"
+
+
+def room(session: Session) -> tuple[int, str]:
+    """Bytes that the database can still take, and what sets the limit: the disk, or the largest file allowed."""
+    free = shutil.disk_usage(session.path.parent).free
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+    size, log = _size(session.path), _size(session.path.with_name(f"{session.path.name}-wal"))
+    disk = f"the disk that holds {session.path} has {free / 1e6:.3g} MB left"
+    limited = f"files may not grow beyond {limit / 1e6:.3g} MB here (ulimit -f)"
+    capped = limit != resource.RLIM_INFINITY
+    if free >= RESERVE_BYTES and not (capped and limit - size - log < RESERVE_BYTES):
+        return (limit - size - log, limited) if capped and limit - size - log < free else (free, disk)
+    spare, reusable = _within(session)
+    reusable = min(reusable, log)
+    if capped and (left := min(limit - size + spare, limit - log + reusable)) < free + spare + reusable:
+        return left, limited
+    return free + spare + reusable, disk
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except FileNotFoundError:
+        return 0
+
+
+def _within(session: Session) -> tuple[int, int]:
+    """Bytes free inside the files: pages of deleted rows, and the part of the log that has been moved to its place."""
+    with session.plain() as connection:
+        page: int = connection.exec_driver_sql("PRAGMA page_size").scalar_one()
+        unused: int = connection.exec_driver_sql("PRAGMA freelist_count").scalar_one()
+        _busy, logged, moved = connection.exec_driver_sql("PRAGMA wal_checkpoint(PASSIVE)").one()
+    # The log is written over from its beginning once all of it has been moved.
+    return unused * page, (logged * page if logged == moved else 0)
+
+
+class Room(Part):
+    """Studies held while the disk is full. Part of `worker.ports.Store`."""
+
+    def room(self) -> int:
+        """Bytes that the database can still take."""
+        return room(self.session)[0]
+
+    def shortage(self) -> str | None:
+        """Why there is no room for more rows, as a sentence; None where there is."""
+        left, limit = room(self.session)
+        return f"no room: {limit}; {GOES_ON}" if left < RESERVE_BYTES else None
+
+    def hold(self, epoch: int, reason: str) -> None:
+        """Pause every study that is queued or running, with the reason, until `let_go`."""
+        with self.session.write() as connection:
+            self._own(connection, epoch)
+            going = [StudyState.QUEUED.value, StudyState.RUNNING.value]
+            numbers = connection.execute(sa.select(STUDIES.c.number).where(STUDIES.c.state.in_(going))).scalars().all()
+            for number in numbers:
+                self._move(connection, number, StudyEvent.FAULT, reason)
+                connection.execute(
+                    sa.update(STUDIES).where(STUDIES.c.number == number).values(waits_for=WAITS_FOR_ROOM)
+                )
+
+    def let_go(self, epoch: int) -> None:
+        """Queue again every study that `hold` paused and nobody has touched since."""
+        with self.session.write() as connection:
+            self._own(connection, epoch)
+            numbers = connection.execute(sa.select(STUDIES.c.number).where(STUDIES.c.waits_for == WAITS_FOR_ROOM))
+            for number in numbers.scalars().all():
+                self._move(connection, number, StudyEvent.RESUME)

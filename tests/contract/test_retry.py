@@ -1,0 +1,134 @@
+"""Running failed cases again: exactly these, in the books and in the rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from service.storage.errors import NothingToRetry, StudyNotFound
+from service.storage.records import StudyRecord
+from service.storage.store import Store
+from tests.worker import fakes
+from worker import kernels
+from worker.chunking import Chunking
+from worker.kernels import ChunkResult
+from worker.ports import Chunk
+from worker.states import StudyState, TransitionError
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
+    folder: Path = tmp_path_factory.mktemp("retry")
+    with Store.open(f"sqlite:///{folder / 'store.sqlite3'}", chunking=Chunking(cases=10)) as store:
+        yield store
+
+
+def run(store: Store, record: StudyRecord, endings: list[str]) -> list[Chunk]:
+    """Run every open chunk so that case N ends as ``endings[N]``; gives the chunks."""
+    epoch = store.take_over("test")
+    chunks = store.open_chunks(record.number)
+    for chunk in chunks:
+        assert store.claim(epoch, [chunk]) == [chunk]
+        part = endings[chunk.first : chunk.last + 1]
+        values = fakes.values(chunk.first, chunk.count)
+        assert store.commit(epoch, chunk, ChunkResult(chunk.first, part, [""] * chunk.count, values))
+    store.settle(epoch, record.number)
+    return chunks
+
+
+def made(store: Store, endings: list[str]) -> StudyRecord:
+    """An ended study whose cases ended so."""
+    record = store.create_study({}, fakes.study(len(endings)))
+    run(store, record, endings)
+    return store.get_study(record.id)
+
+
+NAMES = st.sampled_from(["ok", "ok", "crashed", "timed_out", "diverged"])
+
+
+@given(endings=st.lists(NAMES, min_size=1, max_size=45), chosen=st.sets(NAMES.filter(lambda name: name != "ok")))
+def test_exactly_the_failed_cases_run_again(store: Store, endings: list[str], chosen: set[str]) -> None:
+    record = made(store, endings)
+    failed = [case for case, name in enumerate(endings) if (name in chosen if chosen else name != "ok")]
+    if not failed:
+        with pytest.raises(NothingToRetry):
+            store.retry_study(record.id, chosen or None)
+        assert store.get_study(record.id) == record
+        return
+    queued = store.retry_study(record.id, chosen or None)
+    assert (queued.state, queued.done, queued.finished_at) == (StudyState.QUEUED, len(endings) - len(failed), None)
+    assert queued.ok == record.ok
+    assert queued.revision > record.revision
+    kept = [case for case in range(len(endings)) if case not in failed]
+    assert store.case_rows(record.id).cases.tolist() == kept
+    ran = run(store, record, ["ok"] * len(endings))
+    assert [case for chunk in ran for case in range(chunk.first, chunk.last + 1)] == failed
+    ended = store.get_study(record.id)
+    assert (ended.state, ended.done) == (StudyState.FINISHED, len(endings))
+    progress = store.progress(record.id)
+    expected = ["ok" if case in failed else name for case, name in enumerate(endings)]
+    assert progress.endings == {name: expected.count(name) for name in set(expected)}
+    block = store.case_rows(record.id)
+    assert block.endings == expected
+    np.testing.assert_array_equal(block.values, fakes.values(0, len(endings)))
+
+
+def test_what_failed_again_can_be_run_again(store: Store) -> None:
+    record = made(store, ["ok"] * 12 + ["crashed"] * 3)
+    for _ in range(2):
+        store.retry_study(record.id)
+        run(store, record, ["ok"] * 12 + ["crashed"] * 3)
+        ended = store.get_study(record.id)
+        assert (ended.state, ended.done, ended.ok) == (StudyState.FINISHED, 15, 12)
+
+
+def test_speed_is_told_from_the_time_that_was_really_taken(store: Store) -> None:
+    clock = fakes.HandClock()
+    store.clock, before = clock, store.clock
+    try:
+        record = store.create_study({}, fakes.study(40))
+        epoch = store.take_over("test")
+        for chunk in store.open_chunks(record.number):
+            store.claim(epoch, [chunk])
+            clock.seconds += 5.0
+            result = fakes.result(chunk.first, chunk.count)
+            result.endings[3] = "diverged"
+            store.commit(epoch, chunk, result)
+        store.settle(epoch, record.number)
+        assert store.progress(record.id).rate == pytest.approx(2.0)
+        clock.seconds += 3600.0
+        store.retry_study(record.id)
+        progress = store.progress(record.id)
+    finally:
+        store.clock = before
+    assert progress.rate == pytest.approx(2.0, rel=0.01)
+    assert progress.seconds_left is not None
+    low, high = progress.seconds_left
+    assert low <= 2.0 <= high <= 6.0
+
+
+def test_a_study_that_has_not_ended_or_was_cancelled_is_not_run_again(store: Store) -> None:
+    record = store.create_study({}, fakes.study(5))
+    with pytest.raises(TransitionError, match="queued"):
+        store.retry_study(record.id)
+    store.cancel_study(record.id)
+    store.settle(store.take_over("test"), record.number)
+    with pytest.raises(TransitionError, match="cancelled"):
+        store.retry_study(record.id)
+    with pytest.raises(StudyNotFound):
+        store.retry_study("st_nothing")
+
+
+def test_nothing_to_run_again_is_said(store: Store) -> None:
+    record = made(store, [kernels.OK] * 3)
+    with pytest.raises(NothingToRetry, match="every case of the study ended ok"):
+        store.retry_study(record.id)
+    failed = made(store, ["diverged"] * 3)
+    with pytest.raises(NothingToRetry, match="ended as crashed or timed_out"):
+        store.retry_study(failed.id, ["timed_out", "crashed"])
+    assert store.retry_study(failed.id, ["diverged"]).state is StudyState.QUEUED
