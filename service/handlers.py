@@ -17,6 +17,7 @@ from service.errors import ApiError, ErrorItem, parameter_error, problem_respons
 from service.selection import SelectionError
 from service.spec_messages import SpecError
 from service.storage import errors as storage
+from service.web.problem_page import problem_page
 from worker.states import TransitionError
 
 _log = logging.getLogger("sprag.service")
@@ -53,6 +54,11 @@ def as_api_error(error: Exception) -> ApiError | None:
     return None
 
 
+def _answer(request: Request, error: ApiError) -> Response:
+    """The error as a page for a browser, as a problem document for everybody else."""
+    return problem_page(request, error) or problem_response(error)
+
+
 def _sentence(error: Exception) -> str:
     text = str(error)
     return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
@@ -63,24 +69,24 @@ def _known(request: Request, error: Exception) -> Response:
     assert found is not None
     if found.type.status >= 500:
         _log.warning("%s %s: %s", request.method, request.url.path, found.detail)
-    return problem_response(found)
+    return _answer(request, found)
 
 
 def _unknown(request: Request, error: Exception) -> Response:
     _log.error("%s %s failed", request.method, request.url.path, exc_info=error)
-    return problem_response(ApiError("internal", "The service failed to answer; the fault is in its log."))
+    return _answer(request, ApiError("internal", "The service failed to answer; the fault is in its log."))
 
 
 def _http(request: Request, error: Exception) -> Response:
     raised = cast("HTTPException", error)
     if raised.status_code == 404:
-        return problem_response(ApiError("not-found", f"There is nothing at {shown(request.url.path)}."))
+        return _answer(request, ApiError("not-found", f"There is nothing at {shown(request.url.path)}."))
     if raised.status_code == 405:
         methods = ", ".join(sorted(_methods_at(request.app, request.url.path)))
         detail = f"{request.method} is not possible here; possible: {methods}."
-        return problem_response(ApiError("method-not-allowed", detail, headers={"Allow": methods}))
+        return _answer(request, ApiError("method-not-allowed", detail, headers={"Allow": methods}))
     if raised.status_code < 500:
-        return problem_response(ApiError("bad-request", str(raised.detail)))
+        return _answer(request, ApiError("bad-request", str(raised.detail)))
     return _unknown(request, error)
 
 
@@ -94,11 +100,11 @@ def _methods_at(app: FastAPI, path: str) -> set[str]:
     return found | {"HEAD"} if "GET" in found else found
 
 
-def _invalid(_request: Request, error: Exception) -> Response:
+def _invalid(request: Request, error: Exception) -> Response:
     raised = cast("RequestValidationError", error)
     items = tuple(_parameter_item(fault) for fault in raised.errors())
     detail = "; ".join(f"{item.parameter}: {item.message}" for item in items)
-    return problem_response(ApiError("invalid-parameter", detail, items))
+    return _answer(request, ApiError("invalid-parameter", detail, items))
 
 
 def _parameter_item(fault: dict[str, Any]) -> ErrorItem:

@@ -19,6 +19,8 @@ _ALONG: Final = ("shaft.load", "excitation.frequency")
 _APART: Final = ("excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y", "shaft.load")
 _RESULTS: Final = ("shaft.speed.mean", "shaft.speed.max")
 _MOST_CURVES: Final = 8
+#: Results of the mechanical characteristic, and how many of another model stand for them.
+_CHARACTERISTIC: Final = ("shaft.speed.mean", "torque.mean", "power.useful.mean", "efficiency")
 
 
 def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
@@ -38,11 +40,18 @@ def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
     few = [axis for axis in others if len(axis) <= _MOST_CURVES]
     by = next((path for path in _APART for axis in few if path in axis.paths), few[0].paths[0] if few else None)
     held = [axis for axis in others if by not in axis.paths]
-    at = tuple((axis.paths[0], repr(_usual(study, axis))) for axis in held)
+    at = tuple((axis.paths[0], repr(usual_value(study, axis))) for axis in held)
     return CurveQuery(x, y if by is None else y[:1], () if by is None else (by,), at)
 
 
-def _usual(study: Study, axis: Axis) -> float:
+def characteristic_names(infos: Sequence[ResultInfo]) -> tuple[str, ...]:
+    """The results that tell most of a machine: speed, torque, power and efficiency where it has them."""
+    names = [info.name for info in infos]
+    return tuple(name for name in _CHARACTERISTIC if name in names) or tuple(names[: len(_CHARACTERISTIC)])
+
+
+def usual_value(study: Study, axis: Axis) -> float:
+    """The value at which an axis that is not drawn is held: the base's where the axis has it, else its middle one."""
     base = study.base.get(axis.paths[0])
     index = None if base is None else axis.index_of(base)
     return sorted(axis.values)[len(axis) // 2] if index is None else axis.values[index]

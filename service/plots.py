@@ -72,14 +72,14 @@ def draw_curves(curves: Curves, title: str, picture: Picture) -> bytes:
     Raises SelectionError when there are more curves or points than one picture can show.
     """
     require_drawable(curves)
-    return _render(partial(paint_curves, curves=curves, title=title), picture, (8.0, 1.2 + 3.6 * len(_groups(curves))))
+    return render(partial(paint_curves, curves=curves, title=title), picture, (8.0, 1.2 + 3.6 * len(_groups(curves))))
 
 
 def require_drawable(curves: Curves) -> None:
     """Raise SelectionError when there are more curves or points than one picture can show."""
     points = sum(len(curve.endings) for curve in curves.curves) * len(curves.selection.results)
-    _check_size("curves", len(curves.curves), MAX_PICTURE_CURVES)
-    _check_size("points", points, MAX_PICTURE_POINTS)
+    check_size("curves", len(curves.curves), MAX_PICTURE_CURVES)
+    check_size("points", points, MAX_PICTURE_POINTS)
 
 
 def _groups(curves: Curves) -> dict[str, list[ResultInfo]]:
@@ -97,14 +97,14 @@ def paint_curves(figure: Figure, curves: Curves, title: str) -> None:
     for axes, (unit, infos) in zip(plots, groups.items(), strict=True):
         _paint_curves(axes, curves, infos, unit)
     chosen = curves.selection
-    plots[-1].set_xlabel(_label(chosen.names[chosen.x], chosen.units[chosen.x]))
+    plots[-1].set_xlabel(axis_label(chosen.names[chosen.x], chosen.units[chosen.x]))
     _explain(figure, list(plots), curves)
     _head(figure, title, chosen.held)
 
 
 def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
     """A map as a picture: colours over two axes, cases without a result left blank; SelectionError when too large."""
-    _check_size("points", drawn.values.size, MAX_PICTURE_POINTS)
+    check_size("points", drawn.values.size, MAX_PICTURE_POINTS)
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
@@ -119,16 +119,17 @@ def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
         for axis, values in ((axes.xaxis, drawn.x_values), (axes.yaxis, drawn.y_values)):
             if len(values) == 1:
                 axis.set_ticks(values)
-        axes.set_xlabel(_label(drawn.names[0], drawn.units[0]))
-        axes.set_ylabel(_label(drawn.names[1], drawn.units[1]))
-        figure.colorbar(mesh, label=_label(drawn.result.name, drawn.result.unit))
+        axes.set_xlabel(axis_label(drawn.names[0], drawn.units[0]))
+        axes.set_ylabel(axis_label(drawn.names[1], drawn.units[1]))
+        figure.colorbar(mesh, label=axis_label(drawn.result.name, drawn.result.unit))
         missing = int(np.isnan(drawn.values).sum())
         _head(figure, title, (*drawn.held, f"grey: {missing} cases without a result") if missing else drawn.held)
 
-    return _render(paint, picture, (8.0, 6.0))
+    return render(paint, picture, (8.0, 6.0))
 
 
-def _check_size(what: str, count: int, most: int) -> None:
+def check_size(what: str, count: int, most: int) -> None:
+    """SelectionError when a picture would show more than ``most``."""
     if count > most:
         message = f"{count} {what} are too many for one picture; choose fewer, or take the numbers"
         raise SelectionError([ErrorItem(message, parameter="format", allowed=f"<= {most} {what}")])
@@ -143,7 +144,8 @@ def painting() -> Iterator[None]:
         yield
 
 
-def _render(paint: Callable[[Figure], None], picture: Picture, size: tuple[float, float]) -> bytes:
+def render(paint: Callable[[Figure], None], picture: Picture, size: tuple[float, float]) -> bytes:
+    """The picture that ``paint`` makes of a figure of that size (inches), in the style of all pictures."""
     from matplotlib.figure import Figure
 
     buffer = io.BytesIO()
@@ -173,7 +175,7 @@ def _paint_curves(axes: Axes, curves: Curves, infos: list[ResultInfo], unit: str
                 linewidth=1.4,
             )
     if len(infos) == 1:
-        axes.set_ylabel(_label(infos[0].name, unit))
+        axes.set_ylabel(axis_label(infos[0].name, unit))
         return
     axes.set_ylabel("dimensionless" if unit == "1" else unit)
     handles = [
@@ -207,7 +209,7 @@ def _explain(figure: Figure, plots: list[Axes], curves: Curves) -> None:
     paths = list(curves.curves[0].line.by)
     if not paths:
         return
-    meaning = ",\n".join(_label(chosen.names[path].replace(" = ", " =\n"), chosen.units[path]) for path in paths)
+    meaning = ",\n".join(axis_label(chosen.names[path].replace(" = ", " =\n"), chosen.units[path]) for path in paths)
     texts = [", ".join(f"{value:.6g}" for value in curve.line.by.values()) for curve in curves.curves]
     colours = _colours(len(texts))
     if len(texts) <= _LEGEND_CURVES:
@@ -246,7 +248,8 @@ def _head(figure: Figure, title: str, held: tuple[str, ...]) -> None:
         figure.suptitle("\n".join(lines), fontsize=10)
 
 
-def _label(name: str, unit: str, brackets: str = "()") -> str:
+def axis_label(name: str, unit: str, brackets: str = "()") -> str:
+    """What stands at an axis: the name, and its unit in ``brackets`` where it has one."""
     return f"{name} {brackets[:1]}{unit}{brackets[1:]}" if unit != "1" else name
 
 

@@ -63,7 +63,7 @@ def _after(page_token: str | None) -> int:
 @router.get("/{case:case}", response_model=m.CaseDetail, responses=problems(*_CASE_PROBLEMS))
 def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
     """One case; its ending is `pending` while it has not been run."""
-    study = _study_with(context, study_id, case)
+    study = study_with(context, study_id, case)
     row = context.store.case_row(study_id, case)
     parameters = study.case_parameters(case)
     if row is None:
@@ -112,7 +112,7 @@ async def get_trajectory(
     written: Format = "csv" if chosen == "csv" else "json"
 
     def find() -> tuple[Study, tuple[float, float]]:
-        study = _study_with(context, study_id, case)
+        study = study_with(context, study_id, case)
         return study, trajectories.span(study, case, start, end)
 
     study, (first, last) = await run_in_threadpool(find)
@@ -123,7 +123,8 @@ async def get_trajectory(
     return Response(content, media_type=MEDIA_TYPES[written], headers=headers)
 
 
-def _study_with(context: Context, study_id: str, case: int) -> Study:
+def study_with(context: Context, study_id: str, case: int) -> Study:
+    """The study, when it has that case; ApiError else."""
     study = context.store.study(study_id)
     if case >= study.cases:
         raise ApiError("case-not-found", f"The cases of this study are 0 .. {study.cases - 1}.")

@@ -44,7 +44,7 @@ def get_model(request: Request, name: ModelName) -> Any:
 @router.get("/presets", response_model=m.PresetList, responses=problems("invalid-parameter") | documented_304())
 def list_presets(request: Request) -> Any:
     """Studies that come with the program, each with its whole spec, to be submitted as they are or changed."""
-    return _answer(request, {"presets": [_preset(name) for name in preset_names()]})
+    return _answer(request, {"presets": [preset_of(name) for name in preset_names()]})
 
 
 @router.get(
@@ -54,11 +54,12 @@ def get_preset(request: Request, name: PresetName) -> Any:
     """One study that comes with the program."""
     if name not in preset_names():
         raise ApiError("not-found", f"There is no such preset; there are: {', '.join(preset_names())}.")
-    return _answer(request, _preset(name))
+    return _answer(request, preset_of(name))
 
 
 @lru_cache
-def _preset(name: str) -> dict[str, Any]:
+def preset_of(name: str) -> dict[str, Any]:
+    """A study that comes with the program: name, title, cases, spec; KeyError when there is none of that name."""
     file, text = preset_text(name)
     spec = parse_spec(load_spec(text, format_of(file)))
     return {"name": name, "title": spec.study.name, "cases": spec.study.cases, "spec": spec.spec}

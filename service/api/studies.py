@@ -19,6 +19,7 @@ from service.api.respond import entity_tag, json_response, not_modified, tagged
 from service.errors import ApiError, parameter_error
 from service.preview import estimated_bytes, preview_json
 from service.spec import ParsedSpec, load_spec, parse_spec
+from service.storage.records import StudyRecord
 from service.storage.room import RESERVE_BYTES
 from service.storage.store import Store
 from worker.kernels import ENDING_SENTENCES, OK, WorkerEnding
@@ -68,20 +69,25 @@ def create_study(
     context: Ctx, received: SpecBody, idempotency_key: IdempotencyKey = None, priority: Priority = 0
 ) -> Response:
     """Submit a study. It is queued, and its cases are run in the order of their numbers."""
-    parsed = _parsed(received)
+    record = accept(context.store, _parsed(received), idempotency_key, priority)
+    return json_response(views.summary(record), 202, {"Location": views.study_address(record.id)})
+
+
+def accept(store: Store, parsed: ParsedSpec, idempotency_key: str | None = None, priority: int = 0) -> StudyRecord:
+    """Take a study in, warnings and all; ApiError when its results would not fit on the disk."""
     body_hash = hashlib.sha256(json.dumps(parsed.spec, sort_keys=True).encode("ascii")).hexdigest()
-    known = context.store.study_of_key(idempotency_key, body_hash) if idempotency_key else None
-    if known is None:
-        _require_room(context.store, parsed)
-    record = known or context.store.create_study(
+    known = store.study_of_key(idempotency_key, body_hash) if idempotency_key else None
+    if known is not None:
+        return known
+    _require_room(store, parsed)
+    return store.create_study(
         parsed.spec,
         parsed.study,
-        warnings=(*parsed.warnings, *context.store.chunking.warnings(parsed.study)),
+        warnings=(*parsed.warnings, *store.chunking.warnings(parsed.study)),
         idempotency_key=idempotency_key,
         body_hash=body_hash,
         priority=priority,
     )
-    return json_response(views.summary(record), 202, {"Location": views.study_address(record.id)})
 
 
 def _require_room(store: Store, parsed: ParsedSpec) -> None:

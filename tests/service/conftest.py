@@ -37,7 +37,9 @@ class PortalTransport(httpx.BaseTransport):
         request.read()
         response = self._portal.call(self._inner.handle_async_request, request)
         content = self._portal.call(response.aread)
-        return httpx.Response(response.status_code, headers=response.headers, content=content)
+        # What was read is unpacked already.
+        headers = [(name, value) for name, value in response.headers.multi_items() if name != "content-encoding"]
+        return httpx.Response(response.status_code, headers=headers, content=content)
 
 
 class InThread:

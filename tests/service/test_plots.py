@@ -33,7 +33,7 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
         drawn[-1].draw_without_rendering()
         return b""
 
-    monkeypatch.setattr(plots, "_render", render)
+    monkeypatch.setattr(plots, "render", render)
     return drawn
 
 

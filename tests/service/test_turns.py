@@ -53,6 +53,6 @@ def test_pictures_take_turns(monkeypatch: pytest.MonkeyPatch) -> None:
     turns = Turns("pictures", 0)
     monkeypatch.setattr(plots, "_TURNS", turns)
     with turns.take(), pytest.raises(ApiError, match="Too many pictures are waiting") as refused:
-        plots._render(lambda _: None, "svg", (1.0, 1.0))
+        plots.render(lambda _: None, "svg", (1.0, 1.0))
     assert refused.value.problem == "unavailable"
-    assert plots._render(lambda _: None, "svg", (1.0, 1.0)).startswith(b"<?xml")
+    assert plots.render(lambda _: None, "svg", (1.0, 1.0)).startswith(b"<?xml")

@@ -1,0 +1,141 @@
+"""The page of one case: its parameters, ending and results, and its motion over time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from service import trajectories
+from service.api.cases import CaseNumber, study_with
+from service.api.context import Context, Ctx, StudyId
+from service.api.curves import picture_response
+from service.api.respond import entity_tag, json_response, not_modified, tagged
+from service.catalogue import unit_of
+from service.curves import PENDING
+from service.errors import ApiError
+from service.main_curve import characteristic_names
+from service.plots_motion import draw_motion
+from service.selection import axis_name
+from service.web.motion import SAMPLES, motion_figures
+from service.web.study import study_frame
+from service.web.templates import page
+from worker import kernels
+
+if TYPE_CHECKING:
+    from worker.study import Study
+
+router = APIRouter(include_in_schema=False)
+
+#: Periods of the motion that are shown first, at the end of the evaluated window.
+_FIRST_PERIODS = 4
+
+Begin = Annotated[str, Query(alias="from", max_length=80)]
+End = Annotated[str, Query(alias="to", max_length=80)]
+
+
+def _span(study: Study, case: int, begin: str, end: str) -> tuple[float, float]:
+    """First and last time (s) that are shown: as asked for, else the last periods of the window."""
+    if begin.strip() or end.strip():
+        return trajectories.span(study, case, begin.strip() or None, end.strip() or None)
+    frequency = {**study.base, **study.case_parameters(case)}["excitation.frequency"]
+    duration = kernels.duration_seconds(study, case)
+    window = study.run.get("window")
+    last = duration
+    if window:
+        last = min(window[1][0] / (frequency if window[1][1] == "periods" else 1.0), duration)
+    return max(last - _FIRST_PERIODS / frequency, 0.0), last
+
+
+@router.get("/studies/{study_id:study}/cases/{case:case}")
+def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = "") -> Response:
+    """One case."""
+    study = study_with(context, study_id, case)
+    row = context.store.case_row(study_id, case)
+    faults: tuple[Any, ...] = ()
+    span = None
+    try:
+        span = _span(study, case, begin, end) if _has_motion(study) else None
+    except ApiError as error:
+        faults = error.errors
+    query = urlencode([("from", repr(span[0])), ("to", repr(span[1]))]) if span else ""
+    own = f"/studies/{study_id}/cases/{case}"
+    infos = kernels.study_results(study)
+    frequency = {**study.base, **study.case_parameters(case)}.get("excitation.frequency")
+    return page(
+        "case.html",
+        status=422 if faults else 200,
+        **study_frame(context, study_id),
+        tab="/cases",
+        case=case,
+        row=row,
+        ending=PENDING if row is None else row.ending,
+        sentence="The case has not been run yet." if row is None else kernels.ENDING_SENTENCES.get(row.ending, ""),
+        flags=[(flag, kernels.FLAG_SENTENCES.get(flag, "")) for flag in (() if row is None else row.flags)],
+        parameters=[
+            (
+                axis_name(study, axis.paths[0]),
+                study.case_parameters(case)[axis.paths[0]],
+                unit_of(study.model, axis.paths[0]),
+            )
+            for axis in study.axes
+        ],
+        infos=infos,
+        main=[info for info in infos if info.name in characteristic_names(infos)],
+        faults=faults,
+        span=span,
+        begin=begin,
+        end=end,
+        whole=repr(kernels.duration_seconds(study, case)) if span else "",
+        period=None if frequency is None else 1.0 / frequency,
+        figures=f"{own}/motion?{query}",
+        picture=f"{own}/motion.svg?{query}",
+        file=f"/api/v1{own}/trajectory?{query}&points={SAMPLES}&format=csv",
+        last=study.cases - 1,
+    )
+
+
+def _has_motion(study: Study) -> bool:
+    return "excitation.frequency" in {*study.base, *study.axis_paths}
+
+
+async def _asked(
+    context: Context, request: Request, study_id: str, case: int, span: tuple[str, str]
+) -> tuple[Study, tuple[float, float], str, Response | None]:
+    def find() -> tuple[Study, tuple[float, float]]:
+        study = study_with(context, study_id, case)
+        return study, _span(study, case, *span)
+
+    study, times = await run_in_threadpool(find)
+    # A case is what its study says, and studies never change.
+    tag = entity_tag(study_id, request.url.path, request.url.query, kernels.ENGINE_VERSION)
+    return study, times, tag, not_modified(request, tag)
+
+
+@router.get("/studies/{study_id:study}/cases/{case:case}/motion")
+async def motion(
+    context: Ctx, request: Request, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = ""
+) -> Response:
+    """The figures of a motion."""
+    study, times, tag, unchanged = await _asked(context, request, study_id, case, (begin, end))
+    if unchanged:
+        return unchanged
+    await context.computer.load(kernels.shape_of(study))
+    return tagged(json_response(await context.computer.run(motion_figures, study, case, *times)), tag)
+
+
+@router.get("/studies/{study_id:study}/cases/{case:case}/motion.svg")
+async def motion_picture(
+    context: Ctx, request: Request, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = ""
+) -> Response:
+    """The motion as one picture, for pages without JavaScript."""
+    study, times, tag, unchanged = await _asked(context, request, study_id, case, (begin, end))
+    if unchanged:
+        return unchanged
+    await context.computer.load(kernels.shape_of(study))
+    made = await context.computer.run(kernels.run_trajectory, study, case, *times, SAMPLES // 3)
+    content = await run_in_threadpool(draw_motion, made, f"{study.name}, case {case}", "svg")
+    return tagged(picture_response(content, "svg"), tag)

@@ -1,0 +1,121 @@
+"""What a filled form amounts to: its spec, what is wrong beside which field, what it would cost, its clutch fits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from service.errors import ErrorItem, spec_items
+from service.fits import fit_json
+from service.preview import preview_json
+from service.spec import ParsedSpec, SpecError, load_spec, parse_spec
+from service.spec_clutch import read_clutch
+from service.spec_messages import Report
+from service.units import QuantityError, parse_quantity
+from service.web.fit_chart import FitChart, fit_chart
+from service.web.form_spec import Faults, clutch_pointers, field_of, pendulums_of, spec_of
+from service.web.templates import unit_text
+
+if TYPE_CHECKING:
+    from worker.chunking import Chunking
+
+
+@dataclass(slots=True)
+class Checked:
+    """A filled form, looked over.
+
+    ``faults`` has the messages by field ("" for those of no field); ``preview`` is None while there are any. ``fits``
+    has the report and the picture of each clutch that could be fitted, whatever else is wrong.
+    """
+
+    spec: dict[str, Any]
+    parsed: ParsedSpec | None = None
+    faults: Faults = field(default_factory=dict)
+    preview: dict[str, Any] | None = None
+    fits: dict[str, tuple[dict[str, Any], FitChart]] = field(default_factory=dict)
+
+
+def check_form(values: Mapping[str, str], chunking: Chunking) -> Checked:
+    """Look a filled form over."""
+    spec, faults = spec_of(values)
+    found = Checked(spec, faults=faults)
+    try:
+        found.parsed = parse_spec(spec)
+    except SpecError as error:
+        for item in spec_items(error.problems):
+            name = field_of(item.pointer or "", values)
+            # Data that could not be read were told of already, line by line.
+            if not (name in faults and name.endswith("/data")):
+                found.faults.setdefault(name, []).append(message(item))
+    if found.faults:
+        found.parsed = None
+    if found.parsed is not None:
+        found.preview = preview_json(found.parsed, chunking)
+    for pointer in clutch_pointers(values):
+        if values.get(f"{pointer}/kind") == "data":
+            _fit(found, pointer, values)
+    return found
+
+
+def check_text(text: str, form: str, chunking: Chunking) -> Checked:
+    """Look a spec over that is given as text, JSON or TOML."""
+    found = Checked({})
+    try:
+        loaded = load_spec(text, "toml" if form == "toml" else "json")
+        found.parsed = parse_spec(loaded)
+    except SpecError as error:
+        places = [(problem.pointer or "the spec", item) for problem, item in _with_items(error)]
+        found.faults["/text"] = [f"{pointer}: {message(item)}" for pointer, item in places]
+        return found
+    found.spec = found.parsed.spec
+    found.preview = preview_json(found.parsed, chunking)
+    return found
+
+
+def _with_items(error: SpecError) -> list[tuple[Any, ErrorItem]]:
+    return list(zip(error.problems, spec_items(error.problems), strict=True))
+
+
+def message(item: ErrorItem) -> str:
+    """A fault as a sentence beside its field."""
+    parts = [item.message]
+    if item.value is not None and not isinstance(item.value, list | dict):
+        parts.append(f"got {item.value}")
+    if item.allowed:
+        parts.append(f"allowed: {unit_text(item.allowed)}")
+    elif item.unit and item.unit != "1":
+        parts.append(f"in {unit_text(item.unit)}")
+    return "; ".join(parts)
+
+
+def backlashes(spec: Mapping[str, Any], pointer: str) -> list[float]:
+    """Backlash (rad) of every pendulum that has the clutch at ``pointer``, as far as they can be read."""
+    pendulums = spec["base"].get("pendulums", [])
+    own = pointer.split("/")
+    chosen = [pendulums[int(own[3])]] if len(own) > 4 else pendulums
+    found = []
+    for item in chosen:
+        try:
+            found.append(parse_quantity(item.get("backlash", 0.0), "rad"))
+        except QuantityError:
+            continue
+    return found
+
+
+def clutch_at(spec: Mapping[str, Any], pointer: str) -> dict[str, Any]:
+    """The clutch at a JSON Pointer of a spec."""
+    parts = pointer.split("/")
+    base = spec["base"]
+    found: dict[str, Any] = base["clutch"] if len(parts) == 3 else base["pendulums"][int(parts[3])]["clutch"]
+    return found
+
+
+def _fit(found: Checked, pointer: str, values: Mapping[str, str]) -> None:
+    clutch = clutch_at(found.spec, pointer)
+    if not clutch.get("data") or "accuracy" not in clutch or pendulums_of(values) < 1:
+        return
+    known = backlashes(found.spec, pointer)
+    read = read_clutch(Report(), pointer, clutch, pointer.removeprefix("/base/").replace("/", ".") + ".", known)
+    if read is not None and read.fit is not None:
+        found.fits[pointer] = (fit_json(read.fit), fit_chart(read.fit, clutch, known[0] if known else 0.0))

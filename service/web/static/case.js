@@ -1,0 +1,37 @@
+// The motion of a case: drawn by the figures of the server; a closer look is computed anew there.
+"use strict";
+
+const motion = document.getElementById("motion"), phase = document.getElementById("phase");
+
+const showMotion = async (address) => {
+  const figures = await sprag.fetchJson(address);
+  await sprag.show(motion, figures.motion);
+  await sprag.show(phase, figures.phase);
+};
+
+if (motion) {
+  const whole = motion.dataset.motion;
+  let waiting = null, shown = whole;
+  const change = (address) => {
+    clearTimeout(waiting);
+    if (address === shown) return;
+    waiting = setTimeout(() => { shown = address; showMotion(address).catch(() => {}); }, 250);
+  };
+  document.addEventListener("DOMContentLoaded", async () => {
+    try {
+      await showMotion(whole);
+    } catch (error) {
+      sprag.say(motion, error.message);
+      return;
+    }
+    motion.on("plotly_relayout", (event) => {
+      const low = event["xaxis.range[0]"], high = event["xaxis.range[1]"];
+      if (low !== undefined && high > low) {
+        const url = new URL(whole, location.href), ends = [Number(url.searchParams.get("from")), Number(url.searchParams.get("to"))];
+        url.searchParams.set("from", String(Math.max(low, ends[0])));
+        url.searchParams.set("to", String(Math.min(high, ends[1])));
+        change(url.pathname + url.search);
+      } else if (event["xaxis.autorange"]) change(whole);
+    });
+  });
+}

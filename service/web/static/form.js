@@ -1,0 +1,88 @@
+// The form for a new study: looked over by the server while it is filled in; the sketch shows what a field means.
+"use strict";
+
+let form = document.getElementById("study-form");
+let waiting = null, latest = 0;
+const touched = new Set();
+let whole = false; // after a look at everything, empty required fields are told of too
+
+const encoded = (extra = []) => new URLSearchParams([...new FormData(form), ...extra]);
+
+const check = async () => {
+  const mine = ++latest;
+  const answer = await fetch(form.dataset.check, { method: "POST", body: encoded() });
+  if (!answer.ok || mine !== latest) return;
+  const found = await answer.json();
+  for (const place of form.querySelectorAll(".wrong")) {
+    const name = place.id.slice("wrong:".length);
+    const field = document.getElementById(name);
+    const told = whole || touched.has(name) || (field && field.value !== "");
+    const messages = told ? found.faults[name] || [] : [];
+    const text = messages.join(name === "/text" ? "\n" : ". ");
+    if (place.textContent !== text) place.textContent = text;
+    if (field) field.toggleAttribute("aria-invalid", messages.length > 0);
+    if (field && messages.length) field.setAttribute("aria-invalid", "true");
+  }
+  const panel = document.getElementById("panel");
+  const open = [...panel.querySelectorAll("details")].map((part) => part.open);
+  panel.innerHTML = found.panel;
+  panel.querySelectorAll("details").forEach((part, index) => { part.open = Boolean(open[index]); });
+  for (const place of form.querySelectorAll(".fit")) place.innerHTML = found.fits[place.id.slice("fit:".length)] || "";
+  form.dataset.checked = String(mine);
+};
+
+const soon = () => { clearTimeout(waiting); waiting = setTimeout(check, 300); };
+
+// Another pendulum or axis: the server makes the form anew with what is filled in.
+const reshape = async (extra) => {
+  clearTimeout(waiting);
+  latest += 1;
+  const answer = await fetch(form.action, { method: "POST", body: encoded(extra), headers: { Accept: "text/html" } });
+  const page = new DOMParser().parseFromString(await answer.text(), "text/html");
+  const fresh = page.getElementById("study-form");
+  if (!fresh) return;
+  const known = new Set([...form.elements].map((element) => element.id || element.value));
+  form.replaceWith(document.adoptNode(fresh));
+  form = fresh;
+  listen();
+  const first = [...form.elements].find((element) => element.id && !known.has(element.id));
+  const same = extra.length ? form.querySelector(`button[value="${CSS.escape(extra[0][1])}"]`) : null;
+  (first || same || form.querySelector("[name='clutches']:checked"))?.focus();
+  if (!whole) check();
+};
+
+const mark = (event) => {
+  for (const part of document.querySelectorAll(".sketch .shown")) part.classList.remove("shown");
+  const wanted = event.target.dataset && event.target.dataset.for;
+  if (!wanted) return;
+  for (const part of document.querySelectorAll(".sketch [data-mark]")) {
+    const names = part.dataset.mark.split(" ");
+    const meant = names.includes(wanted) || (wanted === "inertia" && event.target.name.includes("/shaft/") && names.includes("shaft"));
+    const other = wanted === "inertia" && event.target.name.includes("/shaft/") && names.includes("mass");
+    if (meant && !other) part.classList.add("shown");
+  }
+};
+
+function listen() {
+  form.addEventListener("input", soon);
+  form.addEventListener("focusin", mark);
+  form.addEventListener("focusout", (event) => { if (event.target.name) { touched.add(event.target.name); soon(); } });
+  form.addEventListener("change", (event) => { if (event.target.matches("[data-shape]")) reshape([]); });
+  form.addEventListener("submit", (event) => {
+    const button = event.submitter;
+    if (button && button.matches("[data-shape]")) {
+      event.preventDefault();
+      reshape([["do", button.value]]);
+    } else if (button && button.value === "check") {
+      event.preventDefault();
+      whole = true;
+      check();
+    }
+  });
+}
+
+if (form.querySelector("[aria-invalid]")) {
+  whole = true;
+  form.querySelector("[aria-invalid]").focus();
+}
+listen();

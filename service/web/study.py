@@ -1,0 +1,194 @@
+"""The page of one study: how far it is, its mechanical characteristic, what went in; and what can be done with it."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import urlencode
+
+from fastapi import APIRouter
+from starlette.responses import RedirectResponse, Response
+
+from service import exports, plots
+from service.api import views
+from service.api.context import Context, Ctx, StudyId
+from service.api.respond import timestamp
+from service.catalogue import parameter_of, unit_of
+from service.errors import ApiError
+from service.fits import fit_json
+from service.main_curve import caption, drawn_numbers
+from service.spec import parse_spec
+from service.web.choice import characteristic, map_query, pairs_of
+from service.web.templates import page
+from worker import kernels
+from worker.states import TRANSITIONS, StudyEvent, StudyState
+
+if TYPE_CHECKING:
+    from starlette.datastructures import QueryParams
+
+    from worker.study import Study
+
+router = APIRouter(include_in_schema=False)
+
+#: What a person can do with a study: word on the button, and whether it ends something for good.
+VERBS: Final = {"pause": "Pause", "resume": "Resume", "cancel": "Cancel the rest", "retry": "Run failed cases again"}
+_EVENTS: Final = {
+    "pause": StudyEvent.PAUSE,
+    "resume": StudyEvent.RESUME,
+    "cancel": StudyEvent.CANCEL,
+    "retry": StudyEvent.RETRY,
+}
+
+
+def study_frame(context: Context, study_id: str) -> dict[str, Any]:
+    """What every page about a study shows: the study as the interface tells it, its verbs, the pages beside it."""
+    record, study = context.store.get_study(study_id), context.store.study(study_id)
+    shown = views.detail(record, context.store.progress(study_id), study, context.store.spec(study_id))
+    varies = any(len(axis) > 1 for axis in study.axes)
+    mapped = study.combine == "grid" and sum(len(axis) > 1 for axis in study.axes) > 1
+    tabs = [("", "Overview"), *([("/curves", "Curves")] if varies else []), *([("/map", "Map")] if mapped else [])]
+    return {
+        "study": shown,
+        "live": not StudyState(shown["state"]).terminal,
+        "verbs": {verb: VERBS[verb] for verb in _verbs(StudyState(shown["state"]), record.ok < record.done)},
+        "tabs": [*tabs, ("/cases", "Cases")],
+        "endings": kernels.ENDING_SENTENCES,
+        "formats": list(exports.MEDIA_TYPES),
+        "now": timestamp(datetime.now(UTC)),
+    }
+
+
+def _verbs(state: StudyState, some_failed: bool) -> list[str]:
+    possible = [verb for verb, event in _EVENTS.items() if (state, event) in TRANSITIONS]
+    return [verb for verb in possible if verb != "retry" or some_failed]
+
+
+@router.get("/studies/{study_id:study}")
+def study_page(context: Ctx, study_id: StudyId) -> Response:
+    """One study: how far it is, its mechanical characteristic, its inputs."""
+    study = context.store.study(study_id)
+    query = characteristic(study, kernels.study_results(study))
+    frame = study_frame(context, study_id)
+    first = context.store.case_row(study_id, 0) if query is None else None
+    too_many = query is not None and drawn_numbers(study, query) > plots.MAX_PICTURE_POINTS
+    address = views.study_address(study_id)
+    pairs = [] if query is None else pairs_of(query)
+    return page(
+        "study.html",
+        **frame,
+        tab="",
+        caption=None if query is None else caption(study, query),
+        figure=None if query is None else f"/studies/{study_id}/figures/curves?{urlencode([*pairs, ('columns', '2')])}",
+        picture=None if query is None or too_many else f"{address}/curves?{urlencode([*pairs, ('format', 'svg')])}",
+        curves=f"/studies/{study_id}/curves?{urlencode(pairs)}",
+        only_row=None if first is None else first.results.items(),
+        units={info.name: info.unit for info in kernels.study_results(study)},
+        inputs=inputs(study),
+        run=run_lines(study),
+        fits=fits_of(frame["study"]["spec"]),
+    )
+
+
+def inputs(study: Study) -> list[tuple[str, list[dict[str, Any]]]]:
+    """Every parameter of the base by its section, with letter, value and unit; those on an axis say so."""
+    varied = study.axis_paths
+    sections: dict[str, list[dict[str, Any]]] = {}
+    for path in dict.fromkeys((*study.base, *varied)):
+        entry = parameter_of(study.model, path)
+        section, _, name = path.rpartition(".")
+        sections.setdefault(section, []).append(
+            {
+                "name": name,
+                "path": path,
+                "symbol": "" if entry is None else entry.symbol,
+                "help": "" if entry is None else entry.help,
+                "value": study.base.get(path),
+                "unit": unit_of(study.model, path),
+                "varied": path in varied,
+            }
+        )
+    return [(section or "surroundings", rows) for section, rows in sections.items()]
+
+
+def run_lines(study: Study) -> list[tuple[str, str]]:
+    """The run as people read it."""
+
+    def time(value: Any) -> str:
+        return f"{value[0]:g} {value[1]}"
+
+    lines = []
+    for name, value in study.run.items():
+        if name == "duration":
+            lines.append((name, time(value)))
+        elif name == "window":
+            shown = "the last third" if value is None else f"{time(value[0])} to {time(value[1])}"
+            lines.append(("evaluated window", shown))
+        else:
+            lines.append((name, f"{value:g}" if isinstance(value, float) else str(value)))
+    return lines
+
+
+def fits_of(spec: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The reports of the clutch laws that the spec gives as measured data, by their JSON Pointers."""
+    base = spec.get("base", {})
+    pendulums = base.get("pendulums")
+    clutches = [base.get("clutch"), *(item.get("clutch") for item in pendulums or () if isinstance(item, dict))]
+    if not any(isinstance(clutch, dict) and "data" in clutch for clutch in clutches):
+        return {}
+    # The fit is not stored: it follows from the spec, to the last bit.
+    return {pointer: fit_json(fit) for pointer, fit in parse_spec({**spec, "axes": []}).fits.items()}
+
+
+@router.post("/studies/{study_id:study}/{verb}")
+def act(context: Ctx, study_id: StudyId, verb: str) -> Response:
+    """A button of the page: the wish is written down, and the page shown again."""
+    wishes = {
+        "pause": context.store.pause_study,
+        "resume": context.store.resume_study,
+        "cancel": context.store.cancel_study,
+        "retry": context.store.retry_study,
+    }
+    if verb not in wishes:
+        raise ApiError("not-found", "There is no such thing to do with a study.")
+    wishes[verb](study_id)
+    return RedirectResponse(f"/studies/{study_id}", status_code=303)
+
+
+def fixed_choices(study: Study, drawn: tuple[str, ...], at: tuple[tuple[str, str], ...]) -> list[dict[str, Any]]:
+    """For each axis that a picture holds: its values to choose from, and the one that is chosen."""
+    chosen = dict(at)
+    found = []
+    for axis in study.axes:
+        if len(axis) < 2 or any(path in axis.paths for path in drawn):
+            continue
+        path = next((path for path in axis.paths if path in chosen), axis.paths[0])
+        unit = unit_of(study.model, axis.paths[0])
+        text = chosen.get(path)
+        found.append(
+            {
+                "path": axis.paths[0],
+                "paths": axis.paths,
+                "unit": unit,
+                "values": [] if len(axis) > _MOST_CHOICES else sorted(set(axis.values)),
+                "chosen": text,
+                "number": _plain(text),
+            }
+        )
+    return found
+
+
+#: Values of an axis that a list to choose from may have; of more, the value is written.
+_MOST_CHOICES: Final = 200
+
+
+def _plain(text: str | None) -> float | None:
+    try:
+        return None if text is None else float(text)
+    except ValueError:
+        return None
+
+
+def map_address(study: Study, given: QueryParams, study_id: str) -> str | None:
+    """Address of the map that the choices of ``given`` lead to; None where there is none."""
+    query = map_query(study, kernels.study_results(study), given)
+    return None if query is None else f"/studies/{study_id}/map?{urlencode(pairs_of(query))}"

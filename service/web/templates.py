@@ -1,0 +1,143 @@
+"""The templates of the pages, and how numbers, units and names are written on them."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from functools import lru_cache
+from typing import Any, Final
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
+from starlette.responses import Response
+
+from service.catalogue import parameter_of
+
+#: Narrow blank without a line break: between thousands, as ISO 80000 writes them.
+_THIN: Final = "\N{NARROW NO-BREAK SPACE}"
+_RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+#: Significant digits of numbers on pages; files and the interface for programs have all of them.
+_DIGITS: Final = 5
+#: MODEL's letters as books print them: base and index.
+_SYMBOLS: Final = {
+    "nu/2pi": ("f", ""),
+    "chi": ("χ", ""),
+    "lambda": ("λ", ""),
+    "delta": ("δ", ""),
+    "phi(0)": ("φ", "0"),
+    "phi'(0)": ("ω", "0"),
+    "phi_e'(0)": ("ω", "e0"),
+    "c_(K+1)": ("c", "k"),
+    "u_end": ("u", "end"),
+}
+
+
+@lru_cache(maxsize=1)
+def _templates() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("service.web"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {
+        "number": number,
+        "unit": unit_text,
+        "spec": spec_text,
+        "marked": marked,
+        "symbol": symbol,
+        "words": words,
+        "path_words": path_words,
+        "moment": moment,
+        "duration": duration,
+        "bytes": bytes_text,
+    }
+    return environment
+
+
+def page(name: str, status: int = 200, **values: Any) -> Response:
+    """The page that the template ``name`` makes of ``values``."""
+    text = _templates().get_template(name).render(**values)
+    return Response(text, status_code=status, media_type="text/html")
+
+
+def fragment(name: str, **values: Any) -> str:
+    """A part of a page, as its text."""
+    return _templates().get_template(name).render(**values)
+
+
+def number(value: float | None, digits: int = _DIGITS) -> str:
+    """A number as people read it: few digits, thousands apart, powers of ten raised; a dash for none."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "–"
+    if isinstance(value, int):
+        return f"{value:,}".replace(",", _THIN)
+    text = f"{value:.{digits}g}".replace("-", "−", 1 if value < 0 else 0)
+    mantissa, _, exponent = text.partition("e")
+    if exponent:
+        return f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}"
+    if abs(value) >= 1e4 and "." not in text:
+        return f"{value:,.0f}".replace(",", _THIN).replace("-", "−")
+    return text
+
+
+def unit_text(unit: str | None) -> str:
+    """``kg*m^2`` as ``kg·m²``; nothing for a number without a unit."""
+    if unit in (None, "1"):
+        return ""
+    raised = re.sub(r"\^(-?\d+)", lambda found: found[1].translate(_RAISED), str(unit))
+    return raised.replace("*", "·")
+
+
+def symbol(text: str) -> Markup:
+    """A letter of the model with its index, as books print it."""
+    base, _, index = text.partition("_")
+    base, index = _SYMBOLS.get(text, (base, index))
+    return Markup("<i>{}</i>{}").format(base, Markup("<sub>{}</sub>").format(index) if index else "")
+
+
+def words(name: str) -> str:
+    """``shaft.speed.mean`` as ``Shaft speed mean``."""
+    text = name.replace(".", " ").replace("_", " ").strip()
+    text = re.sub(r"^pendulums (\d+)", r"pendulum \1", text)
+    return text[:1].upper() + text[1:]
+
+
+def path_words(path: str, model: str = "") -> str:
+    """A path of the spec in words, with its letter where the catalogue of ``model`` has one that is short."""
+    entry = parameter_of(model, path) if model else None
+    letter = re.match(r"\w+$", entry.symbol) if entry else None
+    return words(path) + (f" {letter[0]}" if letter and letter[0] not in path.split(".") else "")
+
+
+def spec_text(spec: dict[str, Any]) -> str:
+    """A spec as it was given: keys in their order, every character itself; escaped with the rest of the page."""
+    return json.dumps(spec, ensure_ascii=False, indent=2)
+
+
+def marked(text: str) -> Markup:
+    """A sentence of the documentation; what stands between backticks is code."""
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))  # noqa: S704 - escaped just before
+
+
+def moment(text: str | None) -> str:
+    """A time stamp to the second."""
+    return text[:19].replace("T", " ") + " UTC" if text else "–"
+
+
+def duration(seconds: float) -> str:
+    """A time span in the unit that suits it, two digits: ``40 s``, ``3 min``, ``2.5 h``."""
+    for limit, divisor, unit in ((1.0, 1e-3, "ms"), (100.0, 1.0, "s"), (6000.0, 60.0, "min"), (172800.0, 3600.0, "h")):
+        if seconds < limit:
+            return f"{float(f'{seconds / divisor:.2g}'):g} {unit}"
+    return f"{float(f'{seconds / 86400.0:.2g}'):g} days"
+
+
+def bytes_text(count: float) -> str:
+    """A size of a file: ``12 kB``, ``3.4 MB``."""
+    for divisor, unit in ((1e9, "GB"), (1e6, "MB"), (1e3, "kB")):
+        if count >= divisor:
+            return f"{float(f'{count / divisor:.2g}'):g} {unit}"
+    return f"{count:.0f} B"
