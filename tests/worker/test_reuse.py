@@ -1,0 +1,101 @@
+"""Cases that two studies share, against a plain comparison of every case with every other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.worker.fakes import BASE, RUN
+from worker import kernels
+from worker.reuse import kin_hash, shared_cases, taken
+from worker.study import Axis, Study
+
+PATHS = ("shaft.load", "excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y")
+NUMBERS = (0.1, 2e-3, 3e-3, 25.0, 30.0)
+
+
+@st.composite
+def studies(draw: st.DrawFn) -> Study:
+    """A small grid or zip over some of four paths, some of them tied; its values often meet the base's."""
+    combine = draw(st.sampled_from(["grid", "zip"]))
+    paths = draw(st.permutations(PATHS))
+    cuts = sorted(draw(st.sets(st.integers(1, 4), max_size=3)))
+    groups = [tuple(paths[a:b]) for a, b in zip([0, *cuts[:-1]], cuts, strict=True)] if cuts else []
+    length = draw(st.integers(1, 4))
+    axes = []
+    for group in groups:
+        values = draw(st.lists(st.sampled_from(NUMBERS), min_size=length, max_size=length, unique=combine == "grid"))
+        axes.append(Axis(group, tuple(values)))
+    study = Study("vibration-drive", "", dict(BASE), dict(RUN), tuple(axes), combine)  # type: ignore[arg-type]
+    # A zip that repeats a case is refused by the spec.
+    rows = set(map(tuple, np.stack([*study.columns(range(study.cases)).values()], 1).tolist())) if axes else {()}
+    return study if len(rows) == study.cases else replace(study, axes=(), combine="grid")
+
+
+def parameters(study: Study, case: int) -> dict[str, float]:
+    return {**study.base, **study.case_parameters(case)}
+
+
+@given(studies(), studies())
+@settings(max_examples=300, deadline=None)
+def test_the_cases_found_are_those_with_equal_parameters(new: Study, old: Study) -> None:
+    expected = {
+        (ours, theirs)
+        for ours in range(new.cases)
+        for theirs in range(old.cases)
+        if parameters(new, ours) == parameters(old, theirs)
+    }
+    ours, theirs = shared_cases(new, old)
+    assert set(zip(ours.tolist(), theirs.tolist(), strict=True)) == expected
+    assert ours.tolist() == sorted(ours.tolist())
+
+
+@given(studies(), st.data())
+@settings(max_examples=100, deadline=None)
+def test_a_study_of_chosen_cases_has_their_parameters(study: Study, data: st.DataObject) -> None:
+    if not study.axes:
+        return
+    cases = data.draw(st.lists(st.integers(0, study.cases - 1), min_size=1, unique=True))
+    part = taken(study, np.array(cases))
+    assert [parameters(part, index) for index in range(part.cases)] == [parameters(study, case) for case in cases]
+    assert kernels.shape_of(part) == kernels.shape_of(study)
+
+
+def test_large_grids_share_what_they_share() -> None:
+    def grid(loads: range) -> Study:
+        axes = (
+            Axis(("shaft.load",), tuple(load / 7.0 for load in loads)),
+            Axis(("excitation.frequency",), tuple(map(float, range(10, 410)))),
+        )
+        return Study("vibration-drive", "", dict(BASE), dict(RUN), axes)
+
+    ours, theirs = shared_cases(grid(range(500, 1500)), grid(range(1000)))
+    assert ours.size == 500 * 400
+    np.testing.assert_array_equal(theirs, ours + 500 * 400)
+
+
+def test_many_zipped_columns_do_not_overflow() -> None:
+    random = np.random.default_rng(1)
+    paths = [path for path in BASE if path not in PATHS]
+    axes = tuple(Axis((path,), tuple(random.uniform(1.0, 2.0, 5000).tolist())) for path in (*PATHS, *paths))
+    study = Study("vibration-drive", "", dict(BASE), dict(RUN), axes, "zip")
+    order = random.permutation(5000)
+    shuffled = taken(study, order)
+    ours, theirs = shared_cases(shuffled, study)
+    np.testing.assert_array_equal(ours, np.arange(5000))
+    np.testing.assert_array_equal(theirs, order)
+
+
+def test_kin_depends_on_run_engine_and_parameters_but_not_on_values() -> None:
+    study = Study("vibration-drive", "a", dict(BASE), dict(RUN))
+    same = replace(study, name="b", base={**BASE, "shaft.load": 7.0}, axes=(Axis(("shaft.load",), (1.0, 2.0)),))
+    assert kin_hash(study, "1") == kin_hash(same, "1")
+    others = [
+        kin_hash(study, "2"),
+        kin_hash(replace(study, run={**RUN, "tolerance": 1e-8}), "1"),
+        kin_hash(replace(study, base={**BASE, "pendulums.1.mass": 1.0}), "1"),
+    ]
+    assert len({kin_hash(study, "1"), *others}) == 4
