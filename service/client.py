@@ -94,10 +94,16 @@ class ServiceClient:
     def __exit__(self, *_: object) -> None:
         self._http.close()
 
-    def create_study(self, spec: object, key: str | None = None, priority: int = 0) -> dict[str, Any]:
-        """Submit a study; the same ``key`` submits it once, however often it is sent."""
+    def create_study(
+        self, spec: object, key: str | None = None, priority: int = 0, fresh: bool = False
+    ) -> dict[str, Any]:
+        """Submit a study; the same ``key`` submits it once, however often it is sent.
+
+        Of a ``fresh`` study every case is run, also those that other studies have already.
+        """
         headers = {"Idempotency-Key": key or uuid.uuid4().hex}
         query = [("priority", str(priority))] if priority else []
+        query += [("fresh", "true")] if fresh else []
         return self._json("POST", "/studies", json=spec, headers=headers, params=query)
 
     def preview(self, spec: object) -> dict[str, Any]:

@@ -55,6 +55,7 @@ def run_here(
     chunk_cases: int = 0,
     chunk_timeout: float = 600.0,
     warnings: Sequence[str] = (),
+    fresh: bool = False,
     on_progress: Callable[[Progress], None] | None = None,
     executor: Executor | None = None,
 ) -> Iterator[LocalRun]:
@@ -68,7 +69,7 @@ def run_here(
     with tempfile.TemporaryDirectory(prefix=_FOLDER_PREFIX) as folder, marked(Path(folder)):
         url = database_url or f"sqlite:///{Path(folder) / 'run.sqlite3'}"
         with Store.open(url, chunking=Chunking(chunk_cases, max(processes, 1), chunk_timeout)) as store:
-            record = store.create_study(spec, study, warnings=warnings)
+            record = store.create_study(spec, study, warnings=warnings, fresh=fresh)
             settings = WorkerSettings(url, processes, chunk_timeout)
             watch = _Watch(store, record.id, on_progress)
             lock = DispatcherLock(store.session.path)

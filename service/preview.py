@@ -25,14 +25,16 @@ def estimated_bytes(study: Study) -> int:
     return study.cases * (_ROW_BYTES + _NUMBER_BYTES * len(kernels.study_results(study)))
 
 
-def preview_json(parsed: ParsedSpec, chunking: Chunking) -> dict[str, Any]:
+def preview_json(parsed: ParsedSpec, chunking: Chunking, reusable: int = 0) -> dict[str, Any]:
     """What ``parsed`` would be as a study that is cut and run so, as JSON data.
 
-    ``estimated_seconds`` (wall time) and ``estimated_bytes`` (in the database) are rough.
+    ``reusable`` of its cases need not be run, because studies of the database have them. ``estimated_seconds`` (wall
+    time) and ``estimated_bytes`` (in the database) are rough.
     """
     study = parsed.study
     # A study of fewer cases than processes still takes the time of one case.
-    rounds = max(study.cases / chunking.processes, 1.0)
+    to_run = study.cases - reusable
+    rounds = max(to_run / chunking.processes, 1.0)
     first = range(min(_FIRST_CASES, study.cases))
     return {
         "model": study.model,
@@ -42,7 +44,8 @@ def preview_json(parsed: ParsedSpec, chunking: Chunking) -> dict[str, Any]:
         "combine": study.combine,
         "axes": axes_json(study),
         "results": len(kernels.study_results(study)),
-        "estimated_seconds": work_of(rounds) * kernels.estimate_seconds_per_case(study),
+        "reusable": reusable,
+        "estimated_seconds": work_of(rounds) * kernels.estimate_seconds_per_case(study) if to_run else 0.0,
         "estimated_bytes": estimated_bytes(study),
         "warnings": [*parsed.warnings, *chunking.warnings(study)],
         "fits": {pointer: fit_json(fit) for pointer, fit in parsed.fits.items()},

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, assert_never
 
 from worker import dispatch
 from worker.dispatch import Dispatch
-from worker.ports import EpochLostError, KernelError, StoreFullError
+from worker.ports import Chunk, EpochLostError, Fate, KernelError, Outcome, StoreFullError
+from worker.reuse import no_cases, taken
 from worker.states import StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from worker.kernels import ChunkResult
-    from worker.ports import ActiveStudy, Chunk, Clock, Executor, Store
+    from worker.ports import ActiveStudy, Clock, Executor, Known, Store
     from worker.study import Study
 
 _LOG = logging.getLogger(__name__)
@@ -63,6 +64,9 @@ class Dispatcher:
         #: Studies that wait for their kernels, and when they began to; infinity once they say so.
         self._compiling: dict[int, float] = {}
         self._priorities: dict[int, int] = {}
+        #: By ticket: what of a chunk in flight the store has already; and outcomes of chunks of which it has all.
+        self._known: dict[int, Known] = {}
+        self._had_all: list[Outcome] = []
         #: Why the store took nothing when it was last asked to; claims are still to be returned then.
         self._full: str | None = None
         self._full_delay = FULL_SECONDS[0]
@@ -99,8 +103,10 @@ class Dispatcher:
             if now >= self._next_poll:
                 self._next_poll = now + POLL_SECONDS
                 self._poll()
-            for outcome in self._executor.wait(POLL_SECONDS):
+            at_once, self._had_all = self._had_all, []
+            for outcome in (*at_once, *self._executor.wait(0.0 if at_once else POLL_SECONDS)):
                 self._handle(dispatch.Ended(outcome.ticket, outcome.fate, outcome.detail), outcome.result)
+                self._known.pop(outcome.ticket, None)
         except StoreFullError as error:
             self._store_is_full(str(error))
 
@@ -109,6 +115,8 @@ class Dispatcher:
             self._try_again = self._clock.monotonic() + self._full_delay
             self._full_delay = min(2.0 * self._full_delay, FULL_SECONDS[1])
         self._full = reason
+        self._known.clear()
+        self._had_all.clear()
         self._handle(dispatch.Lost())
         for number in list(self._studies):
             self._forget(number)
@@ -207,6 +215,8 @@ class Dispatcher:
             self._ids.get(number, number), reason,
         )  # fmt: skip
         self._executor.close()
+        self._known.clear()
+        self._had_all.clear()
         self._executor = self._renew()
         self._store.begin_again(self._epoch, number)
         for known in list(self._studies):
@@ -226,17 +236,30 @@ class Dispatcher:
         got: set[Chunk] = set(self._store.claim(self._epoch, [run.chunk for run in runs]))
         for run in runs:
             if run.chunk in got:
-                self._executor.submit(run.ticket, self._studies[run.chunk.study], run.chunk)
+                self._submit(run.ticket, run.chunk)
         for run in runs:
             if run.chunk not in got:
                 self._handle(dispatch.Refused(run.ticket))
 
+    def _submit(self, ticket: int, chunk: Chunk) -> None:
+        """Start what of the chunk has to be run: a case that another study has is not."""
+        study = self._studies[chunk.study]
+        known = self._store.known(study, chunk)
+        if known is None:
+            self._executor.submit(ticket, study, chunk)
+            return
+        self._known[ticket] = known
+        if known.missing.size:
+            self._executor.submit(ticket, taken(study, known.missing), Chunk(chunk.study, 0, known.missing.size))
+        else:
+            self._had_all.append(Outcome(ticket, Fate.DONE, no_cases(study)))
+
     def _do(self, instruction: dispatch.Instruction, result: ChunkResult | None) -> None:
         match instruction:
-            case dispatch.Commit(chunk=chunk):
+            case dispatch.Commit(ticket=ticket, chunk=chunk):
                 if result is None:
                     raise ValueError(f"the executor gave no result for {chunk}")
-                self._store.commit(self._epoch, chunk, result)
+                self._store.commit(self._epoch, chunk, result, self._known.get(ticket))
                 self._full_delay = FULL_SECONDS[0]
             case dispatch.PutBack(chunk=chunk, detail=detail):
                 self._store.put_back(self._epoch, chunk, detail)

@@ -10,6 +10,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from datetime import datetime
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from worker.kernels import ChunkResult
     from worker.states import StudyState
     from worker.study import Study
@@ -32,6 +35,24 @@ class Chunk:
     def last(self) -> int:
         """Number of the last case."""
         return self.first + self.count - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """Cases of a chunk whose rows other studies have already.
+
+    Attributes
+    ----------
+    missing : int64 array
+        The cases of the chunk that have to be run, ascending.
+    cases, studies, there : int64 arrays of one length
+        The others, ascending; the number of the study that has each, and its case there.
+    """
+
+    missing: NDArray[np.int64]
+    cases: NDArray[np.int64]
+    studies: NDArray[np.int64]
+    there: NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +114,15 @@ class Store(Protocol):
     def claim(self, epoch: int, chunks: Sequence[Chunk]) -> list[Chunk]:
         """Claim waiting chunks of studies that are queued or running; gives those that were got."""
 
-    def commit(self, epoch: int, chunk: Chunk, result: ChunkResult) -> bool:
-        """Insert the rows of a claimed chunk and mark it done. False, and no change, when it is not claimed by us."""
+    def known(self, study: Study, chunk: Chunk) -> Known | None:
+        """Which cases of a chunk of ``study`` other studies have already; None where none is."""
+
+    def commit(self, epoch: int, chunk: Chunk, result: ChunkResult, known: Known | None = None) -> bool:
+        """Insert the rows of a claimed chunk and mark it done. False, and no change, when it is not claimed by us.
+
+        With ``known`` the result is that of the missing cases only, and the other rows are copied; where one of them is
+        gone, the chunk is returned to waiting instead (False).
+        """
 
     def release(self, epoch: int) -> None:
         """Return every claim of this epoch to waiting: the dispatcher ends."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from worker import kernels
 from worker.study import Axis
 
 if TYPE_CHECKING:
@@ -110,3 +111,8 @@ def taken(study: Study, cases: Cases) -> Study:
         for index, axis in enumerate(study.axes)
     )
     return replace(study, axes=axes, combine="zip")
+
+
+def no_cases(study: Study) -> kernels.ChunkResult:
+    """The result of running no case of ``study``."""
+    return kernels.ChunkResult(0, [], [], np.empty((0, len(kernels.study_results(study)))))

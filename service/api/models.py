@@ -50,6 +50,7 @@ class StudySummary(Body):
     reason: str | None = Field(description="why the study is held, waits or failed")
     cases: int = Field(description="number of cases")
     progress: Progress
+    reused: int = Field(description="cases whose rows were taken from other studies instead of being run")
     warnings: list[str] = Field(description="what is allowed but probably not meant")
     priority: int = Field(description="of the studies that wait, those of the highest priority go first")
     created_at: datetime
@@ -127,6 +128,7 @@ class Preview(Body):
     combine: str
     axes: list[AxisInfo]
     results: int = Field(description="number of results of each case")
+    reusable: int = Field(description="cases that need not be run, because other studies of the database have them")
     estimated_seconds: float = Field(description="rough time on the processes of this service, s")
     estimated_bytes: int = Field(description="rough size in the database")
     warnings: list[str]

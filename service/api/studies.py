@@ -66,14 +66,20 @@ def _parsed(received: Body) -> ParsedSpec:
     openapi_extra=_SPEC_BODY,
 )
 def create_study(
-    context: Ctx, received: SpecBody, idempotency_key: IdempotencyKey = None, priority: Priority = 0
+    context: Ctx,
+    received: SpecBody,
+    idempotency_key: IdempotencyKey = None,
+    priority: Priority = 0,
+    fresh: Annotated[bool, Query(description="run every case, also those that other studies have already")] = False,
 ) -> Response:
-    """Submit a study. It is queued, and its cases are run in the order of their numbers."""
-    record = accept(context.store, _parsed(received), idempotency_key, priority)
+    """Submit a study. Its cases are run in the order of their numbers; rows that other studies have are taken."""
+    record = accept(context.store, _parsed(received), idempotency_key, priority, fresh)
     return json_response(views.summary(record), 202, {"Location": views.study_address(record.id)})
 
 
-def accept(store: Store, parsed: ParsedSpec, idempotency_key: str | None = None, priority: int = 0) -> StudyRecord:
+def accept(
+    store: Store, parsed: ParsedSpec, idempotency_key: str | None = None, priority: int = 0, fresh: bool = False
+) -> StudyRecord:
     """Take a study in, warnings and all; ApiError when its results would not fit on the disk."""
     body_hash = hashlib.sha256(json.dumps(parsed.spec, sort_keys=True).encode("ascii")).hexdigest()
     known = store.study_of_key(idempotency_key, body_hash) if idempotency_key else None
@@ -87,6 +93,7 @@ def accept(store: Store, parsed: ParsedSpec, idempotency_key: str | None = None,
         idempotency_key=idempotency_key,
         body_hash=body_hash,
         priority=priority,
+        fresh=fresh,
     )
 
 
@@ -109,7 +116,8 @@ def _size(count: int) -> str:
 )
 def preview_study(context: Ctx, received: SpecBody) -> Response:
     """What a study would be: cases, time, size, warnings and fitted clutch laws. Nothing is submitted."""
-    return json_response(preview_json(_parsed(received), context.store.chunking))
+    parsed = _parsed(received)
+    return json_response(preview_json(parsed, context.store.chunking, context.store.reusable(parsed.study)))
 
 
 @router.get("/studies", response_model=m.StudyPage, responses=problems("invalid-parameter"))

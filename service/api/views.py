@@ -36,6 +36,7 @@ def summary(record: StudyRecord) -> dict[str, Any]:
         "reason": record.reason,
         "cases": record.cases,
         "progress": {"total": record.cases, "done": record.done, "ok": record.ok},
+        "reused": record.reused,
         "warnings": list(record.warnings),
         "priority": record.priority,
         "created_at": timestamp(record.created_at),

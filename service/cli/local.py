@@ -20,7 +20,7 @@ from service.cli.console import (
     write_text,
 )
 from service.cli.files import output, read_study
-from service.cli.options import ChunkCases, JsonFlag, OutputFile, Processes, SpecFile
+from service.cli.options import ChunkCases, Fresh, JsonFlag, OutputFile, Processes, SpecFile
 from service.cli.remote import TableFormat, table_format
 from service.cli.settings import read_settings
 from service.spec_messages import Problem
@@ -77,13 +77,22 @@ def _say_warnings(parsed: ParsedSpec) -> None:
     say(*(f"warning: {warning}" for warning in parsed.warnings))
 
 
-def preview(spec: SpecFile, processes: Processes = None, as_json: JsonFlag = False) -> None:
+def preview(
+    spec: SpecFile,
+    db: Annotated[
+        str | None, typer.Option("--db", metavar="URL", help="Database to look through for cases it has already.")
+    ] = None,
+    processes: Processes = None,
+    as_json: JsonFlag = False,
+) -> None:
     """Tell what a study would be: number of cases, time, size, first cases. Nothing is run."""
     from service.preview import preview_json
     from worker.chunking import Chunking
 
-    settings = read_settings(processes=processes)
-    made = preview_json(read_study(spec), Chunking(0, settings.pool_processes, settings.chunk_timeout))
+    settings = read_settings(database=db, processes=processes)
+    parsed = read_study(spec)
+    reusable = 0 if db is None else _reusable(settings, parsed)
+    made = preview_json(parsed, Chunking(0, settings.pool_processes, settings.chunk_timeout), reusable)
     if as_json:
         write_json(made)
         return
@@ -92,6 +101,8 @@ def preview(spec: SpecFile, processes: Processes = None, as_json: JsonFlag = Fal
         f"{made['results']} results each\n"
         f"about {duration_text(made['estimated_seconds'])} and {made['estimated_bytes'] / 1e6:.3g} MB\n"
     )
+    if reusable:
+        write_text(f"{reusable} of the cases need not be run: the database has them\n")
     columns = (("axis", False), ("unit", False), ("values", True), ("first", True), ("last", True))
     rows = [
         (", ".join(axis["paths"]), axis["unit"], axis["values"], axis["first"], axis["last"]) for axis in made["axes"]
@@ -99,6 +110,19 @@ def preview(spec: SpecFile, processes: Processes = None, as_json: JsonFlag = Fal
     if rows:
         show_table("Axes", columns, rows)
     say(*(f"warning: {warning}" for warning in made["warnings"]))
+
+
+def _reusable(settings: Settings, parsed: ParsedSpec) -> int:
+    """Cases that studies of the database have; none where there is no database yet."""
+    from service.storage.session import Session
+    from service.storage.store import Store
+
+    session = Session(settings.database_url)
+    session.close()
+    if not session.path.exists():
+        return 0
+    with Store.open(settings.database_url) as store:
+        return store.reusable(parsed.study)
 
 
 def trajectory(
@@ -193,6 +217,7 @@ def run(
     ] = None,
     processes: Processes = None,
     chunk: ChunkCases = None,
+    fresh: Fresh = False,
     as_json: JsonFlag = False,
 ) -> None:
     """Run a study here, without a service: rows or a report to standard output or FILE, progress on standard error."""
@@ -213,6 +238,7 @@ def run(
             chunk_cases=settings.chunk_cases,
             chunk_timeout=settings.chunk_timeout,
             warnings=parsed.warnings,
+            fresh=fresh,
             on_progress=lambda now: update(now.done, now.total, progress_text(now.state, now.rate, now.seconds_left)),
         ) as done,
     ):
@@ -220,7 +246,9 @@ def run(
             write(piece)
         record = done.record
     kept = f", kept as {record.id}" if db is not None else ""
-    say(f"{record.done} of {record.cases} cases done, {record.ok} ok, {time.monotonic() - start:.1f} s{kept}")
+    known = f", {record.reused} of them known from before" if record.reused else ""
+    seconds = time.monotonic() - start
+    say(f"{record.done} of {record.cases} cases done{known}, {record.ok} ok, {seconds:.1f} s{kept}")
     if record.ok != record.cases:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
 

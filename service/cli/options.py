@@ -40,10 +40,13 @@ ChunkCases = Annotated[
     ),
 ]
 
+Fresh = Annotated[bool, typer.Option("--fresh", help="Run every case, also those that other studies have already.")]
+
 __all__ = [
     "DEFAULT_SERVER",
     "ChunkCases",
     "Database",
+    "Fresh",
     "JsonFlag",
     "OutputFile",
     "Processes",

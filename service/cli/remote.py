@@ -23,7 +23,7 @@ from service.cli.console import (
     write_json,
 )
 from service.cli.files import read_spec, write_pieces
-from service.cli.options import DEFAULT_SERVER, JsonFlag, OutputFile, Server, SpecFile, StudyId, Token
+from service.cli.options import DEFAULT_SERVER, Fresh, JsonFlag, OutputFile, Server, SpecFile, StudyId, Token
 from service.spec_messages import Problem
 from worker.limits import MAX_PRIORITY
 from worker.states import TERMINAL, StudyState
@@ -114,6 +114,7 @@ def submit(
         str | None, typer.Option("--key", metavar="KEY", help="Idempotency key: the same key submits the study once.")
     ] = None,
     priority: PriorityOption = 0,
+    fresh: Fresh = False,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -121,7 +122,7 @@ def submit(
     """Submit a study to the service and print its id."""
     data = read_spec(spec)
     with connection(server, token) as client:
-        study = client.create_study(data, key, priority)
+        study = client.create_study(data, key, priority, fresh)
         say(*(f"warning: {warning}" for warning in study.get("warnings", ())))
         if wait:
             study = follow(client, study["id"])

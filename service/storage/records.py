@@ -28,6 +28,7 @@ class StudyRecord:
     ``number`` counts studies in order of submission; ``id`` is the public name. ``done`` counts cases with an ending,
     ``ok`` those that ended ok. ``reason`` says why the study is held or failed. ``revision`` rises with every change of
     the record or its rows: together with ``id`` it makes an ETag. Studies of higher ``priority`` go first.
+    ``reused`` counts the cases whose rows were taken from earlier studies.
     """
 
     number: int
@@ -45,6 +46,7 @@ class StudyRecord:
     physics_hash: str
     warnings: tuple[str, ...]
     priority: int
+    reused: int
     revision: int
     created_at: datetime
     started_at: datetime | None
@@ -187,6 +189,7 @@ def record_of(row: sa.Row[Any]) -> StudyRecord:
         physics_hash=row.physics_hash,
         warnings=tuple(json.loads(row.warnings)),
         priority=row.priority,
+        reused=row.reused,
         revision=row.revision,
         created_at=moment(row.created_at),
         started_at=optional_moment(row.started_at),

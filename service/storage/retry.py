@@ -58,6 +58,8 @@ class Retries(Part):
                     continue
                 _give_back(connection, row, runs, counts)
                 self._move(connection, row.number, StudyEvent.RETRY)
+                # To be run again means run, not taken from a study in which they failed in the same way.
+                connection.execute(sa.update(STUDIES).where(c.number == row.number).values(fresh=1))
                 return record_of(self._row(connection, study_id, *RECORD_COLUMNS))
 
 

@@ -17,6 +17,7 @@ from service.storage.records import Progress, StudyPage, StudyRecord, record_of
 from service.storage.tables import CHUNKS, ENDINGS, IDEMPOTENCY_KEYS, RECORD_COLUMNS, STUDIES, results_table
 from worker import kernels
 from worker.chunking import Chunking, spans
+from worker.reuse import kin_hash
 from worker.states import StudyEvent, StudyState
 from worker.study import Study
 
@@ -51,11 +52,12 @@ class Studies(Part):
         body_hash: str = "",
         warnings: Sequence[str] = (),
         priority: int = 0,
+        fresh: bool = False,
     ) -> StudyRecord:
         """Accept a study: the study and its chunks in one transaction.
 
         ``spec`` is the user's own, kept verbatim. A key that was used before with the same ``body_hash`` gives the
-        study of that time; with another one raises IdempotencyConflict.
+        study of that time; with another one raises IdempotencyConflict. A ``fresh`` study takes no rows from others.
         """
         size = self.chunking.cases_of(study)
         values = {
@@ -74,6 +76,8 @@ class Studies(Part):
             "study": json.dumps(study.to_json(), allow_nan=False),
             "warnings": json.dumps(list(warnings)),
             "priority": priority,
+            "kin_hash": kin_hash(study, kernels.ENGINE_VERSION),
+            "fresh": int(fresh),
             "revision": 1,
             "created_at": self._now(),
         }

@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from worker import kernels
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0003"
+HEAD_REVISION = "0004"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -47,6 +47,12 @@ STUDIES = sa.Table(
     sa.Column("priority", sa.Integer, nullable=False, server_default="0"),
     # What a paused study waits for by itself (`WAITS_FOR_ROOM`); NULL where it waits for somebody to resume it.
     sa.Column("waits_for", sa.String(12)),
+    # Equal for studies that may have cases in common (`worker.reuse`).
+    sa.Column("kin_hash", sa.String(64), nullable=False, server_default="", index=True),
+    # 1: every case is run, whatever other studies have.
+    sa.Column("fresh", sa.Integer, nullable=False, server_default="0"),
+    # Cases whose rows were taken from other studies.
+    sa.Column("reused", sa.Integer, nullable=False, server_default="0"),
     sqlite_autoincrement=True,
 )
 
@@ -55,7 +61,9 @@ WAITS_FOR_ROOM = "room"
 
 #: The columns of a `StudyRecord`: without the texts that can be long.
 RECORD_COLUMNS = tuple(
-    column for column in STUDIES.c if column.name not in {"spec", "study", "deleted_at", "waits_for"}
+    column
+    for column in STUDIES.c
+    if column.name not in {"spec", "study", "deleted_at", "waits_for", "kin_hash", "fresh"}
 )
 
 CHUNKS = sa.Table(

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sqlalchemy as sa
 
-from service.storage.part import Part, moment
+from service.storage.part import moment
 from service.storage.records import DispatcherRecord
+from service.storage.reuse import Reuse, copy_rows, endings_of
 from service.storage.tables import (
     CHUNKS,
     DISPATCHER,
@@ -30,6 +31,8 @@ from worker.study import Study
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from worker.ports import Known
+
 _WAITING = {"state": "waiting", "epoch": None, "claimed_at": None}
 _TERMINAL = [state.value for state in TERMINAL]
 #: Only studies that have not ended have claims; by study the chunks have an index.
@@ -38,7 +41,11 @@ CLAIMED = (CHUNKS.c.state == "claimed") & CHUNKS.c.study.in_(
 )
 
 
-class Work(Part):
+class _SourceGoneError(Exception):
+    """Rows that were to be copied are not there any more."""
+
+
+class Work(Reuse):
     """Claims and results."""
 
     def take_over(self, owner: str) -> int:
@@ -142,28 +149,50 @@ class Work(Part):
         ).one_or_none()
         return found is not None
 
-    def commit(self, epoch: int, chunk: Chunk, result: ChunkResult) -> bool:
-        """Insert the rows of a claimed chunk and mark it done. False, and no change, when it is not claimed by us."""
-        if (result.first, result.count) != (chunk.first, chunk.count):
+    def commit(self, epoch: int, chunk: Chunk, result: ChunkResult, known: Known | None = None) -> bool:
+        """Insert the rows of a claimed chunk and mark it done. False, and no change, when it is not claimed by us.
+
+        With ``known`` the result is that of the missing cases only, and the other rows are copied; where one of them is
+        gone, the chunk is returned to waiting instead (False).
+        """
+        expected = (chunk.first, chunk.count) if known is None else (0, known.missing.size)
+        if (result.first, result.count) != expected:
             raise ValueError(f"a result of {result.count} cases from {result.first} is not that of {chunk}")
-        with self.session.write() as connection:
-            if not self._claimed(connection, epoch, chunk):
-                return False
-            self._store(connection, chunk, result, None)
+        try:
+            with self.session.write() as connection:
+                if not self._claimed(connection, epoch, chunk):
+                    return False
+                self._store(connection, chunk, result, None, known)
+        except _SourceGoneError:
+            self._forget_reuse(chunk.study)
+            self.put_back(epoch, chunk, "cases of another study were to be taken, and it was deleted")
+            return False
         return True
 
-    def _store(self, connection: sa.Connection, chunk: Chunk, result: ChunkResult, detail: str | None) -> None:
+    def _store(
+        self,
+        connection: sa.Connection,
+        chunk: Chunk,
+        result: ChunkResult,
+        detail: str | None,
+        known: Known | None = None,
+    ) -> None:
         model, pendulums = connection.execute(
             sa.select(STUDIES.c.model, STUDIES.c.pendulums).where(STUDIES.c.number == chunk.study)
         ).one()
         statement = _insert(model, pendulums, self.session.dialect.name)
-        connection.exec_driver_sql(statement, _tuples(chunk, result, kernels.result_infos(model, pendulums)))
+        numbers = range(chunk.first, chunk.last + 1) if known is None else known.missing.tolist()
+        if result.count:
+            rows = _tuples(chunk.study, numbers, result, kernels.result_infos(model, pendulums))
+            connection.exec_driver_sql(statement, rows)
+        if known is not None and not copy_rows(connection, model, pendulums, chunk, known):
+            raise _SourceGoneError
         connection.execute(
             sa.update(CHUNKS)
             .where(_is(chunk))
             .values(state="done", finished_at=self._now(), detail=detail, failures=chunk.failures)
         )
-        endings = Counter(result.endings)
+        endings = Counter(result.endings if known is None else endings_of(connection, model, pendulums, chunk))
         for ending, cases in endings.items():
             this = (ENDINGS.c.study == chunk.study) & (ENDINGS.c.ending == ending)
             more = connection.execute(sa.update(ENDINGS).where(this).values(cases=ENDINGS.c.cases + cases))
@@ -175,6 +204,7 @@ class Work(Part):
             .values(
                 done=STUDIES.c.done + chunk.count,
                 ok=STUDIES.c.ok + endings[kernels.OK],
+                reused=STUDIES.c.reused + (0 if known is None else known.cases.size),
                 revision=STUDIES.c.revision + 1,
             )
         )
@@ -256,6 +286,7 @@ class Work(Part):
 
     def settle(self, epoch: int, number: int) -> StudyState:
         """Bring a study without open claims to its end: cancelled when that was asked for, else finished or failed."""
+        self._forget_reuse(number)
         open_chunks = (CHUNKS.c.study == number) & (CHUNKS.c.state != "done")
         with self.session.write() as connection:
             self._own(connection, epoch)
@@ -294,8 +325,10 @@ def _insert(model: str, pendulums: int, dialect: str) -> str:
     return f"INSERT INTO {table.name} ({', '.join(names)}) VALUES ({', '.join([mark] * len(names))})"  # noqa: S608
 
 
-def _tuples(chunk: Chunk, result: ChunkResult, infos: Sequence[kernels.ResultInfo]) -> list[tuple[Any, ...]]:
-    """Rows for `_insert`: NaN and infinities become NULL, counts whole numbers."""
+def _tuples(
+    study: int, numbers: Sequence[int], result: ChunkResult, infos: Sequence[kernels.ResultInfo]
+) -> list[tuple[Any, ...]]:
+    """Rows for `_insert`, of the cases with those numbers: NaN and infinities become NULL, counts whole numbers."""
     columns: list[list[Any]] = []
     for index, info in enumerate(infos):
         column = result.values[:, index]
@@ -307,6 +340,4 @@ def _tuples(chunk: Chunk, result: ChunkResult, infos: Sequence[kernels.ResultInf
         if not finite.all():
             cells = [cell if known else None for cell, known in zip(cells, finite.tolist(), strict=True)]
         columns.append(cells)
-    count = chunk.count
-    numbers = range(chunk.first, chunk.first + count)
-    return list(zip([chunk.study] * count, numbers, result.endings, result.flags, *columns, strict=True))
+    return list(zip([study] * result.count, numbers, result.endings, result.flags, *columns, strict=True))

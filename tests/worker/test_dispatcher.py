@@ -29,7 +29,7 @@ def store(tmp_path: Path) -> Iterator[Store]:
 
 
 def submit(store: Store, cases: int = 20, name: str = "a study") -> StudyRecord:
-    return store.create_study({"name": name}, fakes.study(cases, name))
+    return store.create_study({"name": name}, fakes.study(cases, name), fresh=True)
 
 
 def work(store: Store, executor: Executor, only: int | None = None) -> None:

@@ -1,0 +1,180 @@
+"""Cases whose rows other studies have already: found from the studies alone, copied when their chunk is committed."""
+
+from __future__ import annotations
+
+import json
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import sqlalchemy as sa
+
+from service.storage.part import Part
+from service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, results_table
+from worker import kernels
+from worker.kernels import WorkerEnding
+from worker.ports import Known
+from worker.reuse import kin_hash, shared_cases
+from worker.states import StudyState
+from worker.study import Study
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from service.storage.session import Session
+    from worker.ports import Chunk, Clock
+
+    Cases = NDArray[np.int64]
+
+#: Studies that are looked through for equal cases, the newest first.
+MOST_SOURCES: Final = 64
+#: Studies whose equal cases are kept in memory.
+_KEPT: Final = 16
+_SOURCE: Final[tuple[sa.ColumnElement[Any], ...]] = (
+    STUDIES.c.number,
+    STUDIES.c.state,
+    STUDIES.c.model,
+    STUDIES.c.pendulums,
+)
+#: Endings that say nothing of the case itself: it deserves a run of its own.
+_NO_RESULT: Final = tuple(ending.value for ending in WorkerEnding)
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """Cases of a study, ascending, with the number of the study that has each and its case there."""
+
+    cases: Cases
+    studies: Cases
+    there: Cases
+
+
+class Reuse(Part):
+    """Equal cases of other studies."""
+
+    def __init__(self, session: Session, clock: Clock) -> None:
+        super().__init__(session, clock)
+        self._found: OrderedDict[int, _Found | None] = OrderedDict()
+
+    def reusable(self, study: Study) -> int:
+        """How many cases of a study that is not submitted yet would not have to be run."""
+        with self.session.read() as connection:
+            found = _find(connection, study, kin_hash(study, kernels.ENGINE_VERSION), 0)
+        return 0 if found is None else found.cases.size
+
+    def known(self, study: Study, chunk: Chunk) -> Known | None:
+        """Which cases of a chunk of ``study`` other studies have; None where none is.
+
+        What is found at the first chunk of a study holds for all of them.
+        """
+        found = self._of_study(study, chunk.study)
+        if found is None:
+            return None
+        begin, end = np.searchsorted(found.cases, [chunk.first, chunk.first + chunk.count])
+        if begin == end:
+            return None
+        missing = np.setdiff1d(np.arange(chunk.first, chunk.first + chunk.count), found.cases[begin:end])
+        return Known(missing, found.cases[begin:end], found.studies[begin:end], found.there[begin:end])
+
+    def _of_study(self, study: Study, number: int) -> _Found | None:
+        if number not in self._found:
+            with self.session.read() as connection:
+                kin, fresh = connection.execute(
+                    sa.select(STUDIES.c.kin_hash, STUDIES.c.fresh).where(STUDIES.c.number == number)
+                ).one()
+                self._found[number] = None if fresh else _find(connection, study, kin, number)
+            while len(self._found) > _KEPT:
+                self._found.popitem(last=False)
+        self._found.move_to_end(number)
+        return self._found[number]
+
+    def _forget_reuse(self, number: int) -> None:
+        """Look again at the next chunk of the study: its sources have changed."""
+        self._found.pop(number, None)
+
+
+def _find(connection: sa.Connection, study: Study, kin: str, number: int) -> _Found | None:
+    """Equal cases with rows in the studies of the same kin; the newest study that has a case counts."""
+    c = STUDIES.c
+    sources = connection.execute(
+        sa.select(*_SOURCE)
+        .where(c.kin_hash == kin, c.number != number, c.done > 0, c.deleted_at.is_(None))
+        .order_by(c.number.desc())
+        .limit(MOST_SOURCES)
+    ).all()
+    found: list[tuple[Cases, int, Cases]] = []
+    left = study.cases
+    taken = np.zeros(study.cases, dtype=np.bool_) if sources else np.empty(0, dtype=np.bool_)
+    for source in sources:
+        text = connection.execute(sa.select(c.study).where(c.number == source.number)).scalar_one()
+        ours, theirs = shared_cases(study, Study.from_json(json.loads(text)))
+        new = ~taken[ours]
+        ours, theirs = ours[new], theirs[new]
+        stored = _has_rows(connection, source, theirs)
+        ours, theirs = ours[stored], theirs[stored]
+        if ours.size:
+            taken[ours] = True
+            found.append((ours, source.number, theirs))
+            left -= ours.size
+        if not left:
+            break
+    if not found:
+        return None
+    cases = np.concatenate([ours for ours, _, _ in found])
+    studies = np.concatenate([np.full(ours.size, source, dtype=np.int64) for ours, source, _ in found])
+    order = np.argsort(cases)
+    return _Found(cases[order], studies[order], np.concatenate([theirs for _, _, theirs in found])[order])
+
+
+def _has_rows(connection: sa.Connection, source: sa.Row[Any], cases: Cases) -> NDArray[np.bool_]:
+    """Which of the cases of a study have rows that are results."""
+    stored = np.ones(cases.size, dtype=np.bool_)
+    if not cases.size:
+        return stored
+    c = CHUNKS.c
+    if source.state not in {StudyState.FINISHED.value, StudyState.FAILED.value}:
+        done = connection.execute(
+            sa.select(c["first"], c["count"]).where(c.study == source.number, c.state == "done").order_by(c["first"])
+        ).all()
+        if not done:
+            return ~stored
+        first, count = np.array(done, dtype=np.int64).T
+        at = np.searchsorted(first, cases, side="right") - 1
+        stored = (at >= 0) & (cases < (first + count)[at])
+    e = ENDINGS.c
+    odd = connection.execute(
+        sa.select(sa.func.sum(e.cases)).where(e.study == source.number, e.ending.in_(_NO_RESULT))
+    ).scalar_one()
+    if odd:
+        rows = results_table(source.model, source.pendulums).c
+        without = connection.execute(
+            sa.select(rows.case_number).where(rows.study == source.number, rows.ending.in_(_NO_RESULT))
+        ).scalars()
+        stored &= ~np.isin(cases, np.fromiter(without, dtype=np.int64))
+    return stored
+
+
+def copy_rows(connection: sa.Connection, model: str, pendulums: int, chunk: Chunk, known: Known) -> bool:
+    """Copy the known rows of a chunk; False when some are not there any more."""
+    table = results_table(model, pendulums)
+    rest = ", ".join(column.name for column in table.c if column.name not in KEY_COLUMNS[:2])
+    mark = "?" if connection.dialect.name == "sqlite" else "%s"
+    statement = (
+        f"INSERT INTO {table.name} (study, case_number, {rest}) "  # noqa: S608 - names of our own tables
+        f"SELECT {mark}, {mark}, {rest} FROM {table.name} WHERE study = {mark} AND case_number = {mark}"
+    )
+    pairs = zip(known.cases.tolist(), known.studies.tolist(), known.there.tolist(), strict=True)
+    done = connection.exec_driver_sql(statement, [(chunk.study, case, study, there) for case, study, there in pairs])
+    return done.rowcount == known.cases.size
+
+
+def endings_of(connection: sa.Connection, model: str, pendulums: int, chunk: Chunk) -> dict[str, int]:
+    """How many rows of a chunk ended how."""
+    c = results_table(model, pendulums).c
+    found = connection.execute(
+        sa.select(c.ending, sa.func.count())
+        .where(c.study == chunk.study, c.case_number >= chunk.first, c.case_number <= chunk.last)
+        .group_by(c.ending)
+    )
+    return {ending: count for ending, count in found}  # noqa: C416 - rows are no pairs for the type checker
