@@ -63,7 +63,7 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1) -> Figu
         for trace in _panel_traces(lines, info, panel, max(_MOST_POINTS // len(lines), _LEAST_POINTS))
     ]
     layout: Figure = {
-        "height": rows * _PANEL_HEIGHT + 90,
+        "height": 440 if rows == 1 else rows * _PANEL_HEIGHT + 90,
         "margin": {"t": 60 if 1 < len(lines) <= len(PALETTE) else 20, "r": 20, "b": 60, "l": 70},
         "hovermode": "closest",
         "showlegend": len(lines) > 1,

@@ -39,11 +39,13 @@ def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
     faults: tuple[Any, ...] = ()
     query: CurveQuery | None = None
     values = 0
+    held: tuple[str, ...] = ()
     try:
         query = curve_query(study, infos, request.query_params)
         if query is None:
             return RedirectResponse(f"/studies/{study_id}", status_code=303)
         selection = select(study, infos, query)
+        held = selection.held
         values = sum(line.cases.size for line in selection.lines) * len(selection.results)
     except SelectionError as error:
         faults = error.errors
@@ -63,6 +65,7 @@ def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
         figure=f"/studies/{study_id}/figures/curves?{urlencode(pairs)}",
         files=f"{views.study_address(study_id)}/curves?{urlencode(pairs)}",
         pictured=values <= plots.MAX_PICTURE_POINTS,
+        held=held,
     )
 
 
@@ -75,11 +78,12 @@ def map_page(
     infos = kernels.study_results(study)
     faults: tuple[Any, ...] = ()
     query: MapQuery | None = None
+    held: tuple[str, ...] = ()
     try:
         query = map_query(study, infos, request.query_params)
         if query is None:
             return RedirectResponse(f"/studies/{study_id}", status_code=303)
-        select(study, infos, CurveQuery(query.x, (query.z,), (query.y,), query.at))
+        held = select(study, infos, CurveQuery(query.x, (query.z,), (query.y,), query.at)).held
     except SelectionError as error:
         faults = error.errors
     shown = query or map_query(study, infos, type(request.query_params)())
@@ -100,6 +104,7 @@ def map_page(
         fixed=fixed_choices(study, (shown.x, shown.y), shown.at),
         figure=f"/studies/{study_id}/figures/map?{urlencode([*pairs, ('kind', kind)])}",
         files=f"{views.study_address(study_id)}/map?{urlencode(pairs)}",
+        held=held,
     )
 
 

@@ -19,6 +19,8 @@ from service.fits import fit_json
 from service.main_curve import caption, drawn_numbers
 from service.spec import parse_spec
 from service.web.choice import characteristic, map_query, pairs_of
+from service.web.fit_chart import FitChart, fit_chart
+from service.web.form_check import backlashes, clutch_at
 from service.web.templates import page
 from worker import kernels
 from worker.states import TRANSITIONS, StudyEvent, StudyState
@@ -128,15 +130,19 @@ def run_lines(study: Study) -> list[tuple[str, str]]:
     return lines
 
 
-def fits_of(spec: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """The reports of the clutch laws that the spec gives as measured data, by their JSON Pointers."""
+def fits_of(spec: dict[str, Any]) -> dict[str, tuple[dict[str, Any], FitChart]]:
+    """Report and picture of each clutch law that the spec gives as measured data, by their JSON Pointers."""
     base = spec.get("base", {})
     pendulums = base.get("pendulums")
     clutches = [base.get("clutch"), *(item.get("clutch") for item in pendulums or () if isinstance(item, dict))]
     if not any(isinstance(clutch, dict) and "data" in clutch for clutch in clutches):
         return {}
     # The fit is not stored: it follows from the spec, to the last bit.
-    return {pointer: fit_json(fit) for pointer, fit in parse_spec({**spec, "axes": []}).fits.items()}
+    found = {}
+    for pointer, fit in parse_spec({**spec, "axes": []}).fits.items():
+        known = backlashes(spec, pointer)
+        found[pointer] = (fit_json(fit), fit_chart(fit, clutch_at(spec, pointer), known[0] if known else 0.0))
+    return found
 
 
 @router.post("/studies/{study_id:study}/{verb}")

@@ -76,11 +76,15 @@ def number(value: float | None, digits: int = _DIGITS) -> str:
         return f"{value:,}".replace(",", _THIN)
     text = f"{value:.{digits}g}".replace("-", "−", 1 if value < 0 else 0)
     mantissa, _, exponent = text.partition("e")
-    if exponent:
-        return f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}"
-    if abs(value) >= 1e4 and "." not in text:
-        return f"{value:,.0f}".replace(",", _THIN).replace("-", "−")
-    return text
+    if 1e4 <= abs(value) < 1e7 and (exponent or "." not in text):
+        return _grouped(float(f"{value:.{digits}g}"))
+    if not exponent:
+        return text
+    return f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}"
+
+
+def _grouped(value: float) -> str:
+    return f"{value:,.0f}".replace(",", _THIN).replace("-", "−")
 
 
 def unit_text(unit: str | None) -> str:
@@ -128,8 +132,10 @@ def moment(text: str | None) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A time span in the unit that suits it, two digits: ``40 s``, ``3 min``, ``2.5 h``."""
-    for limit, divisor, unit in ((1.0, 1e-3, "ms"), (100.0, 1.0, "s"), (6000.0, 60.0, "min"), (172800.0, 3600.0, "h")):
+    """A rough time span in the unit that suits it, two digits: ``40 s``, ``3 min``, ``2.5 h``."""
+    if seconds < 1.0:
+        return "less than 1 s"
+    for limit, divisor, unit in ((100.0, 1.0, "s"), (6000.0, 60.0, "min"), (172800.0, 3600.0, "h")):
         if seconds < limit:
             return f"{float(f'{seconds / divisor:.2g}'):g} {unit}"
     return f"{float(f'{seconds / 86400.0:.2g}'):g} days"

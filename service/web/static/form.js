@@ -16,7 +16,7 @@ const check = async () => {
   for (const place of form.querySelectorAll(".wrong")) {
     const name = place.id.slice("wrong:".length);
     const field = document.getElementById(name);
-    const told = whole || touched.has(name) || (field && field.value !== "");
+    const told = whole || touched.has(name) || !field || field.value !== "";
     const messages = told ? found.faults[name] || [] : [];
     const text = messages.join(name === "/text" ? "\n" : ". ");
     if (place.textContent !== text) place.textContent = text;

@@ -1,0 +1,163 @@
+"""The form and the spec: what goes in comes out, and faults are told beside the right fields."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from service.presets import preset_names, preset_text
+from service.spec import format_of, load_spec, parse_spec
+from service.web.form_check import check_form, check_text
+from service.web.form_spec import field_of, plain, spec_of, values_of
+from service.web.templates import duration, number, unit_text
+from service.web.thinning import thin
+from worker.chunking import Chunking
+from worker.study import Study
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def drives() -> list[dict[str, Any]]:
+    """Every study of a vibration drive that comes with the program."""
+    files = [preset_text(name) for name in preset_names()]
+    files += [(path.name, path.read_text()) for path in EXAMPLES.iterdir() if path.suffix in (".json", ".toml")]
+    specs = [load_spec(text, format_of(name)) for name, text in files]
+    return [spec for spec in specs if isinstance(spec, dict) and spec.get("model") == "vibration-drive"]
+
+
+def physics(study: Study) -> str:
+    return study.physics_hash("1")
+
+
+@pytest.mark.parametrize("spec", drives(), ids=lambda spec: spec["name"])
+def test_a_cloned_study_is_the_same_study(spec: dict[str, Any]) -> None:
+    again, faults = spec_of(values_of(json.loads(json.dumps(spec))))
+    assert faults == {}
+    assert physics(parse_spec(again).study) == physics(parse_spec(spec).study)
+    assert again["name"] == spec["name"]
+
+
+def test_specs_of_other_models_are_not_forced_into_the_form() -> None:
+    with pytest.raises(ValueError, match="another model"):
+        values_of({"sprag": 1, "model": "machine-shaft", "base": {}})
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("25", 25),
+        (" 0.1 ", 0.1),
+        ("1e-9", 1e-9),
+        ("25 Hz", "25 Hz"),
+        ("1,5", "1,5"),
+        ("nan", "nan"),
+        ("1e999", "1e999"),
+    ],
+)
+def test_plain_numbers_are_numbers_and_all_else_is_left_to_the_reader(text: str, value: Any) -> None:
+    found = plain(text)
+    assert found == value or (text == "1e999" and found == float("inf"))
+
+
+def filled(**changes: str) -> dict[str, str]:
+    values = values_of(load_spec(preset_text("one_pendulum")[1], "json"))  # type: ignore[arg-type]
+    return {**values, **{name.replace("__", "/"): text for name, text in changes.items()}}
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("/base/excitation/frequency", "25 mm", "no unit of this field"),
+        ("/base/excitation/frequency", "", "is required"),
+        ("/base/pendulums/0/mass", "-1", "out of range"),
+        ("/base/clutch/coefficients", "0; -200", "negative"),
+        ("/base/clutch/coefficients", "", "is required"),
+        ("/base/gravity", "much", "must begin with a number"),
+        ("/axes/0/count", "0", "out of range"),
+        ("/axes/0/from", "16 mm", "no unit of this field"),
+        ("/axes/1/values", "1,5 mm", "decimal point"),
+        ("/axes/2/path", "shaft.lod", "shaft.load"),
+        ("/run/tolerance", "1", "out of range"),
+        ("/run/window/1", "90 periods", "ends after the run"),
+        ("/run/duration", "-1", "out of range"),
+    ],
+)
+def test_each_fault_stands_beside_its_field(name: str, text: str, message: str) -> None:
+    checked = check_form({**filled(), name: text}, Chunking())
+    assert message in " ".join(checked.faults[name])
+    assert checked.preview is None
+
+
+def test_axes_that_are_not_filled_in_do_not_shift_the_faults() -> None:
+    values = {"axes": "2", "/axes/1/path": "shaft.load", "/axes/1/way": "range"}
+    assert field_of("/axes/0/range/2", values) == "/axes/1/step"
+    assert field_of("/axes/0", values) == "/axes/1/path"
+    assert field_of("/axes", values) == "/axes"
+
+
+def test_a_clutch_is_fitted_whatever_else_is_wrong() -> None:
+    data = {
+        "/base/clutch/kind": "data",
+        "/base/clutch/data": "0 0\n0.01 2\n0.02 4\n0.03 6",
+        "/base/clutch/accuracy": "0.01",
+    }
+    checked = check_form(
+        {**filled(), **data, "/base/shaft/inertia": "", "/base/clutch/through_origin": "on"}, Chunking()
+    )
+    assert "/base/shaft/inertia" in checked.faults
+    fit, chart = checked.fits["/base/clutch"]
+    assert fit["coefficients"] == pytest.approx([0.0, 200.0])
+    assert len(chart.points) == len(chart.residuals) == 4
+    # Residuals are nothing here, so every one lies on the line of zero.
+    assert {y for _, y in chart.residuals} == {chart.zero}
+
+
+def test_a_spec_as_text_is_looked_over() -> None:
+    assert check_text("{", "json", Chunking()).faults["/text"]
+    checked = check_text(preset_text("two_pendulums")[1], "toml", Chunking())
+    assert (checked.faults, checked.preview and checked.preview["cases"]) == ({}, 96)
+
+
+VALUES = arrays(np.float64, st.integers(1, 400), elements=st.floats(-1e9, 1e9) | st.just(float("nan")))
+
+
+@given(VALUES, st.integers(5, 60))
+def test_thinned_lines_keep_their_ends_and_extrema(y: np.ndarray, most: int) -> None:
+    kept = thin(y, most)
+    assert kept.size <= max(most, 5) or kept.size == y.size <= most
+    assert np.all(np.diff(kept) > 0)
+    assert {0, y.size - 1} <= set(kept.tolist())
+    if np.isnan(y).any():
+        assert np.isnan(y[kept]).any()
+    if not np.isnan(y).all():
+        assert np.nanmax(y[kept]) == np.nanmax(y)
+        assert np.nanmin(y[kept]) == np.nanmin(y)
+
+
+def test_a_hundred_thousand_points_keep_a_single_spike() -> None:
+    y = np.sin(np.arange(100_000) / 500.0)
+    y[61_803] = 40.0
+    kept = thin(y, 2_000)
+    assert kept.size <= 2_000
+    assert 61_803 in kept
+
+
+def test_numbers_are_written_for_people() -> None:
+    assert [number(v) for v in (None, 0.0, 1234567, 123456.7, -4.5548e-6, 0.30000000000000004)] == [
+        "–", "0", "1\u202f234\u202f567", "123\u202f460", "−4.5548·10⁻⁶", "0.3",
+    ]  # fmt: skip
+    assert [unit_text(u) for u in ("1", "kg*m^2", "N*m/rad^10")] == ["", "kg·m²", "N·m/rad¹⁰"]
+    assert [duration(s) for s in (0.2, 45.2, 400.0, 9000.0, 4e5)] == [
+        "less than 1 s",
+        "45 s",
+        "6.7 min",
+        "2.5 h",
+        "4.6 days",
+    ]
