@@ -309,11 +309,10 @@ def test_a_study_is_made_with_the_keyboard_alone(visitor: Visitor, office: Offic
     tab_to('[name="/name"]')
     page.keyboard.press("Control+A")
     page.keyboard.type("By keyboard")
-    for axis in (0, 0):
-        tab_to(f'button[value="drop-axis {axis}"]')
+    for left in (2, 1):
+        tab_to('button[value="drop-axis 0"]')
         page.keyboard.press("Enter")
-        page.wait_for_timeout(50)
-    expect(page.locator(".axis")).to_have_count(1)
+        expect(page.locator(".axis")).to_have_count(left)
     tab_to('[name="/axes/0/values"]')
     page.keyboard.press("Control+A")
     page.keyboard.type("0; 0.1")

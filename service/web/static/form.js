@@ -34,7 +34,14 @@ const check = async () => {
 const soon = () => { clearTimeout(waiting); waiting = setTimeout(check, 300); };
 
 // Another pendulum or axis: the server makes the form anew with what is filled in.
+let reshaping = false;
 const reshape = async (extra) => {
+  if (reshaping) return;
+  reshaping = true;
+  try { await newShape(extra); } finally { reshaping = false; }
+};
+
+const newShape = async (extra) => {
   clearTimeout(waiting);
   latest += 1;
   const answer = await fetch(form.action, { method: "POST", body: encoded(extra), headers: { Accept: "text/html" } });
