@@ -25,8 +25,10 @@ PALETTE: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e
 SYMBOLS: Final = ("circle", "square", "diamond", "triangle-up", "x", "triangle-down", "star", "cross")
 DASHES: Final = ("solid", "dash", "dot", "dashdot")
 #: Points that all lines of a figure may have together, and one line at least.
-_MOST_POINTS: Final = 60_000
+_MOST_POINTS: Final = 24_000
 _LEAST_POINTS: Final = 400
+#: Points of one line: the five that are kept of each column of pixels of a wide picture.
+_LINE_POINTS: Final = 6_000
 #: Lines with more points are drawn without markers.
 _MARKED: Final = 60
 _PANEL_HEIGHT: Final = 280
@@ -60,7 +62,9 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1) -> Figu
     traces = [
         trace
         for panel, info in enumerate(chosen.results)
-        for trace in _panel_traces(lines, info, panel, max(_MOST_POINTS // len(lines), _LEAST_POINTS))
+        for trace in _panel_traces(
+            lines, info, panel, min(max(_MOST_POINTS // len(lines), _LEAST_POINTS), _LINE_POINTS)
+        )
     ]
     layout: Figure = {
         "height": 440 if rows == 1 else rows * _PANEL_HEIGHT + 90,

@@ -12,8 +12,6 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 from starlette.responses import Response
 
-from service.catalogue import parameter_of
-
 #: Narrow blank without a line break: between thousands, as ISO 80000 writes them.
 _THIN: Final = "\N{NARROW NO-BREAK SPACE}"
 _RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -49,7 +47,6 @@ def _templates() -> Environment:
         "marked": marked,
         "symbol": symbol,
         "words": words,
-        "path_words": path_words,
         "moment": moment,
         "duration": duration,
         "bytes": bytes_text,
@@ -107,13 +104,6 @@ def words(name: str) -> str:
     text = name.replace(".", " ").replace("_", " ").strip()
     text = re.sub(r"^pendulums (\d+)", r"pendulum \1", text)
     return text[:1].upper() + text[1:]
-
-
-def path_words(path: str, model: str = "") -> str:
-    """A path of the spec in words, with its letter where the catalogue of ``model`` has one that is short."""
-    entry = parameter_of(model, path) if model else None
-    letter = re.match(r"\w+$", entry.symbol) if entry else None
-    return words(path) + (f" {letter[0]}" if letter and letter[0] not in path.split(".") else "")
 
 
 def spec_text(spec: dict[str, Any]) -> str:

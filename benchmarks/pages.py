@@ -1,0 +1,126 @@
+"""How soon pages answer on a database of a million cases, against the most trivial request of the same service.
+
+    python -m benchmarks.pages [--cases 1000000] [--requests 30]
+
+The rows are made up (running them is what `benchmarks.scaling` measures); the service is a process of its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from urllib.parse import urlencode
+
+import httpx
+import numpy as np
+
+from service.api.examples import SPEC
+from service.spec import parse_spec
+from service.storage.store import Store
+from worker import kernels
+from worker.chunking import Chunking
+from worker.kernels import ChunkResult
+
+_CURVE = 100_000
+#: One case in so many ends otherwise than ok.
+_RARE = 997
+
+
+def fill(store: Store, axes: list[dict[str, object]], name: str) -> str:
+    """A finished study with made-up rows; its id."""
+    parsed = parse_spec({**SPEC, "axes": axes, "name": name})
+    record = store.create_study(parsed.spec, parsed.study)
+    infos = kernels.study_results(parsed.study)
+    random = np.random.default_rng(1)
+    epoch = store.take_over("benchmark")
+    while chunks := store.open_chunks(record.number)[:50]:
+        for chunk in store.claim(epoch, chunks):
+            values = random.normal(size=(chunk.count, len(infos)))
+            for column, info in enumerate(infos):
+                if info.kind == "count":
+                    values[:, column] = chunk.first % 100
+            endings = [
+                "chatter" if case % _RARE == 0 else "ok" for case in range(chunk.first, chunk.first + chunk.count)
+            ]
+            values[[ending != "ok" for ending in endings]] = np.nan
+            store.commit(epoch, chunk, ChunkResult(chunk.first, endings, [""] * chunk.count, values))
+    store.settle(epoch, record.number)
+    return record.id
+
+
+def pages(big: str, line: str, cases: int) -> dict[str, str]:
+    """What is asked for, by what it is called."""
+    own = f"/studies/{big}"
+    held = urlencode([("at", "excitation.frequency=20"), ("sort", "-efficiency")])
+    return {
+        "trivial: /livez": "/livez",
+        "list of studies": "/",
+        "new study": "/new",
+        "new study from an example": "/new?preset=one_pendulum",
+        "clone": f"/new?clone={big}",
+        "study": own,
+        "curves": f"{own}/curves",
+        "map": f"{own}/map",
+        "cases, first page": f"{own}/cases",
+        "cases, last page": f"{own}/cases?after={cases - 50}",
+        "cases, rare ending": f"{own}/cases?ending=chatter",
+        "cases of one frequency, sorted": f"{own}/cases?{held}",
+        "case": f"{own}/cases/{cases // 2}",
+        "compare": f"/compare?study={big}&study={line}",
+        f"figure: curve of {_CURVE:,} points, thinned": f"/studies/{line}/figures/curves",
+        "figure: characteristic": f"{own}/figures/curves?columns=2",
+    }
+
+
+def measure(client: httpx.Client, address: str, requests: int) -> tuple[float, float, int]:
+    """Median and slowest time (s) of ``requests`` requests after one that is not counted, and bytes of the answer."""
+    answer = client.get(address)
+    answer.raise_for_status()
+    times = []
+    for _ in range(requests):
+        start = time.perf_counter()
+        client.get(address)
+        times.append(time.perf_counter() - start)
+    return statistics.median(times), max(times), len(answer.content)
+
+
+def main() -> None:
+    """Fill a database, start a service on it, measure."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=1_000_000)
+    parser.add_argument("--requests", type=int, default=30)
+    given = parser.parse_args()
+    side = round(given.cases**0.5)
+    with tempfile.TemporaryDirectory() as folder:
+        database = Path(folder) / "pages.sqlite3"
+        start = time.perf_counter()
+        with Store.open(f"sqlite:///{database}", chunking=Chunking(cases=5000)) as store:
+            loads = {"path": "shaft.load", "linspace": [0, 1, side]}
+            big = fill(store, [{"path": "excitation.frequency", "linspace": [20, 35, side]}, loads], "A million cases")
+            line = fill(store, [{"path": "shaft.load", "linspace": [0, 1, _CURVE]}], "A long curve")
+        size = database.stat().st_size / 1e6
+        print(f"{side * side + _CURVE:,} rows, {size:,.0f} MB, written in {time.perf_counter() - start:.0f} s")
+        command = [sys.executable, "-m", "service.cli", "serve", "--json", "--port", "0", "--db", str(database)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+            assert process.stdout is not None
+            address = json.loads(process.stdout.readline())["address"]
+            with httpx.Client(base_url=address, timeout=60.0) as client:
+                trivial = 0.0
+                print(f"{'':44} median ms  slowest ms     kB  x trivial")
+                for name, path in pages(big, line, side * side).items():
+                    median, slowest, size = measure(client, path, given.requests)
+                    trivial = trivial or median
+                    times = f"{median * 1e3:9.1f} {slowest * 1e3:11.1f}"
+                    print(f"{name:44} {times} {size / 1e3:6.0f} {median / trivial:10.1f}")
+            process.send_signal(signal.SIGTERM)
+
+
+if __name__ == "__main__":
+    main()
