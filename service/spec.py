@@ -11,9 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
-from service.spec_axes import read_axes, read_combine, varied_values
+from service.spec_axes import varied_values
 from service.spec_base import Machine, read_base
 from service.spec_clutch import check_laws
+from service.spec_design import read_design
 from service.spec_fields import read_object
 from service.spec_messages import Problem, Report, SpecError, did_you_mean
 from service.spec_run import read_run
@@ -33,7 +34,7 @@ VERSION: Final = 1
 #: What a study without a name is called.
 UNNAMED: Final = "untitled"
 
-FIELDS: Final = ("sprag", "model", "name", "base", "run", "axes", "combine")
+FIELDS: Final = ("sprag", "model", "name", "base", "run", "axes", "combine", "exclude")
 
 _WARNINGS: Final[dict[str, Callable[[Report, Study], None]]] = {"vibration-drive": warn_vibration_drive}
 
@@ -84,8 +85,7 @@ def parse_spec(data: object) -> ParsedSpec:
     if model is None:
         raise report.error()
     machine = read_base(report, found.get("base"), model)
-    combine = read_combine(report, found.get("combine", "grid"))
-    axes = read_axes(report, found.get("axes", []), combine, machine)
+    axes, combine = read_design(report, found, machine)
     run = read_run(report, found.get("run", {}), varied_values("excitation.frequency", axes, machine.values))
     check_laws(report, machine.clutches, axes or (), combine)
     report.raise_if_any()

@@ -4,28 +4,18 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
-from typing import Any, cast
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from service.spec_base import Machine, assumed_clutch
 from service.spec_fields import read_object
-from service.spec_messages import Report, did_you_mean, join
+from service.spec_messages import Report, join
 from service.spec_values import PLANS, Plan, count_text
 from worker.kernels import Parameter
 from worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_TIED_PATHS
 from worker.study import Axis, Combine
 
 FIELDS = ("path", *PLANS)
-_COMBINE = ("grid", "zip")
-
-
-def read_combine(report: Report, data: object) -> Combine:
-    """How the axes go together; "grid" when it is not said, or wrong (which is noted)."""
-    if isinstance(data, str) and data in _COMBINE:
-        return cast("Combine", data)
-    hint = did_you_mean(data, _COMBINE) if isinstance(data, str) else ""
-    report.problem("/combine", f"must be 'grid' or 'zip'{hint}", data, allowed="'grid' (every combination) or 'zip'")
-    return "grid"
 
 
 def read_axes(report: Report, data: object, combine: Combine, machine: Machine) -> tuple[Axis, ...] | None:
@@ -37,8 +27,8 @@ def read_axes(report: Report, data: object, combine: Combine, machine: Machine) 
         report.problem("/axes", "must be a list of axes", data, allowed=f"a list of 0 to {MAX_AXES} axes")
         return None
     before = len(report.problems)
-    read = [_read_axis(report, join("/axes", index), item, machine) for index, item in enumerate(data)]
-    _check_paths(report, [(paths or ()) for paths, _ in read])
+    read = [read_axis(report, join("/axes", index), item, machine) for index, item in enumerate(data)]
+    check_paths(report, [(paths or ()) for paths, _ in read])
     plans = [plan for _, plan in read if plan is not None]
     if not _sizes_fit(report, plans, combine) or len(plans) < len(data) or len(report.problems) > before:
         return None
@@ -46,7 +36,7 @@ def read_axes(report: Report, data: object, combine: Combine, machine: Machine) 
     for paths, plan in read:
         if paths is None or plan is None:
             return None
-        values = _expand(report, plan, [machine.parameters[path] for path in paths], combine)
+        values = expand(report, plan, [machine.parameters[path] for path in paths], combine)
         if values is None:
             return None
         axes.append(Axis(paths, values))
@@ -55,13 +45,25 @@ def read_axes(report: Report, data: object, combine: Combine, machine: Machine) 
     return tuple(axes)
 
 
-def _read_axis(
+def axis_values(
+    report: Report, pointer: str, data: object, machine: Machine
+) -> tuple[tuple[str, ...], tuple[float, ...]] | None:
+    """Paths and values (SI) of one axis alone; None when something is wrong with it, which is noted."""
+    paths, plan = read_axis(report, pointer, data, machine)
+    if paths is None or plan is None or not _sizes_fit(report, [plan], "grid"):
+        return None
+    values = expand(report, plan, [machine.parameters[path] for path in paths], "grid")
+    return None if values is None else (paths, values)
+
+
+def read_axis(
     report: Report, pointer: str, data: object, machine: Machine
 ) -> tuple[tuple[str, ...] | None, Plan | None]:
+    """The paths of one axis, and its values counted but not there yet; None for what could not be read."""
     found = read_object(report, pointer, data, FIELDS)
     if found is None:
         return None, None
-    paths = _read_paths(report, join(pointer, "path"), found.get("path"), machine)
+    paths = read_paths(report, join(pointer, "path"), found.get("path"), machine)
     ways = [name for name in PLANS if name in found]
     if len(ways) != 1:
         given = f"{len(ways)} are given: {', '.join(ways)}" if ways else "none is given"
@@ -75,7 +77,7 @@ def _read_axis(
     return paths, plan
 
 
-def _read_paths(report: Report, pointer: str, data: object, machine: Machine) -> tuple[str, ...] | None:
+def read_paths(report: Report, pointer: str, data: object, machine: Machine) -> tuple[str, ...] | None:
     """The paths of one axis, all known and of one unit; None, and problems noted, otherwise."""
     items = data if isinstance(data, list) else [data]
     if data is None or not 1 <= len(items) <= MAX_TIED_PATHS:
@@ -104,16 +106,16 @@ def _read_paths(report: Report, pointer: str, data: object, machine: Machine) ->
     return tuple(entry.path for entry in found)
 
 
-def _check_paths(report: Report, axes: list[tuple[str, ...]]) -> None:
-    """Notes every path that stands twice, in one axis or on two."""
+def check_paths(report: Report, axes: Sequence[tuple[str, ...]], pointer: str = "/axes") -> None:
+    """Notes every path that stands twice, in one axis or on two; ``pointer`` is that of the list of axes."""
     taken: dict[str, int] = {}
     for index, paths in enumerate(axes):
         for path, times in Counter(paths).items():
             if times > 1:
-                report.problem(join("/axes", index, "path"), "names the same path twice", path)
+                report.problem(join(pointer, index, "path"), "names the same path twice", path)
             if path in taken:
                 report.problem(
-                    join("/axes", index, "path"), f"this path already stands on axis {taken[path]}", path,
+                    join(pointer, index, "path"), f"this path already stands on axis {taken[path]}", path,
                     allowed="each path on one axis",
                 )  # fmt: skip
             taken.setdefault(path, index)
@@ -147,7 +149,8 @@ def _sizes_fit(report: Report, plans: list[Plan], combine: Combine) -> bool:
     return len(report.problems) == before
 
 
-def _expand(report: Report, plan: Plan, parameters: list[Parameter], combine: Combine) -> tuple[float, ...] | None:
+def expand(report: Report, plan: Plan, parameters: list[Parameter], combine: Combine) -> tuple[float, ...] | None:
+    """The values of a plan, in range for every parameter, each once on an axis of a grid; None, and a problem noted."""
     values = plan.expand()
     seen: dict[float, int] = {}
     for index, value in enumerate(values):

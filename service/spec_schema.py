@@ -7,9 +7,20 @@ inside the run, sizes of grids, clutch laws) only `service.spec.parse_spec` chec
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Final
 
 from service.spec import UNNAMED, VERSION
+from service.spec_design import COMBINE
+from service.spec_design_schema import (
+    COMBINE_HELP,
+    Schema,
+    axis_schema,
+    exclude_schema,
+    group_schema,
+    object_schema,
+    points_schema,
+    sample_schema,
+)
 from service.spec_fields import placed
 from service.spec_run import DEFAULTS, RESETS
 from service.units import example
@@ -17,23 +28,19 @@ from worker import kernels
 from worker.kernels import CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, MAX_PENDULUMS, Parameter
 from worker.limits import (
     MAX_AXES,
-    MAX_AXIS_VALUES,
     MAX_CLUTCH_ROWS,
     MAX_NAME_LENGTH,
     MAX_QUANTITY_LENGTH,
-    MAX_TIED_PATHS,
     MAX_TOLERANCE,
     MIN_TOLERANCE,
 )
-
-Schema = dict[str, Any]
 
 _TEXT: Final[Schema] = {"type": "string", "minLength": 1, "maxLength": MAX_QUANTITY_LENGTH}
 
 
 def spec_schema() -> Schema:
     """JSON Schema of a whole spec, self-contained (no references), unknown fields refused."""
-    return _object(
+    return object_schema(
         {
             "sprag": {"const": VERSION, "description": "version of the spec"},
             "model": {"enum": list(kernels.models()), "description": "what is simulated"},
@@ -49,15 +56,16 @@ def spec_schema() -> Schema:
             "axes": {
                 "type": "array",
                 "maxItems": MAX_AXES,
-                "items": axis_schema(),
+                "items": {"anyOf": [axis_schema(), sample_schema(), points_schema(), group_schema()]},
                 "default": [],
                 "description": "what varies from case to case",
             },
             "combine": {
-                "enum": ["grid", "zip"],
+                "enum": list(COMBINE),
                 "default": "grid",
-                "description": "every combination of the axes (the first varies slowest), or the axes side by side",
+                "description": COMBINE_HELP,
             },
+            "exclude": exclude_schema(),
         },
         required=("sprag", "model", "base"),
         description="a study: a machine, a run, and what varies",
@@ -81,7 +89,7 @@ def base_schema(model: str) -> Schema:
         if any(entry.default is None for entry in entries):
             required.append(section)
     properties["clutch"] = clutch_schema()
-    return _object(properties, required=required, description="the machine that every case begins from")
+    return object_schema(properties, required=required, description="the machine that every case begins from")
 
 
 def clutch_schema() -> Schema:
@@ -124,14 +132,17 @@ def clutch_schema() -> Schema:
     }
     return {
         "description": "torque of the freewheel clutch over its windup",
-        "oneOf": [_object(law, required=("coefficients",)), _object(measured, required=("data", "accuracy"))],
+        "oneOf": [
+            object_schema(law, required=("coefficients",)),
+            object_schema(measured, required=("data", "accuracy")),
+        ],
     }
 
 
 def run_schema() -> Schema:
     """Schema of `run`."""
     time = {"type": ["number", "string"], "examples": ["60 periods", "2 s", 2.0], "minimum": 0}
-    return _object(
+    return object_schema(
         {
             "duration": {
                 **time,
@@ -162,46 +173,6 @@ def run_schema() -> Schema:
     )
 
 
-def axis_schema() -> Schema:
-    """Schema of one axis."""
-    path = {"type": "string", "examples": ["excitation.frequency", "pendulums.0.spring_rate", "clutch.coefficients.1"]}
-    end = {"type": ["number", "string"]}
-
-    def three(third: Schema, description: str) -> Schema:
-        return {
-            "type": "array",
-            "prefixItems": [end, end, third],
-            "minItems": 3,
-            "maxItems": 3,
-            "description": description,
-        }
-
-    count = {"type": "integer", "minimum": 1, "maximum": MAX_AXIS_VALUES}
-    ways: Schema = {
-        "values": {
-            "type": "array",
-            "minItems": 1,
-            "maxItems": MAX_AXIS_VALUES,
-            "items": end,
-            "description": "the values themselves",
-        },
-        "linspace": three(count, "[from, to, count], evenly divided, both ends included"),
-        "geomspace": three(count, "[from, to, count], each value the same multiple of the one before"),
-        "range": three(end, "[from, to, step], the end included when a whole number of steps leads there"),
-    }
-    paths = {"type": "array", "items": path, "minItems": 1, "maxItems": MAX_TIED_PATHS, "uniqueItems": True}
-    return {
-        **_object(
-            {
-                "path": {"anyOf": [path, paths], "description": "what varies; several paths take the same values"},
-                **ways,
-            },
-            required=("path",),
-        ),
-        "oneOf": [{"required": [name]} for name in ways],
-    }
-
-
 def quantity_schema(parameter: Parameter) -> Schema:
     """Schema of one quantity: a number in the parameter's SI unit and range, or a text with its unit."""
     schema: Schema = {
@@ -221,7 +192,7 @@ def _section(entries: list[Parameter], *, with_clutch: bool) -> Schema:
     properties = {name: quantity_schema(entry) for name, entry in names.items()}
     if with_clutch:
         properties["clutch"] = clutch_schema()
-    return _object(properties, required=[name for name, entry in names.items() if entry.default is None])
+    return object_schema(properties, required=[name for name, entry in names.items() if entry.default is None])
 
 
 def _bounds(parameter: Parameter) -> Schema:
@@ -231,12 +202,3 @@ def _bounds(parameter: Parameter) -> Schema:
     if math.isfinite(parameter.high):
         bounds["maximum"] = parameter.high
     return bounds
-
-
-def _object(properties: Schema, required: tuple[str, ...] | list[str] = (), description: str = "") -> Schema:
-    schema: Schema = {"type": "object", "properties": properties, "additionalProperties": False}
-    if required:
-        schema["required"] = list(required)
-    if description:
-        schema["description"] = description
-    return schema

@@ -1,0 +1,174 @@
+"""What varies in a study: axes as a grid or side by side, and whatever has to be written out case by case.
+
+A plain grid or zip of axes stays what it is. Samples, points, groups, unions and exclusions are put together here and
+become one table, a zip of as many axes as parameters vary.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, cast
+
+import numpy as np
+
+from service.spec_axes import check_paths, expand, read_axes, read_axis
+from service.spec_blocks import Block, as_axes, chosen, first_rows, made, one_after_another, product, side_by_side
+from service.spec_exclude import kept, read_exclude
+from service.spec_fields import read_object
+from service.spec_messages import Report, did_you_mean, join
+from service.spec_points import read_points
+from service.spec_sample import read_sample
+from service.spec_values import count_text
+from worker.limits import MAX_AXES, MAX_AXIS_VALUES
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from service.spec_base import Machine
+    from worker.study import Axis, Combine
+
+COMBINE: Final = ("grid", "zip", "union")
+GROUP_FIELDS: Final = ("combine", "axes")
+_ALLOWED: Final = "'grid' (every combination), 'zip' (side by side) or 'union' (one after the other)"
+
+
+def read_design(report: Report, found: Mapping[str, Any], machine: Machine) -> tuple[tuple[Axis, ...] | None, Combine]:
+    """The axes of the study and how they go together, from the spec's fields `axes`, `combine` and `exclude`.
+
+    The axes are None when something is wrong, which is noted.
+    """
+    combine = _read_combine(report, "/combine", found.get("combine", "grid"))
+    items = found.get("axes", [])
+    plain = not isinstance(items, list) or all(_kind(item) == "axis" for item in items)
+    if plain and combine != "union" and "exclude" not in found:
+        chosen_combine = cast("Combine", combine or "grid")
+        return read_axes(report, items, chosen_combine, machine), chosen_combine
+    conditions = read_exclude(report, found["exclude"], machine) if "exclude" in found else []
+    block = _group(report, "", items, combine, machine)
+    if block is None or report.problems or not _fits(report, block):
+        return None, "zip"
+    columns = block.make()
+    if columns is None or report.problems:
+        return None, "zip"
+    if conditions:
+        columns = chosen(columns, kept(conditions, columns, machine.values, _length(columns)))
+    return (_as_axes(report, columns, excluded=bool(conditions)), "zip")
+
+
+def _as_axes(report: Report, columns: dict[str, NDArray[np.float64]], excluded: bool) -> tuple[Axis, ...] | None:
+    count = _length(columns)
+    if not count:
+        message = "every case is excluded" if excluded else "nothing varies"
+        report.problem("/exclude" if excluded else "/axes", message, allowed="at least one case that is left")
+        return None
+    if first_rows(columns).size < count:
+        report.problem("/axes", "two of the cases are the same", allowed="each combination of values once")
+        return None
+    return as_axes(columns)
+
+
+def _length(columns: Mapping[str, NDArray[np.float64]]) -> int:
+    return next(iter(columns.values())).size if columns else 0
+
+
+def _kind(item: object) -> str:
+    """What an item of `axes` is, by the field that no other kind has."""
+    if isinstance(item, Mapping):
+        for kind, mark in (("sample", "sample"), ("points", "points"), ("group", "axes")):
+            if mark in item:
+                return kind
+    return "axis"
+
+
+def _read_combine(report: Report, pointer: str, data: object) -> str | None:
+    if isinstance(data, str) and data in COMBINE:
+        return data
+    hint = did_you_mean(data, COMBINE) if isinstance(data, str) else ""
+    report.problem(pointer, f"must be 'grid', 'zip' or 'union'{hint}", data, allowed=_ALLOWED)
+    return None
+
+
+def _group(report: Report, pointer: str, items: object, combine: str | None, machine: Machine) -> Block | None:
+    """The block of a list of axes, samples, points and (at the top) groups."""
+    where = join(pointer, "axes")
+    if not isinstance(items, list) or not 1 <= len(items) <= MAX_AXES:
+        report.problem(where, "must be a list of axes", items, allowed=f"a list of 1 to {MAX_AXES} axes")
+        return None
+    read = [_item(report, join(where, index), item, machine, top=not pointer) for index, item in enumerate(items)]
+    blocks = [block for block in read if block is not None]
+    if len(blocks) < len(items) or combine is None:
+        return None
+    if combine != "union":
+        check_paths(report, [block.paths for block in blocks], where)
+    counts = [block.count for block in blocks]
+    if combine == "zip" and len(set(counts)) > 1:
+        report.problem(
+            where, "axes that are zipped must have equally many values", [count_text(count) for count in counts],
+            allowed="axes of one length, or combine: 'grid'",
+        )  # fmt: skip
+        return None
+    count = {"grid": math.prod(counts), "zip": counts[0], "union": sum(counts)}[combine]
+    paths = tuple(dict.fromkeys(path for block in blocks for path in block.paths))
+    return Block(pointer, paths, count, partial(_make, report, where, blocks, combine, machine))
+
+
+def _make(
+    report: Report, where: str, blocks: list[Block], combine: str, machine: Machine
+) -> dict[str, NDArray[np.float64]] | None:
+    tables = made(blocks)
+    if tables is None:
+        return None
+    counts = [_length(columns) for columns in tables]
+    if combine == "grid":
+        return product(tables, counts)
+    if combine == "zip" and len(set(counts)) > 1:  # a union inside had the same cases twice
+        report.problem(where, "axes that are zipped must have equally many different cases", counts)
+        return None
+    return side_by_side(tables) if combine == "zip" else one_after_another(tables, counts, machine.values)
+
+
+def _item(report: Report, pointer: str, data: object, machine: Machine, *, top: bool) -> Block | None:
+    kind = _kind(data)
+    readers: dict[str, Callable[..., Block | None]] = {"sample": read_sample, "points": read_points}
+    if kind in readers:
+        return readers[kind](report, pointer, data, machine)
+    if kind == "axis":
+        return _axis(report, pointer, data, machine)
+    found = read_object(report, pointer, data, GROUP_FIELDS) or {}
+    if not top:
+        report.problem(pointer, "is a group inside a group", allowed="an axis, a sample or points")
+        return None
+    combine = _read_combine(report, join(pointer, "combine"), found.get("combine", "grid"))
+    return _group(report, pointer, found.get("axes"), combine, machine)
+
+
+def _axis(report: Report, pointer: str, data: object, machine: Machine) -> Block | None:
+    paths, plan = read_axis(report, pointer, data, machine)
+    if paths is None or plan is None:
+        return None
+    counts = Counter(paths)
+    if max(counts.values()) > 1:
+        report.problem(join(pointer, "path"), "names the same path twice", counts.most_common(1)[0][0])
+        return None
+
+    def make() -> dict[str, NDArray[np.float64]] | None:
+        values = expand(report, plan, [machine.parameters[path] for path in paths], "grid")
+        return None if values is None else dict.fromkeys(paths, np.array(values))
+
+    return Block(pointer, paths, plan.count, make)
+
+
+def _fits(report: Report, block: Block) -> bool:
+    """Whether the table may be made: every number of it is kept with the study."""
+    most = MAX_AXIS_VALUES // max(len(block.paths), 1)
+    if block.count <= most:
+        return True
+    report.problem(
+        "/axes",
+        f"{count_text(block.count)} cases of {len(block.paths)} parameters are to be written out one by one",
+        allowed=f"at most {MAX_AXIS_VALUES:,} numbers, here {most:,} cases; a plain grid may have more",
+    )
+    return False
