@@ -11,7 +11,7 @@ from fastapi import APIRouter, FastAPI
 from starlette.types import ASGIApp
 
 from service import handlers
-from service.api import cases, catalogues, clutch_fits, curves, events, health, studies
+from service.api import cases, catalogues, clutch_fits, curves, events, health, sensitivity, studies
 from service.api.context import Context
 from service.api.document import API_PREFIX, build_openapi
 from service.computer import Computes, ProcessComputer
@@ -96,7 +96,7 @@ def create_app(
     )
     app.state.context = Context(settings, used_store, used_computer)
     api = APIRouter(prefix=API_PREFIX)
-    for module in (studies, events, curves, cases, clutch_fits, catalogues):
+    for module in (studies, events, curves, sensitivity, cases, clutch_fits, catalogues):
         api.include_router(module.router)
     app.include_router(api)
     app.include_router(health.router)

@@ -157,6 +157,14 @@ class ServiceClient:
         """The picture of a map as "svg", "png" or "pdf"."""
         return self.download(f"{_study(study_id)}/map", [*query, ("format", form)])
 
+    def sensitivity(self, study_id: str, query: Query) -> dict[str, Any]:
+        """Main effects and shares of the variance of results."""
+        return self._json("GET", f"{_study(study_id)}/sensitivity", params=list(query))
+
+    def sensitivity_picture(self, study_id: str, query: Query, form: str) -> Iterator[bytes]:
+        """The picture of it as "svg", "png" or "pdf"."""
+        return self.download(f"{_study(study_id)}/sensitivity", [*query, ("format", form)])
+
     def report(self, study_id: str, form: str) -> Iterator[bytes]:
         """The study as a document, "html" or "pdf"."""
         return self.download(f"{_study(study_id)}/report", [("format", form)])

@@ -99,7 +99,7 @@ def paint_curves(figure: Figure, curves: Curves, title: str) -> None:
     chosen = curves.selection
     plots[-1].set_xlabel(axis_label(chosen.names[chosen.x], chosen.units[chosen.x]))
     _explain(figure, list(plots), curves)
-    _head(figure, title, chosen.held)
+    head(figure, title, chosen.held)
 
 
 def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
@@ -123,7 +123,7 @@ def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
         axes.set_ylabel(axis_label(drawn.names[1], drawn.units[1]))
         figure.colorbar(mesh, label=axis_label(drawn.result.name, drawn.result.unit))
         missing = int(np.isnan(drawn.values).sum())
-        _head(figure, title, (*drawn.held, f"grey: {missing} cases without a result") if missing else drawn.held)
+        head(figure, title, (*drawn.held, f"grey: {missing} cases without a result") if missing else drawn.held)
 
     return render(paint, picture, (8.0, 6.0))
 
@@ -233,7 +233,7 @@ def _explain(figure: Figure, plots: list[Axes], curves: Curves) -> None:
     bar.set_label(meaning.replace(" =\n", " = "), fontsize=8)
 
 
-def _head(figure: Figure, title: str, held: tuple[str, ...]) -> None:
+def head(figure: Figure, title: str, held: tuple[str, ...]) -> None:
     """The title, and below it what is held at which value, broken between two of these only."""
     lines = [_short(title)] if title else []
     line = ""

@@ -12,16 +12,21 @@ from starlette.convertors import Convertor, register_url_convertor
 from service.computer import Computes
 from service.settings import Settings
 from service.storage.store import Store
+from service.unaffected import Unaffected
 
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """Settings, store and computer of one service; ``ending`` is set when the service is about to end."""
+    """Settings, store and computer of one service; ``ending`` is set when the service is about to end.
+
+    ``unaffected`` tells of parameters that change nothing.
+    """
 
     settings: Settings
     store: Store
     computer: Computes
     ending: Event = field(default_factory=Event)
+    unaffected: Unaffected = field(default_factory=Unaffected)
 
 
 class StudyIdConvertor(Convertor[str]):

@@ -85,11 +85,11 @@ def get_curves(
         if chosen == "json":
             return json_response({"study": study_id, **curves.to_json()})
         if chosen == "csv":
-            return _attachment(_curves_csv(curves), _CURVE_FORMATS["csv"], f"{study_id}-curves.csv")
-        picture = _picture(chosen)
+            return attachment(_curves_csv(curves), _CURVE_FORMATS["csv"], f"{study_id}-curves.csv")
+        picture = picture_of(chosen)
         return picture_response(plots.draw_curves(curves, record.name or record.model, picture), picture)
 
-    return _conditional(context, request, study_id, chosen, make)
+    return conditional(context, request, study_id, chosen, make)
 
 
 @router.get(
@@ -120,10 +120,10 @@ def get_map(
         drawn = draw_map(study, kernels.study_results(study), x, y, z, _pairs(at), fetch)
         if chosen == "json":
             return json_response({"study": study_id, **drawn.to_json()})
-        picture = _picture(chosen)
+        picture = picture_of(chosen)
         return picture_response(plots.draw_map(drawn, record.name or record.model, picture), picture)
 
-    return _conditional(context, request, study_id, chosen, make)
+    return conditional(context, request, study_id, chosen, make)
 
 
 @router.get(
@@ -154,7 +154,7 @@ def get_results(
             exports.export(source, form), exports.MEDIA_TYPES[form], f"{study_id}.{exports.SUFFIXES[form][0]}"
         )
 
-    return _conditional(context, request, study_id, chosen, make)
+    return conditional(context, request, study_id, chosen, make)
 
 
 @router.get(
@@ -183,10 +183,10 @@ def get_report(
         headers = {"Content-Security-Policy": _REPORT_POLICY} if form == "html" else {}
         return Response(content, media_type=report.MEDIA_TYPES[form], headers=headers)
 
-    return _conditional(context, request, study_id, chosen, make)
+    return conditional(context, request, study_id, chosen, make)
 
 
-def _conditional(
+def conditional(
     context: Ctx, request: Request, study_id: str, form: str, make: Callable[[StudyRecord], Response]
 ) -> Response:
     """The answer that ``make`` gives, or 304 when the client has it: it depends on the study's rows and the query."""
@@ -205,7 +205,8 @@ def _pairs(at: list[str] | None) -> tuple[tuple[str, str], ...]:
     return tuple(pairs)
 
 
-def _picture(form: str) -> plots.Picture:
+def picture_of(form: str) -> plots.Picture:
+    """The kind of picture of that name."""
     return next(picture for picture in plots.PICTURES if picture == form)
 
 
@@ -215,7 +216,8 @@ def picture_response(content: bytes, picture: plots.Picture) -> Response:
     return Response(content, media_type=plots.MEDIA_TYPES[picture], headers=headers)
 
 
-def _attachment(content: bytes, media_type: str, filename: str) -> Response:
+def attachment(content: bytes, media_type: str, filename: str) -> Response:
+    """A small file to be saved under that name."""
     headers = {"Content-Disposition": f'attachment; filename="{filename}"'}
     return Response(content, media_type=media_type, headers=headers)
 

@@ -230,6 +230,42 @@ class Map(Body):
     endings: list[list[str]]
 
 
+class AxisEffect(Body):
+    """What one axis does to one result."""
+
+    paths: list[str]
+    unit: str
+    values: list[Number] = Field(description="values of the axis, or middles of groups of them, SI")
+    means: list[Number] = Field(description="mean of the result at each of these values")
+    first_order: float | None = Field(description="share of the variance that knowing this axis would take away")
+    first_order_error: float | None = Field(description="half width of its 95 % interval; null where it is exact")
+    total: float | None = Field(description="share that would stay if everything but this axis were known")
+    total_error: float | None = Field(description="half width of its 95 % interval; null where it is exact")
+
+
+class ResultSensitivity(Body):
+    """What one result depends on."""
+
+    result: str
+    unit: str
+    description: str
+    method: str = Field(description="grid: exact; saltelli: by the design for it; rbd-fast: from any cases")
+    cases: int = Field(description="cases that have the result")
+    missing: int = Field(description="cases that have not")
+    mean: float | None
+    variance: float | None
+    effects: list[AxisEffect]
+    notes: list[str]
+
+
+class SensitivityReport(Body):
+    """What results depend on."""
+
+    study: str
+    results: list[ResultSensitivity]
+    warnings: list[str] = Field(description="axes that change no result; told once the study has ended")
+
+
 class ParameterInfo(Body):
     """A parameter of a model."""
 

@@ -147,6 +147,7 @@ def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
         return unchanged
     study = context.store.study(study_id)
     data = views.detail(record, context.store.progress(study_id), study, context.store.spec(study_id))
+    data["warnings"] += context.unaffected.of(context.store, record)
     response = json_response(data)
     # While it runs, the time left changes with no change of the study.
     return tagged(response, tag) if record.state.terminal else response

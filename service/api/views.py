@@ -21,7 +21,7 @@ def study_address(study_id: str) -> str:
 def study_links(study_id: str) -> dict[str, str]:
     """Addresses of what belongs to a study."""
     own = study_address(study_id)
-    parts = {name: f"{own}/{name}" for name in ("cases", "results", "curves", "map", "report", "events")}
+    parts = {name: f"{own}/{name}" for name in ("cases", "results", "curves", "map", "sensitivity", "report", "events")}
     return {"self": own, **parts, "cancel": f"{own}:cancel", "page": f"/studies/{study_id}"}
 
 

@@ -73,6 +73,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "curve": pictures.curve,
         "export": remote.export,
         "map": pictures.draw_map,
+        "sensitivity": pictures.sensitivity,
     },
 }
 for _title, _commands in _COMMANDS.items():

@@ -222,6 +222,7 @@ def run(
 ) -> None:
     """Run a study here, without a service: rows or a report to standard output or FILE, progress on standard error."""
     from service.local import run_here
+    from service.unaffected import Unaffected
 
     parsed = read_study(spec)
     settings = read_settings(database=db, processes=processes, chunk_cases=chunk)
@@ -244,9 +245,10 @@ def run(
     ):
         for piece in _rows(done, parsed.study, table_format(form, file, as_json)):
             write(piece)
-        record = done.record
+        record, unaffecting = done.record, Unaffected().of(done.store, done.record)
     kept = f", kept as {record.id}" if db is not None else ""
     known = f", {record.reused} of them known from before" if record.reused else ""
+    say(*(f"warning: {text}" for text in unaffecting))
     seconds = time.monotonic() - start
     say(f"{record.done} of {record.cases} cases done{known}, {record.ok} ok, {seconds:.1f} s{kept}")
     if record.ok != record.cases:

@@ -1,4 +1,4 @@
-"""Commands that draw what a running service has: curve, map."""
+"""Commands that draw what a running service has: curve, map, sensitivity."""
 
 from __future__ import annotations
 
@@ -98,6 +98,46 @@ def _show_map(found: dict[str, Any]) -> None:
     columns = [(corner, True), *((cell_text(value), True) for value in found["x"]["values"])]
     rows = [(y, *row) for y, row in zip(found["y"]["values"], found["z"]["values"], strict=True)]
     show_table(title, columns, rows)
+
+
+def sensitivity(
+    study_id: StudyId,
+    y: Annotated[list[str], typer.Option("--y", metavar="RESULT", help="Result; may be given again.")],
+    file: Annotated[
+        str | None, typer.Option("-o", "--output", metavar="FILE", help="Picture to write: .svg, .png or .pdf.")
+    ] = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Tell what results depend on: shares of their variance for every axis, and the range of its main effect."""
+    picture = "" if file is None else file_format(file, _PICTURES, "picture")
+    query = [("y", name) for name in y]
+    with connection(server, token) as client:
+        found = client.sensitivity(study_id, query)
+        if file is not None:
+            write_pieces(file, client.sensitivity_picture(study_id, query, picture))
+    if as_json:
+        write_json(found)
+    else:
+        for result in found["results"]:
+            _show_effects(result)
+        say(*(f"warning: {text}" for text in found["warnings"]))
+    if file is not None:
+        say(f"picture: {file}")
+
+
+def _show_effects(result: dict[str, Any]) -> None:
+    title = f"{_heading(result['result'], result['unit'])}: {result['cases']} cases, method {result['method']}"
+    columns = [("axis", False), ("first order", True), ("+-", True), ("total", True), ("+-", True)]
+    columns += [("least mean", True), ("largest mean", True)]
+    rows = []
+    for effect in result["effects"]:
+        means = [value for value in effect["means"] if value is not None]
+        shares = [effect[name] for name in ("first_order", "first_order_error", "total", "total_error")]
+        rows.append((", ".join(effect["paths"]), *shares, min(means, default=None), max(means, default=None)))
+    show_table(title, columns, rows)
+    say(*(f"note: {text}" for text in result["notes"]))
 
 
 def show_curves(found: dict[str, Any]) -> None:
