@@ -72,7 +72,7 @@ def new_study(
     spec = _start(context, preset, clone)
     if spec is None:
         values = {"/text": "", "format": "json"} if mode == "text" else dict(_EMPTY)
-        return _form_page(request, values, None)
+        return form_page(request, values, None)
     try:
         values = values_of(spec)
     except ValueError:
@@ -81,8 +81,8 @@ def new_study(
         values = {"/text": spec_text(spec), "format": "json"}
     if clone is not None and "/name" in values:
         values["/name"] = f"{values['/name']} (copy)"
-    checked = _check(context, values)
-    return _form_page(request, values, checked)
+    checked = look_over(context, values)
+    return form_page(request, values, checked)
 
 
 def _start(context: Context, preset: str | None, clone: str | None) -> dict[str, Any] | None:
@@ -103,13 +103,13 @@ async def send_form(context: Ctx, request: Request, values: Form) -> Response:
     if wanted == "submit":
         return await run_in_threadpool(_submit, context, request, values)
     reshape(values, wanted)
-    return await run_in_threadpool(lambda: _form_page(request, values, _check(context, values)))
+    return await run_in_threadpool(lambda: form_page(request, values, look_over(context, values)))
 
 
 def _submit(context: Context, request: Request, values: Values) -> Response:
-    checked = _check(context, values)
+    checked = look_over(context, values)
     if checked.parsed is None:
-        return _form_page(request, values, checked, status=422)
+        return form_page(request, values, checked, status=422)
     # Sent twice, by a second click, the same form is one study; changed and sent again it is another.
     text = json.dumps(checked.spec, sort_keys=True)
     key = f"form-{values.get('key', '')[:64]}-{hashlib.sha256(text.encode()).hexdigest()[:32]}"
@@ -118,7 +118,7 @@ def _submit(context: Context, request: Request, values: Values) -> Response:
         record = accept(context.store, checked.parsed, key)
     except ApiError as error:
         checked.faults.setdefault("", []).append(error.detail)
-        return _form_page(request, values, checked, status=error.type.status)
+        return form_page(request, values, checked, status=error.type.status)
     return RedirectResponse(f"/studies/{record.id}", status_code=303)
 
 
@@ -127,7 +127,7 @@ async def check(context: Ctx, request: Request, values: Form) -> Response:
     """The live preview: what is wrong by field, and the panel that tells cases, time, size, warnings and fits."""
 
     def answer() -> dict[str, Any]:
-        checked = _check(context, values)
+        checked = look_over(context, values)
         return {
             "faults": checked.faults,
             "panel": fragment("_form_panel.html", checked=checked, address=_address(request)),
@@ -140,7 +140,8 @@ async def check(context: Ctx, request: Request, values: Form) -> Response:
     return json_response(await run_in_threadpool(answer))
 
 
-def _check(context: Context, values: Mapping[str, str]) -> Checked:
+def look_over(context: Context, values: Mapping[str, str]) -> Checked:
+    """A form, field by field or as text, looked over."""
     if "/text" in values:
         return check_text(values["/text"], values.get("format", "json"), context.store.chunking)
     return check_form(values, context.store.chunking)
@@ -179,7 +180,8 @@ def _drop(values: Values, prefix: str) -> None:
         del values[name]
 
 
-def _form_page(request: Request, values: Values, checked: Checked | None, status: int = 200) -> Response:
+def form_page(request: Request, values: Values, checked: Checked | None, status: int = 200) -> Response:
+    """The page with the form filled in with ``values``; ``checked`` is None while nothing is to be said about them."""
     text_mode = "/text" in values
     laws = {} if text_mode else {pointer: _coefficients(values, pointer) for pointer in clutch_pointers(values)}
     prefixes = {pointer.removeprefix("/base/").replace("/", ".") + ".": count for pointer, count in laws.items()}

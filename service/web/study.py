@@ -102,7 +102,7 @@ def inputs(study: Study) -> list[tuple[str, list[dict[str, Any]]]]:
             {
                 "name": name,
                 "path": path,
-                "symbol": "" if entry is None else entry.symbol,
+                "symbol": f"c_{int(name) + 1}" if name.isdigit() else "" if entry is None else entry.symbol,
                 "help": "" if entry is None else entry.help,
                 "value": study.base.get(path),
                 "unit": unit_of(study.model, path),

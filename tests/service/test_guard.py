@@ -95,6 +95,17 @@ def test_the_token_opens_the_interface_and_the_pages(guarded: httpx.Client) -> N
     assert guarded.get("/", headers=doubled).status_code == 401
 
 
+def test_the_password_of_pages_opens_what_they_show_and_no_more(guarded: httpx.Client) -> None:
+    """Pictures, downloads and progress of pages come from the interface, by requests of the browser's own."""
+    password = ("anybody", TOKEN)
+    for site, status in (("same-origin", 200), ("none", 200), ("same-site", 401), ("cross-site", 401), ("", 401)):
+        answer = guarded.get("/api/v1/studies", auth=password, headers={"Sec-Fetch-Site": site})
+        assert answer.status_code == status, site
+    own = {"Sec-Fetch-Site": "same-origin"}
+    assert guarded.post("/api/v1/studies", auth=password, json=SPEC, headers=own).status_code == 401
+    assert guarded.get("/api/v1/studies", auth=("anybody", "wrong"), headers=own).status_code == 401
+
+
 @pytest.mark.parametrize(
     ("host", "status"),
     [
