@@ -22,17 +22,23 @@ def general_path(path: str) -> str:
     return _INDEX.sub(lambda match: ".N" if path[: match.start()].endswith("pendulums") else ".K", path)
 
 
-def parameter_of(model: str, path: str) -> Parameter | None:
-    """The catalogue's entry of a flat SPEC path; None when ``model`` has no such parameter."""
+def model_parameter(model: str, path: str) -> Parameter | None:
+    """The entry of a flat SPEC path in the catalogue of ``model``; None when it has no such parameter."""
     general = general_path(path)
     # A clutch of one pendulum has the parameters of the common one.
     wanted = {general, general.removeprefix("pendulums.N.")} if ".clutch." in general else {general}
     return next((entry for entry in kernels.parameter_catalogue(model) if entry.path in wanted), None)
 
 
-def unit_of(model: str, path: str) -> str:
+def parameter_of(study: Study, path: str) -> Parameter | None:
+    """The parameter at a flat SPEC path of the machine of ``study``; None when it has none there."""
+    own = kernels.parameters_of(study)
+    return own.get(path) if own else model_parameter(study.model, path)
+
+
+def unit_of(study: Study, path: str) -> str:
     """SI unit of a flat SPEC path, "1" where it has none."""
-    entry = parameter_of(model, path)
+    entry = parameter_of(study, path)
     return "1" if entry is None else placed(entry, path).unit
 
 
@@ -51,7 +57,7 @@ def axes_json(study: Study) -> list[dict[str, Any]]:
     return [
         {
             "paths": list(axis.paths),
-            "unit": unit_of(study.model, axis.paths[0]),
+            "unit": unit_of(study, axis.paths[0]),
             "values": len(axis),
             "first": axis.values[0],
             "last": axis.values[-1],

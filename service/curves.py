@@ -29,7 +29,10 @@ if TYPE_CHECKING:
 PENDING = "pending"
 
 #: Parameters without which a picture tells nobody what it shows.
-_OPERATING_POINT: Final = ("excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y", "shaft.load")
+_OPERATING_POINT: Final = (
+    "excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y", "shaft.load",
+    "mean_speed", "drive.inertia",
+)  # fmt: skip
 
 #: Results of cases, aligned with them: (case numbers, result names) -> columns.
 Fetch = Callable[[NDArray[np.int64], Sequence[str]], "CaseColumns"]
@@ -168,7 +171,7 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
     chooser = _zip_lines if study.combine == "zip" else _grid_lines
     x_values, lines = chooser(study, x_axis, by_axes, fixed, len(results))
     made = tuple(lines)
-    units = {path: unit_of(study.model, path) for path in (query.x, *made[0].by, *made[0].at)}
+    units = {path: unit_of(study, path) for path in (query.x, *made[0].by, *made[0].at)}
     names = {path: axis_name(study, path) for path in (query.x, *made[0].by)}
     return Selection(query.x, units, names, _held(study, made[0]), x_values, results, made)
 
@@ -213,7 +216,7 @@ def draw_map(
     return Map(
         x,
         y,
-        (unit_of(study.model, x), unit_of(study.model, y)),
+        (unit_of(study, x), unit_of(study, y)),
         (axis_name(study, x), axis_name(study, y)),
         _held(study, rows[0]),
         x_values,
@@ -267,7 +270,7 @@ def _grid_lines(
             f"the axis {axis.paths[0]} is left open: name it in by=, or give its value as at={axis.paths[0]}=VALUE",
             parameter="at",
             allowed=listed(axis.values),
-            unit=unit_of(study.model, axis.paths[0]),
+            unit=unit_of(study, axis.paths[0]),
         )
         for position, axis in enumerate(axes)
         if position not in named and len(axis) > 1

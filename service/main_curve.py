@@ -14,13 +14,18 @@ if TYPE_CHECKING:
     from worker.kernels import ResultInfo
     from worker.study import Axis, Study
 
-#: Axes a designer draws along, and then those told apart by colour, first choice first.
-_ALONG: Final = ("shaft.load", "excitation.frequency")
-_APART: Final = ("excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y", "shaft.load")
-_RESULTS: Final = ("shaft.speed.mean", "shaft.speed.max")
+#: Axes a designer draws along, and then those told apart by colour, first choice first; of either model.
+_ALONG: Final = ("shaft.load", "excitation.frequency", "drive.inertia")
+_APART: Final = (
+    "excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y", "shaft.load", "mean_speed",
+)  # fmt: skip
+_RESULTS: Final = ("shaft.speed.mean", "shaft.speed.max", "irregularity")
 _MOST_CURVES: Final = 8
 #: Results of the mechanical characteristic, and how many of another model stand for them.
-_CHARACTERISTIC: Final = ("shaft.speed.mean", "torque.mean", "power.useful.mean", "efficiency")
+_CHARACTERISTIC: Final = (
+    "shaft.speed.mean", "torque.mean", "power.useful.mean", "efficiency",
+    "irregularity", "omega.max", "omega.min", "energy.fluctuation", "drive_torque.mean", "required_inertia",
+)  # fmt: skip
 
 
 def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
@@ -74,7 +79,7 @@ def caption(study: Study, query: CurveQuery) -> str:
 
 
 def _with_unit(study: Study, path: str) -> str:
-    unit = unit_of(study.model, path)
+    unit = unit_of(study, path)
     return axis_name(study, path) + ("" if unit == "1" else f" ({unit})")
 
 

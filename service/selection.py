@@ -64,7 +64,7 @@ def axis_name(study: Study, path: str) -> str:
 
 def held_text(study: Study, path: str, value: float) -> str:
     """A parameter held at ``value`` (SI) as people read it: ``excitation.frequency = 25 Hz``."""
-    unit = unit_of(study.model, path)
+    unit = unit_of(study, path)
     return f"{axis_name(study, path)} = {value:.6g}" + ("" if unit == "1" else f" {unit}")
 
 
@@ -78,7 +78,7 @@ def locate_axes(study: Study, at: Sequence[tuple[str, str]]) -> Fixed:
         position = study.axis_of(path)
         if position is None and path not in study.base:
             require_axis(study, "at", path)
-        unit = unit_of(study.model, path)
+        unit = unit_of(study, path)
         value = _value(path, text, unit)
         if position is None:
             if not math.isclose(study.base[path], value, rel_tol=SAME_VALUE):

@@ -166,7 +166,7 @@ def _of_result(study: Study, varying: list[Axis], info: ResultInfo, y: Numbers, 
         notes.append("the result is the same in every case")
         indices = [(None, None, None, None)] * len(varying)
     effects = tuple(
-        Effect(axis.paths, unit_of(study.model, axis.paths[0]), *_main_effect(axis, column[known], values), *numbers_)
+        Effect(axis.paths, unit_of(study, axis.paths[0]), *_main_effect(axis, column[known], values), *numbers_)
         for axis, column, numbers_ in zip(varying, columns, indices, strict=True)
     )
     return Sensitivity(info, method, cases, missing, mean, variance, effects, tuple(notes))

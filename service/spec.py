@@ -1,7 +1,8 @@
 """The study spec, version 1: raw JSON or TOML data in, a study in SI numbers out, or all that is wrong with it.
 
 The parts stand in the modules beside it: text (`spec_text`), quantities (`units`), the machine (`spec_base`,
-`spec_clutch`), axes and their values (`spec_axes`, `spec_values`), the run (`spec_run`), warnings and messages.
+`spec_clutch`, `spec_shaft`), axes and their values (`spec_axes`, `spec_values`), the run (`spec_run`), warnings and
+messages.
 """
 
 from __future__ import annotations
@@ -17,9 +18,10 @@ from service.spec_clutch import check_laws
 from service.spec_design import read_design
 from service.spec_fields import read_object
 from service.spec_messages import Problem, Report, SpecError, did_you_mean
-from service.spec_run import read_run
+from service.spec_run import read_run, refuse_run
+from service.spec_shaft import read_shaft
 from service.spec_text import Format, load_spec
-from service.spec_warnings import warn_vibration_drive
+from service.spec_warnings import warn_machine_shaft, warn_vibration_drive
 from worker import kernels
 from worker.limits import MAX_NAME_LENGTH
 from worker.study import Study
@@ -36,7 +38,10 @@ UNNAMED: Final = "untitled"
 
 FIELDS: Final = ("sprag", "model", "name", "base", "run", "axes", "combine", "exclude")
 
-_WARNINGS: Final[dict[str, Callable[[Report, Study], None]]] = {"vibration-drive": warn_vibration_drive}
+_WARNINGS: Final[dict[str, Callable[[Report, Study], None]]] = {
+    kernels.VIBRATION_DRIVE: warn_vibration_drive,
+    kernels.MACHINE_SHAFT: warn_machine_shaft,
+}
 
 
 @dataclass(frozen=True)
@@ -84,6 +89,10 @@ def parse_spec(data: object) -> ParsedSpec:
     model = _read_model(report, found)
     if model is None:
         raise report.error()
+    if model == kernels.MACHINE_SHAFT:
+        study = _read_machine_shaft(report, found, name)
+        _WARNINGS[model](report, study)
+        return ParsedSpec(study, tuple(report.warnings), {}, dict(found))
     machine = read_base(report, found.get("base"), model)
     axes, combine = read_design(report, found, machine)
     run = read_run(report, found.get("run", {}), varied_values("excitation.frequency", axes, machine.values))
@@ -92,6 +101,14 @@ def parse_spec(data: object) -> ParsedSpec:
     study = Study(model, name, _in_order(machine), run, axes or (), combine)
     _WARNINGS[model](report, study)
     return ParsedSpec(study, tuple(report.warnings), machine.fits, dict(found))
+
+
+def _read_machine_shaft(report: Report, found: Mapping[str, Any], name: str) -> Study:
+    machine = read_shaft(report, found.get("base"))
+    axes, combine = read_design(report, found, machine)
+    run = refuse_run(report, found.get("run", {}))
+    report.raise_if_any()
+    return Study(kernels.MACHINE_SHAFT, name, _in_order(machine), run, axes or (), combine, machine.structure)
 
 
 def _read_version(report: Report, found: Mapping[str, Any]) -> None:

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from service.spec_base import Machine, assumed_clutch
+from service.spec_base import Machine
 from service.spec_fields import read_object
 from service.spec_messages import Report, join
 from service.spec_values import PLANS, Plan, count_text
@@ -95,7 +95,7 @@ def read_paths(report: Report, pointer: str, data: object, machine: Machine) -> 
             found.append(machine.parameters[path])
         elif report.full:
             break
-        elif machine.clutches or not assumed_clutch(path):
+        elif not machine.assumed(path):
             report.problem(where, machine.why_not(path), path, allowed="the path of a number in `base`")
     if len(found) < len(items):
         return None

@@ -41,6 +41,10 @@ class Machine:
         """JSON Pointer of each clutch that was fitted here -> its fit."""
         return {clutch.pointer: clutch.fit for clutch in self.clutches if clutch.fit is not None}
 
+    def assumed(self, path: str) -> bool:
+        """Whether ``path`` could be a number of a part of the base that could not be read."""
+        return not self.clutches and assumed_clutch(path)
+
     def why_not(self, path: str) -> str:
         """Why an axis cannot vary ``path``: a sentence that says what it can."""
         inside = _PENDULUM_PATH.fullmatch(path)

@@ -46,6 +46,19 @@ def read_run(report: Report, data: object, frequencies: Sequence[float]) -> dict
     return run
 
 
+def refuse_run(report: Report, data: object) -> dict[str, Any]:
+    """The empty run of a model that has none; every field of one that was given is noted in ``report``."""
+    if not isinstance(data, Mapping):
+        report.problem("/run", "must be an object", data, allowed="nothing, or an empty object: this model has no run")
+        return {}
+    for name, value in data.items():
+        report.problem(
+            join("/run", name), "belongs to the vibration drive: a machine shaft is solved for its whole cycle at once",
+            value, allowed="no `run`",
+        )  # fmt: skip
+    return {}
+
+
 def in_periods(time: Time, frequency: float) -> float:
     """A time of a run in excitation periods at ``frequency`` (Hz)."""
     return float(time[0]) if time[1] == "periods" else float(time[0]) * frequency

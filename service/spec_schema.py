@@ -6,9 +6,7 @@ inside the run, sizes of grids, clutch laws) only `service.spec.parse_spec` chec
 
 from __future__ import annotations
 
-import math
-from typing import Final
-
+from service.schema_parts import quantity_schema
 from service.spec import UNNAMED, VERSION
 from service.spec_design import COMBINE
 from service.spec_design_schema import (
@@ -23,24 +21,21 @@ from service.spec_design_schema import (
 )
 from service.spec_fields import placed
 from service.spec_run import DEFAULTS, RESETS
-from service.units import example
+from service.spec_shaft_schema import shaft_schema
 from worker import kernels
 from worker.kernels import CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, MAX_PENDULUMS, Parameter
 from worker.limits import (
     MAX_AXES,
     MAX_CLUTCH_ROWS,
     MAX_NAME_LENGTH,
-    MAX_QUANTITY_LENGTH,
     MAX_TOLERANCE,
     MIN_TOLERANCE,
 )
 
-_TEXT: Final[Schema] = {"type": "string", "minLength": 1, "maxLength": MAX_QUANTITY_LENGTH}
-
 
 def spec_schema() -> Schema:
     """JSON Schema of a whole spec, self-contained (no references), unknown fields refused."""
-    return object_schema(
+    schema = object_schema(
         {
             "sprag": {"const": VERSION, "description": "version of the spec"},
             "model": {"enum": list(kernels.models()), "description": "what is simulated"},
@@ -51,8 +46,8 @@ def spec_schema() -> Schema:
                 "default": UNNAMED,
                 "description": "what people call the study",
             },
-            "base": base_schema(kernels.models()[0]),
-            "run": run_schema(),
+            "base": {"type": "object", "description": "the machine that every case begins from"},
+            "run": {"type": "object"},
             "axes": {
                 "type": "array",
                 "maxItems": MAX_AXES,
@@ -70,10 +65,23 @@ def spec_schema() -> Schema:
         required=("sprag", "model", "base"),
         description="a study: a machine, a run, and what varies",
     )
+    # Base and run are those of the model.
+    return {**schema, "allOf": [_of_model(model) for model in kernels.models()]}
+
+
+def _of_model(model: str) -> Schema:
+    no_run = object_schema({}, description="nothing: a machine shaft is solved for its whole cycle")
+    run = no_run if model == kernels.MACHINE_SHAFT else run_schema()
+    return {
+        "if": {"properties": {"model": {"const": model}}, "required": ["model"]},
+        "then": {"properties": {"base": base_schema(model), "run": run}},
+    }
 
 
 def base_schema(model: str) -> Schema:
     """Schema of `base` for ``model``, from its catalogue of parameters; ValueError for an unknown model."""
+    if model == kernels.MACHINE_SHAFT:
+        return shaft_schema()
     catalogue = [entry for entry in kernels.parameter_catalogue(model) if not entry.path.startswith("clutch.")]
     properties: Schema = {}
     required: list[str] = []
@@ -173,32 +181,9 @@ def run_schema() -> Schema:
     )
 
 
-def quantity_schema(parameter: Parameter) -> Schema:
-    """Schema of one quantity: a number in the parameter's SI unit and range, or a text with its unit."""
-    schema: Schema = {
-        "anyOf": [{"type": "number", **_bounds(parameter)}, _TEXT],
-        "description": f"{parameter.help} ({parameter.symbol}), {parameter.unit}",
-        "examples": [text.strip('"') for text in example(parameter.unit).replace(" or ", ", ").split(", ")],
-        "x-unit": parameter.unit,
-        "x-range": parameter.range_text(),
-    }
-    if parameter.default is not None and math.isfinite(parameter.default):
-        schema["default"] = parameter.default
-    return schema
-
-
 def _section(entries: list[Parameter], *, with_clutch: bool) -> Schema:
     names = {entry.path.split(".")[-1]: placed(entry, entry.path) for entry in entries}
     properties = {name: quantity_schema(entry) for name, entry in names.items()}
     if with_clutch:
         properties["clutch"] = clutch_schema()
     return object_schema(properties, required=[name for name, entry in names.items() if entry.default is None])
-
-
-def _bounds(parameter: Parameter) -> Schema:
-    bounds: Schema = {}
-    if math.isfinite(parameter.low):
-        bounds["exclusiveMinimum" if parameter.low_open else "minimum"] = parameter.low
-    if math.isfinite(parameter.high):
-        bounds["maximum"] = parameter.high
-    return bounds

@@ -51,12 +51,42 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
         _inertia(report, study, index)
 
 
+#: The same for a machine shaft.
+_PLAUSIBLE_SHAFT: Final[dict[str, tuple[float, str, str]]] = {
+    "mean_speed": (1e3, "rad/s", "was it in rpm?"),
+    **dict.fromkeys(
+        ("crank", "rod", "offset", "rod_centre", "frame", "coupler", "rocker", "coupler_centre", "pivot_distance",
+         "link_arm", "lift"),
+        (10.0, "m", "was it in mm?"),
+    ),
+    "inclination": (2.0 * math.pi, "rad", "was it in degrees?"),
+}  # fmt: skip
+
+
+def warn_machine_shaft(report: Report, study: Study) -> None:
+    """Notes what is implausible about a machine shaft anywhere on the axes of ``study``."""
+    for path in dict.fromkeys((*study.base, *study.axis_paths)):
+        _plausible(report, study, path, _PLAUSIBLE_SHAFT)
+    structure = study.structure or {}
+    if structure["balance"] == "constant" and (
+        structure["drive"]["form"] != "constant" or any(_values(study, "drive.torque"))
+    ):
+        report.warn(
+            '/base/drive/torque: is not used: the balance "constant" puts the mean resistance in its place; choose '
+            '"scale" or "refuse" to keep its course'
+        )
+    if structure["balance"] == "motor" and _values(study, "wanted_irregularity"):
+        report.warn("/base/wanted_irregularity: is not used: with a motor no required inertia is computed")
+    if structure["operation"]["quantity"] == "none" and structure["mechanism"]["kind"] == "none":
+        report.warn("/base: neither mechanism nor operation, so that the shaft turns evenly")
+
+
 def _values(study: Study, path: str) -> tuple[float, ...]:
     return varied_values(path, study.axes, study.base)
 
 
-def _plausible(report: Report, study: Study, path: str) -> None:
-    entry = _PLAUSIBLE.get(path) or _PLAUSIBLE.get(path.rsplit(".", 1)[-1])
+def _plausible(report: Report, study: Study, path: str, known: dict[str, tuple[float, str, str]] = _PLAUSIBLE) -> None:
+    entry = known.get(path) or known.get(path.rsplit(".", 1)[-1])
     if entry is None:
         return
     limit, unit, question = entry

@@ -1,4 +1,4 @@
-"""Instantaneous values of one case: which times, and the document or table of them."""
+"""Instantaneous values of one case: which times or angles, and the document or table of them."""
 
 from __future__ import annotations
 
@@ -13,38 +13,42 @@ from worker import kernels
 
 if TYPE_CHECKING:
     from service.exports import Format
-    from worker.kernels import Trajectory
+    from worker.kernels import Extent, Trajectory
     from worker.study import Study
 
 
 def span(study: Study, case: int, start: str | None, end: str | None) -> tuple[float, float]:
-    """First and last time (s) of a part of the run; by default the whole run.
+    """First and last place of a part of the case's extent (time in s, angle in rad); by default all of it.
 
-    ``start`` and ``end`` are numbers in s, or quantities with a unit of time or in excitation periods. Raises ApiError,
-    about the parameter ``from`` or ``to``, when they are no times within the run.
+    ``start`` and ``end`` are SI numbers, or quantities with a unit or in periods. Raises ApiError, about the parameter
+    ``from`` or ``to``, when they are no places within it.
     """
-    duration = kernels.duration_seconds(study, case)
-    frequency = {**study.base, **study.case_parameters(case)}["excitation.frequency"]
-    first = 0.0 if start is None else _time("from", start, frequency)
-    last = duration if end is None else _time("to", end, frequency)
-    # The last digit of a duration given in periods is not the client's to know.
-    if math.isclose(last, duration, rel_tol=1e-12):
-        last = duration
-    if not 0.0 <= first < duration:
-        raise parameter_error("from", "outside the run", shown(start), f"0 .. {duration!r} s, before `to`")
-    if not first < last <= duration:
-        raise parameter_error("to", "outside the run, or not after `from`", shown(end), f"{first!r} .. {duration!r} s")
+    extent = kernels.extent(study, case)
+    first = 0.0 if start is None else _place("from", start, extent)
+    last = extent.end if end is None else _place("to", end, extent)
+    # The last digit of an end given in periods or degrees is not the client's to know.
+    if math.isclose(last, extent.end, rel_tol=1e-12):
+        last = extent.end
+    whole = {"time": "the run", "angle": "the cycle"}[extent.along]
+    if not 0.0 <= first < extent.end:
+        raise parameter_error(
+            "from", f"outside {whole}", shown(start), f"0 .. {extent.end!r} {extent.unit}, before `to`"
+        )
+    if not first < last <= extent.end:
+        message = f"outside {whole}, or not after `from`"
+        raise parameter_error("to", message, shown(end), f"{first!r} .. {extent.end!r} {extent.unit}")
     return first, last
 
 
-def _time(name: str, text: str, frequency: float) -> float:
+def _place(name: str, text: str, extent: Extent) -> float:
     try:
         number, unit = split_quantity(text)
         if unit in PERIOD_NAMES:
-            return to_float(number) / frequency
-        return parse_quantity(text, "s") if unit else to_float(number)
+            return to_float(number) * extent.period
+        return parse_quantity(text, extent.unit) if unit else to_float(number)
     except QuantityError as error:
-        raise parameter_error(name, str(error), shown(text), "a time in s or periods") from error
+        kind = {"time": "a time in s or periods", "angle": "an angle in rad, deg or cycles"}[extent.along]
+        raise parameter_error(name, str(error), shown(text), kind) from error
 
 
 def trajectory_file(study: Study, case: int, start: float, end: float, points: int, form: Format) -> bytes:
@@ -57,19 +61,31 @@ def trajectory_file(study: Study, case: int, start: float, end: float, points: i
 
 def trajectory_json(made: Trajectory, case: int, parameters: dict[str, float]) -> dict[str, Any]:
     """The values as JSON data; ``parameters`` are the axis parameters of the case, SI."""
+    variables = {name: {"unit": unit} for name, unit in zip(made.names, made.units, strict=True)}
+    values = {name: numbers(made.values[:, column]) for column, name in enumerate(made.names)}
+    if made.along == "angle":
+        return {
+            "case": case,
+            "parameters": parameters,
+            "angles": made.times.tolist(),
+            "variables": variables,
+            "values": values,
+            "phi_c": list(made.phi_c),
+            "ending": made.ending,
+        }
     return {
         "case": case,
         "parameters": parameters,
         "times": made.times.tolist(),
-        "variables": {name: {"unit": unit} for name, unit in zip(made.names, made.units, strict=True)},
-        "values": {name: numbers(made.values[:, column]) for column, name in enumerate(made.names)},
+        "variables": variables,
+        "values": values,
         "states": {name: list(states) for name, states in made.states.items()},
-        "ending": str(made.ending),
+        "ending": made.ending,
     }
 
 
 def trajectory_csv(made: Trajectory) -> bytes:
-    """The values as CSV: time, every variable, every state."""
-    header = ["time", *made.names, *(f"{name}.state" for name in made.states)]
+    """The values as CSV: time or angle, every variable, every state."""
+    header = [made.along, *made.names, *(f"{name}.state" for name in made.states)]
     columns = [made.times.tolist(), *(made.values[:, i].tolist() for i in range(len(made.names)))]
     return table_csv(header, [*columns, *made.states.values()])

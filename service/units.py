@@ -43,6 +43,7 @@ _DEFINITIONS: Final = (
     *("degree = turn / 360 = deg = °", "arcminute = degree / 60 = arcmin", "arcsecond = degree / 3600 = arcsec"),
     *("revolution_per_minute = turn / minute = rpm", "revolution_per_second = turn / second = rps"),
     *("hertz = 1 / second = Hz", "newton = 1000 * gram * meter / second**2 = N", "joule = newton * meter = J"),
+    *("pascal = newton / meter**2 = Pa", "bar = 1e5 * pascal"),
     *("watt = joule / second = W", "kilogram_force = 9.80665 * newton = kgf = kp"),
     "pound_force = 4.4482216152605 * newton = lbf",
     "standard_gravity = 9.80665 * meter / second**2 = g_0 = g0",
@@ -63,6 +64,10 @@ _EXAMPLES: Final = {
     "N*m*s/rad": '"0.01 N*m*s/rad"',
     "m/s^2": '"9.81 m/s^2"',
     "s": '"2 s"',
+    "N": '"20 kN"',
+    "Pa": '"6 bar" or "0.6 MPa"',
+    "m^2": '"50 cm^2"',
+    "1": "0.05",
 }
 
 _QUANTITY: Final = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?)\s*(.*)", re.DOTALL)
@@ -123,6 +128,8 @@ def parse_quantity(value: object, unit: str) -> float:
 
 def parse_exact(value: object, unit: str) -> Fraction:
     """As `parse_quantity`, but exact: the decimal number as it was written, times the exact factor of its unit."""
+    if isinstance(value, str) and unit == "1":
+        raise QuantityError("must be a plain number, without a unit or quotation marks")
     if isinstance(value, str):
         number, text = split_quantity(value)
         if not text:
@@ -136,6 +143,8 @@ def parse_exact(value: object, unit: str) -> Fraction:
 def exact_number(value: object, unit: str) -> Fraction:
     """A plain JSON number as the decimal it was written as; QuantityError when it is none (a bool is none)."""
     if isinstance(value, bool) or not isinstance(value, int | float):
+        if unit == "1":
+            raise QuantityError("must be a plain number")
         raise QuantityError(f"must be a number in {unit} or a text with its unit, for example {example(unit)}")
     if isinstance(value, int):
         if value.bit_length() > 1024:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -28,10 +28,16 @@ _LARGEST_CODE: Final = 2**62
 
 
 def kin_hash(study: Study, engine_version: str) -> str:
-    """SHA-256 (hexadecimal) of what studies with a case in common share: model, engine, run and set of parameters."""
+    """SHA-256 (hexadecimal) of what studies with a case in common share: model, engine, run and set of parameters.
+
+    And the structure of the machine, where its model knows one.
+    """
     paths = sorted({*study.base, *study.axis_paths})
+    shared: dict[str, Any] = {"engine": engine_version, "model": study.model, "run": study.run, "paths": paths}
+    if study.structure is not None:
+        shared["structure"] = study.structure
     text = json.dumps(
-        {"engine": engine_version, "model": study.model, "run": study.run, "paths": paths},
+        shared,
         sort_keys=True,
         separators=(",", ":"),
         allow_nan=False,

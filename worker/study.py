@@ -78,8 +78,11 @@ class Study:
         Flat SPEC path -> SI number, every parameter, defaults filled in.
     run : dict
         ``{"duration": [60.0, "periods"], "window": [[40.0, "periods"], [60.0, "periods"]] or None, "tolerance": 1e-9,
-        "reset": "contact"}``; times in "periods" or "s".
+        "reset": "contact"}``; times in "periods" or "s". Empty for a model without a run.
     axes : tuple of Axis
+    structure : dict or None
+        What of the machine is no number, as plain JSON data, where its model knows such (a machine shaft's mechanism,
+        tables and formulas); never changed.
     combine : "grid" or "zip"
         Grid: every combination, the first axis varies slowest. Zip: the axes go together, all of one length.
 
@@ -95,6 +98,7 @@ class Study:
     run: dict[str, Any]
     axes: tuple[Axis, ...] = ()
     combine: Combine = "grid"
+    structure: dict[str, Any] | None = None
 
     def __post_init__(self) -> None:
         if self.combine not in get_args(Combine):
@@ -239,6 +243,8 @@ class Study:
             "run": dict(self.run),
             "axes": [{"paths": list(axis.paths), "values": list(axis.values)} for axis in self.axes],
             "combine": self.combine,
+            # Left out where there is none: studies of before it, and their hashes, stay as they are.
+            **({} if self.structure is None else {"structure": self.structure}),
         }
 
     @classmethod
@@ -251,6 +257,7 @@ class Study:
             run=dict(data["run"]),
             axes=tuple(Axis(tuple(axis["paths"]), tuple(map(float, axis["values"]))) for axis in data["axes"]),
             combine=cast("Combine", data["combine"]),
+            structure=data.get("structure"),
         )
 
     def physics_hash(self, engine_version: str) -> str:

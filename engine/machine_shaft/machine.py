@@ -256,11 +256,11 @@ class Machine:
         """
         phi = np.asarray((np.arange(720 * self.spec.cycle) + 0.5) * np.pi / 360.0, dtype=np.float64)[None, None, :]
         fields = self.fields(phi)
-        for name, values in (
-            ("inertia of the mechanism", fields.inertia), ("driving torque", fields.drive),
-            ("operation", fields.resistance),
+        for part, name, values in (
+            ("mechanism", "inertia of the mechanism", fields.inertia), ("drive", "driving torque", fields.drive),
+            ("operation", "torque of the operation", fields.resistance),
         ):  # fmt: skip
             wrong = ~np.isfinite(values[0, 0])
             if wrong.any():
                 angle = float(np.degrees(phi[0, 0, int(np.argmax(wrong))]))
-                raise ExpressionError(f"the {name} is no finite number at {angle:.4g} deg", 0)
+                raise ExpressionError(f"The {name} is no finite number at {angle:.4g} deg.", None, part)

@@ -30,13 +30,15 @@ class ExpressionError(MachineError):
 
     Attributes
     ----------
-    position : int
-        Where in the text, from 0.
+    position : int or None
+        Where in the text, from 0; None where it is no single place.
+    part : str
+        "mechanism", "drive" or "operation"; "" where the text alone was looked at.
     """
 
-    def __init__(self, message: str, position: int) -> None:
-        super().__init__(f"{message} (at character {position + 1})")
-        self.position = position
+    def __init__(self, message: str, position: int | None, part: str = "") -> None:
+        super().__init__(message if position is None else f"{message} (at character {position + 1})")
+        self.position, self.part = position, part
 
 
 class AssemblyError(MachineError):

@@ -5,13 +5,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator, PPoly
 
 from engine.machine_shaft.problems import TableError
+
+if TYPE_CHECKING:
+    # Imported where tables are made: whoever only reads catalogues does not wait for it.
+    from scipy.interpolate import PPoly
 
 Floats = NDArray[np.float64]
 Interpolation = Literal["smooth", "linear"]
@@ -42,7 +45,7 @@ class Curve:
         The rows' x: where the function may have a kink or a jump.
     """
 
-    def __init__(self, pieces: PPoly, period: float | None) -> None:
+    def __init__(self, pieces: "PPoly", period: float | None) -> None:
         self._pieces, self._slope, self._period = pieces, pieces.derivative(), period
         self._start = float(pieces.x[0])
         self.knots: Floats = np.asarray(pieces.x)
@@ -76,15 +79,19 @@ def _checked(rows: Sequence[tuple[float, float]]) -> tuple[Floats, Floats]:
     return x, y
 
 
-def _smooth(x: Floats, y: Floats) -> PPoly:
+def _smooth(x: Floats, y: Floats) -> "PPoly":
+    from scipy.interpolate import PchipInterpolator, PPoly
+
     if len(x) == 2:
         return PPoly(np.array([[(y[1] - y[0]) / (x[1] - x[0])], [y[0]]]), x)
     cubic = PchipInterpolator(x, y)
     return PPoly(cubic.c, cubic.x)
 
 
-def _pieces(x: Floats, y: Floats, interpolation: Interpolation) -> PPoly:
+def _pieces(x: Floats, y: Floats, interpolation: Interpolation) -> "PPoly":
     """Piecewise polynomial through the rows, in parts between jumps."""
+    from scipy.interpolate import PPoly
+
     edges = [0, *[int(i) + 1 for i in np.nonzero(np.diff(x) == 0.0)[0]], len(x)]
     knots, columns = [x[:1]], []
     for first, end in pairwise(edges):
@@ -136,6 +143,8 @@ def periodic(table: Table, period: float) -> Curve:
         return Curve(_pieces(x, y, table.interpolation), period)
     if table.interpolation == "linear":
         return Curve(_pieces(x, y, "linear"), period)
+    from scipy.interpolate import PPoly
+
     before, after = x[-4:-1] - period, x[1:4] + period
     wide = _smooth(np.concatenate([before, x, after]), np.concatenate([y[-4:-1], y, y[1:4]]))
     begin = len(before)

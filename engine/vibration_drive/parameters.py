@@ -28,8 +28,9 @@ class Parameter:
 
     def range_text(self) -> str:
         """The allowed range as people write it."""
-        low = "" if self.low == -math.inf else f"{'>' if self.low_open else '>='} {self.low:g} {self.unit}"
-        high = "" if self.high == math.inf else f"<= {self.high:g} {self.unit}"
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        low = "" if self.low == -math.inf else f"{'>' if self.low_open else '>='} {self.low:g}{unit}"
+        high = "" if self.high == math.inf else f"<= {self.high:g}{unit}"
         return " and ".join(part for part in (low, high) if part) or "any finite number"
 
     def accepts(self, value: float) -> bool:

@@ -82,7 +82,7 @@ def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
 
 @router.get(
     "/{case:case}/trajectory",
-    response_model=m.Trajectory,
+    response_model=m.Trajectory | m.AngleTable,
     responses={
         **files("Instantaneous values, as JSON or CSV.", (MEDIA_TYPES["json"], MEDIA_TYPES["csv"])),
         **problems(*_CASE_PROBLEMS, "not-computed", "timed-out", "unavailable"),
@@ -95,19 +95,32 @@ async def get_trajectory(
     case: CaseNumber,
     start: Annotated[
         str | None,
-        Query(alias="from", description="first time, in s or with a unit (s, periods); by default 0", examples=["0"]),
+        Query(
+            alias="from",
+            description="first time, in s or with a unit (s, periods), or angle, in rad or with a unit; by default 0",
+            examples=["0"],
+        ),
     ] = None,
     end: Annotated[
         str | None,
-        Query(alias="to", description="last time, likewise; by default the end of the run", examples=["2.5 periods"]),
+        Query(
+            alias="to",
+            description="last time or angle, likewise; by default the end of the run, or cycle",
+            examples=["2.5 periods"],
+        ),
     ] = None,
     points: Annotated[
         int,
-        Query(ge=MIN_TRAJECTORY_POINTS, le=MAX_TRAJECTORY_POINTS, description="equally spaced times", examples=[50]),
+        Query(
+            ge=MIN_TRAJECTORY_POINTS,
+            le=MAX_TRAJECTORY_POINTS,
+            description="equally spaced times or angles",
+            examples=[50],
+        ),
     ] = 1000,
     form: Annotated[str | None, Query(alias="format", description="json or csv", examples=["json"])] = None,
 ) -> Response:
-    """Every variable, torque, power and state of one case over time. The case is run again for it."""
+    """Every variable, torque, power and state of one case over time (or the angle). The case is run again for it."""
     chosen = choose_format(request, form, {"json": MEDIA_TYPES["json"], "csv": MEDIA_TYPES["csv"]})
     written: Format = "csv" if chosen == "csv" else "json"
 

@@ -86,8 +86,8 @@ def _model(name: str) -> dict[str, Any]:
             }
             for info in kernels.result_infos(name, 1)
         ],
-        "endings": dict(kernels.ENDING_SENTENCES),
-        "flags": dict(kernels.FLAG_SENTENCES),
+        "endings": kernels.endings_of(name),
+        "flags": kernels.flags_of(name),
     }
 
 

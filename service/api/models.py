@@ -173,6 +173,18 @@ class Trajectory(Body):
     ending: str
 
 
+class AngleTable(Body):
+    """Tables of one case of a machine shaft over the angle of the shaft."""
+
+    case: int
+    parameters: dict[str, float]
+    angles: list[float] = Field(description="rad, from the start of the cycle; none where the case has no motion")
+    variables: dict[str, dict[str, str]] = Field(description="unit of each variable")
+    values: dict[str, list[Number]] = Field(description="values at the angles, by variable")
+    phi_c: list[float] = Field(description="all angles in rad at which the energy is its mean")
+    ending: str
+
+
 class CurveAxis(Body):
     """The axis of a curve."""
 
@@ -269,7 +281,9 @@ class SensitivityReport(Body):
 class ParameterInfo(Body):
     """A parameter of a model."""
 
-    path: str = Field(description="SPEC path; N stands for a pendulum's index, K for a coefficient's")
+    path: str = Field(
+        description="SPEC path; N stands for a pendulum's index, K for a coefficient's or a step's, NAME for a constant"
+    )
     symbol: str
     unit: str
     low: float | None = Field(description="least value; null: none")

@@ -57,7 +57,7 @@ def schema(source: Source) -> pa.Schema:
             path,
             pa.float64(),
             nullable=False,
-            metadata={"unit": unit_of(study.model, path), "description": description_of(study, path)},
+            metadata={"unit": unit_of(study, path), "description": description_of(study, path)},
         )
         for path in study.axis_paths
     ]

@@ -61,7 +61,7 @@ def _coordinates(study: Study, dims: tuple[str, ...]) -> dict[str, Any]:
     for index, axis in enumerate(study.axes):
         dim = dims[index if study.combine == "grid" else 0]
         for path in axis.paths:
-            attributes = {"units": unit_of(study.model, path), "long_name": description_of(study, path)}
+            attributes = {"units": unit_of(study, path), "long_name": description_of(study, path)}
             found[path] = (dim, axis.array, attributes)
     if dims == (_CASE,):
         found[_CASE] = (_CASE, np.arange(study.cases, dtype=np.int64), {"long_name": "number of the case"})

@@ -37,7 +37,7 @@ class Input:
 
 def description_of(study: Study, path: str) -> str:
     """What a flat SPEC path means, as a few words; "" where the catalogue does not have it."""
-    entry = parameter_of(study.model, path)
+    entry = parameter_of(study, path)
     return "" if entry is None else entry.help
 
 
@@ -49,7 +49,7 @@ def inputs(study: Study) -> tuple[Input, ...]:
         Input(
             path,
             None if path in varying else study.base[path],
-            unit_of(study.model, path),
+            unit_of(study, path),
             description_of(study, path),
             path in varying,
         )

@@ -43,7 +43,7 @@ def json_pieces(source: Source) -> Iterator[bytes]:
     head = {
         **source.about,
         "axes": [
-            {"paths": list(axis.paths), "unit": unit_of(study.model, axis.paths[0]), "values": len(axis)}
+            {"paths": list(axis.paths), "unit": unit_of(study, axis.paths[0]), "values": len(axis)}
             for axis in study.axes
         ],
         "results": [{"name": info.name, "unit": info.unit} for info in source.infos],

@@ -52,7 +52,7 @@ def _write(source: Source, folder: Path, sheet_rows: int = SHEET_ROWS) -> Path:
 def _cases(book: Any, source: Source, title: Any, unit: Any, sheet_rows: int) -> None:
     study = source.study
     names = ["case", *study.axis_paths, "ending", "flags", *(info.name for info in source.infos)]
-    units = ["", *(unit_of(study.model, path) for path in study.axis_paths), "", "", *(i.unit for i in source.infos)]
+    units = ["", *(unit_of(study, path) for path in study.axis_paths), "", "", *(i.unit for i in source.infos)]
     number, sheet, row = 0, None, sheet_rows
     for block in source.blocks:
         for cells in _rows(source, block):

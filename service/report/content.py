@@ -91,7 +91,7 @@ def make_report(
         _facts(record, study),
         record.warnings,
         tuple(
-            AxisRow(", ".join(a.paths), unit_of(study.model, a.paths[0]), len(a), a.values[0], a.values[-1])
+            AxisRow(", ".join(a.paths), unit_of(study, a.paths[0]), len(a), a.values[0], a.values[-1])
             for a in study.axes
         ),
         run_texts(study),

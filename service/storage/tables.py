@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from worker import kernels
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0004"
+HEAD_REVISION = "0005"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -117,8 +117,8 @@ KEY_COLUMNS = ("study", "case_number", "ending", "flags")
 
 
 def results_name(model: str, pendulums: int) -> str:
-    """Name of the table with the results of ``model`` with that many pendulums."""
-    return f"{model.replace('-', '_')}_{pendulums}"
+    """Name of the table with the results of ``model`` with that many pendulums; 0 where it has none."""
+    return model.replace("-", "_") + (f"_{pendulums}" if pendulums else "")
 
 
 @cache

@@ -79,7 +79,7 @@ def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = 
             (
                 axis_name(study, axis.paths[0]),
                 study.case_parameters(case)[axis.paths[0]],
-                unit_of(study.model, axis.paths[0]),
+                unit_of(study, axis.paths[0]),
             )
             for axis in study.axes
         ],

@@ -142,7 +142,7 @@ def compare_page(context: Ctx, request: Request) -> Response:
         ids=given.getlist("study"),
         faults=faults,
         listed=[views.summary(record) for record in context.store.list_studies(page_size=_LISTED).studies],
-        units={} if chosen is None else {path: unit_of(chosen.studies[0].model, path) for path in chosen.axes},
+        units={} if chosen is None else {path: unit_of(chosen.studies[0], path) for path in chosen.axes},
         held=[] if chosen is None else [chosen.query(position).at for position in range(len(chosen.studies))],
         fixed=[] if chosen is None else _fixed(chosen),
         figure=f"/compare/figure?{query}",

@@ -110,7 +110,7 @@ def map_page(
 
 def _axis_choices(study: Study) -> list[dict[str, Any]]:
     return [
-        {"path": axis.paths[0], "paths": axis.paths, "unit": unit_of(study.model, axis.paths[0]), "values": len(axis)}
+        {"path": axis.paths[0], "paths": axis.paths, "unit": unit_of(study, axis.paths[0]), "values": len(axis)}
         for axis in varying_axes(study)
     ]
 

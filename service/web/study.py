@@ -96,7 +96,7 @@ def inputs(study: Study) -> list[tuple[str, list[dict[str, Any]]]]:
     varied = study.axis_paths
     sections: dict[str, list[dict[str, Any]]] = {}
     for path in dict.fromkeys((*study.base, *varied)):
-        entry = parameter_of(study.model, path)
+        entry = parameter_of(study, path)
         section, _, name = path.rpartition(".")
         sections.setdefault(section, []).append(
             {
@@ -105,7 +105,7 @@ def inputs(study: Study) -> list[tuple[str, list[dict[str, Any]]]]:
                 "symbol": f"c_{int(name) + 1}" if name.isdigit() else "" if entry is None else entry.symbol,
                 "help": "" if entry is None else entry.help,
                 "value": study.base.get(path),
-                "unit": unit_of(study.model, path),
+                "unit": unit_of(study, path),
                 "varied": path in varied,
             }
         )
@@ -168,7 +168,7 @@ def fixed_choices(study: Study, drawn: tuple[str, ...], at: tuple[tuple[str, str
         if len(axis) < 2 or any(path in axis.paths for path in drawn):
             continue
         path = next((path for path in axis.paths if path in chosen), axis.paths[0])
-        unit = unit_of(study.model, axis.paths[0])
+        unit = unit_of(study, axis.paths[0])
         text = chosen.get(path)
         found.append(
             {

@@ -85,7 +85,7 @@ def cases_page(
         flags=kernels.FLAG_SENTENCES,
         sortable=study.cases <= MOST_SORTED or bool(at),
         most_sorted=MOST_SORTED,
-        units_of=lambda path: unit_of(study.model, path),
+        units_of=lambda path: unit_of(study, path),
         address=lambda **more: f"/studies/{study_id}/cases?" + urlencode([*kept, *more.items()]),
         first=after,
     )

@@ -73,15 +73,24 @@ def test_a_fit_that_cannot_be_made_says_why(service: Service, change: dict[str, 
 def test_models_describe_parameters_results_and_endings(service: Service) -> None:
     body = service.get("/models")
     m.ModelList.model_validate(body)
-    (model,) = body["models"]
+    model, shaft = body["models"]
     assert model == service.get("/models/vibration-drive")
+    assert shaft == service.get("/models/machine-shaft")
+    assert {"drive.inertia", "mechanism.four_bar.crank", "operation.steps.K.value", "constants.NAME"} <= {
+        entry["path"] for entry in shaft["parameters"]
+    }
+    assert {"omega.mean", "s4.amplitude", "required_inertia"} <= {entry["name"] for entry in shaft["results"]}
+    assert {"ok", "inertia_insufficient", "crashed"} <= set(shaft["endings"])
+    assert not {"chatter", "step_budget"} & set(shaft["endings"])
+    assert shaft["flags"] == {}
     parameters = {entry["path"]: entry for entry in model["parameters"]}
     assert parameters["excitation.frequency"]["required"]
     assert parameters["gravity"]["default"] == 9.80665
     assert parameters["clutch.windup_limit"]["high"] is None
     names = {entry["name"] for entry in model["results"]}
     assert {"shaft.speed.mean", "pendulums.N.torque.max"} <= names
-    assert model["endings"] == kernels.ENDING_SENTENCES
+    assert model["endings"] | shaft["endings"] == kernels.ENDING_SENTENCES
+    assert not {"motor_stalled", "cannot_assemble"} & set(model["endings"])
     missing = service.http.get("/api/v1/models/perpetuum-mobile")
     assert missing.status_code == 404
     tag = service.http.get("/api/v1/models").headers["etag"]

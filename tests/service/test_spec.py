@@ -107,7 +107,7 @@ def test_the_version_is_one(version: object) -> None:
     assert problems({"/sprag": version})["/sprag"].allowed == "1"
 
 
-@pytest.mark.parametrize("model", ["vibration_drive", "machine-shaft", "", 3, None, ["vibration-drive"], ...])
+@pytest.mark.parametrize("model", ["vibration_drive", "machine_shaft", "", 3, None, ["vibration-drive"], ...])
 def test_the_models_are_listed(model: object) -> None:
     problem = problems({"/model": model})["/model"]
     assert "'vibration-drive'" in str(problem.allowed)

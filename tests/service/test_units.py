@@ -103,7 +103,8 @@ def test_plain_numbers_pass_unchanged(number: float) -> None:
 @pytest.mark.parametrize("unit", ALL_UNITS)
 def test_the_example_of_each_unit_is_accepted(unit: str) -> None:
     for text in example(unit).replace(" or ", ", ").split(", "):
-        assert math.isfinite(parse_quantity(text.strip('"'), unit))
+        value = text.strip('"') if text.startswith('"') else float(text)
+        assert math.isfinite(parse_quantity(value, unit))
 
 
 @pytest.mark.parametrize(

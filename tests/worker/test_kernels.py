@@ -22,9 +22,9 @@ def test_every_ending_has_a_sentence() -> None:
 
 
 def test_unknown_models_are_named() -> None:
-    assert kernels.models() == ("vibration-drive",)
+    assert kernels.models() == ("vibration-drive", "machine-shaft")
     for ask in (kernels.parameter_catalogue, kernels.result_shapes, lambda model: kernels.result_infos(model, 1)):
-        with pytest.raises(ValueError, match="unknown model 'steam-engine'; there is: vibration-drive"):
+        with pytest.raises(ValueError, match="unknown model 'steam-engine'; there is: vibration-drive, machine-shaft"):
             ask("steam-engine")
 
 

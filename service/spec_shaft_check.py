@@ -1,0 +1,67 @@
+"""What is wrong with a machine shaft as a whole: parts that make no machine, and machines without a steady cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Final
+
+from service.spec_messages import Report
+from worker.kernels import Ending, ExpressionError, InsufficientInertiaError, MachineError, machine_shaft
+
+#: Where the fault of a machine that ends so is told.
+_POINTERS: Final[dict[Ending | None, str]] = {
+    Ending.UNBALANCED_WORK: "/base/balance",
+    Ending.NEGATIVE_INERTIA: "/base/drive/inertia",
+    Ending.MOTOR_STALLED: "/base/drive/motor",
+}
+_PARTS: Final = ("mechanism", "drive", "operation")
+_NEUTRAL: Final[dict[str, dict[str, Any]]] = {"drive": {}, "mechanism": {"kind": "none"}, "operation": {}}
+
+
+def check_machine(
+    report: Report, structure: Mapping[str, Any], values: Mapping[str, float], places: Mapping[str, str]
+) -> None:
+    """Notes what is wrong with a machine whose numbers are all in range.
+
+    Parameters
+    ----------
+    structure : as a study keeps it
+    values : flat path -> SI number, all that the structure needs
+    places : part -> JSON Pointer of its formula, its table, or all of it
+    """
+    before = len(report.problems)
+    for part in _PARTS:
+        # Alone but for the mechanism, which an operation needs, so that a fault is told where it is.
+        alone = {name: structure[name] if name in {part, "mechanism"} else _NEUTRAL[name] for name in _PARTS}
+        own = {**structure, **alone}
+        if part != "drive" and structure["balance"] == "motor":
+            own["balance"] = "constant"
+        _note(report, places[part], partial(machine_shaft.check_structure, own), structure[part].get("formula"))
+        if len(report.problems) > before:
+            return
+    _note(report, "/base", partial(machine_shaft.check_structure, structure))
+    if len(report.problems) > before:
+        return
+    try:
+        machine_shaft.check(structure, values)
+    except ExpressionError as error:
+        report.problem(places.get(error.part, "/base"), str(error), structure.get(error.part, {}).get("formula"))
+    except InsufficientInertiaError as error:
+        report.problem(
+            "/base/mean_speed", str(error), error.asked, allowed=f">= {error.least_mean_speed:.6g} rad/s", unit="rad/s"
+        )
+    except MachineError as error:
+        pointer = _POINTERS.get(error.ending)
+        if error.ending is Ending.CANNOT_ASSEMBLE:
+            pointer = places["mechanism"]
+        if error.ending is Ending.NEGATIVE_INERTIA and structure["mechanism"]["kind"] in {"table", "formula"}:
+            pointer = places["mechanism"]
+        report.problem(pointer or "/base", str(error))
+
+
+def _note(report: Report, pointer: str, check: Callable[[], None], value: object = None) -> None:
+    try:
+        check()
+    except MachineError as error:
+        report.problem(pointer, str(error), value)

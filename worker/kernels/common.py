@@ -1,0 +1,117 @@
+"""What tasks and results are, whichever model they are of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from engine import Run
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkResult:
+    """What a run of consecutive cases gave.
+
+    Attributes
+    ----------
+    first : int
+        Number of the first case.
+    endings : list of str, length ``count``
+        Names of the endings, keys of `ENDING_SENTENCES`.
+    flags : list of str, length ``count``
+        Names of the flags of each case joined by commas; "" where there is none.
+    values : float64 array, shape (count, results), C-contiguous
+        Results in the order of `result_infos`, SI units; NaN where a result could not be computed.
+    """
+
+    first: int
+    endings: list[str]
+    flags: list[str]
+    values: NDArray[np.float64]
+
+    @property
+    def count(self) -> int:
+        """Number of cases."""
+        return len(self.endings)
+
+
+@dataclass(frozen=True, slots=True)
+class KernelShape:
+    """What decides which compiled kernel a case needs; zeros where a model knows no such thing."""
+
+    model: str
+    pendulums: int
+    coefficients: int
+    tolerance: float
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkTask:
+    """Consecutive cases as they travel to a process: their own columns only, however large the study is.
+
+    ``columns`` maps flat SPEC paths to SI numbers, or to arrays of shape (count,) where they vary. ``run`` is None for
+    a model without a run, ``structure`` None for one whose machines have none (`Study.structure`).
+    """
+
+    first: int
+    count: int
+    shape: KernelShape
+    run: Run | None
+    columns: dict[str, float | NDArray[np.float64]]
+    structure: dict[str, Any] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """What instantaneous values go along, from 0 to ``end``.
+
+    Attributes
+    ----------
+    along : str
+        "time" of the run, or "angle" of the shaft.
+    unit : str
+        Its SI unit.
+    end : float
+    period : float
+        What "1 period" means in that unit.
+    """
+
+    along: str
+    unit: str
+    end: float
+    period: float
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """Instantaneous values of one case.
+
+    Attributes
+    ----------
+    times : float64 array, shape (points,)
+        Times, or angles of the shaft: whatever ``along`` says, in its SI unit. None of them where a case has no motion.
+    names, units : tuples, length V
+        Name and SI unit of each variable.
+    values : float64 array, shape (points, V)
+    states : dict
+        States of parts of the machine by name, each of length points.
+    ending : str
+    along, unit : str
+        "time" in "s", or "angle" in "rad".
+    phi_c : tuple of float
+        Angles (rad) at which the energy of a machine shaft is its mean.
+    """
+
+    times: NDArray[np.float64]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: NDArray[np.float64]
+    states: dict[str, list[str]]
+    ending: str
+    along: str = "time"
+    unit: str = "s"
+    phi_c: tuple[float, ...] = ()
