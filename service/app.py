@@ -11,7 +11,7 @@ from fastapi import APIRouter, FastAPI
 from starlette.types import ASGIApp
 
 from service import handlers
-from service.api import cases, catalogues, clutch_fits, curves, events, health, sensitivity, studies
+from service.api import cases, catalogues, clutch_fits, curves, events, health, schedules, sensitivity, studies
 from service.api.context import Context
 from service.api.document import API_PREFIX, build_openapi
 from service.computer import Computes, ProcessComputer
@@ -33,6 +33,7 @@ TAGS = [
     {"name": "studies", "description": "Submit, preview, follow and cancel studies."},
     {"name": "results", "description": "Curves, maps and all rows of a study."},
     {"name": "cases", "description": "Single cases and their instantaneous values."},
+    {"name": "schedules", "description": "Studies that are submitted by themselves."},
     {"name": "clutch", "description": "Clutch laws from measured data."},
     {"name": "models", "description": "Parameters, results and endings; studies to start from."},
     {"name": "health", "description": "Whether the service is up."},
@@ -53,7 +54,12 @@ class Application(FastAPI):
     def openapi(self) -> dict[str, Any]:
         """The OpenAPI document, made once."""
         if self.openapi_schema is None:
-            schemas = {"Spec": spec_schema(), "ClutchFitRequest": clutch_fits.SCHEMA}
+            schemas = {
+                "Spec": spec_schema(),
+                "ClutchFitRequest": clutch_fits.SCHEMA,
+                "ScheduleRequest": schedules.SCHEMA,
+                "ScheduleChange": schedules.CHANGE_SCHEMA,
+            }
             self.openapi_schema = build_openapi(self, schemas)
         return self.openapi_schema
 
@@ -96,7 +102,7 @@ def create_app(
     )
     app.state.context = Context(settings, used_store, used_computer)
     api = APIRouter(prefix=API_PREFIX)
-    for module in (studies, events, curves, sensitivity, cases, clutch_fits, catalogues):
+    for module in (studies, events, curves, sensitivity, cases, clutch_fits, schedules, catalogues):
         api.include_router(module.router)
     app.include_router(api)
     app.include_router(health.router)

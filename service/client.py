@@ -169,13 +169,37 @@ class ServiceClient:
         """The study as a document, "html" or "pdf"."""
         return self.download(f"{_study(study_id)}/report", [("format", form)])
 
-    def _json(self, method: str, path: str, **arguments: Any) -> dict[str, Any]:
+    def schedules(self) -> dict[str, Any]:
+        """Every schedule with its last and its next run."""
+        return self._json("GET", "/schedules")
+
+    def schedule(self, schedule_id: str) -> dict[str, Any]:
+        """One schedule with its spec and its latest runs."""
+        return self._json("GET", _schedule(schedule_id))
+
+    def create_schedule(self, fields: Mapping[str, Any]) -> dict[str, Any]:
+        """Keep a new schedule: a study that is submitted by itself."""
+        return self._json("POST", "/schedules", json=dict(fields))
+
+    def change_schedule(self, schedule_id: str, fields: Mapping[str, Any]) -> dict[str, Any]:
+        """Change some fields of a schedule."""
+        return self._json("PATCH", _schedule(schedule_id), json=dict(fields))
+
+    def delete_schedule(self, schedule_id: str) -> None:
+        """Delete a schedule; its studies stay."""
+        self._request("DELETE", _schedule(schedule_id))
+
+    def _request(self, method: str, path: str, **arguments: Any) -> httpx.Response:
         try:
             response = self._http.request(method, _API + path, **arguments)
         except httpx.HTTPError as error:
             raise UnreachableError(self.server, _reason(error)) from error
         if response.is_error:
             raise _refusal(response)
+        return response
+
+    def _json(self, method: str, path: str, **arguments: Any) -> dict[str, Any]:
+        response = self._request(method, path, **arguments)
         try:
             data = response.json()
         except ValueError:
@@ -187,6 +211,10 @@ class ServiceClient:
 
 def _study(study_id: str) -> str:
     return f"/studies/{quote(study_id, safe='')}"
+
+
+def _schedule(schedule_id: str) -> str:
+    return f"/schedules/{quote(schedule_id, safe='')}"
 
 
 def _refusal(response: httpx.Response) -> ServiceError:

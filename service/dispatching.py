@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import TYPE_CHECKING
 
+from service.schedules.scheduler import Scheduler
 from service.storage.lock import DispatcherLock
 from service.storage.part import SystemClock
 from service.storage.store import Store
 from worker import kernels
+from worker.chunking import Chunking
 from worker.dispatcher import Dispatcher
 from worker.ports import EpochLostError, ExecutorError, StoreError
 from worker.processes import end_with_parent, ignore_interrupts, interrupts_held_back
@@ -39,6 +41,8 @@ class WorkerSettings:
     database_url: str
     processes: int
     chunk_timeout: float
+    #: Cases of one chunk of the studies that schedules submit; 0: about a second of work.
+    chunk_cases: int = 0
 
 
 class StopFlag:
@@ -85,7 +89,9 @@ def run_dispatcher(
 
     Raises StoreError (EpochLostError when another dispatcher took over) and ExecutorError, each with one sentence.
     """
-    with Store.open(settings.database_url) as store:
+    chunking = Chunking(settings.chunk_cases, settings.processes, settings.chunk_timeout)
+    with Store.open(settings.database_url, chunking=chunking) as store:
+        scheduler = Scheduler(store)
         lock = DispatcherLock(store.session.path)
         if not lock.take():
             say(f"another worker (process {lock.holder()}) is at work on {store.session.path}; waiting for its end")
@@ -99,8 +105,10 @@ def run_dispatcher(
             dispatcher = Dispatcher(
                 store, executor(settings), SystemClock(), owner=owner_name(), renew=lambda: renewed(settings)
             )
+            scheduler.start()
             dispatcher.run(stopping)
         finally:
+            scheduler.stop()
             lock.release()
 
 

@@ -43,6 +43,7 @@ PROBLEM_TYPES: dict[str, ProblemType] = _catalogue(
     _P("invalid-selection", 422, "The cases asked for cannot be drawn", "A curve needs a value for every axis."),
     _P("idempotency-conflict", 422, "The Idempotency-Key was used with another body", "A new study needs a new key."),
     _P("study-not-found", 404, "There is no such study", "It never existed or was deleted."),
+    _P("schedule-not-found", 404, "There is no such schedule", "It never existed or was deleted."),
     _P("case-not-found", 404, "There is no such case in the study", "Cases are numbered from 0."),
     _P("not-found", 404, "There is nothing at this address", "The addresses of the interface are listed at /docs."),
     _P("method-not-allowed", 405, "This address does not take this method", "The header Allow lists those it takes."),

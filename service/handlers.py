@@ -28,6 +28,8 @@ _PATTERNS = {r"^[!-~]+$": "printable ASCII characters without blanks"}
 #: Fault of the store -> kind of problem; the first that matches, so the special ones come first.
 _STORE_PROBLEMS: tuple[tuple[type[storage.StoreError], str], ...] = (
     (storage.StudyNotFound, "study-not-found"),
+    (storage.ScheduleNotFound, "schedule-not-found"),
+    (storage.TooManySchedules, "wrong-state"),
     (storage.IdempotencyConflict, "idempotency-conflict"),
     (storage.StudyBusy, "wrong-state"),
     (storage.NothingToRetry, "wrong-state"),

@@ -131,7 +131,7 @@ class Server(uvicorn.Server):
 
 def worker_settings(settings: Settings) -> WorkerSettings:
     """The part of ``settings`` that a dispatcher needs."""
-    return WorkerSettings(settings.database_url, settings.pool_processes, settings.chunk_timeout)
+    return WorkerSettings(settings.database_url, settings.pool_processes, settings.chunk_timeout, settings.chunk_cases)
 
 
 def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) -> None:

@@ -46,5 +46,8 @@ MAX_TRAJECTORY_POINTS: Final = 20_000
 #: Priorities of studies lie between this and its negative.
 MAX_PRIORITY: Final = 100
 
+#: Schedules that are kept.
+MAX_SCHEDULES: Final = 1_000
+
 #: Seconds in which a kernel must be compiled: many times what the largest takes on a slow, busy machine.
 LOAD_SECONDS = 3600.0

@@ -92,7 +92,7 @@ def build_openapi(app: FastAPI, extra_schemas: dict[str, Any]) -> dict[str, Any]
         for method, operation in operations.items():
             if path.startswith(API_PREFIX):
                 operation["security"] = [{"bearer": []}, {}]
-                everywhere = problems(*_EVERYWHERE, *(_UNSAFE if method in ("post", "delete") else ()))
+                everywhere = problems(*_EVERYWHERE, *(_UNSAFE if method in ("post", "patch", "delete") else ()))
                 for status, response in everywhere.items():
                     _merge(operation["responses"], str(status), response)
     return document

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Query, Request
@@ -16,12 +14,10 @@ from service.api.document import body, problems
 from service.api.document import not_modified as documented_304
 from service.api.requests import Body, read_body, strict_query
 from service.api.respond import entity_tag, json_response, not_modified, tagged
-from service.errors import ApiError, parameter_error
-from service.preview import estimated_bytes, preview_json
+from service.errors import parameter_error
+from service.intake import accept
+from service.preview import preview_json
 from service.spec import ParsedSpec, load_spec, parse_spec
-from service.storage.records import StudyRecord
-from service.storage.room import RESERVE_BYTES
-from service.storage.store import Store
 from worker.kernels import ENDING_SENTENCES, OK, WorkerEnding
 from worker.limits import MAX_PAGE_SIZE, MAX_PRIORITY
 from worker.states import StudyState
@@ -75,40 +71,6 @@ def create_study(
     """Submit a study. Its cases are run in the order of their numbers; rows that other studies have are taken."""
     record = accept(context.store, _parsed(received), idempotency_key, priority, fresh)
     return json_response(views.summary(record), 202, {"Location": views.study_address(record.id)})
-
-
-def accept(
-    store: Store, parsed: ParsedSpec, idempotency_key: str | None = None, priority: int = 0, fresh: bool = False
-) -> StudyRecord:
-    """Take a study in, warnings and all; ApiError when its results would not fit on the disk."""
-    body_hash = hashlib.sha256(json.dumps(parsed.spec, sort_keys=True).encode("ascii")).hexdigest()
-    known = store.study_of_key(idempotency_key, body_hash) if idempotency_key else None
-    if known is not None:
-        return known
-    _require_room(store, parsed)
-    return store.create_study(
-        parsed.spec,
-        parsed.study,
-        warnings=(*parsed.warnings, *store.chunking.warnings(parsed.study)),
-        idempotency_key=idempotency_key,
-        body_hash=body_hash,
-        priority=priority,
-        fresh=fresh,
-    )
-
-
-def _require_room(store: Store, parsed: ParsedSpec) -> None:
-    """Refuse a study whose results would not fit on the disk."""
-    needed, left = estimated_bytes(parsed.study), max(store.room() - RESERVE_BYTES, 0)
-    if needed > left:
-        raise ApiError(
-            "storage-full",
-            f"The results would take about {_size(needed)}; the database has room for {_size(left)} more.",
-        )
-
-
-def _size(count: int) -> str:
-    return f"{count / 1e9:.3g} GB" if count >= 1e8 else f"{count / 1e6:.3g} MB"
 
 
 @router.post(

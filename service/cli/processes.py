@@ -54,7 +54,7 @@ def worker(db: Database = None, processes: Processes = None) -> None:
 
     settings = read_settings(database=db, processes=processes)
     run_dispatcher(
-        WorkerSettings(settings.database_url, settings.pool_processes, settings.chunk_timeout),
+        WorkerSettings(settings.database_url, settings.pool_processes, settings.chunk_timeout, settings.chunk_cases),
         stop_on_signals(),
         say=say,
     )

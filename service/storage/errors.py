@@ -9,10 +9,12 @@ __all__ = [
     "IdempotencyConflict",
     "NothingToRetry",
     "PageTokenError",
+    "ScheduleNotFound",
     "SchemaError",
     "StoreError",
     "StudyBusy",
     "StudyNotFound",
+    "TooManySchedules",
 ]
 
 
@@ -38,6 +40,17 @@ class StudyNotFound(StoreError):  # noqa: N818 - the name callers read
     def __init__(self, study_id: str) -> None:
         super().__init__(f"there is no study {study_id!r}")
         self.study_id = study_id
+
+
+class ScheduleNotFound(StoreError):  # noqa: N818
+    """There is no schedule of that id."""
+
+    def __init__(self, schedule_id: str) -> None:
+        super().__init__(f"there is no schedule {schedule_id!r}")
+
+
+class TooManySchedules(StoreError):  # noqa: N818
+    """There are as many schedules as are kept."""
 
 
 class StudyBusy(StoreError):  # noqa: N818

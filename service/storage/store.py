@@ -9,6 +9,7 @@ from service.storage.cases import Cases
 from service.storage.part import SystemClock
 from service.storage.retry import Retries
 from service.storage.room import Room
+from service.storage.schedules import Schedules
 from service.storage.session import Session
 from service.storage.studies import Studies
 from service.storage.work import Work
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from worker.ports import Clock
 
 
-class Store(Studies, Retries, Cases, Room, Work):
+class Store(Studies, Retries, Cases, Room, Schedules, Work):
     """One database. Safe to use from several threads; close it at the end (it is a context manager)."""
 
     @classmethod

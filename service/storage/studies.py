@@ -14,7 +14,16 @@ from service.storage.errors import IdempotencyConflict, PageTokenError, StudyBus
 from service.storage.part import Part
 from service.storage.progress import RECENT_CHUNKS, FinishedChunk, estimate
 from service.storage.records import Progress, StudyPage, StudyRecord, record_of
-from service.storage.tables import CHUNKS, ENDINGS, IDEMPOTENCY_KEYS, RECORD_COLUMNS, STUDIES, results_table
+from service.storage.schedules import unbind
+from service.storage.tables import (
+    CHUNKS,
+    ENDINGS,
+    IDEMPOTENCY_KEYS,
+    RECORD_COLUMNS,
+    STUDIES,
+    WAITS_FOR_WINDOW,
+    results_table,
+)
 from worker import kernels
 from worker.chunking import Chunking, spans
 from worker.reuse import kin_hash
@@ -182,6 +191,8 @@ class Studies(Part):
         with self.session.write() as connection:
             row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.waits_for)
             self._move(connection, row.number, event)
+            if event is StudyEvent.RESUME and row.waits_for == WAITS_FOR_WINDOW:
+                unbind(connection, row.number)
             if event is StudyEvent.PAUSE and row.waits_for is not None:  # it was paused, but not by the user
                 connection.execute(
                     sa.update(STUDIES)

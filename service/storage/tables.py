@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from worker import kernels
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0005"
+HEAD_REVISION = "0006"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -58,6 +58,8 @@ STUDIES = sa.Table(
 
 #: What a study waits for that the dispatcher holds while the disk is full.
 WAITS_FOR_ROOM = "room"
+#: What a study waits for that is held outside its window.
+WAITS_FOR_WINDOW = "window"
 
 #: The columns of a `StudyRecord`: without the texts that can be long.
 RECORD_COLUMNS = tuple(

@@ -16,8 +16,8 @@ from starlette.responses import RedirectResponse, Response
 from service.api.catalogues import preset_of
 from service.api.context import Context, Ctx
 from service.api.respond import json_response
-from service.api.studies import accept
 from service.errors import ApiError
+from service.intake import accept
 from service.presets import preset_names
 from service.web.form_check import Checked, check_form, check_text
 from service.web.form_fields import path_choices, pendulum, sections

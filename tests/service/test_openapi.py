@@ -11,6 +11,7 @@ import pytest
 from fastapi.routing import iter_route_contexts
 from openapi_spec_validator import OpenAPIV31SpecValidator
 
+from service.api.schedules import EXAMPLE
 from service.errors import PROBLEM_TYPES
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
     from tests.service.conftest import Service
 
-METHODS = ("get", "post", "delete")
+METHODS = ("get", "post", "patch", "delete")
 
 
 @pytest.fixture
@@ -84,6 +85,9 @@ def test_every_operation_documents_its_problems(document: dict[str, Any]) -> Non
 def send(service: Service, path: str, method: str, operation: dict[str, Any], study_id: str) -> list[httpx.Response]:
     """What the service answers to every documented example of an operation."""
     address = path.replace("{study_id}", study_id)
+    if "{schedule_id}" in path:
+        kept = service.http.post("/api/v1/schedules", json=EXAMPLE).json()["id"]
+        address = address.replace("{schedule_id}", kept)
     query: list[tuple[str, str]] = []
     headers: dict[str, str] = {}
     for parameter in operation.get("parameters", ()):

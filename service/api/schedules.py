@@ -1,0 +1,188 @@
+"""Schedules: studies that are submitted by themselves, once or again and again."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Depends, Path
+from starlette.convertors import register_url_convertor
+from starlette.responses import Response
+
+from service.api import examples
+from service.api import models as m
+from service.api.context import Ctx, StudyIdConvertor
+from service.api.document import API_PREFIX, body, problems
+from service.api.requests import Body, read_body, strict_query
+from service.api.respond import json_response, timestamp
+from service.api.views import study_address
+from service.errors import ApiError, spec_items
+from service.schedules.fields import change_fields, read_fields
+from service.spec import load_spec
+from service.spec_messages import SpecError
+from service.storage.schedules import RunRecord, ScheduleRecord
+from worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
+
+router = APIRouter(tags=["schedules"], dependencies=[Depends(strict_query)])
+
+_PROBLEMS: Final = ("invalid-parameter", "invalid-body", "body-too-large", "unsupported-media-type")
+_TIME_OF_DAY: Final = {"type": "string", "pattern": "^([01]?[0-9]|2[0-3]):[0-5][0-9]$"}
+_FIELDS: Final[dict[str, Any]] = {
+    "name": {
+        "type": ["string", "null"],
+        "maxLength": MAX_NAME_LENGTH,
+        "description": "name of its studies; else the spec's own",
+    },
+    "spec": {"$ref": "#/components/schemas/Spec"},
+    "cron": {
+        "type": ["string", "null"],
+        "description": "again and again: minute, hour, day of the month, month, day of the week, in `zone`",
+    },
+    "at": {
+        "type": ["string", "null"],
+        "description": "once: a time to come, in `zone` unless it carries its own offset",
+    },
+    "zone": {"type": "string", "default": "UTC", "description": "name of the time zone"},
+    "window": {
+        "type": ["array", "null"],
+        "minItems": 2,
+        "maxItems": 2,
+        "items": _TIME_OF_DAY,
+        "description": "its studies run between these times of day, in `zone`, and are held outside",
+    },
+    "priority": {"type": "integer", "minimum": -MAX_PRIORITY, "maximum": MAX_PRIORITY, "default": 0},
+    "fresh": {"type": "boolean", "default": False, "description": "run every case, also those that studies have"},
+    "enabled": {"type": "boolean", "default": True},
+}
+SCHEMA: Final[dict[str, Any]] = {
+    "type": "object",
+    "description": "A study and when it is to run; either `cron` or `at`.",
+    "required": ["spec"],
+    "additionalProperties": False,
+    "properties": _FIELDS,
+}
+CHANGE_SCHEMA: Final[dict[str, Any]] = {
+    "type": "object",
+    "description": "The fields of a schedule that are to change.",
+    "additionalProperties": False,
+    "properties": _FIELDS,
+}
+EXAMPLE: Final[dict[str, Any]] = {
+    "name": "Every working night",
+    "cron": "0 22 * * 1-5",
+    "zone": "Europe/Berlin",
+    "window": ["22:00", "06:00"],
+    "spec": examples.SPEC,
+}
+
+
+class ScheduleIdConvertor(StudyIdConvertor):
+    """Part of an address that can be the id of a schedule."""
+
+
+register_url_convertor("schedule", ScheduleIdConvertor())
+
+ScheduleId = Annotated[str, Path(description="id of the schedule", examples=["sc_0123456789abcdef"])]
+Fields = Annotated[Body, Depends(read_body)]
+
+
+@router.post(
+    "/schedules",
+    status_code=201,
+    response_model=m.ScheduleDetail,
+    responses=problems(*_PROBLEMS, "wrong-state"),
+    openapi_extra=body({"every working night": EXAMPLE}, {"$ref": "#/components/schemas/ScheduleRequest"}),
+)
+def create_schedule(context: Ctx, received: Fields) -> Response:
+    """Keep a schedule: its study is submitted whenever it is due. Due times that were missed are made up for once."""
+    try:
+        fields = read_fields(load_spec(received.content, received.format), context.store.clock.now())
+    except SpecError as error:
+        raise _refusal(error) from error
+    record = context.store.create_schedule(fields)
+    return json_response(detail(record, ()), 201, {"Location": schedule_address(record.id)})
+
+
+@router.get("/schedules", response_model=m.ScheduleList, responses=problems("invalid-parameter"))
+def list_schedules(context: Ctx) -> Response:
+    """Every schedule with its last and its next run, newest first."""
+    return json_response({"schedules": [summary(record) for record in context.store.list_schedules()]})
+
+
+@router.get(
+    "/schedules/{schedule_id:schedule}",
+    response_model=m.ScheduleDetail,
+    responses=problems("invalid-parameter", "schedule-not-found"),
+)
+def get_schedule(context: Ctx, schedule_id: ScheduleId) -> Response:
+    """A schedule with its spec and its latest runs."""
+    return json_response(detail(context.store.get_schedule(schedule_id), context.store.schedule_runs(schedule_id)))
+
+
+@router.patch(
+    "/schedules/{schedule_id:schedule}",
+    response_model=m.ScheduleDetail,
+    responses=problems(*_PROBLEMS, "schedule-not-found"),
+    openapi_extra=body({"disabled": {"enabled": False}}, {"$ref": "#/components/schemas/ScheduleChange"}),
+)
+def change_schedule(context: Ctx, schedule_id: ScheduleId, received: Fields) -> Response:
+    """Change some fields of a schedule; the others stay. It begins anew: nothing missed is made up for."""
+    record = context.store.get_schedule(schedule_id)
+    try:
+        data = load_spec(received.content, received.format)
+        fields = change_fields(record.fields, data, context.store.clock.now())
+    except SpecError as error:
+        raise _refusal(error) from error
+    changed = context.store.change_schedule(schedule_id, fields)
+    return json_response(detail(changed, context.store.schedule_runs(schedule_id)))
+
+
+@router.delete(
+    "/schedules/{schedule_id:schedule}",
+    status_code=204,
+    response_class=Response,
+    responses=problems("invalid-parameter", "schedule-not-found"),
+)
+def delete_schedule(context: Ctx, schedule_id: ScheduleId) -> Response:
+    """Delete a schedule. Studies that came of it stay."""
+    context.store.delete_schedule(schedule_id)
+    return Response(status_code=204)
+
+
+def _refusal(error: SpecError) -> ApiError:
+    return ApiError("invalid-body", str(error), spec_items(error.problems))
+
+
+def schedule_address(schedule_id: str) -> str:
+    """Address of a schedule in the API."""
+    return f"{API_PREFIX}/schedules/{schedule_id}"
+
+
+def summary(record: ScheduleRecord) -> dict[str, Any]:
+    """A schedule without its spec."""
+    fields = record.fields.to_json()
+    return {
+        "id": record.id,
+        **{name: fields.get(name) for name in ("name", "cron", "at", "zone", "window", "priority", "fresh", "enabled")},
+        "created_at": timestamp(record.created_at),
+        "next_due": timestamp(record.next_due),
+        "last_run": None if record.last is None else run_json(record.last),
+        "links": {"self": schedule_address(record.id), "page": f"/schedules#{record.id}"},
+    }
+
+
+def detail(record: ScheduleRecord, runs: tuple[RunRecord, ...]) -> dict[str, Any]:
+    """A schedule with everything."""
+    return {**summary(record), "runs": [run_json(run) for run in runs], "spec": record.fields.spec}
+
+
+def run_json(run: RunRecord) -> dict[str, Any]:
+    """A due time and what became of it."""
+    return {
+        "due": timestamp(run.due),
+        "state": run.state.value,
+        "missed": run.missed,
+        "begun_at": timestamp(run.begun_at),
+        "study": run.study,
+        "address": None if run.study is None else study_address(run.study),
+        "problem": run.problem,
+    }

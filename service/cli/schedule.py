@@ -1,0 +1,198 @@
+"""``sprag schedule``: studies that the service submits by itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from service.cli.console import WrongInputError, say, show_table, write_json
+from service.cli.files import read_spec
+from service.cli.options import DEFAULT_SERVER, Fresh, JsonFlag, Server, SpecFile, Token
+from service.cli.remote import PriorityOption, connection
+from service.spec_messages import Problem
+from worker.limits import MAX_PRIORITY
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+app = typer.Typer(
+    help="Studies that the service submits by itself, once or again and again.",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+)
+
+ScheduleId = Annotated[str, typer.Argument(metavar="ID", help="Id of the schedule.")]
+Cron = Annotated[
+    str | None,
+    typer.Option(
+        "--cron",
+        metavar="FIELDS",
+        help='Again and again: minute, hour, day, month, weekday, as "0 22 * * 1-5".',
+    ),
+]
+At = Annotated[str | None, typer.Option("--at", metavar="TIME", help="Once, as 2027-01-31T22:00.")]
+Zone = Annotated[
+    str | None, typer.Option("--zone", metavar="NAME", help="Time zone, as Europe/Berlin; default for a new one: UTC.")
+]
+WindowOption = Annotated[
+    str | None,
+    typer.Option("--window", metavar="FROM-TO", help='Run between these times only, as 22:00-06:00; "" for any time.'),
+]
+Name = Annotated[str | None, typer.Option("--name", help="Name of its studies; default: that of the spec.")]
+
+
+@app.command()
+def add(
+    spec: SpecFile,
+    cron: Cron = None,
+    at: At = None,
+    zone: Zone = None,
+    window: WindowOption = None,
+    name: Name = None,
+    priority: PriorityOption = 0,
+    fresh: Fresh = False,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Keep a schedule for a study and print its id: with --cron again and again, with --at once."""
+    fields: dict[str, Any] = {
+        "spec": read_spec(spec),
+        **_given(cron=cron, at=at, zone=zone, name=name, **_window(window)),
+        "priority": priority,
+        "fresh": fresh,
+    }
+    with connection(server, token) as client:
+        _show(client.create_schedule(fields), as_json)
+
+
+@app.command("list")
+def list_schedules(server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
+    """List the schedules with their last and their next run."""
+    with connection(server, token) as client:
+        found = client.schedules()
+    if as_json:
+        write_json(found)
+        return
+    columns = [(heading, False) for heading in ("id", "when", "window", "last run", "next run", "name")]
+    rows = [
+        (s["id"], _when(s), "-".join(s["window"] or ()) or None, _run(s["last_run"]), _next(s), s["name"])
+        for s in found["schedules"]
+    ]
+    show_table("", columns, rows)
+
+
+@app.command()
+def show(
+    schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False
+) -> None:
+    """Show a schedule and what became of its latest due times; with --json also its spec."""
+    with connection(server, token) as client:
+        schedule = client.schedule(schedule_id)
+    if as_json:
+        write_json(schedule)
+        return
+    _show(schedule, as_json)
+    columns = (("due", False), ("missed before", True), ("study", False), ("problem", False))
+    show_table("", columns, [(r["due"], r["missed"], r["study"], r["problem"]) for r in schedule["runs"]])
+
+
+@app.command()
+def change(
+    schedule_id: ScheduleId,
+    spec: Annotated[
+        str | None, typer.Option("--spec", metavar="SPEC", help="Another study spec; - reads standard input.")
+    ] = None,
+    cron: Cron = None,
+    at: At = None,
+    zone: Zone = None,
+    window: WindowOption = None,
+    name: Name = None,
+    priority: Annotated[
+        int | None, typer.Option(min=-MAX_PRIORITY, max=MAX_PRIORITY, help="Priority of its studies.")
+    ] = None,
+    fresh: Annotated[
+        bool | None, typer.Option("--fresh/--no-fresh", help="Run every case, also those that studies have.")
+    ] = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Change what is given of a schedule; the rest stays."""
+    fields = _given(cron=cron, at=at, zone=zone, name=name, priority=priority, fresh=fresh, **_window(window))
+    if spec is not None:
+        fields["spec"] = read_spec(spec)
+    if not fields:
+        raise WrongInputError("nothing is given to change; `sprag schedule change --help` lists what can be")
+    _change(schedule_id, fields, server, token, as_json)
+
+
+@app.command()
+def enable(
+    schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False
+) -> None:
+    """Let a disabled schedule go on from now."""
+    _change(schedule_id, {"enabled": True}, server, token, as_json)
+
+
+@app.command()
+def disable(
+    schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False
+) -> None:
+    """Let a schedule rest: it is kept, and not due."""
+    _change(schedule_id, {"enabled": False}, server, token, as_json)
+
+
+@app.command()
+def delete(schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None) -> None:
+    """Delete a schedule; studies that came of it stay."""
+    with connection(server, token) as client:
+        client.delete_schedule(schedule_id)
+    say(f"{schedule_id} is deleted")
+
+
+def _change(schedule_id: str, fields: Mapping[str, Any], server: str, token: str | None, as_json: bool) -> None:
+    with connection(server, token) as client:
+        _show(client.change_schedule(schedule_id, fields), as_json)
+
+
+def _given(**fields: Any) -> dict[str, Any]:
+    """The fields that were given; an empty window takes the window away."""
+    given = {name: value for name, value in fields.items() if value is not None}
+    if given.get("window") == []:
+        given["window"] = None
+    return given
+
+
+def _window(text: str | None) -> dict[str, Any]:
+    if text is None:
+        return {}
+    if not text.strip():
+        return {"window": []}
+    begin, dash, end = text.partition("-")
+    if not dash:
+        problem = Problem("--window", "is no window", text, allowed="as 22:00-06:00")
+        raise WrongInputError("an option is wrong", problems=[problem])
+    return {"window": [begin.strip(), end.strip()]}
+
+
+def _show(schedule: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        write_json(schedule)
+        return
+    print(schedule["id"])
+    window = f", between {' and '.join(schedule['window'])} only" if schedule["window"] else ""
+    say(f"{schedule['name']}: {_when(schedule)}{window}; next run: {_next(schedule)}")
+
+
+def _when(schedule: dict[str, Any]) -> str:
+    return f"{schedule['cron'] or schedule['at']} ({schedule['zone']})"
+
+
+def _next(schedule: dict[str, Any]) -> str:
+    return schedule["next_due"] or ("none" if schedule["enabled"] else "disabled")
+
+
+def _run(run: dict[str, Any] | None) -> str | None:
+    return None if run is None else f"{run['due']} {run['study'] or run['problem'] or run['state']}"

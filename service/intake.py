@@ -1,0 +1,50 @@
+"""Taking a study in: the one way for the interface, the form and the schedules."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import TYPE_CHECKING
+
+from service.errors import ApiError
+from service.preview import estimated_bytes
+from service.storage.room import RESERVE_BYTES
+
+if TYPE_CHECKING:
+    from service.spec import ParsedSpec
+    from service.storage.records import StudyRecord
+    from service.storage.store import Store
+
+
+def accept(
+    store: Store, parsed: ParsedSpec, idempotency_key: str | None = None, priority: int = 0, fresh: bool = False
+) -> StudyRecord:
+    """Take a study in, warnings and all; ApiError when its results would not fit on the disk."""
+    body_hash = hashlib.sha256(json.dumps(parsed.spec, sort_keys=True).encode("ascii")).hexdigest()
+    known = store.study_of_key(idempotency_key, body_hash) if idempotency_key else None
+    if known is not None:
+        return known
+    _require_room(store, parsed)
+    return store.create_study(
+        parsed.spec,
+        parsed.study,
+        warnings=(*parsed.warnings, *store.chunking.warnings(parsed.study)),
+        idempotency_key=idempotency_key,
+        body_hash=body_hash,
+        priority=priority,
+        fresh=fresh,
+    )
+
+
+def _require_room(store: Store, parsed: ParsedSpec) -> None:
+    """Refuse a study whose results would not fit on the disk."""
+    needed, left = estimated_bytes(parsed.study), max(store.room() - RESERVE_BYTES, 0)
+    if needed > left:
+        raise ApiError(
+            "storage-full",
+            f"The results would take about {_size(needed)}; the database has room for {_size(left)} more.",
+        )
+
+
+def _size(count: int) -> str:
+    return f"{count / 1e9:.3g} GB" if count >= 1e8 else f"{count / 1e6:.3g} MB"

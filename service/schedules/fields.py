@@ -1,0 +1,171 @@
+"""The fields of a schedule as a client gives them, checked like a spec: every fault named by its JSON Pointer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+from zoneinfo import ZoneInfo
+
+from service.schedules.times import Timing, TimingError, Window, check_cron, read_moment, read_time_of_day, zones
+from service.spec import parse_spec
+from service.spec_fields import read_flag, read_object, read_whole
+from service.spec_messages import Problem, Report, SpecError, did_you_mean
+from worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from datetime import datetime
+
+FIELDS: Final = ("name", "spec", "cron", "at", "zone", "window", "priority", "fresh", "enabled")
+_CRON_ALLOWED: Final = 'five fields, such as "0 22 * * 1-5": at 22:00 from Monday to Friday'
+_AT_ALLOWED: Final = 'a time to come, such as "2027-01-31T22:00"'
+_WINDOW_ALLOWED: Final = 'two different times of day, such as ["22:00", "06:00"]'
+_LONGEST_CRON: Final = 200
+
+
+@dataclass(frozen=True, slots=True)
+class ScheduleFields:
+    """A whole schedule: what is run (``spec``, the user's own), when, and how."""
+
+    name: str
+    spec: dict[str, Any]
+    timing: Timing
+    window: Window | None
+    priority: int
+    fresh: bool
+    enabled: bool
+
+    def next_due(self, now: datetime) -> datetime | None:
+        """The next due time; None for a schedule that is disabled or over."""
+        return self.timing.next_after(now) if self.enabled else None
+
+    def to_json(self) -> dict[str, Any]:
+        """The fields as `read_fields` reads them."""
+        timing, window = self.timing, self.window
+        when: dict[str, Any] = {"cron": timing.cron}
+        if timing.at is not None:
+            when = {"at": timing.at.astimezone(ZoneInfo(timing.zone)).isoformat()}
+        return {
+            "name": self.name,
+            "spec": self.spec,
+            **when,
+            "zone": timing.zone,
+            "window": None if window is None else [f"{window.begin:%H:%M}", f"{window.end:%H:%M}"],
+            "priority": self.priority,
+            "fresh": self.fresh,
+            "enabled": self.enabled,
+        }
+
+
+def read_fields(data: object, now: datetime) -> ScheduleFields:
+    """The fields of a new schedule; raises SpecError with everything that is wrong."""
+    return _read(data, now)
+
+
+def change_fields(fields: ScheduleFields, data: object, now: datetime) -> ScheduleFields:
+    """The fields with those of ``data`` in their place; raises SpecError."""
+    report = Report()
+    given = read_object(report, "", data, FIELDS)
+    report.raise_if_any()
+    assert given is not None
+    whole = fields.to_json()
+    if {"cron", "at"} & set(given):
+        whole.pop("cron", None)
+        whole.pop("at", None)
+    # A time that is not given again may have passed.
+    return _read({**whole, **given}, now, old=None if "at" in given else fields)
+
+
+def _read(data: object, now: datetime, old: ScheduleFields | None = None) -> ScheduleFields:
+    report = Report()
+    found = read_object(report, "", data, FIELDS) or {}
+    zone = _read_zone(report, found.get("zone", "UTC"))
+    timing = _read_timing(report, found, zone, now, old)
+    window = _read_window(report, found.get("window"), zone)
+    priority = read_whole(report, "/priority", found.get("priority", 0), -MAX_PRIORITY, MAX_PRIORITY)
+    fresh = read_flag(report, "/fresh", found.get("fresh", False))
+    enabled = read_flag(report, "/enabled", found.get("enabled", True))
+    title, spec = _read_spec(report, found, old)
+    name = _read_name(report, found.get("name"), title)
+    report.raise_if_any()
+    assert timing is not None
+    return ScheduleFields(name, spec, timing, window, priority or 0, bool(fresh), bool(enabled))
+
+
+def _read_spec(report: Report, found: Mapping[str, Any], old: ScheduleFields | None) -> tuple[str, dict[str, Any]]:
+    if "spec" not in found:
+        report.problem("/spec", "is missing", allowed="a study spec")
+        return "", {}
+    if old is not None and found["spec"] == old.spec:
+        return old.name, old.spec
+    try:
+        parsed = parse_spec(found["spec"])
+    except SpecError as error:
+        report.problems += [
+            Problem(f"/spec{item.pointer}", item.message, item.value, item.allowed, item.unit)
+            for item in error.problems
+        ]
+        return "", {}
+    return parsed.study.name, parsed.spec
+
+
+def _read_name(report: Report, value: object, title: str) -> str:
+    if value is None:
+        return title
+    if not isinstance(value, str) or len(value) > MAX_NAME_LENGTH:
+        report.problem("/name", "is no name", value, allowed=f"a text of at most {MAX_NAME_LENGTH} characters")
+        return ""
+    return value
+
+
+def _read_zone(report: Report, value: object) -> str:
+    if isinstance(value, str) and value in zones():
+        return value
+    near = did_you_mean(value, zones()) if isinstance(value, str) else ""
+    report.problem("/zone", f"is no time zone{near}", value, allowed='a name such as "Europe/Berlin" or "UTC"')
+    return "UTC"
+
+
+def _read_timing(
+    report: Report, found: Mapping[str, Any], zone: str, now: datetime, old: ScheduleFields | None
+) -> Timing | None:
+    cron, at = found.get("cron"), found.get("at")
+    if (cron is None) == (at is None):
+        message = "when it is to run is missing" if cron is None else "is given beside `at`"
+        report.problem("/cron", message, cron, allowed=f"either `cron`, {_CRON_ALLOWED}; or `at`, {_AT_ALLOWED}")
+        return None
+    if cron is not None:
+        try:
+            if not isinstance(cron, str) or len(cron) > _LONGEST_CRON:
+                raise TimingError("is no cron expression")
+            check_cron(cron)
+        except TimingError as error:
+            report.problem("/cron", str(error), cron, allowed=_CRON_ALLOWED)
+            return None
+        return Timing(" ".join(cron.split()), None, zone)
+    try:
+        if not isinstance(at, str):
+            raise TimingError("is no time")
+        moment = read_moment(at, zone)
+        if moment <= now and not (old is not None and old.timing.at == moment):
+            raise TimingError("has passed already")
+    except TimingError as error:
+        report.problem("/at", str(error), at, allowed=_AT_ALLOWED)
+        return None
+    return Timing(None, moment, zone)
+
+
+def _read_window(report: Report, value: object, zone: str) -> Window | None:
+    if value is None:
+        return None
+    if not (isinstance(value, list | tuple) and len(value) == 2 and all(isinstance(item, str) for item in value)):
+        report.problem("/window", "is no window", value, allowed=_WINDOW_ALLOWED)
+        return None
+    try:
+        begin, end = map(read_time_of_day, value)
+        if begin == end:
+            raise TimingError("is never closed or never open")
+    except TimingError as error:
+        report.problem("/window", str(error), value, allowed=_WINDOW_ALLOWED)
+        return None
+    return Window(begin, end, zone)

@@ -1,0 +1,98 @@
+"""The scheduler: takes up what is due, submits it, and holds studies outside their windows. Runs beside a dispatcher.
+
+However many schedulers look at one database, each due time becomes one study: who takes it up first writes its row, and
+the study is submitted under a key made of schedule and due time, so that a scheduler that dies in between is no loss.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from typing import TYPE_CHECKING
+
+from service.storage.errors import StoreError
+from worker.states import StudyState
+
+if TYPE_CHECKING:
+    from service.storage.schedules import OpenRun, ScheduleRecord
+    from service.storage.store import Store
+
+_LOG = logging.getLogger("sprag.schedules")
+
+#: Seconds between two looks at what is due.
+LOOK_SECONDS = 1.0
+
+
+class Scheduler(threading.Thread):
+    """Looks at the schedules of a store every second, by the store's clock, until `stop`."""
+
+    def __init__(self, store: Store) -> None:
+        super().__init__(name="sprag-scheduler", daemon=True)
+        self._store = store
+        self._ending = threading.Event()
+
+    def run(self) -> None:
+        """Look, and again. Trouble with the database is said once and waited out."""
+        trouble = None
+        while not self._ending.wait(LOOK_SECONDS):
+            try:
+                self.look()
+                trouble = None
+            except StoreError as error:
+                if str(error) != trouble:
+                    trouble = str(error)
+                    _LOG.error("The schedules cannot be kept: %s", error)
+            except Exception:
+                _LOG.exception("A fault in keeping the schedules; it is tried again")
+                self._ending.wait(60.0)
+
+    def stop(self) -> None:
+        """End the thread; returns when it has ended."""
+        self._ending.set()
+        if self.is_alive():
+            self.join()
+
+    def look(self) -> None:
+        """One look: what is due is submitted, and windows are kept."""
+        now = self._store.clock.now()
+        for record in self._store.due_schedules(now):
+            self._take(record)
+        for run in self._store.open_runs():
+            self._submit(run)
+        for study in self._store.bound_studies():
+            inside = study.window.open_at(now)
+            if inside and study.held:
+                self._store.let_in(study.number)
+            elif not inside and study.state in {StudyState.QUEUED, StudyState.RUNNING}:
+                self._store.hold_for_window(study.number, f"outside its window, {study.window}; it goes on by itself")
+
+    def _take(self, record: ScheduleRecord) -> None:
+        """Take up the latest due time; the ones before it that nobody was there for are only counted."""
+        now, timing = self._store.clock.now(), record.fields.timing
+        assert record.next_due is not None
+        due = max(timing.latest_until(now) or record.next_due, record.next_due)
+        missed = timing.missed(record.next_due, due)
+        if self._store.take_due(record, due, missed, timing.next_after(now)) and missed:
+            _LOG.warning("The schedule %s was missed %d times before %s.", record.id, missed, due.isoformat())
+
+    def _submit(self, run: OpenRun) -> None:
+        from dataclasses import replace
+
+        from service.errors import ApiError
+        from service.intake import accept
+        from service.spec import parse_spec
+        from service.spec_messages import SpecError
+
+        try:
+            parsed = parse_spec(run.fields.spec)
+            if run.fields.name:
+                parsed = replace(parsed, study=replace(parsed.study, name=run.fields.name))
+            # No client can send a key with a blank in it.
+            key = f"schedule {run.id} {run.due}"
+            study = accept(self._store, parsed, key, run.fields.priority, run.fields.fresh)
+        except (SpecError, ApiError) as error:
+            _LOG.error("The schedule %s was due, and no study came of it: %s", run.id, error)
+            self._store.close_run(run, problem=str(error))
+            return
+        self._store.close_run(run, study=study.number)
+        _LOG.info("The schedule %s was due: study %s.", run.id, study.id)

@@ -1,0 +1,135 @@
+"""When a schedule is due, and whether its window is open: arithmetic of wall clocks, without any clock of its own.
+
+A cron expression is read on the wall clock of its zone. A fixed time that a change to daylight saving time leaves out
+is due at the first moment after the gap; one that comes twice is due the first time only. Expressions that name no
+fixed hour ("every 30 minutes") go by real time instead. (That is what Debian's cron does, and `cronsim` after it.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime, time, timedelta
+from functools import lru_cache
+from zoneinfo import ZoneInfo, available_timezones
+
+from cronsim import CronSim, CronSimError
+
+#: Due times that are counted when many were missed; what is told is "this many or more".
+MOST_COUNTED = 1000
+
+
+class TimingError(ValueError):
+    """A cron expression or a time that cannot be kept; the message is one clause."""
+
+
+@lru_cache(maxsize=1)
+def zones() -> frozenset[str]:
+    """The names of all time zones."""
+    return frozenset(available_timezones())
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """Due again and again (``cron``, on the wall clock of ``zone``) or once (``at``, aware); exactly one is given."""
+
+    cron: str | None
+    at: datetime | None
+    zone: str
+
+    def next_after(self, moment: datetime) -> datetime | None:
+        """The first due time later than ``moment`` (UTC); None when there is none."""
+        if self.cron is None:
+            assert self.at is not None
+            return self.at if self.at > moment else None
+        return self._step(moment, reverse=False)
+
+    def latest_until(self, moment: datetime) -> datetime | None:
+        """The last due time not later than ``moment`` (UTC)."""
+        if self.cron is None:
+            assert self.at is not None
+            return self.at if self.at <= moment else None
+        return self._step(moment + timedelta(seconds=1), reverse=True)
+
+    def _step(self, moment: datetime, *, reverse: bool) -> datetime | None:
+        try:
+            found = next(CronSim(str(self.cron), moment.astimezone(ZoneInfo(self.zone)), reverse))
+        except StopIteration:
+            return None
+        return found.astimezone(UTC)
+
+    def missed(self, first: datetime, last: datetime) -> int:
+        """Due times from ``first`` on and before ``last``, counted up to `MOST_COUNTED`."""
+        count, moment = 0, first
+        while moment < last and count < MOST_COUNTED:
+            count += 1
+            following = self.next_after(moment)
+            if following is None:
+                break
+            moment = following
+        return count
+
+
+def check_cron(expression: str) -> None:
+    """Raise TimingError when ``expression`` is no cron expression of five fields that is due some day."""
+    if len(expression.split()) != 5:
+        raise TimingError("a cron expression has five fields: minute, hour, day of the month, month, day of the week")
+    try:
+        next(CronSim(expression, datetime(2024, 1, 1, tzinfo=UTC)))
+    except CronSimError as error:
+        text = str(error)
+        raise TimingError(text[:1].lower() + text[1:]) from None
+    except StopIteration:
+        raise TimingError("is never due") from None
+
+
+def read_moment(text: str, zone: str) -> datetime:
+    """A time such as ``2027-01-31T22:00``, on the wall clock of ``zone`` unless it carries its own offset; in UTC.
+
+    Of a time that comes twice the first one is meant. Raises TimingError for one that there is not.
+    """
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        raise TimingError("is no time") from None
+    try:
+        if moment.tzinfo is not None:
+            return moment.astimezone(UTC)
+        local = moment.replace(tzinfo=ZoneInfo(zone))
+        found = local.astimezone(UTC)
+        if found.astimezone(ZoneInfo(zone)).replace(tzinfo=None) != moment:
+            raise TimingError(f"there is no such time in {zone}: the clocks are put forward then")
+    except OverflowError:
+        raise TimingError("is too far away") from None
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A part of each day on the wall clock of ``zone``, over midnight when ``end`` is less than ``begin``."""
+
+    begin: time
+    end: time
+    zone: str
+
+    def open_at(self, moment: datetime) -> bool:
+        """Whether the window is open at ``moment`` (aware)."""
+        wall = moment.astimezone(ZoneInfo(self.zone)).time()
+        if self.begin < self.end:
+            return self.begin <= wall < self.end
+        return wall >= self.begin or wall < self.end
+
+    def __str__(self) -> str:
+        return f"{self.begin:%H:%M} to {self.end:%H:%M} ({self.zone})"
+
+
+def read_time_of_day(text: str) -> time:
+    """``22:00`` as a time; raises TimingError."""
+    hours, colon, minutes = text.partition(":")
+    if not (
+        colon and len(minutes) == 2 and text.isascii() and hours.isdigit() and minutes.isdigit() and len(hours) < 3
+    ):
+        raise TimingError("is no time of day")
+    try:
+        return time(int(hours), int(minutes))
+    except ValueError:
+        raise TimingError("is no time of day") from None

@@ -1,0 +1,46 @@
+"""The tables of schedules. Times are microseconds since 1970-01-01 UTC, as in `service.storage.tables`."""
+
+import sqlalchemy as sa
+
+from service.storage.tables import METADATA
+
+SCHEDULES = sa.Table(
+    "schedules",
+    METADATA,
+    sa.Column("number", sa.Integer, primary_key=True, autoincrement=True),
+    sa.Column("id", sa.String(40), nullable=False, unique=True),
+    sa.Column("name", sa.Text, nullable=False),
+    sa.Column("spec", sa.Text, nullable=False),
+    # Either an expression or a moment.
+    sa.Column("cron", sa.String(200)),
+    sa.Column("due_at", sa.BigInteger),
+    sa.Column("zone", sa.String(64), nullable=False),
+    # "22:00" and "06:00" on the wall clock of the zone; both NULL where any time is right.
+    sa.Column("window_begin", sa.String(5)),
+    sa.Column("window_end", sa.String(5)),
+    sa.Column("priority", sa.Integer, nullable=False),
+    sa.Column("fresh", sa.Integer, nullable=False),
+    sa.Column("enabled", sa.Integer, nullable=False),
+    # NULL where it is not due any more: disabled, over, or deleted.
+    sa.Column("next_due", sa.BigInteger, index=True),
+    sa.Column("created_at", sa.BigInteger, nullable=False),
+    # A deleted schedule stays as long as the windows of its studies.
+    sa.Column("deleted_at", sa.BigInteger),
+    sqlite_autoincrement=True,
+)
+
+#: One row for each due time that was taken up: the primary key is what makes it run at most once.
+SCHEDULE_RUNS = sa.Table(
+    "schedule_runs",
+    METADATA,
+    sa.Column("schedule", sa.Integer, sa.ForeignKey("schedules.number"), primary_key=True),
+    sa.Column("due", sa.BigInteger, primary_key=True),
+    sa.Column("state", sa.String(12), nullable=False, index=True),
+    # Earlier due times that nobody was there for; they are not run.
+    sa.Column("missed", sa.Integer, nullable=False),
+    sa.Column("begun_at", sa.BigInteger, nullable=False),
+    sa.Column("study", sa.Integer, sa.ForeignKey("studies.number", ondelete="SET NULL"), index=True),
+    # 1: somebody resumed the study outside its window, so that the window does not hold it any more.
+    sa.Column("unbound", sa.Integer, nullable=False),
+    sa.Column("problem", sa.Text),
+)

@@ -1,0 +1,291 @@
+"""Schedules in the database: create, read, change, delete; due times taken up once; studies held by their windows."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from dataclasses import dataclass
+from datetime import timedelta
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any, Final
+
+import sqlalchemy as sa
+
+from service.schedules.fields import ScheduleFields
+from service.schedules.times import Timing, Window, read_time_of_day
+from service.storage.errors import ScheduleNotFound, TooManySchedules
+from service.storage.part import EPOCH, Part, moment, optional_moment
+from service.storage.schedule_tables import SCHEDULE_RUNS, SCHEDULES
+from service.storage.tables import STUDIES, WAITS_FOR_WINDOW
+from worker.limits import MAX_SCHEDULES
+from worker.states import TERMINAL, StudyEvent, StudyState
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+_S, _R = SCHEDULES.c, SCHEDULE_RUNS.c
+#: Runs that are told of one schedule, the latest ones.
+SHOWN_RUNS: Final = 20
+
+
+class RunState(StrEnum):
+    """What became of a due time."""
+
+    TAKEN = "taken"
+    SUBMITTED = "submitted"
+    REFUSED = "refused"
+
+
+@dataclass(frozen=True, slots=True)
+class RunRecord:
+    """A due time that was taken up. ``study`` is None where none came of it or it was deleted since."""
+
+    due: datetime
+    state: RunState
+    missed: int
+    begun_at: datetime
+    study: str | None
+    problem: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class ScheduleRecord:
+    """A schedule: its fields, its next due time, and its last run."""
+
+    number: int
+    id: str
+    fields: ScheduleFields
+    next_due: datetime | None
+    created_at: datetime
+    last: RunRecord | None
+
+
+@dataclass(frozen=True, slots=True)
+class OpenRun:
+    """A due time that was taken up and of which nothing has become yet."""
+
+    schedule: int
+    id: str
+    due: int
+    fields: ScheduleFields
+
+
+@dataclass(frozen=True, slots=True)
+class BoundStudy:
+    """A study with a window that has not ended. ``held`` tells whether the window is what it waits for."""
+
+    number: int
+    state: StudyState
+    held: bool
+    window: Window
+
+
+class Schedules(Part):
+    """Schedules as the service and the scheduler see them."""
+
+    def create_schedule(self, fields: ScheduleFields) -> ScheduleRecord:
+        """Keep a new schedule; raises TooManySchedules."""
+        schedule_id = f"sc_{secrets.token_hex(8)}"
+        with self.session.write() as connection:
+            alive = sa.select(sa.func.count()).select_from(SCHEDULES).where(_S.deleted_at.is_(None))
+            if connection.execute(alive).scalar_one() >= MAX_SCHEDULES:
+                raise TooManySchedules(f"there are {MAX_SCHEDULES} schedules already; delete one first")
+            connection.execute(
+                sa.insert(SCHEDULES).values(id=schedule_id, created_at=self._now(), **self._values(fields))
+            )
+            return self._schedule(connection, schedule_id)
+
+    def get_schedule(self, schedule_id: str) -> ScheduleRecord:
+        """The schedule of that id; raises ScheduleNotFound."""
+        with self.session.read() as connection:
+            return self._schedule(connection, schedule_id)
+
+    def list_schedules(self) -> tuple[ScheduleRecord, ...]:
+        """Every schedule, newest first."""
+        with self.session.read() as connection:
+            query = sa.select(SCHEDULES).where(_S.deleted_at.is_(None)).order_by(_S.number.desc())
+            return tuple(self._record(connection, row) for row in connection.execute(query).all())
+
+    def schedule_runs(self, schedule_id: str) -> tuple[RunRecord, ...]:
+        """The latest due times that the schedule had, latest first; raises ScheduleNotFound."""
+        with self.session.read() as connection:
+            number = self._schedule_row(connection, schedule_id).number
+            return self._runs(connection, number, SHOWN_RUNS)
+
+    def change_schedule(self, schedule_id: str, fields: ScheduleFields) -> ScheduleRecord:
+        """Put ``fields`` in the place of those that the schedule has; what was missed before is forgotten."""
+        with self.session.write() as connection:
+            number = self._schedule_row(connection, schedule_id).number
+            connection.execute(sa.update(SCHEDULES).where(_S.number == number).values(self._values(fields)))
+            return self._schedule(connection, schedule_id)
+
+    def delete_schedule(self, schedule_id: str) -> None:
+        """Delete the schedule; its studies stay, with their window. Raises ScheduleNotFound."""
+        with self.session.write() as connection:
+            number = self._schedule_row(connection, schedule_id).number
+            connection.execute(
+                sa.update(SCHEDULES)
+                .where(_S.number == number)
+                .values(deleted_at=self._now(), next_due=None, enabled=0, spec="{}")
+            )
+
+    def due_schedules(self, now: datetime) -> list[ScheduleRecord]:
+        """Schedules that are due at ``now``."""
+        with self.session.read() as connection:
+            query = sa.select(SCHEDULES).where(_S.next_due <= _micros(now)).order_by(_S.next_due, _S.number)
+            return [self._record(connection, row) for row in connection.execute(query).all()]
+
+    def take_due(self, record: ScheduleRecord, due: datetime, missed: int, following: datetime | None) -> bool:
+        """Take ``due`` up, for whoever comes first: False when another did, or the schedule was changed meanwhile."""
+        assert record.next_due is not None
+        with self.session.write() as connection:
+            moved = connection.execute(
+                sa.update(SCHEDULES)
+                .where(_S.number == record.number, _S.next_due == _micros(record.next_due))
+                .values(next_due=None if following is None else _micros(following))
+            )
+            this = (_R.schedule == record.number) & (_R.due == _micros(due))
+            # A clock that was put back comes to the same due time again.
+            if not moved.rowcount or connection.execute(sa.select(_R.due).where(this)).first():
+                return False
+            connection.execute(
+                sa.insert(SCHEDULE_RUNS).values(
+                    schedule=record.number,
+                    due=_micros(due),
+                    state=RunState.TAKEN.value,
+                    missed=missed,
+                    begun_at=self._now(),
+                    unbound=0,
+                )
+            )
+        return True
+
+    def open_runs(self) -> list[OpenRun]:
+        """Due times that were taken up and have neither a study nor a problem yet."""
+        with self.session.read() as connection:
+            query = (
+                sa.select(_R.due, SCHEDULES)
+                .join_from(SCHEDULE_RUNS, SCHEDULES)
+                .where(_R.state == RunState.TAKEN.value, _S.deleted_at.is_(None))
+                .order_by(_R.due)
+            )
+            return [OpenRun(row.number, row.id, row.due, _fields(row)) for row in connection.execute(query).all()]
+
+    def close_run(self, run: OpenRun, *, study: int | None = None, problem: str | None = None) -> None:
+        """Note what became of a due time: a study by its number, or why there is none."""
+        state = RunState.REFUSED if study is None else RunState.SUBMITTED
+        with self.session.write() as connection:
+            connection.execute(
+                sa.update(SCHEDULE_RUNS)
+                .where(_R.schedule == run.schedule, _R.due == run.due)
+                .values(state=state.value, study=study, problem=problem)
+            )
+
+    def bound_studies(self) -> list[BoundStudy]:
+        """Studies that have not ended and are bound to a window."""
+        c = STUDIES.c
+        query = (
+            sa.select(c.number, c.state, c.waits_for, _S.window_begin, _S.window_end, _S.zone)
+            .join_from(SCHEDULE_RUNS, SCHEDULES)
+            .join(STUDIES, c.number == _R.study)
+            .where(
+                _S.window_begin.is_not(None) & (_R.unbound == 0) | (c.waits_for == WAITS_FOR_WINDOW),
+                c.state.not_in([state.value for state in TERMINAL]),
+            )
+        )
+        with self.session.read() as connection:
+            rows = connection.execute(query).all()
+        return [
+            BoundStudy(row.number, StudyState(row.state), row.waits_for == WAITS_FOR_WINDOW, window)
+            for row in rows
+            if (window := _window(row)) is not None
+        ]
+
+    def hold_for_window(self, number: int, reason: str) -> None:
+        """Pause a queued or running study until `let_in`."""
+        with self.session.write() as connection:
+            state = connection.execute(sa.select(STUDIES.c.state).where(STUDIES.c.number == number)).scalar_one()
+            if StudyState(state) in {StudyState.QUEUED, StudyState.RUNNING}:
+                self._move(connection, number, StudyEvent.FAULT, reason)
+                connection.execute(
+                    sa.update(STUDIES).where(STUDIES.c.number == number).values(waits_for=WAITS_FOR_WINDOW)
+                )
+
+    def let_in(self, number: int) -> None:
+        """Queue a study again that `hold_for_window` paused and nobody has touched since."""
+        with self.session.write() as connection:
+            waits = connection.execute(sa.select(STUDIES.c.waits_for).where(STUDIES.c.number == number)).scalar_one()
+            if waits == WAITS_FOR_WINDOW:
+                self._move(connection, number, StudyEvent.RESUME)
+
+    def _values(self, fields: ScheduleFields) -> dict[str, Any]:
+        timing, window = fields.timing, fields.window
+        due = fields.next_due(self.clock.now())
+        return {
+            "name": fields.name,
+            "spec": json.dumps(fields.spec, allow_nan=False),
+            "cron": timing.cron,
+            "due_at": None if timing.at is None else _micros(timing.at),
+            "zone": timing.zone,
+            "window_begin": None if window is None else f"{window.begin:%H:%M}",
+            "window_end": None if window is None else f"{window.end:%H:%M}",
+            "priority": fields.priority,
+            "fresh": int(fields.fresh),
+            "enabled": int(fields.enabled),
+            "next_due": None if due is None else _micros(due),
+        }
+
+    def _schedule_row(self, connection: sa.Connection, schedule_id: str) -> sa.Row[Any]:
+        row = connection.execute(
+            sa.select(SCHEDULES).where(_S.id == schedule_id, _S.deleted_at.is_(None))
+        ).one_or_none()
+        if row is None:
+            raise ScheduleNotFound(schedule_id)
+        return row
+
+    def _schedule(self, connection: sa.Connection, schedule_id: str) -> ScheduleRecord:
+        return self._record(connection, self._schedule_row(connection, schedule_id))
+
+    def _record(self, connection: sa.Connection, row: sa.Row[Any]) -> ScheduleRecord:
+        last = next(iter(self._runs(connection, row.number, 1)), None)
+        return ScheduleRecord(
+            row.number, row.id, _fields(row), optional_moment(row.next_due), moment(row.created_at), last
+        )
+
+    @staticmethod
+    def _runs(connection: sa.Connection, number: int, most: int) -> tuple[RunRecord, ...]:
+        studies = STUDIES.c
+        alive = (studies.number == _R.study) & studies.deleted_at.is_(None)
+        rows = connection.execute(
+            sa.select(_R.due, _R.state, _R.missed, _R.begun_at, _R.problem, studies.id.label("study"))
+            .select_from(sa.outerjoin(SCHEDULE_RUNS, STUDIES, alive))
+            .where(_R.schedule == number)
+            .order_by(_R.due.desc())
+            .limit(most)
+        ).all()
+        return tuple(
+            RunRecord(moment(row.due), RunState(row.state), row.missed, moment(row.begun_at), row.study, row.problem)
+            for row in rows
+        )
+
+
+def unbind(connection: sa.Connection, study: int) -> None:
+    """Somebody resumes a study that its window holds: the window does not hold it any more."""
+    connection.execute(sa.update(SCHEDULE_RUNS).where(_R.study == study).values(unbound=1))
+
+
+def _micros(when: datetime) -> int:
+    return (when - EPOCH) // timedelta(microseconds=1)
+
+
+def _window(row: Any) -> Window | None:
+    if row.window_begin is None:
+        return None
+    return Window(read_time_of_day(row.window_begin), read_time_of_day(row.window_end), row.zone)
+
+
+def _fields(row: Any) -> ScheduleFields:
+    timing = Timing(row.cron, optional_moment(row.due_at), row.zone)
+    return ScheduleFields(
+        row.name, json.loads(row.spec), timing, _window(row), row.priority, bool(row.fresh), bool(row.enabled)
+    )
