@@ -19,7 +19,6 @@ _NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]
 _WHOLE: Final = re.compile(r"[+-]?[0-9]{1,18}")
 #: Between the values of a list: a comma only before a blank, so that a decimal comma is told and not taken for one.
 _BETWEEN: Final = re.compile(r"[;\n]|,\s")
-_LAWS: Final = {"law", "data"}
 #: Fields of an axis for each way of giving its values.
 WAYS: Final = {
     "values": ("values",),
@@ -27,7 +26,7 @@ WAYS: Final = {
     "geomspace": ("from", "to", "count"),
     "range": ("from", "to", "step"),
 }
-CLUTCH_FLAGS: Final = ("through_origin", "angles_include_backlash")
+_FIELDS: Final = frozenset({"sprag", "model", "name", "base", "run", "axes", "combine"})
 
 
 def pendulums_of(values: Mapping[str, str]) -> int:
@@ -181,6 +180,10 @@ def values_of(spec: Mapping[str, Any]) -> Values:
     """The form filled in as ``spec`` says; raises ValueError where the form cannot show it."""
     if spec.get("model") != FORM_MODEL:
         raise ValueError("the form describes another model")
+    if not set(spec) <= _FIELDS or spec.get("combine", "grid") not in ("grid", "zip"):
+        raise ValueError("the form has no fields for all of this spec")
+    if not all(isinstance(axis, Mapping) and _plain_axis(axis) for axis in spec.get("axes", ())):
+        raise ValueError("the form has no fields for all of these axes")
     values: Values = {"/name": str(spec.get("name", "")), "/combine": str(spec.get("combine", "grid"))}
     base: Mapping[str, Any] = spec["base"]
     for key, content in base.items():
@@ -206,6 +209,11 @@ def values_of(spec: Mapping[str, Any]) -> Values:
     for index, axis in enumerate(spec.get("axes", ())):
         values |= _axis_values(f"/axes/{index}", axis)
     return values
+
+
+def _plain_axis(axis: Mapping[str, Any]) -> bool:
+    """Whether an axis gives its values in one of the form's ways."""
+    return any(set(axis) == {"path", way} for way in WAYS)
 
 
 def _text(value: Any) -> str:

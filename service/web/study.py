@@ -139,7 +139,8 @@ def fits_of(spec: dict[str, Any]) -> dict[str, tuple[dict[str, Any], FitChart]]:
         return {}
     # The fit is not stored: it follows from the spec, to the last bit.
     found = {}
-    for pointer, fit in parse_spec({**spec, "axes": []}).fits.items():
+    alone = {key: value for key, value in spec.items() if key in ("sprag", "model", "name", "base", "run")}
+    for pointer, fit in parse_spec(alone).fits.items():
         known = backlashes(spec, pointer)
         found[pointer] = (fit_json(fit), fit_chart(fit, clutch_at(spec, pointer), known[0] if known else 0.0))
     return found

@@ -44,9 +44,19 @@ def test_a_cloned_study_is_the_same_study(spec: dict[str, Any]) -> None:
     assert again["name"] == spec["name"]
 
 
-def test_specs_of_other_models_are_not_forced_into_the_form() -> None:
-    with pytest.raises(ValueError, match="another model"):
-        values_of({"sprag": 1, "model": "machine-shaft", "base": {}})
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"model": "machine-shaft", "base": {}},
+        {"axes": [{"path": "shaft.load", "uniform": [0, 1]}]},
+        {"axes": {"sample": "sobol"}},
+        {"combine": "union"},
+        {"exclude": []},
+    ],
+)
+def test_specs_that_the_form_cannot_show_are_not_forced_into_it(changes: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="form"):
+        values_of({**drives()[0], **changes})
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,147 @@
+"""Pages of studies of every shape, over made-up rows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from tests.service.conftest import Service
+
+LOAD = {"path": "shaft.load", "values": [0.1, 0.2, 0.3]}
+FREQUENCY = {"path": "excitation.frequency", "values": [20, 25, 30]}
+MEASURED = {"data": [[0, 0], [0.01, 2], [0.02, 4], [0.03, 6]], "accuracy": 0.1}
+SHAPES: dict[str, dict[str, Any]] = {
+    "grid": {"axes": [LOAD, FREQUENCY]},
+    "zip": {"axes": [LOAD, FREQUENCY], "combine": "zip"},
+    "union": {"axes": [LOAD, FREQUENCY], "combine": "union"},
+    "one axis": {"axes": [LOAD]},
+    "one value": {"axes": [{**LOAD, "values": [0.1]}]},
+    "nothing": {"axes": []},
+    "three axes": {"axes": [LOAD, FREQUENCY, {"path": "pendulums.0.mass", "values": [0.4, 0.5]}]},
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_every_shape_of_study_has_its_pages(service: Service, spec: dict[str, Any], shape: str) -> None:
+    spec["base"]["clutch"] = MEASURED
+    study_id = service.submit({**spec, **SHAPES[shape]})
+    for filled in (False, True):
+        if filled:
+            service.fill(study_id)
+        for part in ("", "/cases", "/cases?sort=-shaft.speed.mean&ending=ok", "/cases/0"):
+            assert service.http.get(f"/studies/{study_id}{part}").status_code == 200, part
+        for part in ("/curves", "/map"):
+            assert service.http.get(f"/studies/{study_id}{part}").status_code in (200, 303), part
+        for figure in ("curves", "curves?columns=2", "map", "map?kind=contour"):
+            answer = service.http.get(f"/studies/{study_id}/figures/{figure}")
+            assert answer.status_code == 200, figure
+            assert set(answer.json()) >= {"data", "layout"}
+    assert "degree 1 reaches the accuracy" in service.http.get(f"/studies/{study_id}").text
+    assert service.http.get(f"/new?clone={study_id}").status_code == 200
+
+
+def test_figures_have_the_numbers_of_the_interface(service: Service) -> None:
+    study_id = service.submit()
+    service.fill(study_id)
+    query = {"x": "shaft.load", "by": "excitation.frequency", "y": ["torque.mean", "efficiency"]}
+    told = service.get(f"/studies/{study_id}/curves", **query)
+    figure = service.http.get(f"/studies/{study_id}/figures/curves", params=query).json()
+    lines = {(line["legendgroup"], line["yaxis"]): line for line in figure["data"]}
+    for index, curve in enumerate(told["curves"]):
+        for axis, name in (("y", "torque.mean"), ("y2", "efficiency")):
+            assert lines[str(index), axis]["y"] == curve["y"][name]
+            assert lines[str(index), axis]["customdata"] == curve["cases"]
+    drawn = service.get(f"/studies/{study_id}/map", x="shaft.load", y="excitation.frequency", z="efficiency")
+    query = {"x": "shaft.load", "y": "excitation.frequency", "z": "efficiency"}
+    heat = service.http.get(f"/studies/{study_id}/figures/map", params=query).json()["data"][0]
+    assert (heat["z"], heat["customdata"]) == (drawn["z"]["values"], drawn["cases"])
+
+
+def test_a_long_curve_is_thinned_and_keeps_its_highest_point(service: Service, spec: dict[str, Any]) -> None:
+    spec["axes"] = [{"path": "shaft.load", "linspace": [0, 1, 20_000]}]
+    study_id = service.submit(spec)
+    whole = service.fill(study_id)
+    query = {"x": "shaft.load", "y": "torque.mean"}
+    (line,) = service.http.get(f"/studies/{study_id}/figures/curves", params=query).json()["data"]
+    told = service.get(f"/studies/{study_id}/curves", **query)["curves"][0]["y"]["torque.mean"]
+    assert len(line["y"]) <= 6_000 < len(told) == whole.count
+    known = [value for value in told if value is not None]
+    drawn = [value for value in line["y"] if value is not None]
+    assert (max(drawn), min(drawn)) == (max(known), min(known))
+
+
+@pytest.mark.parametrize(
+    ("part", "text"),
+    [
+        ("curves?x=shaft.lod", "did you mean"),
+        ("curves?x=shaft.load&y=efficency", "did you mean"),
+        ("curves?x=shaft.load&by=&at=excitation.frequency=99", "the axis has no such value"),
+        ("curves?x=shaft.load&at=nonsense", "must be path=value"),
+        ("map?z=none", "unknown result"),
+        ("cases?sort=nothing", "no such column"),
+        ("cases?ending=nothing", "no such ending"),
+        ("cases?at=shaft.load=7", "the axis has no such value"),
+        ("cases/0?from=9&to=3", "outside the run"),
+    ],
+)
+def test_wrong_choices_are_told_on_the_page(service: Service, part: str, text: str) -> None:
+    study_id = service.submit()
+    answer = service.http.get(f"/studies/{study_id}/{part}", headers={"Accept": "text/html"})
+    assert answer.status_code == 422
+    assert answer.headers["content-type"].startswith("text/html")
+    assert text in answer.text
+    assert 'role="alert"' in answer.text
+
+
+def test_errors_are_pages_for_browsers_and_documents_for_programs(service: Service) -> None:
+    for path in ("/studies/st_none", "/nowhere", "/new?preset=none", "/compare?study=st_none"):
+        page = service.http.get(path, headers={"Accept": "text/html,application/xhtml+xml"})
+        assert (page.status_code, page.headers["content-type"]) == (404, "text/html; charset=utf-8")
+        assert service.http.get(path).headers["content-type"] == "application/problem+json"
+    api = service.http.get("/api/v1/studies/st_none", headers={"Accept": "text/html"})
+    assert api.headers["content-type"] == "application/problem+json"
+
+
+def test_forms_take_what_browsers_send_and_nothing_else(service: Service) -> None:
+    assert service.http.post("/new", json={}).status_code == 415
+    form = {"Content-Type": "application/x-www-form-urlencoded"}
+    assert service.http.post("/new", content="&".join(["a=1"] * 3000), headers=form).status_code == 400
+    assert service.http.post("/new", content=b"\xff\xfe", headers=form).status_code == 400
+    empty = service.http.post("/new", content="do=submit", headers=form)
+    assert empty.status_code == 422
+    assert "is required" in empty.text
+    cross = service.http.post("/new", content="do=submit", headers={**form, "Origin": "http://evil.example"})
+    assert cross.status_code == 403
+
+
+def test_a_form_sent_twice_is_one_study(service: Service) -> None:
+    page = service.http.get("/new?preset=one_pendulum&mode=text").text
+    form = {"do": "submit", "key": "k", "format": "json", "/text": _textarea(page)}
+    first, again = (service.http.post("/new", data=form) for _ in range(2))
+    assert first.status_code == again.status_code == 303
+    assert first.headers["location"] == again.headers["location"]
+    changed = service.http.post("/new", data={**form, "/text": form["/text"].replace("0.5 kg", "0.6 kg")})
+    assert changed.headers["location"] != first.headers["location"]
+    other = service.http.post("/new", data={**form, "key": "another"})
+    assert other.headers["location"] != first.headers["location"]
+
+
+def _textarea(page: str) -> str:
+    import html
+    import re
+
+    found = re.search(r"<textarea[^>]*>(.*?)</textarea>", page, re.DOTALL)
+    assert found is not None
+    return html.unescape(found[1])
+
+
+def test_wishes_come_from_buttons(service: Service) -> None:
+    study_id = service.submit()
+    for verb, state in (("pause", "paused"), ("resume", "queued"), ("cancel", "cancelling")):
+        answer = service.http.post(f"/studies/{study_id}/{verb}")
+        assert (answer.status_code, answer.headers["location"]) == (303, f"/studies/{study_id}")
+        assert service.get(f"/studies/{study_id}")["state"] == state
+    assert service.http.post(f"/studies/{study_id}/resume").status_code == 409
+    assert service.http.post(f"/studies/{study_id}/explode").status_code == 404
