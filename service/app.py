@@ -19,7 +19,7 @@ from service.guard import Guard
 from service.settings import Settings
 from service.spec_schema import spec_schema
 from service.storage.store import Store
-from service.web import case, compare, form, pages, results, study, table
+from service.web import case, compare, form, laboratory, pages, results, study, table
 from worker.chunking import Chunking
 
 DESCRIPTION = """\
@@ -106,7 +106,7 @@ def create_app(
         api.include_router(module.router)
     app.include_router(api)
     app.include_router(health.router)
-    for page in (pages, form, study, results, table, case, compare):
+    for page in (pages, form, study, results, table, case, compare, laboratory):
         app.include_router(page.router)
     handlers.install(app)
     return app

@@ -19,6 +19,7 @@ from service.curves import PENDING
 from service.errors import ApiError
 from service.main_curve import characteristic_names
 from service.plots_motion import draw_motion
+from service.plots_shaft import draw_shaft
 from service.selection import axis_name
 from service.web.motion import SAMPLES, motion_figures
 from service.web.study import study_frame
@@ -41,13 +42,13 @@ def _span(study: Study, case: int, begin: str, end: str) -> tuple[float, float]:
     """First and last time (s) that are shown: as asked for, else the last periods of the window."""
     if begin.strip() or end.strip():
         return trajectories.span(study, case, begin.strip() or None, end.strip() or None)
-    frequency = {**study.base, **study.case_parameters(case)}["excitation.frequency"]
-    duration = kernels.duration_seconds(study, case)
-    window = study.run.get("window")
-    last = duration
+    extent = kernels.extent(study, case)
+    if extent.along == "angle":
+        return 0.0, extent.end
+    window, last = study.run.get("window"), extent.end
     if window:
-        last = min(window[1][0] / (frequency if window[1][1] == "periods" else 1.0), duration)
-    return max(last - _FIRST_PERIODS / frequency, 0.0), last
+        last = min(window[1][0] * (extent.period if window[1][1] == "periods" else 1.0), extent.end)
+    return max(last - _FIRST_PERIODS * extent.period, 0.0), last
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}")
@@ -58,13 +59,13 @@ def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = 
     faults: tuple[Any, ...] = ()
     span = None
     try:
-        span = _span(study, case, begin, end) if _has_motion(study) else None
+        span = _span(study, case, begin, end)
     except ApiError as error:
         faults = error.errors
     query = urlencode([("from", repr(span[0])), ("to", repr(span[1]))]) if span else ""
     own = f"/studies/{study_id}/cases/{case}"
     infos = kernels.study_results(study)
-    frequency = {**study.base, **study.case_parameters(case)}.get("excitation.frequency")
+    extent = kernels.extent(study, case)
     return page(
         "case.html",
         status=422 if faults else 200,
@@ -89,17 +90,12 @@ def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = 
         span=span,
         begin=begin,
         end=end,
-        whole=repr(kernels.duration_seconds(study, case)) if span else "",
-        period=None if frequency is None else 1.0 / frequency,
+        extent=extent,
         figures=f"{own}/motion?{query}",
         picture=f"{own}/motion.svg?{query}",
         file=f"/api/v1{own}/trajectory?{query}&points={SAMPLES}&format=csv",
         last=study.cases - 1,
     )
-
-
-def _has_motion(study: Study) -> bool:
-    return "excitation.frequency" in {*study.base, *study.axis_paths}
 
 
 async def _asked(
@@ -137,5 +133,6 @@ async def motion_picture(
         return unchanged
     await context.computer.load(kernels.shape_of(study))
     made = await context.computer.run(kernels.run_trajectory, study, case, *times, SAMPLES // 3)
-    content = await run_in_threadpool(draw_motion, made, f"{study.name}, case {case}", "svg")
+    paint = draw_shaft if made.along == "angle" else draw_motion
+    content = await run_in_threadpool(paint, made, f"{study.name}, case {case}", "svg")
     return tagged(picture_response(content, "svg"), tag)

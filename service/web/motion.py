@@ -9,6 +9,7 @@ import numpy as np
 
 from service.curves import numbers
 from service.web.figures import DASHES, PALETTE, Figure, axis_title
+from service.web.shaft_figures import shaft_figure
 from service.web.templates import words
 from service.web.thinning import thin
 from worker import kernels
@@ -70,6 +71,8 @@ def spans_of(states: list[str]) -> Iterator[tuple[str, int, int]]:
 def motion_figures(study: Study, case: int, start: float, end: float) -> dict[str, Figure]:
     """The case run again and drawn. For the computing process."""
     made = kernels.run_trajectory(study, case, start, end, SAMPLES)
+    if made.along == "angle":
+        return {"motion": shaft_figure(made)}
     column = {name: made.values[:, index] for index, name in enumerate(made.names)}
     return {"motion": _histories(made, column), "phase": _phase(made, column)}
 

@@ -60,9 +60,9 @@ def page(name: str, status: int = 200, **values: Any) -> Response:
     return Response(text, status_code=status, media_type="text/html")
 
 
-def fragment(name: str, **values: Any) -> str:
-    """A part of a page, as its text."""
-    return _templates().get_template(name).render(**values)
+def fragment(name: str, **values: Any) -> Markup:
+    """A part of a page, as its text; what it was made of is escaped in it."""
+    return Markup(_templates().get_template(name).render(**values))  # noqa: S704
 
 
 def number(value: float | None, digits: int = _DIGITS) -> str:

@@ -6,7 +6,7 @@ const motion = document.getElementById("motion"), phase = document.getElementByI
 const showMotion = async (address) => {
   const figures = await sprag.fetchJson(address);
   await sprag.show(motion, figures.motion);
-  await sprag.show(phase, figures.phase);
+  if (phase && figures.phase) await sprag.show(phase, figures.phase);
 };
 
 if (motion) {
@@ -24,7 +24,7 @@ if (motion) {
       sprag.say(motion, error.message);
       return;
     }
-    motion.on("plotly_relayout", (event) => {
+    if (sprag.figures.get(motion).zoom) motion.on("plotly_relayout", (event) => {
       const low = event["xaxis.range[0]"], high = event["xaxis.range[1]"];
       if (low !== undefined && high > low) {
         const url = new URL(whole, location.href), ends = [Number(url.searchParams.get("from")), Number(url.searchParams.get("to"))];
