@@ -20,6 +20,7 @@ from service.settings import Settings
 from service.spec_schema import spec_schema
 from service.storage.store import Store
 from service.web import case, compare, form, laboratory, pages, results, study, table
+from service.web import schedules as schedule_pages
 from worker.chunking import Chunking
 
 DESCRIPTION = """\
@@ -106,7 +107,7 @@ def create_app(
         api.include_router(module.router)
     app.include_router(api)
     app.include_router(health.router)
-    for page in (pages, form, study, results, table, case, compare, laboratory):
+    for page in (pages, form, study, results, table, case, compare, laboratory, schedule_pages):
         app.include_router(page.router)
     handlers.install(app)
     return app

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import AsyncIterator, Callable
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +36,7 @@ def guarded(settings: Settings, service: Service, connect: Callable[..., httpx.C
 def every_route(app: Any) -> list[tuple[str, str]]:
     """Method and address of every route."""
     return [
-        (method, str(route.path_format).replace("{study_id}", "st_1").replace("{case}", "0"))
+        (method, re.sub(r"\{(\w+)\}", lambda found: {"case": "0"}.get(found[1], "x_1"), str(route.path_format)))
         for route in iter_route_contexts(app.routes)
         for method in sorted(route.methods or ())
     ]
