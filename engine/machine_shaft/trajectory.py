@@ -123,7 +123,7 @@ def _table(d: Decomposition, chosen: int | None, angles: Floats) -> dict[str, Fl
     square = 2.0 * energy / inertia
     omega = np.sqrt(square)
     return {
-        "time": _time(d, cases, points),
+        "time": np.where(angles == 0.0, 0.0, _time(d, cases, points)),  # without the rounding at the start
         "omega": omega,
         "acceleration": (drive + resistance - 0.5 * square * slope) / inertia,
         "energy": energy,

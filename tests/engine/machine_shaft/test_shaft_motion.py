@@ -118,6 +118,7 @@ def test_acceleration_and_time_are_those_of_the_speed() -> None:
     slope = (column(around[1], "omega") - column(around[0], "omega"))[inner] / (2.0 * fine)
     assert column(table, "acceleration")[inner] == pytest.approx(slope * column(table, "omega")[inner], abs=1e-4)
     got = one(PRESS, PRESS_NUMBERS)
+    assert column(table, "time")[0] == 0.0
     assert column(table, "time")[-1] == pytest.approx(2.0 * math.pi / got["omega.mean_time"], rel=1e-12)
     assert column(table, "omega")[0] == pytest.approx(column(table, "omega")[-1], rel=1e-13)
 
