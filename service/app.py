@@ -17,6 +17,7 @@ from service.api.document import API_PREFIX, build_openapi
 from service.computer import Computes, ProcessComputer
 from service.guard import Guard
 from service.settings import Settings
+from service.spec_design_schema import extension_schema
 from service.spec_schema import spec_schema
 from service.storage.store import Store
 from service.web import case, compare, form, laboratory, pages, results, study, table
@@ -57,6 +58,7 @@ class Application(FastAPI):
         if self.openapi_schema is None:
             schemas = {
                 "Spec": spec_schema(),
+                "Extension": extension_schema(),
                 "ClutchFitRequest": clutch_fits.SCHEMA,
                 "ScheduleRequest": schedules.SCHEMA,
                 "ScheduleChange": schedules.CHANGE_SCHEMA,

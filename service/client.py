@@ -106,6 +106,10 @@ class ServiceClient:
         query += [("fresh", "true")] if fresh else []
         return self._json("POST", "/studies", json=spec, headers=headers, params=query)
 
+    def extend(self, study_id: str, addition: object) -> dict[str, Any]:
+        """Submit a study with more values on the axes of an old one (``axes``), or more cases (``cases``)."""
+        return self._json("POST", f"{_study(study_id)}:extend", json=addition)
+
     def preview(self, spec: object) -> dict[str, Any]:
         """Number of cases, estimated time and size of a study that is not submitted."""
         return self._json("POST", "/studies:preview", json=spec)

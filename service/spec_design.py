@@ -97,7 +97,8 @@ def _group(report: Report, pointer: str, items: object, combine: str | None, mac
     if not isinstance(items, list) or not 1 <= len(items) <= MAX_AXES:
         report.problem(where, "must be a list of axes", items, allowed=f"a list of 1 to {MAX_AXES} axes")
         return None
-    read = [_item(report, join(where, index), item, machine, top=not pointer) for index, item in enumerate(items)]
+    top = not pointer
+    read = [_item(report, join(where, i), item, combine, machine, top=top) for i, item in enumerate(items)]
     blocks = [block for block in read if block is not None]
     if len(blocks) < len(items) or combine is None:
         return None
@@ -130,22 +131,24 @@ def _make(
     return side_by_side(tables) if combine == "zip" else one_after_another(tables, counts, machine.values)
 
 
-def _item(report: Report, pointer: str, data: object, machine: Machine, *, top: bool) -> Block | None:
+def _item(
+    report: Report, pointer: str, data: object, combine: str | None, machine: Machine, *, top: bool
+) -> Block | None:
     kind = _kind(data)
     readers: dict[str, Callable[..., Block | None]] = {"sample": read_sample, "points": read_points}
     if kind in readers:
         return readers[kind](report, pointer, data, machine)
     if kind == "axis":
-        return _axis(report, pointer, data, machine)
+        return _axis(report, pointer, data, "zip" if combine == "zip" else "grid", machine)
     found = read_object(report, pointer, data, GROUP_FIELDS) or {}
     if not top:
         report.problem(pointer, "is a group inside a group", allowed="an axis, a sample or points")
         return None
-    combine = _read_combine(report, join(pointer, "combine"), found.get("combine", "grid"))
-    return _group(report, pointer, found.get("axes"), combine, machine)
+    inner = _read_combine(report, join(pointer, "combine"), found.get("combine", "grid"))
+    return _group(report, pointer, found.get("axes"), inner, machine)
 
 
-def _axis(report: Report, pointer: str, data: object, machine: Machine) -> Block | None:
+def _axis(report: Report, pointer: str, data: object, combine: Combine, machine: Machine) -> Block | None:
     paths, plan = read_axis(report, pointer, data, machine)
     if paths is None or plan is None:
         return None
@@ -155,7 +158,7 @@ def _axis(report: Report, pointer: str, data: object, machine: Machine) -> Block
         return None
 
     def make() -> dict[str, NDArray[np.float64]] | None:
-        values = expand(report, plan, [machine.parameters[path] for path in paths], "grid")
+        values = expand(report, plan, [machine.parameters[path] for path in paths], combine)
         return None if values is None else dict.fromkeys(paths, np.array(values))
 
     return Block(pointer, paths, plan.count, make)

@@ -65,3 +65,6 @@ CLUTCH_FIT: Final[dict[str, Any]] = {
     "max_degree": 7,
     "through_origin": True,
 }
+
+EXTENSION_AXES: Final = {"axes": [{"path": "shaft.load", "values": [0.5, "0.7 N*m"]}]}
+EXTENSION_CASES: Final = {"cases": [{"points": "excitation.frequency [rpm],shaft.load\n1500,0.9\n"}]}

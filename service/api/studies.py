@@ -15,6 +15,7 @@ from service.api.document import not_modified as documented_304
 from service.api.requests import Body, read_body, strict_query
 from service.api.respond import entity_tag, json_response, not_modified, tagged
 from service.errors import parameter_error
+from service.extend import parse_extended
 from service.intake import accept
 from service.preview import preview_json
 from service.spec import ParsedSpec, load_spec, parse_spec
@@ -170,6 +171,29 @@ def retry_study(
         if name not in known:
             raise parameter_error("ending", "no ending of a failed case", name, ", ".join(known))
     return json_response(views.summary(context.store.retry_study(study_id, ending)), 202)
+
+
+@router.post(
+    "/studies/{study_id:study}:extend",
+    status_code=202,
+    response_model=m.StudySummary,
+    responses=problems(*_BODY_PROBLEMS, "study-not-found", "storage-full"),
+    openapi_extra=body(
+        {"further loads": examples.EXTENSION_AXES, "further cases": examples.EXTENSION_CASES},
+        {"$ref": "#/components/schemas/Extension"},
+    ),
+)
+def extend_study(
+    context: Ctx,
+    study_id: StudyId,
+    received: SpecBody,
+    priority: Priority = 0,
+) -> Response:
+    """Submit a study with more values on the axes of an old one, or more cases; only what is new is run."""
+    spec, study = context.store.spec(study_id), context.store.study(study_id)
+    parsed = parse_extended(spec, study, load_spec(received.content, received.format))
+    record = accept(context.store, parsed, priority=priority)
+    return json_response(views.summary(record), 202, {"Location": views.study_address(record.id)})
 
 
 @router.post(

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from service.cli import database, demo, doctor, fit, local, pictures, processes, remote, schedule
+from service.cli import database, demo, doctor, extend, fit, local, pictures, processes, remote, schedule
 from service.cli.console import CommandFailureError, ExitCode, TroubleError, say, write_text
 
 #: Set to anything to see where a fault of the program lies.
@@ -63,6 +63,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
     },
     "Use a running service": {
         "submit": remote.submit,
+        "extend": extend.extend,
         "watch": remote.watch,
         "list": remote.list_studies,
         "pause": remote.pause,

@@ -126,17 +126,17 @@ def submit(
         say(*(f"warning: {warning}" for warning in study.get("warnings", ())))
         if wait:
             study = follow(client, study["id"])
-    _show_study(study, as_json)
+    show_study(study, as_json)
     if wait:
-        _exit_as(study)
+        exit_as(study)
 
 
 def watch(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
     """Follow a study until it has ended."""
     with connection(server, token) as client:
         study = follow(client, study_id)
-    _show_study(study, as_json)
-    _exit_as(study)
+    show_study(study, as_json)
+    exit_as(study)
 
 
 def follow(client: ServiceClient, study_id: str) -> dict[str, Any]:
@@ -164,14 +164,15 @@ def _remark(study: dict[str, Any]) -> str:
     return progress_text(study["state"], progress["rate"], None if left is None else (left["low"], left["high"]))
 
 
-def _exit_as(study: dict[str, Any]) -> None:
+def exit_as(study: dict[str, Any]) -> None:
     """End with the code that tells whether every case ended ok."""
     progress = study["progress"]
     if progress["ok"] != progress["total"]:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
 
 
-def _show_study(study: dict[str, Any], as_json: bool) -> None:
+def show_study(study: dict[str, Any], as_json: bool) -> None:
+    """The study as it is now: its id and how far it is, or all of it as JSON."""
     if as_json:
         write_json(study)
         return
@@ -226,7 +227,7 @@ def _pages(client: ServiceClient, state: StudyState | None, limit: int) -> Itera
 def _act(study_id: str, verb: str, server: str, token: str | None, as_json: bool, query: Query = ()) -> None:
     with connection(server, token) as client:
         study = client.act(study_id, verb, query)
-    _show_study(study, as_json)
+    show_study(study, as_json)
 
 
 def cancel(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:

@@ -1,0 +1,65 @@
+"""``sprag extend``: further values and further cases for a study of a running service."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from service.cli.console import WrongInputError, say
+from service.cli.files import decode, read_bytes
+from service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
+from service.cli.remote import connection, exit_as, follow, show_study
+from service.spec_messages import Problem
+from worker.limits import MAX_BODY_BYTES
+
+
+def extend(
+    study_id: StudyId,
+    axis: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--axis", metavar="PATH=VALUES", help="Further values, such as shaft.load=0.5,0.7; may be repeated."
+        ),
+    ] = None,
+    points: Annotated[
+        str | None, typer.Option("--points", metavar="FILE", help="CSV file of further cases, a header of paths.")
+    ] = None,
+    wait: Annotated[bool, typer.Option("--wait", help="Wait until the new study has ended.")] = False,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Submit a study with more values on the axes of an old one, or more cases; only what is new is run."""
+    addition = _addition(axis or [], points)
+    with connection(server, token) as client:
+        study = client.extend(study_id, addition)
+        say(*(f"warning: {warning}" for warning in study.get("warnings", ())))
+        if wait:
+            study = follow(client, study["id"])
+    show_study(study, as_json)
+    if wait:
+        exit_as(study)
+
+
+def _addition(axes: list[str], points: str | None) -> dict[str, Any]:
+    if bool(axes) == (points is not None):
+        problem = Problem("--axis", "or --points is needed, and not both", allowed="--axis shaft.load=0.5,0.7")
+        raise WrongInputError("an option is missing", problems=[problem])
+    if points is not None:
+        return {"cases": [{"points": decode(points, read_bytes(points, MAX_BODY_BYTES))}]}
+    made = []
+    for text in axes:
+        path, sign, values = text.partition("=")
+        if not sign or not path.strip() or not values.strip():
+            problem = Problem("--axis", "must be PATH=VALUES", text, allowed="such as shaft.load=0.5,0.7")
+            raise WrongInputError("an option is wrong", problems=[problem])
+        made.append({"path": path.strip(), "values": [_value(item.strip()) for item in values.split(",")]})
+    return {"axes": made}
+
+
+def _value(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
