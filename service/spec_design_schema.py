@@ -120,27 +120,24 @@ def extension_schema() -> Schema:
     """Schema of what is added to a study."""
     anything = {"anyOf": [axis_schema(), sample_schema(), points_schema(), group_schema()]}
     every = {"type": "array", "minItems": 1, "maxItems": MAX_AXES}
-    return {
-        **object_schema(
-            {
-                "axes": {
-                    **every,
-                    "items": axis_schema(),
-                    "description": "further values of axes of a grid; a parameter that did not vary becomes an axis of "
-                    "the base's value and these",
-                },
-                "cases": {
-                    **every,
-                    "items": anything,
-                    "description": "further cases, which come after those of the study; what they do not vary is as "
-                    "in the base",
-                },
-                "name": {"type": "string", "description": "name of the new study; that of the old one unless given"},
+    return object_schema(
+        {
+            "axes": {
+                **every,
+                "items": axis_schema(),
+                "description": "further values of axes of a grid; a parameter that did not vary becomes an axis of "
+                "the base's value and these",
             },
-            description="what is added to a study",
-        ),
-        "oneOf": [{"required": ["axes"]}, {"required": ["cases"]}],
-    }
+            "cases": {
+                **every,
+                "items": anything,
+                "description": "further cases, which come after those of the study; what they do not vary is as in "
+                "the base",
+            },
+            "name": {"type": "string", "description": "name of the new study; that of the old one unless given"},
+        },
+        description="what is added to a study: either axes or cases",
+    )
 
 
 def _path_schema() -> Schema:

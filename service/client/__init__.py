@@ -1,0 +1,33 @@
+"""The service as a Python program uses it.
+
+    from service.client import Client
+
+    with Client() as sprag:
+        study = sprag.submit("study.json").wait(progress=True)
+        table = study.table()
+        curves = study.curves("shaft.load", "shaft.speed.mean", by="excitation.frequency").to_xarray()
+
+`AsyncClient` has the same methods to be awaited. `UnreachableError` means nobody answered at the address;
+`RefusedError` carries the service's problem document. pandas and xarray are loaded only where they are asked for.
+"""
+
+from service.client.aio import AsyncClient, AsyncStudy
+from service.client.errors import RefusedError, ServiceError, StudyTimeoutError, UnreachableError
+from service.client.frames import Curves
+from service.client.plain import ServiceClient
+from service.client.study import Client, Study
+from service.client.wire import Query
+
+__all__ = [
+    "AsyncClient",
+    "AsyncStudy",
+    "Client",
+    "Curves",
+    "Query",
+    "RefusedError",
+    "ServiceClient",
+    "ServiceError",
+    "Study",
+    "StudyTimeoutError",
+    "UnreachableError",
+]

@@ -1,0 +1,180 @@
+"""The same for programs that wait for many things at once: every method of `service.client.study`, to be awaited."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import time
+import uuid
+from collections.abc import AsyncIterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, cast
+
+import httpx
+
+from service.client.errors import StudyTimeoutError, UnreachableError
+from service.client.frames import Curves, grid_of, table_of
+from service.client.queries import (
+    ENDED,
+    POLLS,
+    Progressing,
+    Value,
+    curve_query,
+    extension,
+    reporting,
+    result_query,
+    spec_of,
+)
+from service.client.study import DEFAULT_SERVER
+from service.client.wire import API, FILE_TIMEOUT, Query, connection_options, document, reason, refusal, study_path
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    import pandas as pd
+    import xarray as xr
+
+    from service.client.types import Preview, Spec, StudyDetail, StudySummary
+
+
+class AsyncClient:
+    """A connection to a running service; an asynchronous context manager. Parameters and errors as of `Client`."""
+
+    def __init__(
+        self, server: str | None = None, token: str | None = None, *, transport: httpx.AsyncBaseTransport | None = None
+    ) -> None:
+        self.server = (server or os.environ.get("SPRAG_SERVER") or DEFAULT_SERVER).rstrip("/")
+        options = connection_options(self.server, token or os.environ.get("SPRAG_TOKEN"))
+        self._http = httpx.AsyncClient(transport=transport, **options)
+
+    async def __aenter__(self) -> AsyncClient:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        """Close the connection."""
+        await self._http.aclose()
+
+    async def request(self, method: str, path: str, **arguments: Any) -> dict[str, Any]:
+        """The JSON object that the service answers under its API."""
+        try:
+            response = await self._http.request(method, API + path, **arguments)
+        except httpx.HTTPError as error:
+            raise UnreachableError(self.server, reason(error)) from error
+        return document(self.server, response)
+
+    async def read(self, path: str, query: Query) -> bytes:
+        """The bytes of a document under the API."""
+        try:
+            response = await self._http.get(API + path, params=list(query), timeout=FILE_TIMEOUT)
+        except httpx.HTTPError as error:
+            raise UnreachableError(self.server, reason(error)) from error
+        if response.is_error:
+            raise refusal(response)
+        return response.content
+
+    async def preview(self, spec: Spec | str | PathLike[str]) -> Preview:
+        """What a study would be."""
+        return cast("Preview", await self.request("POST", "/studies:preview", json=spec_of(spec)))
+
+    async def submit(
+        self, spec: Spec | str | PathLike[str], *, key: str | None = None, priority: int = 0, fresh: bool = False
+    ) -> AsyncStudy:
+        """Submit a study, as `Client.submit` does."""
+        headers = {"Idempotency-Key": key or uuid.uuid4().hex}
+        query = {"priority": str(priority), "fresh": str(fresh).lower()}
+        made = await self.request("POST", "/studies", json=spec_of(spec), headers=headers, params=query)
+        return AsyncStudy(self, made["id"])
+
+    async def study(self, study_id: str) -> AsyncStudy:
+        """A study by its id."""
+        return AsyncStudy(self, (await self.request("GET", study_path(study_id)))["id"])
+
+    async def studies(self, state: str | None = None) -> AsyncIterator[StudySummary]:
+        """Every study, newest first, or those in one state."""
+        query = {"state": state} if state else {}
+        while True:
+            page = await self.request("GET", "/studies", params=query)
+            for study in page["studies"]:
+                yield study
+            if page["next_page_token"] is None:
+                return
+            query["page_token"] = page["next_page_token"]
+
+
+class AsyncStudy:
+    """One study of the service."""
+
+    def __init__(self, client: AsyncClient, study_id: str) -> None:
+        self._client = client
+        self._path = study_path(study_id)
+        self.id = study_id
+
+    def __repr__(self) -> str:
+        return f"AsyncStudy({self.id!r})"
+
+    async def _get(self, part: str, query: Query = ()) -> dict[str, Any]:
+        return await self._client.request("GET", self._path + part, params=list(query))
+
+    async def detail(self) -> StudyDetail:
+        """The study as it is now."""
+        return cast("StudyDetail", await self._get(""))
+
+    async def wait(self, *, progress: bool | Progressing = False, timeout: float | None = None) -> AsyncStudy:
+        """Wait until the study has ended, as `Study.wait` does."""
+        end = None if timeout is None else time.monotonic() + timeout
+        with reporting(progress) as tell:
+            look = 0
+            while True:
+                study = await self.detail()
+                tell(study)
+                if study["state"] in ENDED:
+                    return self
+                if end is not None and timeout is not None and time.monotonic() >= end:
+                    raise StudyTimeoutError(study, timeout)
+                await asyncio.sleep(POLLS[min(look, len(POLLS) - 1)])
+                look += 1
+
+    async def curves(
+        self,
+        x: str,
+        y: str | Sequence[str],
+        *,
+        by: str | Sequence[str] = (),
+        at: Mapping[str, Value] | None = None,
+    ) -> Curves:
+        """Results against one axis, as `Study.curves` gives them."""
+        return Curves(cast("Any", await self._get("/curves", curve_query(x, y, by, at))))
+
+    async def sensitivity(self, y: str | Sequence[str]) -> dict[str, Any]:
+        """Main effects of every axis on results, and shares of their variance."""
+        return await self._get("/sensitivity", result_query(y))
+
+    async def table(self) -> pd.DataFrame:
+        """All rows as a pandas table."""
+        return table_of(await self.download("parquet"))
+
+    async def grid(self) -> xr.Dataset:
+        """All rows as an xarray grid."""
+        return grid_of(await self.download("netcdf"))
+
+    async def download(self, form: str) -> bytes:
+        """All rows in a format of `service.exports`, or the report as "html" or "pdf"."""
+        part = "/report" if form in ("html", "pdf") else "/results"
+        return await self._client.read(self._path + part, [("format", form)])
+
+    async def extend(
+        self,
+        axes: Sequence[Mapping[str, Any]] | None = None,
+        *,
+        cases: Sequence[Mapping[str, Any]] | None = None,
+        name: str | None = None,
+    ) -> AsyncStudy:
+        """Submit a study that has this one's cases and more."""
+        made = await self._client.request("POST", f"{self._path}:extend", json=extension(axes, cases, name))
+        return AsyncStudy(self._client, made["id"])
+
+    async def act(self, verb: str) -> StudySummary:
+        """Ask for "pause", "resume", "cancel" or "retry"."""
+        return cast("StudySummary", await self._client.request("POST", f"{self._path}:{verb}"))

@@ -1,0 +1,77 @@
+"""Answers as pandas tables and xarray grids. Both libraries are loaded when they are asked for."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+    from service.client.types import CurvesData
+
+
+@dataclass(frozen=True, slots=True)
+class Curves:
+    """Curves of results against one axis; ``data`` is the answer of the service. SI units."""
+
+    data: CurvesData
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of every parameter and result in the table."""
+        return {**self.data["units"], **{name: info["unit"] for name, info in self.data["results"].items()}}
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A row for each point: parameters that tell the curves apart, x, results (NaN for none), ending, case."""
+        import pandas as pd
+
+        x = self.data["x"]["path"]
+        parts = [
+            pd.DataFrame(
+                {
+                    **{path: [value] * len(curve["x"]) for path, value in {**curve["by"], **curve["at"]}.items()},
+                    x: curve["x"],
+                    **{name: pd.Series(values, dtype="float64") for name, values in curve["y"].items()},
+                    "ending": curve["endings"],
+                    "case": curve["cases"],
+                }
+            )
+            for curve in self.data["curves"]
+        ]
+        table = pd.concat(parts, ignore_index=True)
+        table.attrs["units"] = self.units
+        return table
+
+    def to_xarray(self) -> xr.Dataset:
+        """A grid of the results over x and what tells the curves apart, with units as attributes.
+
+        Raises ValueError when two points have the same parameters, as cases that go side by side can.
+        """
+        names = list(self.data["results"])
+        dims = [*self.data["curves"][0]["by"], self.data["x"]["path"]]
+        indexed = self.to_pandas().set_index(dims)[names]
+        if not indexed.index.is_unique:
+            raise ValueError("several points have the same parameters, so that they are no grid; see `to_pandas`")
+        grid = indexed.to_xarray()
+        for name in (*dims, *names):
+            grid[name].attrs["units"] = self.units[name]
+        for name in names:
+            grid[name].attrs["long_name"] = self.data["results"][name]["description"]
+        return grid
+
+
+def table_of(parquet: bytes) -> pd.DataFrame:
+    """All rows of a study, from its Parquet file."""
+    import pandas as pd
+
+    return pd.read_parquet(io.BytesIO(parquet))
+
+
+def grid_of(netcdf: bytes) -> xr.Dataset:
+    """All rows of a study as a labelled grid, from its NetCDF file."""
+    import xarray as xr
+
+    return xr.load_dataset(io.BytesIO(netcdf), engine="h5netcdf")

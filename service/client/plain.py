@@ -1,0 +1,161 @@
+"""The service over HTTP with plain JSON data in and out; what the command line and `service.client.study` stand on."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import httpx
+
+from service.client.errors import UnreachableError
+from service.client.wire import (
+    API,
+    FILE_TIMEOUT,
+    Query,
+    connection_options,
+    document,
+    reason,
+    refusal,
+    schedule_path,
+    study_path,
+)
+
+
+class ServiceClient:
+    """A connection to a running service. Use it as a context manager.
+
+    Parameters
+    ----------
+    server : str
+        Address such as "http://127.0.0.1:8000".
+    token : str, optional
+        Sent as a bearer token.
+    transport : httpx.BaseTransport, optional
+        What carries the requests, in the place of the network.
+
+    Raises
+    ------
+    ValueError
+        When ``server`` is no http address.
+    """
+
+    def __init__(self, server: str, token: str | None = None, *, transport: httpx.BaseTransport | None = None) -> None:
+        self.server = server.rstrip("/")
+        self._http = httpx.Client(transport=transport, **connection_options(self.server, token))
+
+    def __enter__(self) -> ServiceClient:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._http.close()
+
+    def create_study(
+        self, spec: object, key: str | None = None, priority: int = 0, fresh: bool = False
+    ) -> dict[str, Any]:
+        """Submit a study; the same ``key`` submits it once, however often it is sent.
+
+        Of a ``fresh`` study every case is run, also those that other studies have already.
+        """
+        headers = {"Idempotency-Key": key or uuid.uuid4().hex}
+        query = [("priority", str(priority))] if priority else []
+        query += [("fresh", "true")] if fresh else []
+        return self._json("POST", "/studies", json=spec, headers=headers, params=query)
+
+    def extend(self, study_id: str, addition: object) -> dict[str, Any]:
+        """Submit a study with more values on the axes of an old one (``axes``), or more cases (``cases``)."""
+        return self._json("POST", f"{study_path(study_id)}:extend", json=addition)
+
+    def preview(self, spec: object) -> dict[str, Any]:
+        """Number of cases, estimated time and size of a study that is not submitted."""
+        return self._json("POST", "/studies:preview", json=spec)
+
+    def study(self, study_id: str) -> dict[str, Any]:
+        """One study with its state, progress and time left."""
+        return self._json("GET", study_path(study_id))
+
+    def studies(self, query: Query = ()) -> dict[str, Any]:
+        """A page of studies, newest first."""
+        return self._json("GET", "/studies", params=list(query))
+
+    def act(self, study_id: str, verb: str, query: Query = ()) -> dict[str, Any]:
+        """Ask for a change of a study: "cancel", "pause", "resume", "retry" or "prioritize"."""
+        return self._json("POST", f"{study_path(study_id)}:{verb}", params=list(query))
+
+    def curves(self, study_id: str, query: Query) -> dict[str, Any]:
+        """Curves of results against one axis."""
+        return self._json("GET", f"{study_path(study_id)}/curves", params=list(query))
+
+    def cases(self, study_id: str, query: Query = ()) -> dict[str, Any]:
+        """A page of case rows."""
+        return self._json("GET", f"{study_path(study_id)}/cases", params=list(query))
+
+    def download(self, path: str, query: Query = ()) -> Iterator[bytes]:
+        """The bytes of a document under the API, such as ``/studies/ID/results`` with ``format=csv``, as they come."""
+        try:
+            with self._http.stream("GET", API + path, params=list(query), timeout=FILE_TIMEOUT) as response:
+                if response.is_error:
+                    response.read()
+                    raise refusal(response)
+                yield from response.iter_bytes()
+        except httpx.HTTPError as error:
+            raise UnreachableError(self.server, reason(error)) from error
+
+    def results(self, study_id: str, form: str) -> Iterator[bytes]:
+        """All rows of a study in the named format."""
+        return self.download(f"{study_path(study_id)}/results", [("format", form)])
+
+    def picture(self, study_id: str, query: Query, form: str) -> Iterator[bytes]:
+        """The picture of curves as "svg", "png" or "pdf"."""
+        return self.download(f"{study_path(study_id)}/curves", [*query, ("format", form)])
+
+    def map(self, study_id: str, query: Query) -> dict[str, Any]:
+        """One result over two axes."""
+        return self._json("GET", f"{study_path(study_id)}/map", params=list(query))
+
+    def map_picture(self, study_id: str, query: Query, form: str) -> Iterator[bytes]:
+        """The picture of a map as "svg", "png" or "pdf"."""
+        return self.download(f"{study_path(study_id)}/map", [*query, ("format", form)])
+
+    def sensitivity(self, study_id: str, query: Query) -> dict[str, Any]:
+        """Main effects and shares of the variance of results."""
+        return self._json("GET", f"{study_path(study_id)}/sensitivity", params=list(query))
+
+    def sensitivity_picture(self, study_id: str, query: Query, form: str) -> Iterator[bytes]:
+        """The picture of it as "svg", "png" or "pdf"."""
+        return self.download(f"{study_path(study_id)}/sensitivity", [*query, ("format", form)])
+
+    def report(self, study_id: str, form: str) -> Iterator[bytes]:
+        """The study as a document, "html" or "pdf"."""
+        return self.download(f"{study_path(study_id)}/report", [("format", form)])
+
+    def schedules(self) -> dict[str, Any]:
+        """Every schedule with its last and its next run."""
+        return self._json("GET", "/schedules")
+
+    def schedule(self, schedule_id: str) -> dict[str, Any]:
+        """One schedule with its spec and its latest runs."""
+        return self._json("GET", schedule_path(schedule_id))
+
+    def create_schedule(self, fields: Mapping[str, Any]) -> dict[str, Any]:
+        """Keep a new schedule: a study that is submitted by itself."""
+        return self._json("POST", "/schedules", json=dict(fields))
+
+    def change_schedule(self, schedule_id: str, fields: Mapping[str, Any]) -> dict[str, Any]:
+        """Change some fields of a schedule."""
+        return self._json("PATCH", schedule_path(schedule_id), json=dict(fields))
+
+    def delete_schedule(self, schedule_id: str) -> None:
+        """Delete a schedule; its studies stay."""
+        response = self._request("DELETE", schedule_path(schedule_id))
+        if response.is_error:
+            raise refusal(response)
+
+    def _request(self, method: str, path: str, **arguments: Any) -> httpx.Response:
+        try:
+            return self._http.request(method, API + path, **arguments)
+        except httpx.HTTPError as error:
+            raise UnreachableError(self.server, reason(error)) from error
+
+    def _json(self, method: str, path: str, **arguments: Any) -> dict[str, Any]:
+        return document(self.server, self._request(method, path, **arguments))

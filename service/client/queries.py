@@ -1,0 +1,88 @@
+"""What a client asks for, as query parameters; and the little that waiting needs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Protocol, cast
+
+from worker.states import TERMINAL
+
+if TYPE_CHECKING:
+    from service.client.types import Spec, StudyDetail
+
+ENDED: Final = frozenset(state.value for state in TERMINAL)
+#: Seconds between two looks at a study: short at first, then longer, up to the last.
+POLLS: Final = (0.1, 0.2, 0.3, 0.5, 1.0)
+
+Value = float | int | str
+
+
+class Progressing(Protocol):
+    """Is told of a study now and then."""
+
+    def __call__(self, study: StudyDetail, /) -> None:
+        """Take note of the study as it is now."""
+
+
+def spec_of(spec: Spec | str | PathLike[str]) -> Spec:
+    """A spec given as data, or the data of the JSON or TOML file of that name."""
+    if isinstance(spec, Mapping):
+        return spec
+    path = Path(spec)
+    if path.suffix.lower() == ".toml":
+        import tomllib
+
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    return cast("Spec", json.loads(path.read_text(encoding="utf-8")))
+
+
+def curve_query(
+    x: str, y: str | Sequence[str], by: str | Sequence[str], at: Mapping[str, Value] | None
+) -> list[tuple[str, str]]:
+    """Query of curves: ``at`` maps paths to values, SI numbers or texts with a unit."""
+    query = [("x", x), *(("y", name) for name in _listed(y)), *(("by", path) for path in _listed(by))]
+    return query + [("at", f"{path}={value}") for path, value in (at or {}).items()]
+
+
+def result_query(y: str | Sequence[str]) -> list[tuple[str, str]]:
+    """Query of results by their names."""
+    return [("y", name) for name in _listed(y)]
+
+
+def extension(
+    axes: Sequence[Mapping[str, Any]] | None, cases: Sequence[Mapping[str, Any]] | None, name: str | None
+) -> dict[str, Any]:
+    """What is added to a study."""
+    parts = {"axes": axes, "cases": cases, "name": name}
+    return {key: value for key, value in parts.items() if value is not None}
+
+
+def _listed(names: str | Sequence[str]) -> list[str]:
+    return [names] if isinstance(names, str) else list(names)
+
+
+@contextmanager
+def reporting(progress: bool | Progressing) -> Iterator[Progressing]:
+    """Where a wait tells how it goes: a bar on standard error for True, nowhere for False, else the function given."""
+    if callable(progress):
+        yield progress
+        return
+    if not progress:
+        yield lambda _study: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("study", total=None)
+
+        def update(study: StudyDetail, /) -> None:
+            now = study["progress"]
+            bar.update(task, description=f"{study['id']} {study['state']}", completed=now["done"], total=now["total"])
+
+        yield update

@@ -1,0 +1,218 @@
+"""The service for scripts and notebooks: submit a study, wait for it, take its curves and tables."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from service.client.errors import StudyTimeoutError
+from service.client.frames import Curves, grid_of, table_of
+from service.client.plain import ServiceClient
+from service.client.queries import (
+    ENDED,
+    POLLS,
+    Progressing,
+    Value,
+    curve_query,
+    extension,
+    reporting,
+    result_query,
+    spec_of,
+)
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    import httpx
+    import pandas as pd
+    import xarray as xr
+
+    from service.client.types import Preview, Spec, StudyDetail, StudySummary
+
+DEFAULT_SERVER = "http://127.0.0.1:8000"
+
+
+class Client:
+    """A connection to a running service; a context manager.
+
+    Parameters
+    ----------
+    server : str, optional
+        Its address; by default that in ``SPRAG_SERVER``, else ``http://127.0.0.1:8000``.
+    token : str, optional
+        Its token; by default that in ``SPRAG_TOKEN``.
+    transport : httpx.BaseTransport, optional
+        What carries the requests, in the place of the network.
+
+    Every method may raise `UnreachableError` when nobody answers, and `RefusedError`, whose ``errors`` name each fault
+    with its field, value and allowed range.
+    """
+
+    def __init__(
+        self, server: str | None = None, token: str | None = None, *, transport: httpx.BaseTransport | None = None
+    ) -> None:
+        address = server or os.environ.get("SPRAG_SERVER") or DEFAULT_SERVER
+        self.plain = ServiceClient(address, token or os.environ.get("SPRAG_TOKEN"), transport=transport)
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connection."""
+        self.plain.__exit__()
+
+    def preview(self, spec: Spec | str | PathLike[str]) -> Preview:
+        """What a study would be: cases, how many of them are known already, time, size, warnings."""
+        return cast("Preview", self.plain.preview(spec_of(spec)))
+
+    def submit(
+        self, spec: Spec | str | PathLike[str], *, key: str | None = None, priority: int = 0, fresh: bool = False
+    ) -> Study:
+        """Submit a study: a spec, or the name of a JSON or TOML file with one.
+
+        The same ``key`` submits it once, however often it is sent. Of a ``fresh`` study every case is run, also those
+        that other studies have.
+        """
+        return Study(self, self.plain.create_study(spec_of(spec), key, priority, fresh)["id"])
+
+    def study(self, study_id: str) -> Study:
+        """A study by its id; RefusedError when there is none."""
+        return Study(self, self.plain.study(study_id)["id"])
+
+    def studies(self, state: str | None = None) -> Iterator[StudySummary]:
+        """Every study, newest first, or those in one state."""
+        query = [("state", state)] if state else []
+        token: list[tuple[str, str]] = []
+        while True:
+            page = self.plain.studies([*query, *token])
+            yield from page["studies"]
+            if page["next_page_token"] is None:
+                return
+            token = [("page_token", page["next_page_token"])]
+
+
+class Study:
+    """One study of the service. ``id`` is its public name."""
+
+    def __init__(self, client: Client, study_id: str) -> None:
+        self._client = client
+        self.id = study_id
+
+    def __repr__(self) -> str:
+        return f"Study({self.id!r})"
+
+    def detail(self) -> StudyDetail:
+        """The study as it is now, with its progress and its spec."""
+        return cast("StudyDetail", self._client.plain.study(self.id))
+
+    def wait(self, *, progress: bool | Progressing = False, timeout: float | None = None) -> Study:
+        """Wait until the study has ended; gives the study itself.
+
+        Parameters
+        ----------
+        progress : bool or callable
+            True shows a bar on standard error; a function is told the study now and then.
+        timeout : float, optional
+            Seconds after which StudyTimeoutError is raised; the study goes on.
+        """
+        end = None if timeout is None else time.monotonic() + timeout
+        with reporting(progress) as tell:
+            look = 0
+            while True:
+                study = self.detail()
+                tell(study)
+                if study["state"] in ENDED:
+                    return self
+                if end is not None and timeout is not None and time.monotonic() >= end:
+                    raise StudyTimeoutError(study, timeout)
+                time.sleep(POLLS[min(look, len(POLLS) - 1)])
+                look += 1
+
+    def curves(
+        self,
+        x: str,
+        y: str | Sequence[str],
+        *,
+        by: str | Sequence[str] = (),
+        at: Mapping[str, Value] | None = None,
+    ) -> Curves:
+        """Results ``y`` against axis ``x``, a curve for each value of the axes ``by``, others held ``at`` values."""
+        return Curves(cast("Any", self._client.plain.curves(self.id, curve_query(x, y, by, at))))
+
+    def map(self, x: str, y: str, z: str, *, at: Mapping[str, Value] | None = None) -> dict[str, Any]:
+        """One result ``z`` over two axes."""
+        query = [*curve_query(x, y, (), at), ("z", z)]
+        return self._client.plain.map(self.id, query)
+
+    def sensitivity(self, y: str | Sequence[str]) -> dict[str, Any]:
+        """Main effects of every axis on results, and shares of their variance."""
+        return self._client.plain.sensitivity(self.id, result_query(y))
+
+    def table(self) -> pd.DataFrame:
+        """All rows with all results as a pandas table, NaN for what could not be computed."""
+        return table_of(self.download("parquet"))
+
+    def grid(self) -> xr.Dataset:
+        """All rows as an xarray grid whose dimensions are the axes, with units as attributes."""
+        return grid_of(self.download("netcdf"))
+
+    def download(self, form: str) -> bytes:
+        """All rows in a format of `service.exports`, or the report as "html" or "pdf"."""
+        return b"".join(self._pieces(form))
+
+    def export(self, file: str | PathLike[str], form: str | None = None) -> Path:
+        """Write all rows, or a report, to a file; its ending tells the format unless it is given."""
+        path = Path(file)
+        with path.open("wb") as out:
+            for piece in self._pieces(form or _form_of(path)):
+                out.write(piece)
+        return path
+
+    def _pieces(self, form: str) -> Iterator[bytes]:
+        plain = self._client.plain
+        return plain.report(self.id, form) if form in ("html", "pdf") else plain.results(self.id, form)
+
+    def picture(
+        self,
+        file: str | PathLike[str],
+        x: str,
+        y: str | Sequence[str],
+        *,
+        by: str | Sequence[str] = (),
+        at: Mapping[str, Value] | None = None,
+    ) -> Path:
+        """Write curves as a picture: .svg, .png or .pdf."""
+        path = Path(file)
+        pieces = self._client.plain.picture(self.id, curve_query(x, y, by, at), path.suffix[1:].lower())
+        path.write_bytes(b"".join(pieces))
+        return path
+
+    def extend(
+        self,
+        axes: Sequence[Mapping[str, Any]] | None = None,
+        *,
+        cases: Sequence[Mapping[str, Any]] | None = None,
+        name: str | None = None,
+    ) -> Study:
+        """Submit a study that has this one's cases and more, of which only what is new is run."""
+        return Study(self._client, self._client.plain.extend(self.id, extension(axes, cases, name))["id"])
+
+    def act(self, verb: str) -> StudySummary:
+        """Ask for "pause", "resume", "cancel" or "retry"."""
+        return cast("StudySummary", self._client.plain.act(self.id, verb))
+
+
+def _form_of(path: Path) -> str:
+    from service.exports import format_of
+
+    ending = path.suffix[1:].lower()
+    form = ending if ending in ("html", "pdf") else format_of(path.name)
+    if form is None:
+        raise ValueError(f"the ending of {path.name!r} tells no format; name it as `form`")
+    return form

@@ -1,0 +1,86 @@
+"""What every client of the service shares: addresses, time limits, and how an answer is read."""
+
+from __future__ import annotations
+
+import ipaddress
+from collections.abc import Sequence
+from typing import Any, Final
+from urllib.parse import quote
+
+import httpx
+
+from service.client.errors import RefusedError, ServiceError, UnreachableError
+
+API: Final = "/api/v1"
+#: Seconds to wait for an answer; curves of a large study are read from disk first.
+TIMEOUT: Final = httpx.Timeout(60.0, connect=10.0)
+#: A whole study may take minutes to be written before its first byte comes.
+FILE_TIMEOUT: Final = httpx.Timeout(None, connect=10.0)
+
+Query = Sequence[tuple[str, str]]
+
+
+def connection_options(server: str, token: str | None) -> dict[str, Any]:
+    """Options of an httpx client of the service at ``server``; ValueError when that is no http address."""
+    try:
+        url = httpx.URL(server)
+    except httpx.InvalidURL as error:
+        raise ValueError(f"{server!r} is no address: {error}") from error
+    if url.scheme not in ("http", "https") or not url.host:
+        raise ValueError(f"{server!r} is no address of a service, such as http://127.0.0.1:8000")
+    headers = {"Authorization": f"Bearer {token}"} if token else {}
+    # A proxy of the environment never leads to this machine itself.
+    return {"base_url": server, "headers": headers, "timeout": TIMEOUT, "trust_env": not is_loopback(url.host)}
+
+
+def document(server: str, response: httpx.Response) -> dict[str, Any]:
+    """The JSON object that was answered; RefusedError for a problem, UnreachableError for an answer that is none."""
+    if response.is_error:
+        raise refusal(response)
+    try:
+        data = response.json()
+    except ValueError:
+        data = None
+    if not isinstance(data, dict):
+        raise UnreachableError(server, "what answers there is not Sprag")
+    return data
+
+
+def study_path(study_id: str) -> str:
+    """Address of a study under the API."""
+    return f"/studies/{quote(study_id, safe='')}"
+
+
+def schedule_path(schedule_id: str) -> str:
+    """Address of a schedule under the API."""
+    return f"/schedules/{quote(schedule_id, safe='')}"
+
+
+def refusal(response: httpx.Response) -> ServiceError:
+    """The failure that an answer of status 400 or more means."""
+    try:
+        problem = response.json()
+    except ValueError:
+        problem = None
+    if not isinstance(problem, dict):
+        problem = {"title": f"HTTP status {response.status_code} {response.reason_phrase}"}
+    return RefusedError(response.status_code, problem)
+
+
+def reason(error: httpx.HTTPError) -> str:
+    """Why nobody answered, in a few words."""
+    if isinstance(error, httpx.ConnectError):
+        return "nobody answers there"
+    if isinstance(error, httpx.TimeoutException):
+        return "no answer in time"
+    return str(error) or type(error).__name__
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a host is this machine itself."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
