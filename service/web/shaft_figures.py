@@ -62,7 +62,6 @@ def shaft_figure(made: Trajectory) -> Figure:
                     "x": [degrees[position] for position in kept.tolist()],
                     "y": numbers(y[kept]),
                     "name": label,
-                    "legendgroup": title,
                     "showlegend": len(lines) > 1,
                     "xaxis": f"x{suffix}",
                     "yaxis": f"y{suffix}",

@@ -109,7 +109,7 @@ def inputs(study: Study) -> list[tuple[str, list[dict[str, Any]]]]:
                 "varied": path in varied,
             }
         )
-    return [(section or "surroundings", rows) for section, rows in sections.items()]
+    return [(section or "in general", rows) for section, rows in sections.items()]
 
 
 def run_lines(study: Study) -> list[tuple[str, str]]:

@@ -231,7 +231,9 @@ def test_a_study_page_shows_how_far_it_is_and_its_curve(service: Service) -> Non
 def test_names_are_text_on_pages(service: Service, spec: dict[str, Any]) -> None:
     name = "<script>alert(1)</script> & \"'"
     study_id = service.submit({**spec, "name": name})
-    for page in ("/", f"/studies/{study_id}"):
+    others = ("/cases", "/cases/0", "/curves", "/map")
+    pages = (f"/new?clone={study_id}", f"/compare?study={study_id}", *(f"/studies/{study_id}{part}" for part in others))
+    for page in ("/", f"/studies/{study_id}", *pages):
         text, _ = read_page(service, page)
         assert name not in text
         assert "&lt;script&gt;alert(1)" in text
