@@ -11,16 +11,17 @@ from fastapi import APIRouter, FastAPI
 from starlette.types import ASGIApp
 
 from service import handlers
+from service.access import Access
 from service.api import cases, catalogues, clutch_fits, curves, events, health, schedules, sensitivity, studies
 from service.api.context import Context
 from service.api.document import API_PREFIX, build_openapi
 from service.computer import Computes, ProcessComputer
 from service.guard import Guard
-from service.settings import Settings
+from service.settings import Settings, UnsafeSettingsError
 from service.spec_design_schema import extension_schema
 from service.spec_schema import spec_schema
 from service.storage.store import Store
-from service.web import case, compare, form, laboratory, pages, results, study, table
+from service.web import case, compare, form, laboratory, login, pages, results, study, table
 from service.web import schedules as schedule_pages
 from worker.chunking import Chunking
 
@@ -45,13 +46,14 @@ TAGS = [
 class Application(FastAPI):
     """FastAPI whose outermost layer, outside even its own error pages, is the guard."""
 
-    def __init__(self, settings: Settings, **options: Any) -> None:
+    def __init__(self, settings: Settings, access: Access, **options: Any) -> None:
         super().__init__(**options)
         self._settings = settings
+        self._access = access
 
     def build_middleware_stack(self) -> ASGIApp:
         """The framework's layers inside the guard."""
-        return Guard(super().build_middleware_stack(), self._settings)
+        return Guard(super().build_middleware_stack(), self._settings, self._access)
 
     def openapi(self) -> dict[str, Any]:
         """The OpenAPI document, made once."""
@@ -76,9 +78,15 @@ def create_app(
     address that others can reach without a token, and DatabaseError when the database cannot be used.
     """
     settings = settings or Settings()
-    settings.require_safe()
     own_store = store is None
     used_store = store or Store.open(settings.database_url, chunking=chunking(settings))
+    try:
+        settings.require_safe(stored=any(token.revoked_at is None for token in used_store.tokens()))
+    except UnsafeSettingsError:
+        if own_store:
+            used_store.close()
+        raise
+    access = Access(settings, used_store)
     used_computer = computer or ProcessComputer(settings.trajectory_timeout)
 
     @asynccontextmanager
@@ -91,6 +99,7 @@ def create_app(
 
     app = Application(
         settings,
+        access,
         title="Sprag",
         summary="Parameter studies of vibration drives with freewheel clutches",
         description=DESCRIPTION,
@@ -103,13 +112,14 @@ def create_app(
         lifespan=lifespan,
         generate_unique_id_function=lambda route: route.name,
     )
+    app.state.access = access
     app.state.context = Context(settings, used_store, used_computer)
     api = APIRouter(prefix=API_PREFIX)
     for module in (studies, events, curves, sensitivity, cases, clutch_fits, schedules, catalogues):
         api.include_router(module.router)
     app.include_router(api)
     app.include_router(health.router)
-    for page in (pages, form, study, results, table, case, compare, laboratory, schedule_pages):
+    for page in (pages, form, study, results, table, case, compare, laboratory, schedule_pages, login):
         app.include_router(page.router)
     handlers.install(app)
     return app

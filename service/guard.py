@@ -1,19 +1,27 @@
 """The outermost layer of the service: who may send what. Nothing behind it runs for a request that it refuses."""
 
-import base64
-import binascii
-import hmac
 from typing import Final
+from urllib.parse import quote
 
+import anyio
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import Request, cookie_parser
+from starlette.responses import RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.access import OPEN, Access, Grant
 from service.errors import ApiError, problem_response
 from service.settings import Settings
-from worker.limits import MAX_BODY_BYTES
+from service.storage.errors import StoreError
+from service.storage.tokens import TokenScope
+from service.web.problem_page import problem_page
+from worker.limits import BODY_SECONDS, MAX_BODY_BYTES
 
-#: What anybody may ask for, token or not: it tells nothing but whether the service is up.
-OPEN_PATHS: Final = frozenset({"/livez", "/readyz"})
+LOGIN_PATH: Final = "/login"
+#: What anybody may ask for, token or not: whether the service is up, and the way in.
+OPEN_PATHS: Final = frozenset({"/livez", "/readyz", LOGIN_PATH, "/static/sprag.css", "/static/sprag.svg"})
+#: Requests that change nothing, whatever their method says.
+_LOOKING: Final = frozenset({"/api/v1/studies:preview", "/api/v1/clutch-fits", "/new/check", LOGIN_PATH, "/logout"})
 SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 API_PREFIX: Final = "/api/"
 
@@ -40,13 +48,15 @@ class Guard:
     ----------
     app : ASGI application behind the guard
     settings : Settings
-        `host_names`, `token`.
+        `host_names`; by default also those of ``access``.
+    access : Access, optional
+        Knows the tokens.
     """
 
-    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+    def __init__(self, app: ASGIApp, settings: Settings, access: Access | None = None) -> None:
         self._app = app
         self._hosts = settings.host_names
-        self._token = None if settings.token is None else settings.token.get_secret_value().encode("ascii")
+        self._access = access or Access(settings)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":
@@ -56,27 +66,25 @@ class Guard:
             await send({"type": "websocket.close", "code": 1008})
             return
         try:
-            self._check(scope)
+            await self._check(scope)
         except ApiError as error:
-            await problem_response(error)(scope, receive, _with_headers(send))
+            answer = _to_login(scope) if error.problem == "unauthorized" else None
+            answer = answer or problem_page(Request(scope), error) or problem_response(error)
+            await answer(scope, receive, _with_headers(send))
             return
         if scope["method"] == "HEAD":
             # Whatever can be read can be asked for its headers; the server itself sends no body then.
             scope = {**scope, "method": "GET"}
         await self._app(scope, _limited(receive), _with_headers(send))
 
-    def _check(self, scope: Scope) -> None:
+    async def _check(self, scope: Scope) -> None:
         headers = Headers(scope=scope)
         hosts = headers.getlist("host")
         if len(hosts) != 1 or _host_name(hosts[0]) not in self._hosts:
             raise ApiError("wrong-host", "This service does not answer under the name the request is addressed to.")
         if scope["method"] not in SAFE_METHODS and _is_cross_site(headers):
             raise ApiError("cross-site", "A page of another site may not change anything here.")
-        if self._token is not None and scope["path"] not in OPEN_PATHS:
-            # The pages' own script, pictures and downloads have no token but the browser's password.
-            own = scope["method"] in SAFE_METHODS and headers.get("sec-fetch-site") in ("same-origin", "none")
-            api = scope["path"].startswith(API_PREFIX) and not own
-            self._check_token(self._token, headers.getlist("authorization"), api=api)
+        scope["sprag.grant"] = await self._grant(scope, headers)
         if "\n" in scope["path"]:
             # The patterns of the routes end in "$", which a line feed at the very end would slip past.
             raise ApiError("not-found", "There is nothing at this address: it has a line feed in it.")
@@ -86,14 +94,36 @@ class Guard:
         if len(length) > 18 or int(length) > MAX_BODY_BYTES:
             raise body_too_large()
 
-    @staticmethod
-    def _check_token(token: bytes, sent: list[str], *, api: bool) -> None:
-        given = _credentials(sent[0], api=api) if len(sent) == 1 else None
-        if given is None or not hmac.compare_digest(given, token):
+    async def _grant(self, scope: Scope, headers: Headers) -> Grant | None:
+        """Who asks; ApiError where nobody may who has no token, or only a lesser one."""
+        opened, safe = scope["path"] in OPEN_PATHS, scope["method"] in SAFE_METHODS
+        try:
+            await self._access.refresh()
+        except StoreError as error:
+            if opened and scope["path"] != LOGIN_PATH:
+                return None
+            raise ApiError("unavailable", f"The tokens cannot be read: {error}.") from error
+        if not self._access.needed:
+            return OPEN
+        # The pages' own script, pictures and downloads have no token but the browser's password.
+        own = safe and headers.get("sec-fetch-site") in ("same-origin", "none")
+        api = scope["path"].startswith(API_PREFIX) and not own
+        sent = headers.getlist("authorization")
+        grant = self._access.of_header(sent[0], basic=not api) if len(sent) == 1 else None
+        if not sent:
+            grant = self._access.of_cookies(cookie_parser(headers.get("cookie", "")))
+            if grant is not None and not safe and not _names_its_site(headers):
+                raise ApiError("cross-site", "A browser says for which page it asks; this request does not.")
+        if opened:
+            return grant
+        if grant is None:
             challenge = "Bearer" if api else 'Basic realm="Sprag", charset="UTF-8"'
             raise ApiError(
                 "unauthorized", "This request carries no valid token.", headers={"WWW-Authenticate": challenge}
             )
+        if grant.scope is not TokenScope.WRITE and not safe and scope["path"] not in _LOOKING:
+            raise ApiError("read-only", f"The token {grant.name or grant.id} allows to look, not to change anything.")
+        return grant
 
 
 def body_too_large() -> ApiError:
@@ -103,17 +133,20 @@ def body_too_large() -> ApiError:
     )
 
 
-def _credentials(header: str, *, api: bool) -> bytes | None:
-    """The token in an Authorization header: a bearer token, or for pages in a browser the password of Basic."""
-    scheme, _, value = header.partition(" ")
-    if scheme.lower() == "bearer":
-        return value.strip().encode("utf-8", "replace")
-    if scheme.lower() == "basic" and not api:
-        try:
-            return base64.b64decode(value.strip(), validate=True).partition(b":")[2]
-        except (binascii.Error, ValueError):
-            return None
-    return None
+def _to_login(scope: Scope) -> Response | None:
+    """The way to the page where a browser logs in; None for programs."""
+    if scope["method"] != "GET" or scope["path"].startswith(API_PREFIX):
+        return None
+    if "text/html" not in Headers(scope=scope).get("accept", ""):
+        return None
+    query = scope.get("query_string", b"").decode("latin-1")
+    wanted = scope["path"] + (f"?{query}" if query else "")
+    return RedirectResponse(f"{LOGIN_PATH}?next={quote(wanted, safe='/')}", 303, {"Cache-Control": "no-store"})
+
+
+def _names_its_site(headers: Headers) -> bool:
+    """Whether the request says for which page it is sent; then `_is_cross_site` has let it pass."""
+    return "sec-fetch-site" in headers or "origin" in headers
 
 
 def _host_name(host: str) -> str:
@@ -135,12 +168,21 @@ def _is_cross_site(headers: Headers) -> bool:
 
 
 def _limited(receive: Receive) -> Receive:
-    """``receive`` that raises 413 as soon as more than the limit has come in, whatever Content-Length said."""
-    total = 0
+    """``receive`` that raises 413 as soon as more than the limit has come in, and 408 when it comes too slowly."""
+    total, more, until = 0, True, None
 
     async def limited() -> Message:
-        nonlocal total
-        message = await receive()
+        nonlocal total, more, until
+        if not more:  # what comes now is the end of the connection, however late
+            return await receive()
+        until = until or anyio.current_time() + BODY_SECONDS
+        with anyio.move_on_after(until - anyio.current_time()) as scope:
+            message = await receive()
+        if scope.cancelled_caught:
+            raise ApiError(
+                "too-slow", f"The body did not come in within {BODY_SECONDS:g} s.", headers={"Connection": "close"}
+            )
+        more = message["type"] == "http.request" and message.get("more_body", False)
         total += len(message.get("body", b""))
         if total > MAX_BODY_BYTES:
             raise body_too_large()

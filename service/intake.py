@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from service.errors import ApiError
 from service.preview import estimated_bytes
 from service.storage.room import RESERVE_BYTES
+from worker.limits import MAX_WAITING_STUDIES
 
 if TYPE_CHECKING:
     from service.spec import ParsedSpec
@@ -24,6 +25,8 @@ def accept(
     known = store.study_of_key(idempotency_key, body_hash) if idempotency_key else None
     if known is not None:
         return known
+    if store.waiting_studies() >= MAX_WAITING_STUDIES:
+        raise ApiError("queue-full", f"{MAX_WAITING_STUDIES:,} studies have not ended yet.")
     _require_room(store, parsed)
     return store.create_study(
         parsed.spec,

@@ -17,7 +17,9 @@ import uvicorn
 
 from service.app import create_app
 from service.dispatching import WorkerSettings, start_dispatcher_process
+from service.patience import PatientProtocol
 from service.settings import Settings
+from worker.limits import MAX_CONNECTIONS
 
 _LOG = logging.getLogger("sprag.service")
 
@@ -150,6 +152,9 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
         log_config=None,
         log_level=logging.WARNING,
         access_log=False,
+        http=PatientProtocol,
+        ws="none",
+        limit_concurrency=MAX_CONNECTIONS,
         server_header=False,
         proxy_headers=False,
         timeout_graceful_shutdown=_GRACE_SECONDS,

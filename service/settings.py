@@ -109,12 +109,15 @@ class Settings(BaseSettings):
         own = f"[{host}]" if ":" in host and not host.startswith("[") else host
         return frozenset({*LOOPBACK_HOSTS, own, *(name.lower() for name in self.allowed_hosts)})
 
-    def require_safe(self) -> None:
-        """Raise `UnsafeSettingsError` when another machine could reach the service and there is no token."""
-        if not self.loopback and self.token is None:
+    def require_safe(self, *, stored: bool = False) -> None:
+        """Raise `UnsafeSettingsError` when another machine could reach the service and there is no token.
+
+        ``stored`` tells whether the database has one.
+        """
+        if not self.loopback and self.token is None and not stored:
             raise UnsafeSettingsError(
-                f"The host {self.host} can be reached from other machines, so {ENV_PREFIX}TOKEN must be set "
-                "(`sprag token` makes one)."
+                f"The host {self.host} can be reached from other machines, so the service needs a token: "
+                f"`sprag token create` makes one, or set {ENV_PREFIX}TOKEN."
             )
 
 

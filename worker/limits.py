@@ -46,6 +46,17 @@ MAX_TRAJECTORY_POINTS: Final = 20_000
 #: Priorities of studies lie between this and its negative.
 MAX_PRIORITY: Final = 100
 
+#: Studies that have not ended; a further one is refused.
+MAX_WAITING_STUDIES: Final = 1_000
+#: Streams of events that are open at once.
+MAX_STREAMS: Final = 200
+#: Connections that are open at once; a further one is answered 503.
+MAX_CONNECTIONS: Final = 800
+#: Seconds in which the head of a request, and then its body, must have come in.
+HEAD_SECONDS: Final = 20.0
+BODY_SECONDS: Final = 60.0
+#: Seconds in which a client must take something of what is sent to it.
+WRITE_SECONDS: Final = 60.0
 #: Schedules that are kept.
 MAX_SCHEDULES: Final = 1_000
 

@@ -13,19 +13,40 @@ from service.computer import Computes
 from service.settings import Settings
 from service.storage.store import Store
 from service.unaffected import Unaffected
+from worker.limits import MAX_STREAMS
+
+
+class Places:
+    """A number of places; who finds none is sent away. For one event loop."""
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        self.taken = 0
+
+    def take(self) -> bool:
+        """Take a place; False when there is none."""
+        if self.taken >= self.most:
+            return False
+        self.taken += 1
+        return True
+
+    def leave(self) -> None:
+        """Give the place back."""
+        self.taken -= 1
 
 
 @dataclass(frozen=True, slots=True)
 class Context:
     """Settings, store and computer of one service; ``ending`` is set when the service is about to end.
 
-    ``unaffected`` tells of parameters that change nothing.
+    ``unaffected`` tells of parameters that change nothing; ``streams`` are the places for streams of events.
     """
 
     settings: Settings
     store: Store
     computer: Computes
     ending: Event = field(default_factory=Event)
+    streams: Places = field(default_factory=lambda: Places(MAX_STREAMS))
     unaffected: Unaffected = field(default_factory=Unaffected)
 
 

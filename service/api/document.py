@@ -15,7 +15,7 @@ API_PREFIX: Final = "/api/v1"
 _SCHEMAS: Final = "#/components/schemas/"
 #: Problems that any operation of the API may answer with.
 _EVERYWHERE: Final = ("unauthorized", "wrong-host", "internal", "unavailable")
-_UNSAFE: Final = ("cross-site",)
+_UNSAFE: Final = ("cross-site", "read-only", "too-slow")
 
 Responses = dict[int | str, dict[str, Any]]
 

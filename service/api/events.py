@@ -10,12 +10,13 @@ import anyio
 from fastapi import APIRouter, Depends, Header
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
+from starlette.types import Receive, Scope, Send
 
 from service.api import views
 from service.api.context import Context, Ctx, StudyId
 from service.api.document import files, problems
 from service.api.requests import strict_query
-from service.errors import to_bytes
+from service.errors import ApiError, to_bytes
 from service.storage.errors import StoreError
 from service.storage.records import Progress, StudyRecord
 
@@ -47,7 +48,26 @@ async def get_events(context: Ctx, study_id: StudyId, last_event_id: LastEventId
     record = await run_in_threadpool(context.store.get_study, study_id)
     if record.state.terminal and last_event_id == str(record.revision):
         return Response(status_code=204)
-    return StreamingResponse(_events(context, study_id, last_event_id), media_type=_MEDIA_TYPE)
+    if not context.streams.take():
+        raise ApiError(
+            "unavailable", f"{context.streams.most} streams of events are open already.", headers={"Retry-After": "10"}
+        )
+    return _Stream(context, study_id, last_event_id)
+
+
+class _Stream(StreamingResponse):
+    """The stream, which gives its place back however it ends."""
+
+    def __init__(self, context: Context, study_id: str, last: str | None) -> None:
+        super().__init__(_events(context, study_id, last), media_type=_MEDIA_TYPE)
+        self._places = context.streams
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send it."""
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            self._places.leave()
 
 
 async def _events(context: Context, study_id: str, last: str | None) -> AsyncIterator[bytes]:

@@ -59,7 +59,7 @@ def _parsed(received: Body) -> ParsedSpec:
     "/studies",
     status_code=202,
     response_model=m.StudySummary,
-    responses=problems(*_BODY_PROBLEMS, "idempotency-conflict", "storage-full"),
+    responses=problems(*_BODY_PROBLEMS, "idempotency-conflict", "storage-full", "queue-full"),
     openapi_extra=_SPEC_BODY,
 )
 def create_study(

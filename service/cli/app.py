@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from service.cli import database, demo, doctor, extend, fit, local, pictures, processes, remote, schedule
+from service.cli import database, demo, doctor, extend, fit, local, pictures, processes, remote, schedule, token
 from service.cli.console import CommandFailureError, ExitCode, TroubleError, say, write_text
 
 #: Set to anything to see where a fault of the program lies.
@@ -58,7 +58,6 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "demo": demo.demo,
         "serve": processes.serve,
         "worker": processes.worker,
-        "token": processes.token,
         "doctor": doctor.doctor,
     },
     "Use a running service": {
@@ -81,6 +80,7 @@ for _title, _commands in _COMMANDS.items():
     for _name, _command in _commands.items():
         app.command(_name, rich_help_panel=_title)(_command)
 app.add_typer(schedule.app, name="schedule", rich_help_panel="Use a running service")
+app.add_typer(token.app, name="token", rich_help_panel="Run a service")
 app.add_typer(database.app, name="db", rich_help_panel="Run a service")
 
 

@@ -1,8 +1,7 @@
-"""Commands that start processes: serve, worker; and the token that a service open to others needs."""
+"""Commands that start processes: serve, worker."""
 
 from __future__ import annotations
 
-import secrets
 import sys
 from typing import Annotated
 
@@ -58,12 +57,3 @@ def worker(db: Database = None, processes: Processes = None) -> None:
         stop_on_signals(),
         say=say,
     )
-
-
-def token(as_json: JsonFlag = False) -> None:
-    """Make a token for a service that other machines can reach (SPRAG_TOKEN)."""
-    made = secrets.token_urlsafe(32)
-    if as_json:
-        write_json({"token": made})
-    else:
-        print(made)

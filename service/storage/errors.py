@@ -14,6 +14,7 @@ __all__ = [
     "StoreError",
     "StudyBusy",
     "StudyNotFound",
+    "TokenNotFound",
     "TooManySchedules",
 ]
 
@@ -51,6 +52,13 @@ class ScheduleNotFound(StoreError):  # noqa: N818
 
 class TooManySchedules(StoreError):  # noqa: N818
     """There are as many schedules as are kept."""
+
+
+class TokenNotFound(StoreError):  # noqa: N818
+    """There is no token of that id."""
+
+    def __init__(self, token_id: str) -> None:
+        super().__init__(f"there is no token {token_id!r}")
 
 
 class StudyBusy(StoreError):  # noqa: N818

@@ -27,7 +27,7 @@ from service.storage.tables import (
 from worker import kernels
 from worker.chunking import Chunking, spans
 from worker.reuse import kin_hash
-from worker.states import StudyEvent, StudyState
+from worker.states import TERMINAL, StudyEvent, StudyState
 from worker.study import Study
 
 if TYPE_CHECKING:
@@ -151,6 +151,13 @@ class Studies(Part):
             rows = connection.execute(query.order_by(STUDIES.c.number.desc()).limit(size + 1)).all()
         records = tuple(record_of(row) for row in rows[:size])
         return StudyPage(records, str(records[-1].number) if len(rows) > size else None)
+
+    def waiting_studies(self) -> int:
+        """Number of studies that have not ended."""
+        c = STUDIES.c
+        query = sa.select(sa.func.count()).where(c.state.not_in([state.value for state in TERMINAL]))
+        with self.session.read() as connection:
+            return connection.execute(query).scalar_one()
 
     def progress(self, study_id: str) -> Progress:
         """How far the study is; raises StudyNotFound."""

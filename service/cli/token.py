@@ -1,0 +1,109 @@
+"""``sprag token``: who may ask a service that needs tokens."""
+
+from __future__ import annotations
+
+import secrets
+from datetime import UTC
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from service.cli.console import WrongInputError, say, show_table, write_json
+from service.cli.options import Database, JsonFlag
+from service.cli.settings import read_settings
+from service.storage.tokens import TokenScope
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+    from service.storage.store import Store
+    from service.storage.tokens import TokenRecord
+
+app = typer.Typer(
+    help="Create, list and revoke tokens; alone: make a secret for SPRAG_TOKEN.",
+    invoke_without_command=True,
+    rich_markup_mode="rich",
+)
+
+
+@app.callback()
+def token(context: typer.Context, as_json: JsonFlag = False) -> None:
+    """Create, list and revoke tokens; without a further word: make a secret for SPRAG_TOKEN, which is kept nowhere."""
+    if context.invoked_subcommand is not None:
+        return
+    made = secrets.token_urlsafe(32)
+    if as_json:
+        write_json({"token": made})
+    else:
+        print(made)
+
+
+@app.command()
+def create(
+    name: Annotated[str, typer.Option("--name", help="Whose it is, or what it is for.")],
+    scope: Annotated[
+        TokenScope, typer.Option("--scope", help="read: look at everything; write: change it too.")
+    ] = TokenScope.WRITE,
+    db: Database = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Make a token that the service takes, and print it: it is stored as a digest, so this is the only time."""
+    with _store(db) as store:
+        secret, record = store.create_token(name, scope)
+    if as_json:
+        write_json({"token": secret, **_json(record)})
+    else:
+        print(secret)
+        say(f"{record.id}: {record.name}, {record.scope}. It is shown this once; every request needs one from now on.")
+
+
+@app.command("list")
+def list_tokens(db: Database = None, as_json: JsonFlag = False) -> None:
+    """List the tokens that were created, newest first, without their secrets."""
+    with _store(db) as store:
+        found = [_json(record) for record in store.tokens()]
+    if as_json:
+        write_json({"tokens": found})
+        return
+    columns = [(heading, False) for heading in ("id", "name", "scope", "created", "revoked")]
+    show_table("", columns, [[t["id"], t["name"], t["scope"], t["created_at"], t["revoked_at"]] for t in found])
+
+
+@app.command()
+def revoke(
+    token_id: Annotated[str, typer.Argument(metavar="ID", help="Id of the token, as `sprag token list` shows it.")],
+    db: Database = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Make a token worthless, and end the sessions of browsers that logged in with it; within two seconds."""
+    from service.storage.errors import TokenNotFound
+
+    with _store(db) as store:
+        try:
+            record = store.revoke_token(token_id)
+        except TokenNotFound as error:
+            raise WrongInputError(str(error)) from error
+    if as_json:
+        write_json(_json(record))
+    else:
+        say(f"{record.id} ({record.name}) is revoked")
+
+
+def _store(db: str | None) -> Store:
+    from service.storage.store import Store
+
+    return Store.open(read_settings(database=db).database_url)
+
+
+def _json(record: TokenRecord) -> dict[str, Any]:
+    return {
+        "id": record.id,
+        "name": record.name,
+        "scope": record.scope.value,
+        "created_at": _text(record.created_at),
+        "revoked_at": None if record.revoked_at is None else _text(record.revoked_at),
+    }
+
+
+def _text(moment: datetime) -> str:
+    return moment.astimezone(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")

@@ -1,0 +1,107 @@
+"""Tokens: created, listed, revoked. A token itself is shown once and never stored, only its SHA-256 digest is.
+
+A digest without salt and stretching is enough here: a token is made of 256 random bits, which nobody can guess.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Final
+
+import sqlalchemy as sa
+
+from service.storage.errors import TokenNotFound
+from service.storage.part import Part, moment, optional_moment
+from service.storage.tables import METADATA
+
+if TYPE_CHECKING:
+    from datetime import datetime
+    from typing import Any
+
+#: What a token begins with, so that people and scanners of secrets know it.
+TOKEN_PREFIX: Final = "sprag_"  # noqa: S105 - the beginning of all tokens is no secret
+_TOKEN_BYTES: Final = 32
+
+TOKENS = sa.Table(
+    "tokens",
+    METADATA,
+    sa.Column("number", sa.Integer, primary_key=True, autoincrement=True),
+    sa.Column("id", sa.String(40), nullable=False, unique=True),
+    sa.Column("name", sa.Text, nullable=False),
+    sa.Column("scope", sa.String(8), nullable=False),
+    sa.Column("digest", sa.String(64), nullable=False, unique=True),
+    sa.Column("created_at", sa.BigInteger, nullable=False),
+    # Revoked tokens stay listed, and a service that ever had a token never becomes open again.
+    sa.Column("revoked_at", sa.BigInteger),
+    sqlite_autoincrement=True,
+)
+
+
+class TokenScope(StrEnum):
+    """What a token allows: to look at everything, or also to change it."""
+
+    READ = "read"
+    WRITE = "write"
+
+
+@dataclass(frozen=True, slots=True)
+class TokenRecord:
+    """A token without its secret; ``digest`` is the SHA-256 of the secret in hexadecimal digits."""
+
+    id: str
+    name: str
+    scope: TokenScope
+    digest: str
+    created_at: datetime
+    revoked_at: datetime | None
+
+
+def digest_of(token: bytes) -> str:
+    """What is stored of a token."""
+    return hashlib.sha256(token).hexdigest()
+
+
+class Tokens(Part):
+    """Tokens as the command line and the guard see them."""
+
+    def create_token(self, name: str, scope: TokenScope) -> tuple[str, TokenRecord]:
+        """Make a token; its secret, which nobody can show again, and its record."""
+        secret = TOKEN_PREFIX + secrets.token_urlsafe(_TOKEN_BYTES)
+        values = {
+            "id": f"tk_{secrets.token_hex(6)}",
+            "name": name,
+            "scope": scope.value,
+            "digest": digest_of(secret.encode("ascii")),
+            "created_at": self._now(),
+        }
+        with self.session.write() as connection:
+            row = connection.execute(sa.insert(TOKENS).values(values).returning(TOKENS)).one()
+        return secret, _record(row)
+
+    def tokens(self) -> tuple[TokenRecord, ...]:
+        """Every token that there ever was, newest first."""
+        with self.session.read() as connection:
+            rows = connection.execute(sa.select(TOKENS).order_by(TOKENS.c.number.desc())).all()
+        return tuple(map(_record, rows))
+
+    def revoke_token(self, token_id: str) -> TokenRecord:
+        """Make a token worthless from now on; raises TokenNotFound. Twice is as good as once."""
+        with self.session.write() as connection:
+            row = connection.execute(
+                sa.update(TOKENS)
+                .where(TOKENS.c.id == token_id)
+                .values(revoked_at=sa.func.coalesce(TOKENS.c.revoked_at, self._now()))
+                .returning(TOKENS)
+            ).one_or_none()
+            if row is None:
+                raise TokenNotFound(token_id)
+            return _record(row)
+
+
+def _record(row: Any) -> TokenRecord:
+    return TokenRecord(
+        row.id, row.name, TokenScope(row.scope), row.digest, moment(row.created_at), optional_moment(row.revoked_at)
+    )

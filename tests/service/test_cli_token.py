@@ -1,0 +1,53 @@
+"""``sprag token``: a secret alone; tokens created, listed, revoked in the database of the settings."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from service.cli.app import execute
+from service.storage.store import Store
+from service.storage.tokens import digest_of
+
+if TYPE_CHECKING:
+    from service.settings import Settings
+
+
+def test_tokens_are_created_listed_and_revoked(settings: Settings, capsys: pytest.CaptureFixture[str]) -> None:
+    def run(*arguments: str) -> tuple[int, str, str]:
+        code = execute(["token", *arguments])
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    db = ("--db", settings.database)
+    code, out, err = run("create", "--name", "the office", "--scope", "read", *db)
+    assert code == 0
+    secret = out.strip()
+    assert "the office, read" in err
+    with Store.open(settings.database_url) as store:
+        (record,) = store.tokens()
+    assert record.digest == digest_of(secret.encode())
+    found: dict[str, Any] = json.loads(run("list", "--json", *db)[1])
+    assert [(t["id"], t["name"], t["scope"], t["revoked_at"]) for t in found["tokens"]] == [
+        (record.id, "the office", "read", None)
+    ]
+    assert secret not in json.dumps(found)
+    assert record.id in run("list", *db)[1]
+    assert run("revoke", record.id, *db)[0] == 0
+    assert json.loads(run("list", "--json", *db)[1])["tokens"][0]["revoked_at"].startswith("20")
+    code, _, err = run("revoke", "tk_0", *db)
+    assert code == 2
+    assert "no token 'tk_0'" in err
+    made = json.loads(run("create", "--name", "x", "--json", *db)[1])
+    assert (made["scope"], made["token"][:6]) == ("write", "sprag_")
+
+
+def test_alone_it_makes_a_secret_and_keeps_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    assert execute(["token"]) == 0
+    first = capsys.readouterr().out.strip()
+    assert execute(["token", "--json"]) == 0
+    second = json.loads(capsys.readouterr().out)["token"]
+    assert len(first) == len(second) == 43
+    assert first != second
