@@ -48,9 +48,8 @@ def check_machine(
     except ExpressionError as error:
         report.problem(places.get(error.part, "/base"), str(error), structure.get(error.part, {}).get("formula"))
     except InsufficientInertiaError as error:
-        report.problem(
-            "/base/mean_speed", str(error), error.asked, allowed=f">= {error.least_mean_speed:.6g} rad/s", unit="rad/s"
-        )
+        allowed = f"> {error.least_mean_speed:.6g} rad/s"
+        report.problem("/base/mean_speed", str(error), error.asked, allowed=allowed, unit="rad/s")
     except MachineError as error:
         pointer = _POINTERS.get(error.ending)
         if error.ending is Ending.CANNOT_ASSEMBLE:

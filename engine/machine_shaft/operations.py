@@ -56,7 +56,7 @@ class Stroke:
     def angles(self, fraction: Floats, *, forward: bool) -> Floats:
         """Angles at which a stroke has come to ``fraction`` (cases or 1, 1, n); NaN outside 0 .. 1."""
         low, high = (self.start, self.end) if forward else (self.end, self.start + _TURN)
-        shape = np.broadcast_shapes(low.shape, fraction.shape)
+        shape = np.broadcast_shapes(low.shape, high.shape, fraction.shape)
         low, high, target = (np.broadcast_to(part, shape) for part in (low, high, fraction))
         rising = 1.0 if forward else -1.0
         inside = (target > 0.0) & (target < 1.0)

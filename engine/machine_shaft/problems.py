@@ -81,16 +81,23 @@ class UnbalancedWorkError(MachineError):
 
 
 class InsufficientInertiaError(MachineError):
-    """The shaft would stop at the mean speed asked for; ``least_mean_speed`` (rad/s) is the least feasible one."""
+    """The shaft would stop at the mean speed asked for; ``least_mean_speed`` (rad/s) is the least feasible one.
+
+    A mean over time can lie above that and still ask for a shaft that stands nearly still.
+    """
 
     ending = Ending.INERTIA_INSUFFICIENT
 
     def __init__(self, asked: float, least_mean_speed: float) -> None:
-        super().__init__(
-            f"The inertia is insufficient for a mean speed of {asked:.6g} rad/s: the shaft would stop within the "
-            f"cycle. The least feasible mean speed is {least_mean_speed:.6g} rad/s "
-            f"({least_mean_speed * 30.0 / math.pi:.6g} rpm); or give the drive more inertia."
-        )
+        stops = f"The inertia is insufficient for a mean speed of {asked:.6g} rad/s: the shaft would "
+        if asked > least_mean_speed:
+            more = "all but stop within the cycle. Ask for a higher mean speed, or give the drive more inertia."
+        else:
+            more = (
+                f"stop within the cycle. The least feasible mean speed is {least_mean_speed:.6g} rad/s "
+                f"({least_mean_speed * 30.0 / math.pi:.6g} rpm); or give the drive more inertia."
+            )
+        super().__init__(stops + more)
         self.asked, self.least_mean_speed = asked, least_mean_speed
 
 

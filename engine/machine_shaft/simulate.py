@@ -38,6 +38,10 @@ BLOCK = 64
 
 _NAMES = tuple(info.name for info in result_infos())
 _OF_TIME = np.array([_NAMES.index("omega.mean_time"), _NAMES.index("irregularity.time")])
+#: Beginnings of the names of results that a case without motion does not have.
+_OF_MOTION = ("omega.", "irregularity", "acceleration.", "s1.", "s2.", "power.", "energy.m", "required_")
+#: The same for a motor that has no steady torque.
+_OF_MOTOR = ("drive_torque.", "work.drive", "balance.work", "energy.", "s3.", "s4.", "phi_c")
 _CODE = {ending: np.int8(code) for code, ending in enumerate(ENDING_CODES)}
 
 
@@ -114,6 +118,7 @@ def attempts(spec: MachineSpec, columns: Columns) -> Iterator[tuple[NDArray[np.i
         if not rows.size:
             return
         solved = _attempt(spec, columns.take(rows), cuts)
+        _mark_unreached(spec, columns.take(rows), solved)
         yield rows, solved
         chosen = solved.rough | solved.rough_pace
         panels = solved.decomposition.panels
@@ -121,6 +126,22 @@ def attempts(spec: MachineSpec, columns: Columns) -> Iterator[tuple[NDArray[np.i
         again = np.nonzero(chosen.any(axis=1) & (real <= MAX_PANELS * spec.cycle))[0]
         middles = panels.take(again).middles(chosen[again])
         rows, cuts = rows[again], np.concatenate([cuts[again], middles], axis=1)
+
+
+def _mark_unreached(spec: MachineSpec, columns: Columns, solved: Solved) -> None:
+    """Mark cases whose mean speed is not the required one, as far as these panels tell.
+
+    A low mean over time can need the shaft to stand nearer to rest than numbers can tell.
+    """
+    if spec.balance == "motor":
+        return
+    wanted = columns.row("mean_speed")
+    far = ~(np.abs(solved.results["omega.mean"] - wanted) <= 1e-6 * wanted)
+    far &= solved.endings == _CODE[Ending.OK]
+    solved.endings[far] = _CODE[Ending.INERTIA_INSUFFICIENT]
+    for name, values in solved.results.items():
+        if name.startswith(_OF_MOTION):
+            solved.results[name] = np.where(far, np.nan, values)
 
 
 def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
@@ -148,8 +169,15 @@ def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
     results = characteristics(d, spec.phi_c)
     results["work.drive"], results["work.resistance"] = d.drive.ends[:, -1], d.resistance.ends[:, -1]
     results["least_mean_speed"] = least
+    for name in ("omega.angle_at_max", "omega.angle_at_min"):
+        results[name] = np.where(np.isnan(start), np.nan, results[name])
     results["inertia.min"] = np.where(negative, least_inertia, results["inertia.min"])
     _by_definition(spec, columns, d, results)
+    stalled = endings == _CODE[Ending.MOTOR_STALLED]
+    if stalled.any():
+        for name, values in results.items():
+            if name.startswith(_OF_MOTOR):
+                results[name] = np.where(stalled, np.nan, values)
     rough, rough_pace = _rough(d), _rough_pace(d)
     return Solved(d, results, endings, rough | rough_pace if spec.mean_speed_is == "time" else rough, rough_pace)
 

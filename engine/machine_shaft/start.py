@@ -111,14 +111,16 @@ def start_energy(shape: Shape, stop: Stop, kind: MeanSpeed, wanted: Floats) -> F
         high[active] = np.where(error >= 0.0, start[active], high[active])
         with np.errstate(divide="ignore", invalid="ignore"):
             step = start[active] - error / (2.0 * mean * slope)
-        inside = (step >= low[active]) & (step <= high[active])
+        # Where the shaft stops the slope is infinite, and the step leads nowhere.
+        inside = (step >= low[active]) & (step <= high[active]) & np.isfinite(slope)
         following = np.where(inside, step, 0.5 * (low[active] + high[active]))
         scale = np.abs(start[active]) + np.abs(stop.work[active])
         moved = np.abs(following - start[active])
         start[active] = following
         found[active] = following
-        # Newton's next step would be the square of this one.
-        active = active[(moved > 1e-9 * scale) & (error != 0.0)]
+        # Newton's next step would be the square of this one, unless the slope is nearly infinite.
+        near = (moved <= 1e-9 * scale) & (np.abs(error) <= 1e-6 * wanted[active] ** 2)
+        active = active[~near & (error != 0.0)]
     return found
 
 

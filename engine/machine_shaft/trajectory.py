@@ -141,4 +141,5 @@ def _table(d: Decomposition, chosen: int | None, angles: Floats) -> dict[str, Fl
 
 def _time(d: Decomposition, cases: NDArray[np.int64], points: Points) -> Floats:
     pace = 1.0 / np.sqrt(d.squares)
-    return d.panels.running_at_rows(pace, d.panels.running(pace)[1], cases, points)
+    # No time has passed at the angle 0, whatever rounding makes of the polynomial there.
+    return np.maximum(d.panels.running_at_rows(pace, d.panels.running(pace)[1], cases, points), 0.0)

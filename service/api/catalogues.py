@@ -15,7 +15,7 @@ from service.api.document import problems
 from service.api.requests import strict_query
 from service.api.respond import entity_tag, json_response, not_modified, tagged
 from service.errors import ApiError
-from service.presets import preset_names, preset_text
+from service.presets import ABOUT, preset_names, preset_text
 from service.spec import format_of, load_spec, parse_spec
 from worker import kernels
 
@@ -59,10 +59,18 @@ def get_preset(request: Request, name: PresetName) -> Any:
 
 @lru_cache
 def preset_of(name: str) -> dict[str, Any]:
-    """A study that comes with the program: name, title, cases, spec; KeyError when there is none of that name."""
+    """A study that comes with the program, with its spec and what it shows; KeyError when there is none so named."""
     file, text = preset_text(name)
     spec = parse_spec(load_spec(text, format_of(file)))
-    return {"name": name, "title": spec.study.name, "cases": spec.study.cases, "spec": spec.spec}
+    return {
+        "name": name,
+        "title": spec.study.name,
+        "model": spec.study.model,
+        "shows": ABOUT[name].shows,
+        "values": ABOUT[name].values,
+        "cases": spec.study.cases,
+        "spec": spec.spec,
+    }
 
 
 def _answer(request: Request, data: dict[str, Any]) -> Any:

@@ -326,6 +326,9 @@ class Preset(Body):
 
     name: str
     title: str = Field(description="the name of the study")
+    model: str
+    shows: str = Field(description="what to look at in it")
+    values: str = Field(description="where its numbers come from")
     cases: int
     spec: dict[str, Any] = Field(description="its spec, which can be submitted")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import asdict
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
@@ -149,7 +150,7 @@ def trajectory(
         made = _trajectory(study, case, start, end, points)
         as_text = as_json or (file or "").lower().endswith(".json") if form is None else form is ValueFormat.JSON
         write(_trajectory_bytes(made, study, case, as_text))
-    say(f"case {case}: {made.ending}, {points} points in time")
+    say(f"case {case}: {made.ending}, {points} points {'in time' if made.along == 'time' else 'over the angle'}")
     if made.ending != OK:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
 
@@ -183,20 +184,21 @@ def _trajectory_bytes(made: Trajectory, study: Study, case: int, as_json: bool) 
 
 def presets(
     name: Annotated[
-        str | None, typer.Argument(metavar="[NAME]", help="Study to print; without it: their names.")
+        str | None, typer.Argument(metavar="[NAME]", help="Study to print; without it: what each shows.")
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """List the studies that come with the program, or print the spec of one."""
-    from service.presets import preset_names, preset_text
+    from service.presets import ABOUT, preset_names, preset_text
     from service.spec_messages import did_you_mean
 
     names = preset_names()
     if name is None:
         if as_json:
-            write_json({"presets": list(names)})
+            write_json({"presets": list(names), "about": {item: asdict(ABOUT[item]) for item in names}})
         else:
-            write_text("".join(f"{item}\n" for item in names))
+            width = max(map(len, names)) + 2
+            write_text("".join(f"{item:{width}}{ABOUT[item].shows}\n" for item in names))
         return
     if name not in names:
         problem = Problem("NAME", f"there is no such preset{did_you_mean(name, names)}", name, allowed=", ".join(names))

@@ -1,8 +1,67 @@
-"""Studies that come with the program: a demonstration, and a start for one's own."""
+"""Studies that come with the program: demonstrations, and a start for one's own."""
 
+from dataclasses import dataclass
 from importlib.resources import files
+from typing import Final
 
 _FORMATS = (".json", ".toml")
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """What a study is for: ``shows`` what to look at in it, ``values`` where its numbers come from."""
+
+    shows: str
+    values: str
+
+
+#: What every study shows. Those of the machine shaft tell more at the head of their files.
+ABOUT: Final[dict[str, About]] = {
+    "one_pendulum": About(
+        "the mechanical characteristic of a drive with one pendulum: speed, torque, power and efficiency against load, "
+        "at several frequencies and amplitudes",
+        "a hand-sized rig: 0.5 kg at 30 mm on springs that give it a natural frequency of 24 Hz, near the 25 Hz of a "
+        "four-pole unbalance motor on 50 Hz mains",
+    ),
+    "two_pendulums": About(
+        "two pendulums of different stiffness on one shaft: one clutch drives while the other overruns",
+        "the rig of one_pendulum with a second, stiffer pendulum and clutches of 0.3 degrees of lost motion",
+    ),
+    "press": About(
+        "a crank press whose irregularity falls with the flywheel; too little inertia at low speed is an ending of its "
+        "own",
+        "a light press of 200 mm of stroke with 20 kN over the last 60 degrees",
+    ),
+    "shaper": About(
+        "a crank-shaper quick return under a cutting force over the slow stroke",
+        "a shaper of about 0.4 m of stroke at 40 strokes a minute, 3 kN for a cut of 1.5 mm^2 in steel",
+    ),
+    "slotter": About(
+        "a Whitworth quick return with a vertical ram, turned by an induction motor: the speed is a result",
+        "a slotter of about 0.3 m of stroke at 30 strokes a minute with a motor of about 1 kW",
+    ),
+    "compressor": About(
+        "the gas itself as resistance: flywheel and irregularity against discharge pressure",
+        "a workshop compressor of 100 mm bore and 80 mm stroke at 750 rpm",
+    ),
+    "conveyor": About(
+        "unevenness that comes from masses more than from work: a tray rocked to and fro",
+        "an oscillating conveyor of 30 mm of stroke at 300 strokes a minute with 150 kg",
+    ),
+    "cam_machine": About(
+        "a cam that lifts a tool against a spring: work that goes to and fro",
+        "a packaging machine of 120 strokes a minute with 40 mm of lift",
+    ),
+    "question_drive_inertia": About(
+        "first question of the course: irregularity against the inertia of the drive", "the crank press"
+    ),
+    "question_masses": About(
+        "second question of the course: irregularity against masses and geometry of the actuator", "the crank press"
+    ),
+    "question_operation": About(
+        "third question of the course: irregularity against the diagram of the operation", "the crank press"
+    ),
+}
 
 
 def _files() -> dict[str, str]:
@@ -12,8 +71,8 @@ def _files() -> dict[str, str]:
 
 
 def preset_names() -> tuple[str, ...]:
-    """Names of the studies, in order."""
-    return tuple(sorted(_files()))
+    """Names of the studies, in the order in which they are best looked at."""
+    return tuple(name for name in ABOUT if name in _files())
 
 
 def preset_text(name: str) -> tuple[str, str]:

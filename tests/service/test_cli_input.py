@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from engine.endings import Ending
-from engine.vibration_drive.simulate import Trajectory
 from tests.wrong_specs import WRONG, changed
 from worker import kernels
+from worker.kernels import Trajectory
 from worker.study import Study
 
 Sprag = Callable[..., Any]

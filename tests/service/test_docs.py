@@ -9,7 +9,7 @@ import typer
 
 from engine.machine_shaft.results import MACHINE_RESULTS
 from service.cli.app import app
-from service.presets import preset_names, preset_text
+from service.presets import ABOUT, preset_names, preset_text
 from service.settings import table
 from worker import kernels, limits
 from worker.states import StudyState
@@ -132,6 +132,13 @@ def test_the_studies_that_come_with_the_program_are_the_examples() -> None:
     for name in preset_names():
         file, text = preset_text(name)
         assert (ROOT / "examples" / file).read_text() == text
+
+
+def test_the_presets_are_described_with_their_sources() -> None:
+    page = (ROOT / "docs" / "presets.md").read_text()
+    for name, about in ABOUT.items():
+        (row,) = [line for line in page.splitlines() if line.startswith(f"| `{name}` |")]
+        assert row.endswith(f"| {about.shows} | {about.values} |")
 
 
 def test_the_waiting_loop_of_the_readme_ends_in_every_state_that_a_study_does_not_leave_by_itself() -> None:

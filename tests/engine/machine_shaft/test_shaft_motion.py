@@ -141,6 +141,21 @@ def test_extremes_and_means_of_a_dense_table(kind: MeanSpeed) -> None:
         assert got[f"{name}.max"] >= values.max() - 1e-11 * width
 
 
+@pytest.mark.parametrize("kind", ["midrange", "angle", "time"])
+@pytest.mark.parametrize(("spec", "numbers"), [(PRESS, PRESS_NUMBERS), (SHAPER, SHAPER_NUMBERS)])
+def test_every_feasible_mean_speed_is_reached(kind: MeanSpeed, spec: MachineSpec, numbers: dict[str, Any]) -> None:
+    own = replace(spec, mean_speed_is=kind)
+    least = one(own, numbers)["least_mean_speed"]
+    speeds = max(least, 0.1) * np.array([1.0001, 1.001, 1.01, 1.03, 1.05, 1.07, 1.1, 1.13, 1.2, 1.3, 1.5, 2.0, 5.0])
+    batch = simulate(own, numbers | {"mean_speed": speeds}, cases=len(speeds))
+    ok = batch.endings == ENDING_CODES.index(Ending.OK)
+    # The press has a smooth stop: as low a mean over time would take a shaft that stands nearly still.
+    assert ok.sum() == (0 if least == 0.0 else len(speeds))
+    assert set(batch.endings) <= {ENDING_CODES.index(Ending.OK), ENDING_CODES.index(Ending.INERTIA_INSUFFICIENT)}
+    assert batch.values[ok, NAMES.index("omega.mean")] == pytest.approx(speeds[ok], rel=1e-9)
+    assert (batch.values[ok, NAMES.index("omega.min")] > 0.0).all()
+
+
 def test_results_do_not_depend_on_the_batch() -> None:
     cases = 70
     numbers = PRESS_NUMBERS | {

@@ -52,7 +52,8 @@ def test_insufficient_inertia_tells_the_least_mean_speed() -> None:
     assert [ENDING_CODES[code] for code in batch.endings] == [Ending.INERTIA_INSUFFICIENT, Ending.OK, Ending.OK]
     least = batch.values[:, NAMES.index("least_mean_speed")]
     assert least == pytest.approx(error.value.least_mean_speed, rel=1e-12)
-    assert np.isnan(batch.values[0, NAMES.index("omega.max")])
+    for name in ("omega.max", "omega.angle_at_max", "omega.angle_at_min"):
+        assert np.isnan(batch.values[0, NAMES.index(name)])
     table = trajectory(PRESS, PRESS_NUMBERS | {"mean_speed": 4.0}, [0.0, 1.0])
     assert table.ending is Ending.INERTIA_INSUFFICIENT
     assert table.values.shape == (0, len(table.names))
@@ -108,11 +109,15 @@ def test_other_base_errors() -> None:
     with pytest.raises(UnbalancedWorkError, match=r"does 6\.28319 J and the resistance -12\.5664 J"):
         check(refused, FLAT | {"drive.torque": 1.0, "operation.value": 2.0})
     motor = replace(refused, balance="motor", drive=Drive(motor="linear"))
+    weak = {
+        "drive.inertia": 1.0, "operation.value": 5.0, "drive.motor.no_load_speed": 9.0, "drive.motor.stall_torque": 4.0,
+    }  # fmt: skip
     with pytest.raises(MotorStalledError):
-        check(motor, {
-            "drive.inertia": 1.0, "operation.value": 5.0, "drive.motor.no_load_speed": 9.0,
-            "drive.motor.stall_torque": 4.0,
-        })  # fmt: skip
+        check(motor, weak)
+    stalled = dict(zip(NAMES, simulate(motor, weak, cases=1).values[0], strict=True))
+    assert {name for name, value in stalled.items() if not np.isnan(value)} == {
+        "work.resistance", "inertia.mean", "inertia.max", "inertia.min"
+    }  # fmt: skip
     with pytest.raises(QuadratureError):
         check(formula("1 + sin(3000*phi)^2/10"), FLAT)
     with pytest.raises(ExpressionError, match="no finite number"):

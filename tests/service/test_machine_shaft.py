@@ -1,0 +1,204 @@
+"""Machine shafts through the service: rows, curves, maps, tables over the angle and faults, by HTTP and by command."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from engine.machine_shaft.simulate import simulate
+from engine.machine_shaft.spec import MachineSpec
+from engine.machine_shaft.trajectory import trajectory
+from service.api import models as m
+from service.local import run_here
+from service.spec import format_of, load_spec, parse_spec
+from service.storage.store import Store
+from tests.service.test_spec_shaft import PRESS, changed
+from worker import kernels
+from worker.executors.inline import InlineExecutor
+
+if TYPE_CHECKING:
+    from tests.service.conftest import Service
+
+#: The press of MODEL.md's reference, without units: what the engine is called with here knows nothing of specs.
+NUMBERS = {
+    "mechanism.slider_crank.crank": 0.1,
+    "mechanism.slider_crank.rod": 0.4,
+    "mechanism.slider_crank.rod_centre": 0.16,
+    "mechanism.slider_crank.rod_mass": 6.0,
+    "mechanism.slider_crank.rod_inertia": 0.12,
+    "mechanism.slider_crank.ram_mass": 20.0,
+    "mechanism.slider_crank.inclination": -math.pi / 2.0,
+    "operation.steps.0.from": 2.0943951023931957,  # 2 pi/3, correctly rounded
+    "operation.steps.0.to": math.pi,
+    "operation.steps.0.value": 20e3,
+    "wanted_irregularity": 0.1,
+}
+STRUCTURE = MachineSpec.from_json(
+    {
+        "mechanism": {"kind": "slider_crank"},
+        "operation": {"quantity": "force", "form": "steps", "steps": 1},
+    }
+)
+RESULTS = [info.name for info in kernels.result_infos("machine-shaft", 0)]
+
+
+@pytest.fixture
+def filled(service: Service) -> tuple[Service, str]:
+    """A service with the press, its rows computed and committed as a dispatcher does."""
+    study_id = service.submit(PRESS)
+    study, number = service.store.study(study_id), service.store.get_study(study_id).number
+    epoch = service.store.take_over("test")
+    for chunk in service.store.claim(epoch, service.store.open_chunks(number)):
+        assert service.store.commit(epoch, chunk, kernels.run_chunk(study, chunk.first, chunk.count))
+    service.store.settle(epoch, number)
+    return service, study_id
+
+
+def engine_rows(study_id_study: Any) -> np.ndarray[Any, Any]:
+    """Results of all cases straight from the engine."""
+    columns = study_id_study.columns(range(study_id_study.cases))
+    return simulate(STRUCTURE, NUMBERS | columns, cases=study_id_study.cases).values
+
+
+def test_rows_are_the_engines(filled: tuple[Service, str]) -> None:
+    service, study_id = filled
+    block = service.store.case_rows(study_id)
+    np.testing.assert_array_equal(block.values, engine_rows(service.store.study(study_id)))
+    page = service.get(f"/studies/{study_id}/cases", page_size=52)
+    m.CasePage.model_validate(page)
+    row = page["cases"][30]
+    assert row["ending"] == "ok"
+    assert isinstance(row["results"]["phi_c.count"], int)
+    assert page["cases"][0]["ending"] == "inertia_insufficient"
+    assert page["cases"][0]["results"]["omega.max"] is None
+    case = service.get(f"/studies/{study_id}/cases/0")
+    assert "least_mean_speed" in case["ending_meaning"]
+    assert case["results"]["least_mean_speed"] > case["parameters"]["mean_speed"]
+
+
+def test_curves_and_maps(filled: tuple[Service, str]) -> None:
+    service, study_id = filled
+    rows = engine_rows(service.store.study(study_id)).reshape(4, 13, -1)
+    curves = service.get(
+        f"/studies/{study_id}/curves", x="drive.inertia", y=["irregularity", "omega.min"], at="mean_speed=120 rpm"
+    )
+    m.Curves.model_validate(curves)
+    assert curves["x"]["unit"] == "kg*m^2"
+    assert curves["curves"][0]["y"]["irregularity"] == rows[2, :, RESULTS.index("irregularity")].tolist()
+    assert curves["curves"][0]["endings"] == ["ok"] * 13
+    drawn = service.get(f"/studies/{study_id}/map", x="drive.inertia", y="mean_speed", z="s4.amplitude")
+    assert np.array(drawn["z"]["values"], dtype=float) == pytest.approx(
+        rows[:, :, RESULTS.index("s4.amplitude")], rel=0, abs=0, nan_ok=True
+    )
+    picture = service.http.get(
+        f"/api/v1/studies/{study_id}/curves?x=drive.inertia&y=irregularity&by=mean_speed&format=svg"
+    )
+    assert picture.status_code == 200
+    for page in ("", "/cases", "/cases/30", "/curves", "/map"):
+        assert service.http.get(f"/studies/{study_id}{page}").status_code == 200
+
+
+def test_trajectories_are_tables_over_the_angle(filled: tuple[Service, str]) -> None:
+    service, study_id = filled
+    study = service.store.study(study_id)
+    case = study.case_number((2, 6))
+    own = NUMBERS | study.case_parameters(case)
+    table = service.get(f"/studies/{study_id}/cases/{case}/trajectory", points=73)
+    m.AngleTable.model_validate(table)
+    assert table["angles"] == np.linspace(0.0, 2.0 * math.pi, 73).tolist()
+    expected = trajectory(STRUCTURE, own, table["angles"])
+    assert {name: entry["unit"] for name, entry in table["variables"].items()} == dict(
+        zip(expected.names, expected.units, strict=True)
+    )
+    for column, name in enumerate(expected.names):
+        assert table["values"][name] == expected.values[:, column].tolist()
+    squares = np.array([table["values"][f"s{k}"] for k in range(1, 5)]).sum(axis=0)
+    assert squares == pytest.approx(np.array(table["values"]["omega"]) ** 2, rel=1e-12)
+    assert len(table["phi_c"]) == service.get(f"/studies/{study_id}/cases/{case}")["results"]["phi_c.count"]
+    part = service.get(
+        f"/studies/{study_id}/cases/{case}/trajectory", **{"from": "90 deg", "to": "0.5 cycles"}, points=2
+    )
+    assert part["angles"] == pytest.approx([math.pi / 2.0, math.pi], rel=1e-15)
+    text = service.http.get(f"/api/v1/studies/{study_id}/cases/{case}/trajectory?points=2&format=csv").text
+    assert text.startswith("angle,time,omega,acceleration,")
+    beyond = service.http.get(f"/api/v1/studies/{study_id}/cases/{case}/trajectory?to=400%20deg")
+    assert beyond.status_code == 422
+    assert "outside the cycle" in beyond.text
+    assert service.get(f"/studies/{study_id}/cases/0/trajectory")["ending"] == "inertia_insufficient"
+
+
+@pytest.mark.parametrize(
+    ("changes", "pointer", "says"),
+    [
+        ({"/base/mean_speed": "40 rpm"}, "/base/mean_speed", "least feasible mean speed is 4.7"),
+        (
+            {"/base/drive/torque": 50, "/base/balance": "refuse"},
+            "/base/balance",
+            "The work over a cycle is not zero: the drive does 314.159 J",
+        ),
+        ({"/base/mechanism/slider_crank/rod": "90 mm"}, "/base/mechanism/slider_crank", "64.1581 deg"),
+        (
+            {"/base/drive/torque": {"table": [[0, 1], ["360 deg", 2]]}},
+            "/base/drive/torque/table",
+            "does not close on itself",
+        ),
+        ({"/base/drive/inertia": -1}, "/base/drive/inertia", "is out of range"),
+    ],
+)
+def test_faults_by_http_and_by_command(
+    service: Service, sprag: Callable[..., Any], tmp_path: Path, changes: Any, pointer: str, says: str
+) -> None:
+    for address in ("studies", "studies:preview"):
+        answer = service.http.post(f"/api/v1/{address}", json=changed(changes))
+        assert answer.status_code == 422
+        assert answer.headers["content-type"] == "application/problem+json"
+        (error,) = answer.json()["errors"]
+        assert error["pointer"] == pointer
+        assert says in error["message"]
+    path = tmp_path / "press.json"
+    path.write_text(json.dumps(changed(changes)))
+    done = sprag("validate", path)
+    assert done.code == 2
+    assert f"{pointer}: " in done.err
+    assert says in done.err
+
+
+def test_run_and_preview(service: Service, examples: Path) -> None:
+    parsed = parse_spec(load_spec((examples / "press.toml").read_bytes(), format_of("press.toml")))
+    with run_here(parsed.spec, parsed.study, processes=1, executor=InlineExecutor()) as done:
+        np.testing.assert_array_equal(done.store.case_rows(done.record.id).values, engine_rows(parsed.study))
+        assert (done.record.ok, done.record.cases) == (49, 52)
+    preview = service.http.post("/api/v1/studies:preview", json=PRESS).json()
+    m.Preview.model_validate(preview)
+    assert (preview["cases"], preview["shape"], preview["results"]) == (52, [4, 13], len(RESULTS))
+    assert 0.0 < preview["estimated_seconds"] < 5.0
+
+
+def test_rows_of_another_structure_are_not_reused(tmp_path: Path) -> None:
+    plain = {"/base/mechanism": {"formula": "3*sin(phi)^2"}, "/base/operation": ..., "/axes/0/values": [10, 20]}
+    other = plain | {"/base/mechanism": {"formula": "2*sin(phi)^2"}}
+    with Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}") as store:
+        first, second = (parse_spec(changed(spec)) for spec in (plain, other))
+        record = store.create_study(first.spec, first.study)
+        epoch = store.take_over("test")
+        for chunk in store.claim(epoch, store.open_chunks(record.number)):
+            store.commit(epoch, chunk, kernels.run_chunk(first.study, chunk.first, chunk.count))
+        assert store.reusable(first.study) == first.study.cases
+        assert store.reusable(second.study) == 0
+
+
+def test_rows_as_a_file(filled: tuple[Service, str]) -> None:
+    service, study_id = filled
+    text = service.http.get(f"/api/v1/studies/{study_id}/results?format=csv").text
+    rows = list(csv.DictReader(io.StringIO(text)))
+    assert list(rows[0])[:4] == ["case", "mean_speed", "drive.inertia", "ending"]
+    assert list(rows[0])[5:] == RESULTS
+    assert rows[0]["omega.max"] == ""
