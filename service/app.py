@@ -79,7 +79,7 @@ def create_app(
     """
     settings = settings or Settings()
     own_store = store is None
-    used_store = store or Store.open(settings.database_url, chunking=chunking(settings))
+    used_store = store or _sound_store(settings)
     try:
         settings.require_safe(stored=any(token.revoked_at is None for token in used_store.tokens()))
     except UnsafeSettingsError:
@@ -123,6 +123,16 @@ def create_app(
         app.include_router(page.router)
     handlers.install(app)
     return app
+
+
+def _sound_store(settings: Settings) -> Store:
+    store = Store.open(settings.database_url, chunking=chunking(settings))
+    try:
+        store.require_sound()
+    except BaseException:
+        store.close()
+        raise
+    return store
 
 
 def chunking(settings: Settings) -> Chunking:

@@ -32,6 +32,8 @@ _LOG = logging.getLogger(__name__)
 
 #: Seconds between two tries of a standby to take the lock.
 STANDBY_SECONDS = 0.3
+#: Seconds without a sign of life after which a standby says so: several times what lies between two signs.
+SILENT_SECONDS = 60.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,21 +86,23 @@ def run_dispatcher(
     say: Callable[[str], None] = _LOG.info,
     executor: Callable[[WorkerSettings], Executor] = pool,
     renewed: Callable[[WorkerSettings], Executor] = renewed_pool,
+    take_over: bool = False,
 ) -> None:
     """Run every study of the database until ``stopping()``. Waits as a standby while another dispatcher is at work.
+
+    With ``take_over`` it does not wait: the other one can store nothing any more, and ends when it finds that out.
 
     Raises StoreError (EpochLostError when another dispatcher took over) and ExecutorError, each with one sentence.
     """
     chunking = Chunking(settings.chunk_cases, settings.processes, settings.chunk_timeout)
     with Store.open(settings.database_url, chunking=chunking) as store:
+        store.require_sound()
         scheduler = Scheduler(store)
         lock = DispatcherLock(store.session.path)
-        if not lock.take():
-            say(f"another worker (process {lock.holder()}) is at work on {store.session.path}; waiting for its end")
-            while not lock.take():
-                if stopping():
-                    return
-                time.sleep(STANDBY_SECONDS)
+        if take_over:
+            lock.seize()
+        elif not _stand_by(store, lock, stopping, say):
+            return
         try:
             store.purge()
             say(f"worker with {settings.processes} processes at work on {store.session.path}")
@@ -110,6 +114,31 @@ def run_dispatcher(
         finally:
             scheduler.stop()
             lock.release()
+
+
+def _stand_by(store: Store, lock: DispatcherLock, stopping: Callable[[], bool], say: Callable[[str], None]) -> bool:
+    """Wait for the lock; False when ``stopping()`` came first. A holder that is not heard of any more is told once."""
+    if lock.take():
+        return True
+    say(f"another worker (process {lock.holder()}) is at work on {store.session.path}; waiting for its end")
+    told = False
+    while not lock.take():
+        if stopping():
+            return False
+        if not told and (silence := _silence(store)) > SILENT_SECONDS:
+            told = True
+            say(
+                f"nothing was heard of process {lock.holder()} for {silence:.0f} s; end it, or go on without it: "
+                "`sprag worker --take-over`"
+            )
+        time.sleep(STANDBY_SECONDS)
+    return True
+
+
+def _silence(store: Store) -> float:
+    """Seconds since the dispatcher at work was last heard of."""
+    found = store.dispatcher()
+    return 0.0 if found is None else (store.clock.now() - found.heartbeat_at).total_seconds()
 
 
 def stop_on_signals() -> StopFlag:

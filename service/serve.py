@@ -28,8 +28,8 @@ _GRACE_SECONDS = 5
 _STOP_SECONDS = 15.0
 #: Seconds before a dead dispatcher is started again: doubled each time, back to the first after a long life.
 _FIRST_DELAY = 0.5
-_LONGEST_DELAY = 30.0
-_LONG_LIFE = 60.0
+_LONGEST_DELAY = 10.0
+_LONG_LIFE = 10.0
 
 
 class AddressError(Exception):

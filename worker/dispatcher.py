@@ -124,13 +124,13 @@ class Dispatcher:
     def _has_room(self, studies: Sequence[ActiveStudy]) -> bool:
         """Hold every study while there is no room, and let them go on when there is; False when any has changed."""
         shortage = self._store.shortage()
-        if self._full is not None:
-            self._store.release(self._epoch)
+        dropped = self._full is not None
+        if dropped:
             shortage = shortage or f"{self._full}; it is tried again from time to time"
         going = any(study.state in {StudyState.QUEUED, StudyState.RUNNING} for study in studies)
         if shortage is not None or self._clock.monotonic() < self._try_again:
-            if going:
-                self._store.hold(self._epoch, shortage or "no room")
+            if going or dropped:
+                self._store.hold(self._epoch, shortage or "no room", returned=dropped)
                 if self._only is None:
                     _LOG.error("Every study is held: %s", shortage)
             self._full = None

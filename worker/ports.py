@@ -148,8 +148,11 @@ class Store(Protocol):
     def shortage(self) -> str | None:
         """Why there is no room for more rows, as a sentence; None where there is."""
 
-    def hold(self, epoch: int, reason: str) -> None:
-        """Pause every study that is queued or running, with the reason, until `let_go`."""
+    def hold(self, epoch: int, reason: str, *, returned: bool) -> None:
+        """Pause every study that is queued or running, with the reason, until `let_go`.
+
+        With ``returned`` every claim of this epoch goes back to waiting, too.
+        """
 
     def let_go(self, epoch: int) -> None:
         """Queue again every study that `hold` paused and nobody has touched since."""

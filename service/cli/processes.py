@@ -47,7 +47,14 @@ def serve(
         raise TroubleError(str(error)) from error
 
 
-def worker(db: Database = None, processes: Processes = None) -> None:
+def worker(
+    db: Database = None,
+    processes: Processes = None,
+    take_over: Annotated[
+        bool,
+        typer.Option("--take-over", help="Do not wait for another worker: it can store nothing more, and gives up."),
+    ] = False,
+) -> None:
     """Run the studies of a database without a service; Ctrl-C ends it."""
     from service.dispatching import WorkerSettings, run_dispatcher, stop_on_signals
 
@@ -56,4 +63,5 @@ def worker(db: Database = None, processes: Processes = None) -> None:
         WorkerSettings(settings.database_url, settings.pool_processes, settings.chunk_timeout, settings.chunk_cases),
         stop_on_signals(),
         say=say,
+        take_over=take_over,
     )

@@ -29,6 +29,14 @@ class DispatcherLock:
         self._file = file
         return True
 
+    def seize(self) -> None:
+        """Take the lock from whoever has it, which only the epoch then keeps from the database.
+
+        The file is replaced, so that the old holder keeps a lock on nothing and the next one finds ours.
+        """
+        while not self.take():
+            self.path.unlink(missing_ok=True)
+
     def holder(self) -> str:
         """Process id of whoever took the lock last, "" where nobody did."""
         try:

@@ -11,11 +11,14 @@ import sqlalchemy as sa
 
 from service.storage.errors import DatabaseError, SchemaError
 from service.storage.records import CheckReport
-from service.storage.session import sqlite_version, sqlite_warning
+from service.storage.session import damaged, sqlite_version, sqlite_warning
 from service.storage.tables import HEAD_REVISION
 
 if TYPE_CHECKING:
     from service.storage.session import Session
+
+#: Bytes of a database up to which it is looked over at every start: that takes less than a second.
+CHECKED_BYTES = 256_000_000
 
 
 def revision(session: Session) -> str | None:
@@ -86,6 +89,18 @@ def upgrade(session: Session) -> tuple[str | None, str]:
         config.attributes["connection"] = connection
         command.upgrade(config, "head")
     return before, HEAD_REVISION
+
+
+def require_sound(session: Session) -> None:
+    """Raise DatabaseError when the pages of the database are damaged; large ones are not looked over.
+
+    `check` looks at everything, and takes its time.
+    """
+    if session.path.stat().st_size > CHECKED_BYTES:
+        return
+    with session.read() as connection:
+        if connection.exec_driver_sql("PRAGMA quick_check(1)").scalar_one() != "ok":
+            raise DatabaseError(damaged(session.path))
 
 
 def check(session: Session) -> CheckReport:

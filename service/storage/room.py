@@ -1,19 +1,24 @@
 """How much the database can still take, and holding the studies while that is not enough.
 
 A study is held before the disk is full, while there is room to say so. Where others take the last room in between, a
-write fails; the dispatcher then drops what it has in hand and tries to say so until it can.
+write fails; the dispatcher then drops what it has in hand and says so with the help of a reserve: a file beside the
+database that is removed when there is no other room.
 """
 
 from __future__ import annotations
 
+import os
 import resource
 import shutil
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import sqlalchemy as sa
 
+from service.storage.errors import DatabaseFullError
 from service.storage.part import Part
 from service.storage.tables import STUDIES, WAITS_FOR_ROOM
+from service.storage.work import return_claims
 from worker.states import StudyEvent, StudyState
 
 if TYPE_CHECKING:
@@ -23,6 +28,8 @@ if TYPE_CHECKING:
 
 #: Bytes kept free for the chunks that are being run, and for saying that nothing more is.
 RESERVE_BYTES = 4 * 1024 * 1024
+#: Bytes of the file that is given up when not even that can be said.
+RESERVE_FILE_BYTES = 1024 * 1024
 GOES_ON = "the study goes on by itself when there is room"
 
 
@@ -55,7 +62,11 @@ def _within(session: Session) -> tuple[int, int]:
     with session.plain() as connection:
         page: int = connection.exec_driver_sql("PRAGMA page_size").scalar_one()
         unused: int = connection.exec_driver_sql("PRAGMA freelist_count").scalar_one()
-        _busy, logged, moved = connection.exec_driver_sql("PRAGMA wal_checkpoint(PASSIVE)").one()
+    try:
+        with session.plain() as connection:
+            _busy, logged, moved = connection.exec_driver_sql("PRAGMA wal_checkpoint(PASSIVE)").one()
+    except DatabaseFullError:
+        return unused * page, 0
     # The log is written over from its beginning once all of it has been moved.
     return unused * page, (logged * page if logged == moved else 0)
 
@@ -70,12 +81,39 @@ class Room(Part):
     def shortage(self) -> str | None:
         """Why there is no room for more rows, as a sentence; None where there is."""
         left, limit = room(self.session)
-        return f"no room: {limit}; {GOES_ON}" if left < RESERVE_BYTES else None
+        if left < RESERVE_BYTES:
+            return f"no room: {limit}; {GOES_ON}"
+        self._keep_reserve()
+        return None
 
-    def hold(self, epoch: int, reason: str) -> None:
-        """Pause every study that is queued or running, with the reason, until `let_go`."""
+    @property
+    def _reserve(self) -> Path:
+        return self.session.path.with_name(f"{self.session.path.name}.reserve")
+
+    def _keep_reserve(self) -> None:
+        """Have the file there that is given up when the disk is full."""
+        if self._reserve.exists():
+            return
+        with suppress(OSError), self._reserve.open("xb") as file:
+            file.write(os.urandom(RESERVE_FILE_BYTES))  # zeros could be stored as nothing
+            os.fsync(file.fileno())
+
+    def hold(self, epoch: int, reason: str, *, returned: bool) -> None:
+        """Pause every study that is queued or running, with the reason, until `let_go`.
+
+        With ``returned`` every claim of this epoch goes back to waiting in the same transaction.
+        """
+        try:
+            self._hold(epoch, reason, returned)
+        except DatabaseFullError:
+            self._reserve.unlink(missing_ok=True)
+            self._hold(epoch, reason, returned)
+
+    def _hold(self, epoch: int, reason: str, returned: bool) -> None:
         with self.session.write() as connection:
             self._own(connection, epoch)
+            if returned:
+                return_claims(connection)
             going = [StudyState.QUEUED.value, StudyState.RUNNING.value]
             numbers = connection.execute(sa.select(STUDIES.c.number).where(STUDIES.c.state.in_(going))).scalars().all()
             for number in numbers:

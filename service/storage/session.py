@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
@@ -25,6 +26,7 @@ POOL_CONNECTIONS = 8
 NETWORK_FILE_SYSTEMS = frozenset({"afs", "ceph", "cifs", "fuse.sshfs", "glusterfs", "nfs", "nfs4", "smb3", "smbfs"})
 
 _BEGIN = "sprag_begin"
+_BUSY = "another process kept the database {} busy for too long; try again"
 
 
 def sqlite_driver() -> Any:
@@ -99,6 +101,7 @@ class Session:
         )
         sa.event.listen(self._engine, "connect", _set_pragmas)
         sa.event.listen(self._engine, "begin", _begin)
+        self._writing = Lock()
         self._writer = self._engine.execution_options(**{_BEGIN: "BEGIN IMMEDIATE"})
 
     def _check_place(self) -> None:
@@ -110,12 +113,15 @@ class Session:
         if self.path.is_dir():
             raise DatabaseError(f"{self.path} is a folder, not a database file")
         if not os.access(folder, os.W_OK):
-            raise DatabaseError(f"the folder {folder} is read-only; the database needs to write beside its file")
+            raise DatabaseError(
+                f"the folder {folder} is read-only, and the database needs to write beside its file: "
+                f"`chmod u+w {folder}`, or name another place with --db"
+            )
         kind = file_system_of(self.path.resolve())
         if kind in NETWORK_FILE_SYSTEMS:
             raise DatabaseError(
                 f"{self.path} lies on a network file system ({kind}), which cannot hold a database safely: "
-                "use a local disk"
+                "name a file on a local disk with --db"
             )
 
     @property
@@ -132,8 +138,14 @@ class Session:
     @contextmanager
     def write(self) -> Iterator[sa.Connection]:
         """A write transaction, with the write lock from its first moment; commits at the end, or changes nothing."""
-        with self._transaction(self._writer) as connection:
-            yield connection
+        # Threads of one process queue here: SQLite's own waiting is by sleeping ever longer, and the last wakes last.
+        if not self._writing.acquire(timeout=BUSY_SECONDS):
+            raise DatabaseBusyError(_BUSY.format(self.path))
+        try:
+            with self._transaction(self._writer) as connection:
+                yield connection
+        finally:
+            self._writing.release()
 
     @contextmanager
     def _transaction(self, engine: sa.Engine) -> Iterator[sa.Connection]:
@@ -157,21 +169,25 @@ class Session:
         self._engine.dispose()
 
 
+def damaged(path: Path) -> str:
+    """What is to be said of a damaged database."""
+    return (
+        f"the database {path} is damaged; `sprag db check` tells where: put the latest copy that `sprag db backup` "
+        "wrote in its place"
+    )
+
+
 def explained(error: sa.exc.DBAPIError, path: Path) -> Exception:
     """The error with one sentence for a user where its cause is outside the program, else the error itself."""
     text = str(error.orig)
     known = {
-        "database is locked": DatabaseBusyError(
-            f"another process kept the database {path} busy for too long; try again"
-        ),
+        "database is locked": DatabaseBusyError(_BUSY.format(path)),
         "database or disk is full": DatabaseFullError(f"the disk that holds {path} is full"),
         "disk I/O error": DatabaseFullError(f"the disk that holds {path} reports an error on reading or writing"),
-        "readonly database": DatabaseError(f"the database {path} is read-only; make the file and its folder writable"),
+        "readonly database": DatabaseError(f"the database {path} is read-only: `chmod u+w {path}`, and its folder too"),
         "unable to open database": DatabaseError(f"the database {path} cannot be opened; check the folder's rights"),
-        "file is not a database": DatabaseError(f"{path} is not a Sprag database; name another file"),
-        "malformed": DatabaseError(
-            f"the database {path} is damaged; run `sprag db check`, then go on with the latest `sprag db backup`"
-        ),
+        "file is not a database": DatabaseError(f"{path} is not a Sprag database; name another file with --db"),
+        "malformed": DatabaseError(damaged(path)),
     }
     return next((explanation for phrase, explanation in known.items() if phrase in text), error)
 

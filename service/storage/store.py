@@ -48,6 +48,10 @@ class Store(Studies, Retries, Cases, Room, Schedules, Tokens, Work):
         """Raise DatabaseError when the database does not answer or has another revision."""
         maintenance.require_current(self.session)
 
+    def require_sound(self) -> None:
+        """Raise DatabaseError when a database of moderate size is damaged."""
+        maintenance.require_sound(self.session)
+
     def check(self) -> CheckReport:
         """Look the database over; can take minutes on a large one."""
         return maintenance.check(self.session)

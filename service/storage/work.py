@@ -45,6 +45,11 @@ class _SourceGoneError(Exception):
     """Rows that were to be copied are not there any more."""
 
 
+def return_claims(connection: sa.Connection) -> None:
+    """Return every claim to waiting."""
+    connection.execute(sa.update(CHUNKS).where(CLAIMED).values(_WAITING))
+
+
 class Work(Reuse):
     """Claims and results."""
 
@@ -59,7 +64,7 @@ class Work(Reuse):
                 connection.execute(sa.insert(DISPATCHER).values(id=1, **values))
             else:
                 connection.execute(sa.update(DISPATCHER).values(values))
-            connection.execute(sa.update(CHUNKS).where(CLAIMED).values(_WAITING))
+            return_claims(connection)
         return epoch
 
     def dispatcher(self) -> DispatcherRecord | None:
@@ -80,7 +85,7 @@ class Work(Reuse):
         """Return every claim of this epoch to waiting."""
         with self.session.write() as connection:
             self._own(connection, epoch)
-            connection.execute(sa.update(CHUNKS).where(CLAIMED).values(_WAITING))
+            return_claims(connection)
 
     def active_studies(self) -> list[ActiveStudy]:
         """Studies that have not ended, those of the highest priority first, then in order of submission."""
@@ -279,7 +284,7 @@ class Work(Reuse):
         """Return every claim of this epoch to waiting, and take all blame from the study's chunks."""
         with self.session.write() as connection:
             self._own(connection, epoch)
-            connection.execute(sa.update(CHUNKS).where(CLAIMED).values(_WAITING))
+            return_claims(connection)
             connection.execute(
                 sa.update(CHUNKS).where(CHUNKS.c.study == number, CHUNKS.c.state != "done").values(failures=0)
             )

@@ -223,7 +223,7 @@ def test_a_new_epoch_takes_over_and_the_old_one_can_do_nothing(store: Store) -> 
         lambda: store.quarantine(old, chunk, "crashed", ""),
         lambda: store.fault(old, record.number, ""),
         lambda: store.begin_again(old, record.number),
-        lambda: store.hold(old, "no room"),
+        lambda: store.hold(old, "no room", returned=False),
         lambda: store.let_go(old),
         lambda: store.settle(old, record.number),
         lambda: store.heartbeat(old),
@@ -343,7 +343,7 @@ def test_studies_are_held_while_there_is_no_room_and_go_on_unless_somebody_chose
     epoch = store.take_over("test")
     store.claim(epoch, store.open_chunks(running.number)[:1])
     store.pause_study(paused.id)
-    store.hold(epoch, "the disk is full")
+    store.hold(epoch, "the disk is full", returned=False)
     for study in (queued, running, stays, cancelled):
         held = store.get_study(study.id)
         assert (held.state, held.reason) == (StudyState.PAUSED, "the disk is full")

@@ -23,7 +23,7 @@ from tests.worker import fakes
 from worker import kernels
 from worker.chunking import Chunking
 from worker.executors.inline import InlineExecutor
-from worker.ports import Executor
+from worker.ports import EpochLostError, Executor
 from worker.states import StudyState
 
 DEADLINE = 120.0
@@ -119,6 +119,26 @@ def test_a_standby_waits_and_says_so(url: str, monkeypatch: pytest.MonkeyPatch) 
     assert f"process {os.getpid()}" in said[0]
     assert "waiting for its end" in said[0]
     assert "at work on" in said[1]
+
+
+def test_a_standby_tells_of_a_silent_worker_and_one_that_takes_over_does_not_wait(
+    url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(dispatching, "STANDBY_SECONDS", 0.0)
+    monkeypatch.setattr(dispatching, "SILENT_SECONDS", -1.0)
+    said: list[str] = []
+    with Store.open(url) as store:
+        lock, settings = DispatcherLock(store.session.path), WorkerSettings(url, 1, DEADLINE)
+        assert lock.take()
+        epoch = store.take_over("the silent one")
+        turns = iter([False, False, False, True])
+        run_dispatcher(settings, lambda: next(turns), say=said.append, executor=inline)
+        assert [line for line in said if "--take-over" in line] == [said[1]]
+        assert f"nothing was heard of process {os.getpid()}" in said[1]
+        run_dispatcher(settings, lambda: True, say=said.append, executor=inline, take_over=True)
+        with pytest.raises(EpochLostError):
+            store.heartbeat(epoch)
+        lock.release()
 
 
 def test_a_standby_ends_when_it_is_asked_to(url: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -47,6 +48,36 @@ def test_network_file_systems_are_refused(url: str, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(session_module, "file_system_of", lambda _: "nfs4")
     with pytest.raises(DatabaseError, match=r"network file system \(nfs4\)"):
         Session(url)
+
+
+def test_a_read_only_folder_is_refused_with_the_command_that_mends_it(
+    url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Root may write everywhere, so the system's answer is made up.
+    monkeypatch.setattr(session_module.os, "access", lambda *_: False)
+    with pytest.raises(DatabaseError, match=r"is read-only.*`chmod u\+w .*--db"):
+        Session(url)
+
+
+def test_threads_queue_for_the_one_that_writes_and_give_up_in_the_end(
+    url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session_module, "BUSY_SECONDS", 0.05)
+    with Store.open(url) as store, store.session.write(), ThreadPoolExecutor(1) as threads:
+        waiting = threads.submit(store.create_study, {}, fakes.study(1))
+        assert isinstance(waiting.exception(), DatabaseBusyError)
+
+
+def test_a_lock_that_is_seized_is_lost_to_its_holder(tmp_path: Path) -> None:
+    first, second, third = (DispatcherLock(tmp_path / "db") for _ in range(3))
+    assert first.take()
+    second.seize()
+    assert not third.take()
+    first.release()
+    assert not third.take()
+    second.release()
+    assert third.take()
+    third.release()
 
 
 MOUNTS = "/dev/a / ext4 rw 0 0\nserver:/x /home nfs4 rw 0 0\n/dev/b /home/me\\040too/local xfs rw 0 0\n\n"

@@ -162,11 +162,11 @@ class Tank:
     def __getattr__(self, name: str) -> object:
         return getattr(self.store, name)
 
-    def _write(self, name: str, *given: object) -> object:
+    def _write(self, name: str, *given: object, **named: object) -> object:
         if self.full:
             self.failures += 1
             raise StoreFullError("the disk is full")
-        return getattr(self.store, name)(*given)
+        return getattr(self.store, name)(*given, **named)
 
     def shortage(self) -> str | None:
         """See `Store`."""

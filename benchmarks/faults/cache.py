@@ -1,0 +1,43 @@
+"""The compiled kernels on disk are damaged, so that every chunk crashes: they are compiled anew, once."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+from benchmarks.faults import harness
+from worker import kernels
+
+
+def cache(folder: Path, *, cases: int, size: int = 64) -> dict[str, Any]:
+    """Run a study on a damaged copy of the cache; gives the figures.
+
+    Every file of machine code keeps its first ``size`` bytes only.
+    """
+    made = harness.spec(cases, 4.0)
+    kernels.warm_up(harness.study_of(made))
+    whole = kernels.cache_folder()
+    copy = folder / "cache" / "kernels" / whole.name
+    shutil.copytree(whole, copy)
+    damaged = _code(copy)
+    assert damaged, "there is no machine code in the cache"
+    for file in damaged:
+        os.truncate(file, size)
+    with harness.running(
+        folder, "--processes", 2, "--chunk", max(1, cases // 16), SPRAG_KERNEL_CACHE=str(folder / "cache")
+    ) as service:
+        study = service.submit(made)
+        service.finish(study)
+    log = service.log.read_text()
+    assert log.count("The kernels are compiled anew") == 1, log
+    assert "is held" not in log, log
+    harness.compare(service.database, study, made)
+    mended = [file for file in _code(copy) if file.stat().st_size > size]
+    assert mended, "no machine code was made"
+    return {"cases": cases, "files damaged": len(damaged), "times compiled anew": 1, "quarantined": 0}
+
+
+def _code(folder: Path) -> list[Path]:
+    return sorted(folder.rglob("*.nbc"))

@@ -1,0 +1,108 @@
+"""The disk is full, or files may not grow: studies are held with the reason and go on when there is room."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+from benchmarks.faults import harness
+from service.preview import estimated_bytes
+from service.storage.room import RESERVE_BYTES
+
+_STATE = "SELECT state FROM studies WHERE id = ?"
+
+
+def file_limit(folder: Path, *, cases: int, studies: int) -> dict[str, Any]:
+    """Run studies under a limit of file sizes that is too small for all of them, and raise it when they are held."""
+    specs = [harness.spec(cases, 20.0 + 0.5 * number) for number in range(studies)]  # none has rows for another
+    room = int(0.6 * studies * estimated_bytes(harness.study_of(specs[0]))) + RESERVE_BYTES + 1_000_000
+    service = harness.Service(folder, "--processes", 1, "--chunk", 250)
+    service.before_exec = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
+    service.start()
+    try:
+        submitted = [service.submit(made) for made in specs]
+        harness.until(lambda: _state(service, submitted[-1]) == "paused", "the studies are held")
+        held = service.look(submitted[-1])
+        assert "ulimit -f" in held["reason"], held["reason"]
+        refused = service.http.post("/studies", json=harness.spec(cases, 30.0))
+        assert (refused.status_code, refused.json()["type"]) == (507, "/problems/storage-full"), refused.text
+        dispatcher = service.dispatcher()
+        assert dispatcher is not None
+        for process in (service.process.pid, dispatcher.pid):
+            resource.prlimit(process, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+        for study in submitted:
+            service.finish(study)
+    except BaseException:
+        service.kill()
+        raise
+    service.stop()
+    for study, made in zip(submitted, specs, strict=True):
+        harness.compare(service.database, study, made)
+    return {"cases": studies * cases, "held": "by the limit of file sizes", "reason": held["reason"], "rows lost": 0}
+
+
+def disk(folder: Path, *, cases: int, megabytes: int) -> dict[str, Any]:
+    """Run a study on a file system of that size that others fill up, suddenly and to the last byte, three times.
+
+    The file system is one in memory, which takes the rights of root.
+    """
+    place = folder / "small"
+    place.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={megabytes}m", "sprag-drill", place], check=True)
+    try:
+        return _on_small_disk(place, cases)
+    finally:
+        subprocess.run(["umount", "--lazy", place], check=True)
+
+
+def _on_small_disk(place: Path, cases: int) -> dict[str, Any]:
+    made = harness.spec(cases, 30.0)
+    ballast = place / "ballast"
+    waits: list[float] = []
+    reasons: list[str] = []
+    with harness.running(place, "--processes", 2, "--chunk", 100) as service:
+        study = service.submit(made)
+        for share in (0.1, 0.3, 0.5):
+            harness.until(lambda share=share: harness.done(service.database, study) > share * cases, "it goes on")
+            _fill(ballast)
+            harness.until(lambda: _state(service, study) == "paused", "the study is held")
+            reasons.append(service.look(study)["reason"])
+            before = harness.done(service.database, study)
+            assert service.http.get(f"/studies/{study}/cases", params={"page_size": 5}).status_code == 200
+            assert before == harness.done(service.database, study)
+            ballast.unlink()
+            begin = time.monotonic()
+            harness.until(lambda: _state(service, study) in ("running", "finished"), "it goes on by itself")
+            waits.append(round(time.monotonic() - begin, 1))
+        service.finish(study)
+    harness.compare(service.database, study, made)
+    return {
+        "cases": cases,
+        "times the disk was full": len(waits),
+        "reasons": sorted(set(reasons)),
+        "seconds until it went on by itself": waits,
+        "rows lost": 0,
+    }
+
+
+def _state(service: harness.Service, study: str) -> str:
+    return str(harness.asked(service.database, _STATE, study))
+
+
+def _fill(ballast: Path) -> None:
+    """Take every last byte, again and again until nobody else has found one."""
+    with ballast.open("wb", buffering=0) as file:
+        for _ in range(3):
+            try:
+                while True:
+                    file.write(bytes(65536))
+            except OSError:
+                try:
+                    while True:
+                        file.write(bytes(4096))
+                except OSError:
+                    os.fsync(file.fileno())

@@ -1,0 +1,92 @@
+"""A dispatcher is stopped as by SIGSTOP, a second one takes over, the first is woken up again."""
+
+from __future__ import annotations
+
+import random
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+from benchmarks.faults import harness
+from service.storage.errors import DatabaseBusyError
+from service.storage.session import Session
+from service.storage.store import Store
+from worker.chunking import Chunking
+
+_LATEST = "SELECT epoch FROM dispatcher"
+
+
+def _worker(database: Path, log: Path, *options: str) -> subprocess.Popen[bytes]:
+    with log.open("wb") as errors:
+        return subprocess.Popen(
+            [*harness.COMMAND, "worker", "--db", str(database), "--processes", "1", *options],
+            stderr=errors, env=harness.environment(),
+        )  # fmt: skip
+
+
+def stopped(folder: Path, *, cases: int, rounds: int, seed: int, periods: float = 60.0) -> dict[str, Any]:
+    """Let dispatcher after dispatcher be stopped, replaced and woken while a study runs; gives the figures."""
+    draw = random.Random(seed)
+    database, made = folder / "sprag.sqlite3", harness.spec(cases, periods)
+    with Store.open(f"sqlite:///{database}", chunking=Chunking(cases=4)) as store:
+        study = store.create_study(made, harness.study_of(made)).id
+    _watch_commits(database)
+    logs = [folder / f"worker-{number}.log" for number in range(rounds + 1)]
+    workers = [_worker(database, logs[0])]
+    try:
+        for number in range(rounds):
+            share = (number + draw.random()) / (rounds + 1)
+            harness.until(lambda share=share: harness.done(database, study) > share * cases, "the study goes on")
+            _stop(workers[-1], database)
+            before = harness.asked(database, _LATEST)
+            workers.append(_worker(database, logs[number + 1], "--take-over"))
+            harness.until(lambda before=before: harness.asked(database, _LATEST) > before, "the second takes over")
+            time.sleep(draw.uniform(0.0, 0.2))
+            workers[-2].send_signal(signal.SIGCONT)
+            assert workers[-2].wait(60) == 3, logs[number].read_text()
+            assert "another dispatcher has taken over" in logs[number].read_text()
+        harness.until(
+            lambda: harness.asked(database, "SELECT finished_at FROM studies WHERE id = ?", study), "the study ends"
+        )
+        workers[-1].terminate()
+        assert workers[-1].wait(60) == 0, logs[-1].read_text()
+    finally:
+        for worker in workers:
+            worker.kill()
+            worker.wait()
+    stale = harness.asked(database, "SELECT count(*) FROM drill_commits WHERE epoch <> latest")
+    assert stale == 0, f"{stale} chunks were committed by a dispatcher that had lost its epoch"
+    harness.compare(database, study, made)
+    return {"cases": cases, "dispatchers stopped and replaced": rounds, "stale commits": 0, "gave up by itself": rounds}
+
+
+def _watch_commits(database: Path) -> None:
+    """Let the database note, with every chunk that is done, by whose claim it was and who was the latest."""
+    session = Session(f"sqlite:///{database}")
+    with session.write() as connection:
+        connection.exec_driver_sql("CREATE TABLE drill_commits (epoch INTEGER, latest INTEGER)")
+        connection.exec_driver_sql(
+            "CREATE TRIGGER drill_commit AFTER UPDATE OF state ON chunks WHEN new.state = 'done' "
+            f"BEGIN INSERT INTO drill_commits SELECT new.epoch, ({_LATEST}); END"
+        )
+    session.close()
+
+
+def _stop(worker: subprocess.Popen[bytes], database: Path) -> None:
+    """Stop it between two transactions: one that it holds would keep everybody else waiting, not only this drill."""
+    while True:
+        worker.send_signal(signal.SIGSTOP)
+        session = Session(f"sqlite:///{database}")
+        try:
+            with session.plain() as connection:
+                connection.exec_driver_sql("PRAGMA busy_timeout = 0")
+                connection.exec_driver_sql("BEGIN IMMEDIATE")
+                connection.exec_driver_sql("ROLLBACK")
+        except DatabaseBusyError:
+            worker.send_signal(signal.SIGCONT)
+        else:
+            return
+        finally:
+            session.close()

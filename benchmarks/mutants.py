@@ -1,0 +1,148 @@
+"""Each safety mechanism matters: with it removed, the test that watches over it fails.
+
+    python -m benchmarks.mutants
+
+Every mutant is a copy of the program with one change; the test must pass on a copy without it.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+_FOLDERS = ("engine", "worker", "service", "migrations", "tests", "benchmarks")
+_FAULTS = "tests/acceptance/test_faults.py::"
+
+
+@dataclass(frozen=True, slots=True)
+class Mutant:
+    """One change of one file, and the tests one of which has to fail."""
+
+    name: str
+    file: str
+    before: str
+    after: str
+    tests: tuple[str, ...]
+
+
+MUTANTS = (
+    Mutant(
+        "no epoch check",
+        "service/storage/part.py",
+        "        if latest != epoch:",
+        "        if latest != epoch and not latest:",
+        (f"{_FAULTS}test_a_dispatcher_that_was_stopped_commits_nothing_and_gives_up",),
+    ),
+    Mutant(
+        "claims of older epochs are not returned",
+        "service/storage/work.py",
+        "    connection.execute(sa.update(CHUNKS).where(CLAIMED).values(_WAITING))",
+        "    connection.execute(sa.update(CHUNKS).where(CLAIMED, CHUNKS.c.epoch < 0).values(_WAITING))",
+        (f"{_FAULTS}test_killed_processes_lose_nothing",),
+    ),
+    Mutant(
+        "no IMMEDIATE transaction",
+        "service/storage/session.py",
+        '"BEGIN IMMEDIATE"',
+        '"BEGIN"',
+        (f"{_FAULTS}test_clients_do_not_hear_of_locks", "tests/contract/test_concurrency.py"),
+    ),
+    Mutant(
+        "no FULL synchronisation",
+        "service/storage/session.py",
+        '"synchronous = FULL"',
+        '"synchronous = NORMAL"',
+        (f"{_FAULTS}test_a_power_cut_takes_nothing_that_was_acknowledged",),
+    ),
+    Mutant(
+        "rows and the chunk's end in two transactions",
+        "service/storage/work.py",
+        "        endings = Counter(result.endings if known is None",
+        '        connection.exec_driver_sql("COMMIT")\n        connection.exec_driver_sql("BEGIN IMMEDIATE")\n'
+        "        endings = Counter(result.endings if known is None",
+        (f"{_FAULTS}test_a_power_cut_takes_nothing_that_was_acknowledged",),
+    ),
+    Mutant(
+        "no quarantine",
+        "worker/dispatch.py",
+        "            known.suspects.append(Quarantine(chunk, WorkerEnding.CRASHED, event.detail))\n"
+        "            return []",
+        "            known.waiting.appendleft(chunk)\n            return [PutBack(chunk, event.detail)]",
+        ("tests/worker/test_dispatch.py::test_one_success_forgives_the_crashes_before_it",),
+    ),
+    Mutant(
+        "a broken engine is the cases' fault",
+        "worker/dispatch.py",
+        "            if disjoint(known.crashed) >= FAULT_CRASHES:",
+        "            if disjoint(known.crashed) >= FAULT_CRASHES and known.proven:",
+        ("tests/worker/test_dispatch.py::test_when_everything_crashes_the_study_is_held_and_nobody_blamed",),
+    ),
+    Mutant(
+        "children outlive their parent",
+        "worker/processes.py",
+        "    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, int(number), 0, 0, 0)\n",
+        "    ctypes.CDLL(None, use_errno=True)\n",
+        ("tests/acceptance/test_serve.py::test_nothing_outlives_a_killed_service",),
+    ),
+    Mutant(
+        "no reserve for a full disk",
+        "service/storage/room.py",
+        "    if free >= RESERVE_BYTES and not (capped and limit - size - log < RESERVE_BYTES):",
+        "    if True:",
+        ("tests/service/test_room.py",),
+    ),
+)
+
+
+def passes(tree: Path, tests: tuple[str, ...]) -> bool:
+    """Whether the tests pass in that copy; one that takes too long does not."""
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests]
+    try:
+        done = subprocess.run(
+            command, cwd=tree, env=os.environ | {"PYTHONPATH": str(tree), "CI": "true"}, capture_output=True,
+            timeout=180, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return False
+    assert done.returncode in (0, 1), done.stdout.decode()[-2000:]
+    return done.returncode == 0
+
+
+def main() -> None:
+    """Run every test on the program and on its mutant; exit code 1 when some mutant lives."""
+    wanted = sys.argv[1:]
+    alive = []
+    with tempfile.TemporaryDirectory(prefix="sprag-mutant-") as folder:
+        tree = Path(folder)
+        for name in _FOLDERS:
+            shutil.copytree(ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__"))
+        for name in ("pyproject.toml", "examples"):
+            (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(ROOT / name, tree / name)
+        for mutant in MUTANTS:
+            if wanted and not any(word in mutant.name for word in wanted):
+                continue
+            begin = time.monotonic()
+            sound = passes(tree, mutant.tests)
+            file = tree / mutant.file
+            original = file.read_text()
+            assert original.count(mutant.before) == 1, f"{mutant.name}: the place to change is not there"
+            file.write_text(original.replace(mutant.before, mutant.after))
+            dead = not passes(tree, mutant.tests)
+            file.write_text(original)
+            if not (sound and dead):
+                alive.append(mutant.name)
+            verdict = "dead" if sound and dead else "ALIVE" if sound else "the test fails without it"
+            print(f"{mutant.name}: {verdict} ({time.monotonic() - begin:.0f} s)", flush=True)
+    if alive:
+        raise SystemExit(1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,136 @@
+"""Faults done to real processes: nothing that was accepted is lost, doubled or wrong. Long ones: benchmarks.faults."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import httpx
+import pytest
+
+from benchmarks.faults import harness
+from benchmarks.faults.badcases import badcases
+from benchmarks.faults.cache import cache
+from benchmarks.faults.clients import clients
+from benchmarks.faults.disk import file_limit
+from benchmarks.faults.kills import kills
+from benchmarks.faults.powercut import powercut
+from benchmarks.faults.stopped import stopped
+from service.storage.session import sqlite_driver
+from tests.acceptance.processes import sprag
+
+
+def test_killed_processes_lose_nothing(tmp_path: Path) -> None:
+    figures = kills(tmp_path, cases=240, count=6, seed=3)
+    assert sum(figures["kills"].values()) == 6
+
+
+def test_a_dispatcher_that_was_stopped_commits_nothing_and_gives_up(tmp_path: Path) -> None:
+    stopped(tmp_path, cases=200, rounds=1, seed=1)
+
+
+def test_bad_cases_are_named_and_the_others_ok_until_a_retry_mends_them(tmp_path: Path) -> None:
+    badcases(tmp_path, cases=40, crashing=2, hanging=1, seed=1, periods=4.0, chunk=2, timeout=3.0, timed=False)
+
+
+def test_a_damaged_kernel_cache_is_compiled_anew(tmp_path: Path) -> None:
+    cache(tmp_path, cases=64)
+
+
+def test_files_that_may_not_grow_hold_the_studies_until_they_may(tmp_path: Path) -> None:
+    file_limit(tmp_path, cases=8_000, studies=4)
+
+
+def test_a_power_cut_takes_nothing_that_was_acknowledged(tmp_path: Path) -> None:
+    figures = powercut(tmp_path, studies=1, seed=1)
+    assert figures["acknowledged chunks"] == 2
+
+
+def test_clients_do_not_hear_of_locks(tmp_path: Path) -> None:
+    figures = clients(tmp_path, readers=4, writers=4, seconds=2.0, cases=200, periods=60.0)
+    assert figures["write: answers"] > 0
+    assert figures["read a curve: answers"] > 0
+
+
+def test_the_service_ends_soon_and_hands_running_chunks_back(tmp_path: Path) -> None:
+    made = harness.spec(4_000, 2_000.0)
+    service = harness.Service(tmp_path, "--processes", 1, "--chunk", 500)
+    service.start()
+    study = service.submit(made)
+    claimed = "SELECT count(*) FROM chunks WHERE state = 'claimed'"
+    harness.until(lambda: harness.asked(service.database, claimed), "chunks are claimed")
+    http = httpx.Client(base_url=service.http.base_url, timeout=60, trust_env=False)
+    with http, http.stream("GET", f"/studies/{study}/events") as events:
+        assert any(line == "event: progress" for line in events.iter_lines())
+        assert service.stop() < 10.0
+    assert harness.asked(service.database, claimed) == 0
+    assert harness.asked(service.database, "SELECT count(*) FROM chunks WHERE failures > 0") == 0
+    assert harness.asked(service.database, "SELECT state FROM studies") == "running"
+
+
+def test_a_copy_made_during_a_run_goes_on_where_it_was_made(tmp_path: Path) -> None:
+    made = harness.spec(1_000, 400.0)
+    with harness.running(tmp_path, "--processes", 1, "--chunk", 50) as service:
+        study = service.submit(made)
+        harness.until(lambda: harness.done(service.database, study) > 100, "the study goes on")
+        (tmp_path / "restored").mkdir()
+        copy = tmp_path / "restored" / "sprag.sqlite3"
+        saved = sprag("db", "backup", copy, "--db", service.database)
+        assert saved.code == 0, saved.err
+        assert service.look(study)["state"] == "running"
+        service.http.post(f"/studies/{study}:cancel")
+    done = harness.done(copy, study)
+    assert 100 < done < 1_000
+    assert sprag("db", "check", "--db", copy).code == 0
+    with harness.running(copy.parent, "--processes", 2) as service:
+        assert service.look(study)["progress"]["done"] >= done
+        service.finish(study)
+    harness.compare(copy, study, made)
+
+
+def overwritten(database: Path) -> None:
+    content = bytearray(database.read_bytes())
+    content[: len(content) // 2] = os.urandom(len(content) // 2)
+    database.write_bytes(content)
+
+
+def damaged_within(database: Path) -> None:
+    content = bytearray(database.read_bytes())
+    content[len(content) // 3 : -16384] = os.urandom(len(content[len(content) // 3 : -16384]))
+    database.write_bytes(content)
+
+
+def cut_short(database: Path) -> None:
+    os.truncate(database, database.stat().st_size // 2)
+
+
+def of_a_newer_version(database: Path) -> None:
+    connection = sqlite_driver().connect(database)
+    connection.execute("UPDATE alembic_version SET version_num = '9999'")
+    connection.commit()
+    connection.close()
+
+
+@pytest.mark.parametrize("command", ["serve", "worker"])
+@pytest.mark.parametrize(
+    ("spoil", "message", "remedy"),
+    [
+        (overwritten, "is not a Sprag database", "name another file with --db"),
+        (damaged_within, "is damaged", "`sprag db check`"),
+        (cut_short, "is damaged", "`sprag db backup`"),
+        (of_a_newer_version, "newer than this program", "run its `sprag db upgrade`"),
+    ],
+)
+def test_a_database_that_cannot_be_trusted_is_refused_at_the_start(
+    tmp_path: Path, command: str, spoil: object, message: str, remedy: str
+) -> None:
+    database = tmp_path / "sprag.sqlite3"
+    assert sprag("db", "upgrade", "--db", database).code == 0
+    spoil(database)  # type: ignore[operator]
+    before = database.read_bytes()
+    refused = sprag(command, "--db", database, *(["--port", "0"] if command == "serve" else []))
+    assert refused.code == 3
+    assert message in refused.err
+    assert remedy in refused.err
+    assert refused.err.count("\n") == 1
+    assert database.read_bytes() == before
