@@ -20,7 +20,7 @@ from service.errors import ApiError
 from service.intake import accept
 from service.presets import preset_names
 from service.web.form_check import Checked, check_form, check_text
-from service.web.form_fields import path_choices, pendulum, sections
+from service.web.form_fields import FORM_MODEL, path_choices, pendulum, sections
 from service.web.form_spec import Values, axes_of, clutch_pointers, pendulums_of, spec_of, values_of
 from service.web.templates import fragment, page, spec_text
 from worker import kernels
@@ -201,9 +201,13 @@ def form_page(request: Request, values: Values, checked: Checked | None, status:
         clutches=list(laws),
         axes=range(0 if text_mode else axes_of(values)),
         choices=[] if text_mode else path_choices(pendulums_of(values), prefixes),
-        presets=[preset_of(name) for name in preset_names()],
+        presets=[preset for preset in map(preset_of, preset_names()) if text_mode or _fits_form(preset)],
         most_coefficients=kernels.MAX_COEFFICIENTS,
     )
+
+
+def _fits_form(preset: Mapping[str, Any]) -> bool:
+    return bool(preset["spec"]["model"] == FORM_MODEL)
 
 
 def _coefficients(values: Values, pointer: str) -> int:

@@ -48,6 +48,7 @@ _TOLD: Final = (
 #: The questions of the course, each a study: word, and what it varies.
 QUESTIONS: Final = {"inertia": "the drive's inertia", "masses": "the masses", "load": "the operation's load"}
 _QUESTION_VALUES: Final = 25
+_QUESTION: Final = "question_"
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,8 +85,9 @@ class Setting:
 
 @lru_cache(maxsize=1)
 def machines() -> tuple[str, ...]:
-    """Names of the machines that come with the program."""
-    return tuple(name for name in preset_names() if preset_of(name)["spec"]["model"] == kernels.MACHINE_SHAFT)
+    """Names of the machines that come with the program; those of the course's questions are among them already."""
+    shafts = (name for name in preset_names() if preset_of(name)["spec"]["model"] == kernels.MACHINE_SHAFT)
+    return tuple(name for name in shafts if not name.startswith(_QUESTION))
 
 
 def setting(given: QueryParams) -> Setting:

@@ -265,7 +265,7 @@ def test_no_page_is_wider_than_a_tablet_or_asks_another_host(visitor: Visitor, e
     own = f"/studies/{example}"
     pages = ("/", "/new", "/new?preset=two_pendulums", f"/new?clone={example}", "/new?mode=text", own, f"{own}/curves",
              f"{own}/map", f"{own}/cases", f"{own}/cases/3", f"/compare?study={example}", "/compare", "/docs",
-             "/problems/invalid-spec", "/studies/st_none")  # fmt: skip
+             "/problems/invalid-spec", "/studies/st_none", "/laboratory")  # fmt: skip
     for address in pages:
         page.goto(address)
         for plot in page.locator(".plot").all():
@@ -363,3 +363,41 @@ def test_everything_works_without_javascript(visitor: Visitor, office: Office, e
         assert office.http.get(str(picture.get_attribute("src"))).headers["content-type"] == "image/svg+xml", address
     page.goto(f"/studies/{study_id}/cases?sort=-shaft.load")
     assert [cell.inner_text() for cell in page.locator("tbody td:nth-child(2)").all()] == ["0.2", "0.1", "0"]
+
+
+def test_the_laboratory_answers_a_moved_slider(visitor: Visitor, office: Office) -> None:
+    page = visitor.page
+    page.goto("/laboratory?machine=press")
+    drawn(page, "#lab-plot")
+    told = page.locator("[data-irregularity]")
+    before = float(str(told.get_attribute("data-irregularity")))
+    slider = page.locator('input[type="range"][data-for="drive.inertia"]')
+    slider.focus()
+    for _ in range(5):
+        page.keyboard.press("PageUp")
+    inertia = named(page, "drive.inertia")
+    page.wait_for_url(f"**drive.inertia={inertia.input_value()}**")
+    # More inertia turns more evenly; and as a study of one case gives it too.
+    after = float(str(told.get_attribute("data-irregularity")))
+    assert after < before
+    spec = office.get("/presets/press")["spec"]
+    spec["base"]["drive"]["inertia"] = float(inertia.input_value())
+    study_id = office.submit(spec, axes=[])
+    results = office.get(f"/studies/{study_id}/cases/0")["results"]
+    assert after == pytest.approx(results["irregularity"], rel=1e-4)  # fields show six digits
+    speed, energy = drawn(page, "#lab-plot")[:2]
+    assert max(speed["y"]) == pytest.approx(results["omega.max"], rel=1e-4)
+    assert max(energy["y"]) - min(energy["y"]) == pytest.approx(results["energy.fluctuation"], rel=1e-4)
+    page.reload()
+    expect(inertia).to_have_value(str(page.url.split("drive.inertia=")[1].split("&")[0]))
+    inertia.fill("-3")
+    expect(wrong(page, "drive.inertia")).to_contain_text("out of range")
+    inertia.fill("20")
+    expect(wrong(page, "drive.inertia")).to_be_empty()
+    page.wait_for_url("**drive.inertia=20&**")
+    page.get_by_role("link", name="the operation's load").click()
+    expect(page.locator("[data-cases]")).to_have_text("25")
+    page.get_by_role("button", name="Submit the study").click()
+    page.wait_for_url("**/studies/st_*")
+    expect(page.locator("#progress .state")).to_have_text("finished", timeout=60_000)
+    drawn(page)
