@@ -128,7 +128,15 @@ def _make(
     if combine == "zip" and len(set(counts)) > 1:  # a union inside had the same cases twice
         report.problem(where, "axes that are zipped must have equally many different cases", counts)
         return None
-    return side_by_side(tables) if combine == "zip" else one_after_another(tables, counts, machine.values)
+    if combine == "zip":
+        return side_by_side(tables)
+    # A limit that is not given is no number that the cases of other axes could have.
+    lacking = [path for path in dict.fromkeys(path for columns in tables for path in columns)
+               if path not in machine.values and any(path not in columns for columns in tables)]  # fmt: skip
+    for path in lacking:
+        report.problem(where, f"varies {path} in a part of the cases only, and `base` does not give it for the others",
+                       allowed="its value in `base` too")  # fmt: skip
+    return None if lacking else one_after_another(tables, counts, machine.values)
 
 
 def _item(

@@ -78,7 +78,8 @@ def kept(
         held = np.ones(count, dtype=np.bool_)
         for path, parts in condition.items():
             column = columns.get(path)
-            held &= _held(np.full(count, base[path]) if column is None else column, parts)
+            # Only limits may be missing from the base: they are then infinite.
+            held &= _held(np.full(count, base.get(path, np.inf)) if column is None else column, parts)
         keep &= ~held
     return keep
 

@@ -165,4 +165,4 @@ def _known_values() -> tuple[bool, str]:
     wrong, largest = check_known_values()
     if wrong:
         return False, "; ".join(wrong)
-    return True, f"a closed form and a reference case agree within {largest:.1e}"
+    return True, f"closed forms and a reference case agree within {largest:.1e}"

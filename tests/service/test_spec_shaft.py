@@ -225,6 +225,20 @@ def test_an_unreadable_base_brings_no_second_problem_on_its_axes() -> None:
     assert list(found) == ["/base/mechanism/slider_crank"]
 
 
+@pytest.mark.parametrize("combine", ["grid", "zip", "union"])
+def test_a_limit_that_the_base_does_not_give_can_vary(combine: str) -> None:
+    limit = {"path": "wanted_irregularity", "values": [0.1, 0.2]}
+    changes = {"/base/wanted_irregularity": ..., "/axes": [limit], "/combine": combine}
+    assert study(changes=changes).columns(range(2))["wanted_irregularity"].tolist() == [0.1, 0.2]
+    changes["/axes"] = [limit, {"path": "drive.inertia", "values": [20, 30]}]
+    never = {"/exclude": [{"wanted_irregularity": {"below": 1}}], "/base/wanted_irregularity": ...}
+    assert study(changes=never).cases == 52
+    if combine == "union":
+        assert "wanted_irregularity" in problems(changes)["/axes"]
+    else:
+        assert study(changes=changes).cases == (4 if combine == "grid" else 2)
+
+
 def test_every_number_of_a_machine_can_be_an_axis() -> None:
     for name in preset_names():
         file, text = preset_text(name)
