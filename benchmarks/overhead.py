@@ -11,12 +11,14 @@ import argparse
 import statistics
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from multiprocessing.pool import Pool
 from pathlib import Path
+
+import psutil
 
 from service.dispatching import WorkerSettings, start_dispatcher_process
 from service.presets import preset_text
@@ -28,7 +30,8 @@ from worker.chunking import Chunking, spans
 from worker.processes import single_threaded_children
 from worker.study import Axis, Study
 
-_POLL_SECONDS = 0.01
+#: The times are those in the database; looking more often would only take a core from the pool.
+_POLL_SECONDS = 0.1
 
 
 def example(cases: int, periods: float) -> Study:
@@ -89,26 +92,52 @@ def main() -> None:
             dispatcher = start_dispatcher_process(WorkerSettings(url, options.processes, 600.0))
             try:
                 through_the_service(store, example(50 * 16, 1.0))  # its processes load the kernel
-                measure(store, study, options.processes, options.repeats)
+                measure(store, study, options.processes, options.repeats, dispatcher.pid)
             finally:
                 dispatcher.terminate()
                 dispatcher.join()
 
 
-def measure(store: Store, study: Study, processes: int, repeats: int) -> None:
-    """Alternate the two; print every pair, and the ratios of the least times (the least disturbed) and the medians."""
-    alone, service = [], []
+def resident_mib(pid: int | None) -> float:
+    """Resident memory of a process now, in MiB."""
+    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS")) / 1024.0
+
+
+def cpu_seconds(pids: Iterable[int | None]) -> float:
+    """Processor time of processes and all their children so far."""
+    family = [
+        member for pid in pids for process in [psutil.Process(pid)] for member in (process, *process.children(True))
+    ]
+    return sum(sum(member.cpu_times()[:2]) for member in family)
+
+
+def measure(store: Store, study: Study, processes: int, repeats: int, dispatcher: int | None) -> None:
+    """Alternate the two; print every pair, and the ratios of the least times (the least disturbed) and the medians.
+
+    The ratio of processor times is that of the times on a machine with nothing else to do and no core to spare.
+    """
+    alone, service, work = [], [], []
     with warm_pool(study, processes) as pool:
+        members = [process.pid for process in active_children() if process.pid != dispatcher]
         for _ in range(repeats):
+            before = cpu_seconds([dispatcher])
             seconds, chunk = through_the_service(store, study)
             service.append(seconds)
+            between = cpu_seconds([dispatcher])
+            start = cpu_seconds(members)
             alone.append(engine_alone(pool, study, chunk))
+            work.append((between - before, cpu_seconds(members) - start))
             print(
                 f"service {service[-1]:6.2f} s   engine alone {alone[-1]:6.2f} s   ratio {service[-1] / alone[-1]:.3f}"
+                f"   processor time {work[-1][0]:6.2f} s against {work[-1][1]:6.2f} s"
+                f"   dispatcher {resident_mib(dispatcher):.0f} MiB"
             )
     ratios = [pick(service) / pick(alone) for pick in (min, statistics.median)]
+    spent = min(ours for ours, _ in work) / min(theirs for _, theirs in work)
     print(f"{study.cases} cases, {processes} processes, chunks of {chunk}: {study.cases / min(service):.0f} cases/s")
     print(f"service / engine alone: ratio of least times {ratios[0]:.3f}, of medians {ratios[1]:.3f}")
+    print(f"processor time, least of each: ratio {spent:.3f}")
 
 
 if __name__ == "__main__":
