@@ -23,12 +23,14 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     that several others call exists in several copies, each optimised with its caller, and which copy runs depends on
     what was compiled or loaded before; only strict arithmetic gives the same bits from all of them.
     """
-    return _for_any_number(numba.njit(cache=True, error_model="numpy")(function))
+    jitted = _for_any_number(numba.njit(cache=True, error_model="numpy")(function))
+    return cast(Callable[P, R], jitted)
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
     """The same for a short function: its callers take its code in instead of passing it their many arrays."""
-    return _for_any_number(numba.njit(cache=True, error_model="numpy", forceinline=True)(function))
+    jitted = _for_any_number(numba.njit(cache=True, error_model="numpy", forceinline=True)(function))
+    return cast(Callable[P, R], jitted)
 
 
 def _for_any_number(dispatcher: Any) -> Any:
@@ -40,7 +42,9 @@ def _for_any_number(dispatcher: Any) -> Any:
     find = dispatcher.get_call_template
 
     def without_constants(args: Any, kws: Any) -> Any:
-        return find([unliteral(arg) for arg in args], {name: unliteral(arg) for name, arg in kws.items()})
+        types = [unliteral(arg) for arg in args]  # type: ignore[no-untyped-call]
+        named = {name: unliteral(arg) for name, arg in kws.items()}  # type: ignore[no-untyped-call]
+        return find(types, named)
 
     dispatcher.get_call_template = without_constants
     return dispatcher
