@@ -17,6 +17,8 @@ from service.api.context import Context
 from service.api.document import API_PREFIX, build_openapi
 from service.computer import Computes, ProcessComputer
 from service.guard import Guard
+from service.logs import Noted, RequestLog
+from service.metrics import Metrics
 from service.settings import Settings, UnsafeSettingsError
 from service.spec_design_schema import extension_schema
 from service.spec_schema import spec_schema
@@ -46,14 +48,16 @@ TAGS = [
 class Application(FastAPI):
     """FastAPI whose outermost layer, outside even its own error pages, is the guard."""
 
-    def __init__(self, settings: Settings, access: Access, **options: Any) -> None:
+    def __init__(self, settings: Settings, access: Access, metrics: Metrics, **options: Any) -> None:
         super().__init__(**options)
         self._settings = settings
         self._access = access
+        self._metrics = metrics
 
     def build_middleware_stack(self) -> ASGIApp:
         """The framework's layers inside the guard."""
-        return Guard(super().build_middleware_stack(), self._settings, self._access)
+        guarded = Guard(Noted(super().build_middleware_stack()), self._settings, self._access)
+        return RequestLog(guarded, self._metrics.answered)
 
     def openapi(self) -> dict[str, Any]:
         """The OpenAPI document, made once."""
@@ -97,9 +101,11 @@ def create_app(
         if own_store:
             used_store.close()
 
+    metrics = Metrics(used_store)
     app = Application(
         settings,
         access,
+        metrics,
         title="Sprag",
         summary="Parameter studies of vibration drives with freewheel clutches",
         description=DESCRIPTION,
@@ -113,6 +119,7 @@ def create_app(
         generate_unique_id_function=lambda route: route.name,
     )
     app.state.access = access
+    app.state.metrics = metrics
     app.state.context = Context(settings, used_store, used_computer)
     api = APIRouter(prefix=API_PREFIX)
     for module in (studies, events, curves, sensitivity, cases, clutch_fits, schedules, catalogues):

@@ -7,14 +7,18 @@ import os
 import signal
 import socket
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing import get_context
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from service import logs
+from service.logs import LogFormat
 from service.schedules.scheduler import Scheduler
 from service.storage.lock import DispatcherLock
 from service.storage.part import SystemClock
 from service.storage.store import Store
+from service.upkeep import Upkeep, UpkeepPlan
 from worker import kernels
 from worker.chunking import Chunking
 from worker.dispatcher import Dispatcher
@@ -26,6 +30,7 @@ if TYPE_CHECKING:
     from multiprocessing.context import SpawnProcess
     from types import FrameType
 
+    from service.settings import Settings
     from worker.ports import Executor
 
 _LOG = logging.getLogger(__name__)
@@ -45,6 +50,22 @@ class WorkerSettings:
     chunk_timeout: float
     #: Cases of one chunk of the studies that schedules submit; 0: about a second of work.
     chunk_cases: int = 0
+    upkeep: UpkeepPlan = field(default_factory=UpkeepPlan)
+    log_format: LogFormat = "text"
+
+
+def worker_settings(settings: Settings) -> WorkerSettings:
+    """The part of ``settings`` that a dispatcher needs."""
+    folder = Path(settings.backup_folder).expanduser().absolute() if settings.backup_folder else None
+    plan = UpkeepPlan(folder, settings.backup_keep, settings.keep_days, settings.nightly_at, settings.zone)
+    return WorkerSettings(
+        settings.database_url,
+        settings.pool_processes,
+        settings.chunk_timeout,
+        settings.chunk_cases,
+        plan,
+        settings.log_format,
+    )
 
 
 class StopFlag:
@@ -97,7 +118,7 @@ def run_dispatcher(
     chunking = Chunking(settings.chunk_cases, settings.processes, settings.chunk_timeout)
     with Store.open(settings.database_url, chunking=chunking) as store:
         store.require_sound()
-        scheduler = Scheduler(store)
+        scheduler, upkeep = Scheduler(store), Upkeep(store, settings.upkeep)
         lock = DispatcherLock(store.session.path)
         if take_over:
             lock.seize()
@@ -110,9 +131,11 @@ def run_dispatcher(
                 store, executor(settings), SystemClock(), owner=owner_name(), renew=lambda: renewed(settings)
             )
             scheduler.start()
+            upkeep.start()
             dispatcher.run(stopping)
         finally:
             scheduler.stop()
+            upkeep.stop()
             lock.release()
 
 
@@ -167,7 +190,7 @@ def _child(settings: WorkerSettings, parent: int) -> None:
     flag = stop_on_signals()
     ignore_interrupts()
     end_with_parent(parent, signal.SIGTERM)
-    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    logs.configure(settings.log_format, requests=False)
     try:
         run_dispatcher(settings, flag)
     except (EpochLostError, StoreError, ExecutorError) as error:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import signal
 import socket
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -15,8 +14,9 @@ from typing import Protocol
 
 import uvicorn
 
+from service import logs
 from service.app import create_app
-from service.dispatching import WorkerSettings, start_dispatcher_process
+from service.dispatching import start_dispatcher_process, worker_settings
 from service.patience import PatientProtocol
 from service.settings import Settings
 from worker.limits import MAX_CONNECTIONS
@@ -131,19 +131,13 @@ class Server(uvicorn.Server):
         super().handle_exit(sig, frame)
 
 
-def worker_settings(settings: Settings) -> WorkerSettings:
-    """The part of ``settings`` that a dispatcher needs."""
-    return WorkerSettings(settings.database_url, settings.pool_processes, settings.chunk_timeout, settings.chunk_cases)
-
-
 def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) -> None:
     """Serve until SIGINT or SIGTERM; service and dispatcher have ended when this returns.
 
     ``announce`` is called with the address once it is listened on (by default it is said on standard error). Raises
     UnsafeSettingsError, DatabaseError and AddressError, each with one sentence, before anything is started.
     """
-    logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stderr)
-    _LOG.setLevel(logging.INFO)
+    logs.configure(settings.log_format, requests=settings.log_requests)
     app = create_app(settings)  # makes the database ready before the dispatcher looks for it
     listener = _listen(settings)
     address = _address(settings, listener)

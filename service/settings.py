@@ -1,26 +1,41 @@
-"""Settings of the service and the worker: one table of names, defaults and help, read from the environment.
+"""Settings of the service and the worker: one table of names, defaults and help, read from environment and file.
 
-Every setting is an environment variable with the prefix ``SPRAG_``; the documentation's table is made from `table`.
+Every setting is an environment variable with the prefix ``SPRAG_``, and a field of the TOML file that the variable
+``SPRAG_SETTINGS`` names; the environment goes before the file. The documentation's table is made from `table`.
 """
 
 import ipaddress
 import os
+import re
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
+from zoneinfo import available_timezones
 
 import platformdirs
 from pydantic import Field, SecretStr, field_validator
-from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+from pydantic_settings import (
+    BaseSettings,
+    InitSettingsSource,
+    NoDecode,
+    PydanticBaseSettingsSource,
+    SettingsConfigDict,
+)
 
 ENV_PREFIX = "SPRAG_"
+FILE_VARIABLE = "SPRAG_SETTINGS"
 MIN_TOKEN_LENGTH = 16
 LOOPBACK_HOSTS = ("localhost", "127.0.0.1", "[::1]")
 
 
 class UnsafeSettingsError(Exception):
     """The settings would open the service to other machines without protection."""
+
+
+class SettingsFileError(Exception):
+    """The file of settings cannot be read; the message is one sentence."""
 
 
 class Settings(BaseSettings):
@@ -61,6 +76,46 @@ class Settings(BaseSettings):
         le=3_600.0,
         description="seconds after which the instantaneous values of a case are given up",
     )
+
+    log_format: Literal["text", "json"] = Field(
+        default="text", description="form of the log: `text` for people, `json` for machines"
+    )
+    log_requests: bool = Field(default=False, description="a line in the log for every request")
+    backup_folder: str = Field(
+        default="", description="folder that the worker writes a backup of the database to every night; empty: none"
+    )
+    backup_keep: int = Field(default=14, ge=1, le=10_000, description="backups that are kept, the latest ones")
+    keep_days: int = Field(
+        default=0, ge=0, le=36_500, description="days after which a study that has ended is deleted; 0: never"
+    )
+    nightly_at: str = Field(default="02:30", description="time of day for the backup and for deleting old studies")
+    zone: str = Field(default="UTC", description="time zone of `SPRAG_NIGHTLY_AT`, such as `Europe/Berlin`")
+
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,  # noqa: ARG003 - pydantic names them
+        file_secret_settings: PydanticBaseSettingsSource,  # noqa: ARG003
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        """Options first, then the environment, then the file that SPRAG_SETTINGS names."""
+        return init_settings, env_settings, InitSettingsSource(settings_cls, _read_file(settings_cls))
+
+    @field_validator("nightly_at")
+    @classmethod
+    def _time_of_day(cls, value: str) -> str:
+        if re.fullmatch(r"([01]?[0-9]|2[0-3]):[0-5][0-9]", value) is None:
+            raise ValueError("a time of day is needed, such as 02:30")
+        return value
+
+    @field_validator("zone")
+    @classmethod
+    def _known_zone(cls, value: str) -> str:
+        if value not in available_timezones():
+            raise ValueError("the name of a time zone is needed, such as Europe/Berlin")
+        return value
 
     @field_validator("allowed_hosts", mode="before")
     @classmethod
@@ -119,6 +174,25 @@ class Settings(BaseSettings):
                 f"The host {self.host} can be reached from other machines, so the service needs a token: "
                 f"`sprag token create` makes one, or set {ENV_PREFIX}TOKEN."
             )
+
+
+def _read_file(settings_cls: type[BaseSettings]) -> dict[str, Any]:
+    """The settings in the file that the environment names; raises SettingsFileError."""
+    name = os.environ.get(FILE_VARIABLE, "")
+    if not name:
+        return {}
+    try:
+        with Path(name).open("rb") as file:
+            found = tomllib.load(file)
+    except OSError as error:
+        raise SettingsFileError(f"The settings {name} ({FILE_VARIABLE}) cannot be read: {error.strerror}.") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SettingsFileError(f"The settings {name} ({FILE_VARIABLE}) are no TOML: {error}.") from None
+    unknown = [key for key in found if key not in settings_cls.model_fields]
+    if unknown:
+        known = ", ".join(settings_cls.model_fields)
+        raise SettingsFileError(f"The settings {name} have an unknown field {unknown[0]!r}; known are: {known}.")
+    return found
 
 
 def available_cores() -> int:

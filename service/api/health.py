@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Request
+from starlette.responses import Response
 
 from service.api.context import Ctx
-from service.api.document import problems
+from service.api.document import files, problems
 from service.api.models import Health
 from service.api.requests import strict_query
 from service.api.respond import json_response
+from service.metrics import CONTENT_TYPE, Metrics
 
 router = APIRouter(tags=["health"], dependencies=[Depends(strict_query)])
 
@@ -26,3 +28,17 @@ def readyz(context: Ctx) -> Any:
     """Whether studies can be submitted and read: the database answers and has the right schema."""
     context.store.ping()
     return json_response({"status": "ok"})
+
+
+@router.get(
+    "/metrics",
+    response_class=Response,
+    responses={
+        **files("The metrics, in the text format of Prometheus.", ["text/plain"]),
+        **problems("invalid-parameter", "unauthorized", "unavailable"),
+    },
+)
+def metrics(request: Request) -> Response:
+    """What the service measures, for Prometheus: queue, cases, endings, requests, waits for the database."""
+    found = cast("Metrics", request.app.state.metrics)
+    return Response(found.text(), headers={"Content-Type": CONTENT_TYPE})

@@ -72,6 +72,31 @@ def backup(
         say(f"{file}: {size} bytes")
 
 
+@app.command()
+def prune(
+    older_than: Annotated[
+        int, typer.Option("--older-than", metavar="DAYS", min=1, max=36_500, help="Days since a study ended.")
+    ],
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only tell which.")] = False,
+    db: Database = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Delete every study that ended longer ago than that, with all its results."""
+    from datetime import timedelta
+
+    from service.storage.store import Store
+
+    with _opened(db) as session:
+        location = session.url.render_as_string(hide_password=False)
+    with Store.open(location) as store:
+        found = store.prune(store.clock.now() - timedelta(days=older_than), dry=dry_run)
+    if as_json:
+        write_json({"deleted": [] if dry_run else found, "found": found})
+    else:
+        print("\n".join(found), end="\n" if found else "")
+        say(f"{len(found)} studies {'would be deleted' if dry_run else 'deleted'}")
+
+
 @contextmanager
 def _opened(db: str | None, *, existing: bool = True) -> Iterator[Session]:
     """Connections to the database; with ``existing``, a mistyped name makes no new one."""

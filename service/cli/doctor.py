@@ -9,6 +9,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
+from datetime import UTC, datetime, timedelta
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,6 +25,8 @@ from worker.limits import MAX_TOLERANCE, MIN_TOLERANCE
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sqlalchemy", "fastapi", "uvicorn")
 #: The kernel that is printed unless its shape is given.
 _KERNEL = {"pendulums": 1, "coefficients": 4, "tolerance": 1e-9}
+#: Backups are made every night.
+_OLD_BACKUP = timedelta(hours=49)
 #: A study of a million cases of one pendulum takes about half of it.
 _LEAST_FREE_BYTES = 1_000_000_000
 
@@ -50,7 +53,7 @@ def doctor(
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Look at versions, database, disk, kernel cache and known values of the engine; exit code 3 when one is wrong."""
+    """Look at versions, database, disk, backups, kernels, known values of the engine; exit code 3 if one is wrong."""
     shape = {"pendulums": pendulums, "coefficients": coefficients, "tolerance": tolerance}
     given = {name: value for name, value in shape.items() if value is not None}
     if kernel:
@@ -106,6 +109,7 @@ def _checks(db: str | None) -> dict[str, Callable[[], tuple[bool, str]]]:
         "SQLite": _sqlite,
         "database": lambda: _database(location),
         "disk": lambda: _disk(location),
+        "backups": _backups,
         "kernel cache": _cache,
         "engine": _known_values,
     }
@@ -145,6 +149,19 @@ def _disk(location: Path) -> tuple[bool, str]:
     folder = next(parent for parent in location.absolute().parents if parent.exists())
     free = shutil.disk_usage(folder).free
     return free >= _LEAST_FREE_BYTES, f"{free / 1e9:.3g} GB free at {folder}"
+
+
+def _backups() -> tuple[bool, str]:
+    from service.upkeep import backups
+
+    folder = read_settings().backup_folder
+    if not folder:
+        return True, "none are made (SPRAG_BACKUP_FOLDER is not set)"
+    found = backups(Path(folder).expanduser())
+    if not found:
+        return False, f"there is none in {folder} yet: is `sprag serve` or `sprag worker` running?"
+    age = datetime.now(UTC) - found[-1][0]
+    return age < _OLD_BACKUP, f"{len(found)} in {folder}, the latest {age.total_seconds() / 3600:.0f} hours old"
 
 
 def _cache() -> tuple[bool, str]:

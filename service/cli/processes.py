@@ -56,11 +56,13 @@ def worker(
     ] = False,
 ) -> None:
     """Run the studies of a database without a service; Ctrl-C ends it."""
-    from service.dispatching import WorkerSettings, run_dispatcher, stop_on_signals
+    from service import logs
+    from service.dispatching import run_dispatcher, stop_on_signals, worker_settings
 
     settings = read_settings(database=db, processes=processes)
+    logs.configure(settings.log_format, requests=False)
     run_dispatcher(
-        WorkerSettings(settings.database_url, settings.pool_processes, settings.chunk_timeout, settings.chunk_cases),
+        worker_settings(settings),
         stop_on_signals(),
         say=say,
         take_over=take_over,

@@ -18,11 +18,13 @@ def read_settings(**options: object) -> Settings:
     """
     from pydantic import ValidationError
 
-    from service.settings import ENV_PREFIX, Settings
+    from service.settings import ENV_PREFIX, Settings, SettingsFileError
 
     given = {name: value for name, value in options.items() if value is not None}
     try:
         return Settings(**given)  # type: ignore[arg-type]
+    except SettingsFileError as error:
+        raise WrongInputError(str(error)) from error
     except ValidationError as error:
         problems = []
         for item in error.errors(include_url=False):

@@ -6,6 +6,7 @@ import os
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
@@ -14,7 +15,7 @@ from sqlalchemy.engine import URL, make_url
 from service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 #: Seconds a connection waits for another writer before it gives up.
 BUSY_SECONDS = 30.0
@@ -102,6 +103,8 @@ class Session:
         sa.event.listen(self._engine, "connect", _set_pragmas)
         sa.event.listen(self._engine, "begin", _begin)
         self._writing = Lock()
+        #: Told how long ("read" or "write", s) each transaction waited for its beginning.
+        self.on_wait: Callable[[str, float], None] | None = None
         self._writer = self._engine.execution_options(**{_BEGIN: "BEGIN IMMEDIATE"})
 
     def _check_place(self) -> None:
@@ -132,25 +135,28 @@ class Session:
     @contextmanager
     def read(self) -> Iterator[sa.Connection]:
         """A short read transaction: everything read inside is of one moment."""
-        with self._transaction(self._engine) as connection:
+        with self._transaction(self._engine, "read", perf_counter()) as connection:
             yield connection
 
     @contextmanager
     def write(self) -> Iterator[sa.Connection]:
         """A write transaction, with the write lock from its first moment; commits at the end, or changes nothing."""
         # Threads of one process queue here: SQLite's own waiting is by sleeping ever longer, and the last wakes last.
+        began = perf_counter()
         if not self._writing.acquire(timeout=BUSY_SECONDS):
             raise DatabaseBusyError(_BUSY.format(self.path))
         try:
-            with self._transaction(self._writer) as connection:
+            with self._transaction(self._writer, "write", began) as connection:
                 yield connection
         finally:
             self._writing.release()
 
     @contextmanager
-    def _transaction(self, engine: sa.Engine) -> Iterator[sa.Connection]:
+    def _transaction(self, engine: sa.Engine, kind: str, began: float) -> Iterator[sa.Connection]:
         try:
             with engine.begin() as connection:
+                if self.on_wait is not None:
+                    self.on_wait(kind, perf_counter() - began)
                 yield connection
         except sa.exc.DBAPIError as error:
             raise explained(error, self.path) from error

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Self
 
 from service.storage import maintenance
 from service.storage.cases import Cases
+from service.storage.figures import Totals
 from service.storage.part import SystemClock
 from service.storage.retry import Retries
 from service.storage.room import Room
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from worker.ports import Clock
 
 
-class Store(Studies, Retries, Cases, Room, Schedules, Tokens, Work):
+class Store(Studies, Retries, Cases, Room, Schedules, Tokens, Totals, Work):
     """One database. Safe to use from several threads; close it at the end (it is a context manager)."""
 
     @classmethod

@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 import secrets
 from collections import OrderedDict
+from contextlib import suppress
+from datetime import timedelta
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
 
-from service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy
-from service.storage.part import Part
+from service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyNotFound
+from service.storage.part import EPOCH, Part
 from service.storage.progress import RECENT_CHUNKS, FinishedChunk, estimate
 from service.storage.records import Progress, StudyPage, StudyRecord, record_of
 from service.storage.schedules import unbind
@@ -32,6 +34,7 @@ from worker.study import Study
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from datetime import datetime
 
     from service.storage.session import Session
     from worker.ports import Clock
@@ -235,6 +238,18 @@ class Studies(Part):
                 connection.execute(sa.delete(table).where(table.c.study == row.number))
             connection.execute(sa.update(STUDIES).where(STUDIES.c.number == row.number).values(deleted_at=self._now()))
         self.purge()
+
+    def prune(self, ended_before: datetime, *, dry: bool = False) -> list[str]:
+        """Delete every study that ended earlier than ``ended_before``; their ids. ``dry``: only tell."""
+        c = STUDIES.c
+        micros = (ended_before - EPOCH) // timedelta(microseconds=1)
+        old = (c.finished_at < micros) & c.state.in_([state.value for state in TERMINAL]) & c.deleted_at.is_(None)
+        with self.session.read() as connection:
+            found = list(connection.execute(sa.select(c.id).where(old).order_by(c.number)).scalars())
+        for study_id in () if dry else found:
+            with suppress(StudyNotFound, StudyBusy):  # somebody else deleted it, or runs it again
+                self.delete_study(study_id)
+        return found
 
     def purge(self) -> None:
         """Remove what is left of deleted studies, in short transactions."""

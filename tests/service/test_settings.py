@@ -83,3 +83,47 @@ def test_the_table_has_every_setting_with_its_help() -> None:
     assert [row.variable for row in rows] == [f"SPRAG_{name.upper()}" for name in Settings.model_fields]
     assert all(row.help for row in rows)
     assert next(row.default for row in rows if row.variable == "SPRAG_HOST") == "127.0.0.1"
+
+
+def test_a_file_sets_them_and_the_environment_goes_before_it(
+    settings: Settings, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    file = tmp_path / "sprag.toml"
+    file.write_text(
+        """
+        port = 81
+        host = "127.0.0.2"
+        allowed_hosts = ["a.example"]
+        keep_days = 30
+        log_format = "json"
+        """
+    )
+    monkeypatch.setenv("SPRAG_SETTINGS", str(file))
+    monkeypatch.setenv("SPRAG_PORT", "82")
+    read = Settings()
+    assert (read.port, read.host, read.keep_days, read.log_format) == (82, "127.0.0.2", 30, "json")
+    assert "a.example" in read.host_names
+    assert read_settings(port=83).port == 83
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("prot = 81", "unknown field 'prot'"),
+        ("port = ", "no TOML"),
+        (None, "cannot be read"),
+        ("port = 99999", "a setting is wrong"),
+        ('token = "short"', "a setting is wrong"),
+        ('zone = "Mars"', "a setting is wrong"),
+        ('nightly_at = "25:00"', "a setting is wrong"),
+    ],
+)
+def test_a_wrong_file_is_told(
+    settings: Settings, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, text: str | None, why: str
+) -> None:
+    file = tmp_path / "sprag.toml"
+    if text is not None:
+        file.write_text(text)
+    monkeypatch.setenv("SPRAG_SETTINGS", str(file))
+    with pytest.raises(WrongInputError, match=why):
+        read_settings()

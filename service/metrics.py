@@ -1,0 +1,141 @@
+"""What the service measures, in the text format of Prometheus. Labels are few and never ids.
+
+The cases are run by other processes; what became of them is read from the database when the metrics are asked for.
+"""
+
+from __future__ import annotations
+
+import bisect
+import threading
+from collections import deque
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Final
+
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Histogram, generate_latest
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from worker.states import StudyState
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+    from service.storage.figures import FinishedWork
+    from service.storage.store import Store
+
+CONTENT_TYPE: Final = CONTENT_TYPE_LATEST
+METHODS: Final = frozenset({"GET", "HEAD", "POST", "PATCH", "DELETE"})
+#: Upper bounds in s: of one case, of an answer, of waiting for the database.
+CASE_BOUNDS: Final = (0.0001, 0.0003, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+REQUEST_BOUNDS: Final = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
+WAIT_BOUNDS: Final = (0.0001, 0.001, 0.01, 0.1, 1.0, 10.0, 30.0)
+#: Seconds over which the present rate is taken.
+RATE_SECONDS: Final = 60.0
+
+
+class Metrics:
+    """The metrics of one service on ``store``."""
+
+    def __init__(self, store: Store) -> None:
+        self._registry = CollectorRegistry()
+        self._requests = Counter(
+            "sprag_http_requests",
+            "Requests answered.",
+            ("method", "route", "status"),
+            registry=self._registry,
+        )
+        self._seconds = Histogram(
+            "sprag_http_request_seconds", "Time to answer.", ("route",), buckets=REQUEST_BOUNDS, registry=self._registry
+        )
+        self._wait = Histogram(
+            "sprag_database_wait_seconds",
+            "Time that the service waited for the database to begin reading or writing.",
+            ("kind",),
+            buckets=WAIT_BOUNDS,
+            registry=self._registry,
+        )
+        self._registry.register(StudyCollector(store))
+        store.session.on_wait = self.waited
+
+    def answered(self, method: str, route: str, status: int, seconds: float) -> None:
+        """Count a request; ``route`` is the pattern of its address."""
+        # What clients make up must not make new series.
+        self._requests.labels(method if method in METHODS else "other", route, str(status)).inc()
+        self._seconds.labels(route).observe(seconds)
+
+    def waited(self, kind: str, seconds: float) -> None:
+        """Count a wait for the database; ``kind`` is "read" or "write"."""
+        self._wait.labels(kind).observe(seconds)
+
+    def text(self) -> bytes:
+        """All of them, in the text format; raises StoreError."""
+        return generate_latest(self._registry)
+
+
+class StudyCollector(Collector):
+    """What the database tells of studies and cases.
+
+    Cases that are done are counted from the moment on at which this began, so that deleting studies takes none away.
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._lock = threading.Lock()
+        self._since = store.clock.now()
+        self._began = self._since
+        self._cases = 0
+        self._sum = 0.0
+        self._counts = [0] * (len(CASE_BOUNDS) + 1)
+        self._recent: deque[FinishedWork] = deque()
+
+    def describe(self) -> Iterable[Metric]:
+        """Nothing is read for being registered."""
+        return ()
+
+    def collect(self) -> Iterator[Metric]:
+        """Read and tell; raises StoreError."""
+        now = self._store.clock.now()
+        with self._lock:
+            self._look(now)
+            yield CounterMetricFamily("sprag_cases_done", "Cases that came to an ending.", value=self._cases)
+            buckets, total = [], 0
+            for bound, count in zip((*map(str, CASE_BOUNDS), "+Inf"), self._counts, strict=True):
+                total += count
+                buckets.append((bound, float(total)))
+            yield HistogramMetricFamily(
+                "sprag_case_seconds", "Time of a chunk from claim to commit over its cases.", buckets, self._sum
+            )
+            period = min(RATE_SECONDS, max((now - self._began).total_seconds(), 1e-9))
+            rate = sum(work.cases for work in self._recent) / period if self._recent else 0.0
+        yield GaugeMetricFamily("sprag_cases_per_second", "Cases per second over the last minute.", rate)
+        figures = self._store.figures()
+        studies = GaugeMetricFamily("sprag_studies", "Studies by their state.", labels=("state",))
+        for state in StudyState:
+            studies.add_metric((state.value,), figures.studies.get(state.value, 0))
+        yield studies
+        yield GaugeMetricFamily(
+            "sprag_queue_cases",
+            "Cases still to be run, of all studies that have not ended.",
+            figures.waiting,
+        )
+        endings = GaugeMetricFamily("sprag_stored_cases", "Cases in the database by their ending.", labels=("ending",))
+        for ending, cases in figures.endings.items():
+            endings.add_metric((ending,), cases)
+        yield endings
+        yield GaugeMetricFamily(
+            "sprag_reused_cases", "Cases in the database that were taken from other studies.", figures.reused
+        )
+        if figures.heartbeat is not None:
+            age = (now - figures.heartbeat).total_seconds()
+            yield GaugeMetricFamily("sprag_worker_heartbeat_age_seconds", "Since the worker was last heard of.", age)
+
+    def _look(self, now: datetime) -> None:
+        for work in self._store.finished_since(self._since):
+            each = work.seconds / work.cases
+            self._counts[bisect.bisect_left(CASE_BOUNDS, each)] += work.cases
+            self._cases += work.cases
+            self._sum += work.seconds
+            self._since = max(self._since, work.finished_at)
+            self._recent.append(work)
+        while self._recent and (now - self._recent[0].finished_at).total_seconds() > RATE_SECONDS:
+            self._recent.popleft()

@@ -1,0 +1,85 @@
+"""Figures over all studies, for whoever looks after the service."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING
+
+import sqlalchemy as sa
+
+from service.storage.part import EPOCH, Part, moment
+from service.storage.tables import CHUNKS, DISPATCHER, ENDINGS, STUDIES
+from worker.states import TERMINAL
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+_TERMINAL = [state.value for state in TERMINAL]
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """Studies by state, cases by ending, cases still to be run, cases taken from others, the worker's last sign."""
+
+    studies: Mapping[str, int]
+    endings: Mapping[str, int]
+    waiting: int
+    reused: int
+    heartbeat: datetime | None
+
+
+@dataclass(frozen=True, slots=True)
+class FinishedWork:
+    """A chunk that was done: its cases, and the seconds from its claim to its commit."""
+
+    finished_at: datetime
+    seconds: float
+    cases: int
+
+
+class Totals(Part):
+    """Figures as the metrics see them."""
+
+    def figures(self) -> Figures:
+        """The figures of this moment."""
+        c = STUDIES.c
+        alive = c.deleted_at.is_(None)
+        going = alive & c.state.not_in(_TERMINAL)
+        with self.session.read() as connection:
+            states = connection.execute(sa.select(c.state, sa.func.count()).where(alive).group_by(c.state)).all()
+            waiting, reused = connection.execute(
+                sa.select(
+                    sa.func.coalesce(sa.func.sum(sa.case((going, c.cases - c.done), else_=0)), 0),
+                    sa.func.coalesce(sa.func.sum(c.reused), 0),
+                ).where(alive)
+            ).one()
+            endings = connection.execute(
+                sa.select(ENDINGS.c.ending, sa.func.sum(ENDINGS.c.cases)).group_by(ENDINGS.c.ending)
+            ).all()
+            beat = connection.execute(sa.select(DISPATCHER.c.heartbeat_at)).scalar_one_or_none()
+        return Figures(
+            {str(state): int(count) for state, count in states},
+            {ending: int(cases) for ending, cases in endings},
+            int(waiting),
+            int(reused),
+            None if beat is None else moment(beat),
+        )
+
+    def finished_since(self, since: datetime) -> list[FinishedWork]:
+        """Chunks that were done later than ``since``, in that order."""
+        micros = (since - EPOCH) // timedelta(microseconds=1)
+        c = CHUNKS.c
+        # Only studies that may have such chunks are looked at: by study they have an index.
+        lately = STUDIES.c.finished_at.is_(None) | (STUDIES.c.finished_at >= micros)
+        query = (
+            sa.select(c.claimed_at, c.finished_at, c["count"])
+            .where(c.study.in_(sa.select(STUDIES.c.number).where(lately)), c.state == "done", c.finished_at > micros)
+            .order_by(c.finished_at)
+        )
+        with self.session.read() as connection:
+            rows = connection.execute(query).all()
+        return [
+            FinishedWork(moment(end), max(0.0, (end - (end if begin is None else begin)) / 1e6), count)
+            for begin, end, count in rows
+        ]

@@ -1,0 +1,97 @@
+"""Logs: JSON that machines read, with the ids of request and studies; nothing that a client sends breaks a line."""
+
+from __future__ import annotations
+
+import io
+import json
+import logging
+import sys
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from service.logs import REQUEST_HEADER, JsonFormatter, configure
+
+if TYPE_CHECKING:
+    from tests.service.conftest import Service
+
+
+@pytest.fixture
+def log() -> Iterator[io.StringIO]:
+    """What goes to the log as JSON, requests too."""
+    stream = io.StringIO()
+    handler = logging.StreamHandler(stream)
+    handler.setFormatter(JsonFormatter())
+    logger = logging.getLogger("sprag")
+    requests = logging.getLogger("sprag.requests")
+    before = logger.level, requests.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    requests.setLevel(logging.INFO)
+    yield stream
+    logger.removeHandler(handler)
+    logger.setLevel(before[0])
+    requests.setLevel(before[1])
+
+
+def lines(log: io.StringIO) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in log.getvalue().splitlines()]
+
+
+def test_a_request_has_a_line_with_its_id_and_study(service: Service, log: io.StringIO) -> None:
+    study_id = service.submit()
+    answer = service.http.get(f"/api/v1/studies/{study_id}", headers={REQUEST_HEADER: "from-the-proxy_1"})
+    assert answer.headers[REQUEST_HEADER] == "from-the-proxy_1"
+    line = lines(log)[-1]
+    assert (line["method"], line["path"], line["status"]) == ("GET", f"/api/v1/studies/{study_id}", 200)
+    assert (line["request"], line["studies"]) == ("from-the-proxy_1", [study_id])
+    assert line["milliseconds"] > 0
+    assert line["time"].endswith("+00:00")
+
+
+@pytest.mark.parametrize("given", ["", "x" * 65, "a b", "é", '"}', "a\tb"])
+def test_an_id_that_is_none_is_replaced(service: Service, log: io.StringIO, given: str) -> None:
+    answer = service.http.get("/livez", headers={REQUEST_HEADER: given.encode("utf-8")})
+    assert answer.headers[REQUEST_HEADER] == lines(log)[-1]["request"] != given
+    assert len(answer.headers[REQUEST_HEADER]) == 16
+
+
+@pytest.mark.parametrize("path", ["/%0aFAKE%20LINE", "/%1b[31m", "/%e2%80%ae", "/%22,%22level%22:%22x"])
+def test_no_address_breaks_a_line(service: Service, log: io.StringIO, path: str) -> None:
+    service.http.get(path)
+    (line,) = [line for line in lines(log) if "path" in line]
+    assert line["path"].isprintable()
+    assert line["path"].isascii()
+
+
+def test_a_fault_is_told_with_its_trace_and_request(
+    service: Service, log: io.StringIO, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(service.store, "list_studies", lambda **_: 1 / 0)
+    answer = service.http.get("/api/v1/studies")
+    assert answer.status_code == 500
+    told = [line for line in lines(log) if line["level"] == "error"]
+    assert "ZeroDivisionError" in told[0]["exception"]
+    assert told[0]["request"] == answer.headers[REQUEST_HEADER]
+
+
+def test_the_form_of_the_log_is_a_setting(monkeypatch: pytest.MonkeyPatch) -> None:
+    root, names = logging.getLogger(), ("sprag", "service", "worker", "sprag.requests")
+    before, levels = root.handlers[:], [logging.getLogger(name).level for name in names]
+    stream = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    try:
+        for form, requests in (("text", False), ("json", True)):
+            root.handlers[:] = []
+            configure(form, requests=requests)  # type: ignore[arg-type]
+            logging.getLogger("sprag.service").info("it goes")
+            logging.getLogger("sprag.requests").info("a request")
+            logging.getLogger("library").info("chatter")
+    finally:
+        root.handlers[:] = before
+        for name, level in zip(names, levels, strict=True):
+            logging.getLogger(name).setLevel(level)
+    plain, *structured = stream.getvalue().splitlines()
+    assert plain == "it goes"
+    assert [json.loads(line)["message"] for line in structured] == ["it goes", "a request"]
