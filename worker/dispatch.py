@@ -1,6 +1,6 @@
 """What the dispatcher decides, without I/O: events in, instructions out.
 
-A chunk whose process dies or runs out of time is run once more, then split in two until the case is found; a case that
+A chunk whose process dies or runs out of time is run once more, then split until the case is found; a case that
 fails alone twice is given its ending and left aside, a crashed one only when a success or the end of the study shows
 that it was not the engine. Three chunks that share no case and crash with no success of the study between them show a
 fault of the engine, not of the cases, and so do cases that crash alone when nothing of the study ever came through.
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, assert_never
 
 from worker.kernels import WorkerEnding
@@ -21,6 +22,8 @@ from worker.ports import Chunk, Fate
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+#: Parts of a chunk that is split. A failure costs the start of a process, a part next to nothing.
+PARTS = 8
 #: Failures of one chunk after which it is split, or quarantined when it is a single case.
 MAX_FAILURES = 2
 #: Chunks without a common case that crash in a row and so show an engine fault.
@@ -188,14 +191,16 @@ def disjoint(chunks: Iterable[Chunk]) -> int:
     return count
 
 
-def halves(chunk: Chunk) -> tuple[Chunk, Chunk]:
-    """The chunk in two parts. A part of several cases is split again at its next failure; a single case fails twice."""
-    size = chunk.count // 2
-
-    def part(first: int, count: int) -> Chunk:
-        return Chunk(chunk.study, first, count, failures=0 if count == 1 else MAX_FAILURES - 1)
-
-    return part(chunk.first, size), part(chunk.first + size, chunk.count - size)
+def pieces(chunk: Chunk) -> tuple[Chunk, ...]:
+    """The chunk in parts of nearly the same size. One of several cases is split again at its next failure; a single
+    case fails twice.
+    """
+    count = min(PARTS, chunk.count)
+    edges = [chunk.count * k // count for k in range(count + 1)]
+    return tuple(
+        Chunk(chunk.study, chunk.first + a, b - a, failures=0 if b - a == 1 else MAX_FAILURES - 1)
+        for a, b in pairwise(edges)
+    )
 
 
 class Dispatch:
@@ -313,7 +318,7 @@ class Dispatch:
             return []
         if chunk.count == 1:
             return [Quarantine(chunk, WorkerEnding.TIMED_OUT, event.detail)]
-        parts = halves(chunk)
+        parts = pieces(chunk)
         known.waiting.extendleft(reversed(parts))
         return [Split(chunk, parts, event.detail)]
 

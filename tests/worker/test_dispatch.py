@@ -32,7 +32,7 @@ from worker.dispatch import (
     Split,
     Stop,
     disjoint,
-    halves,
+    pieces,
 )
 from worker.ports import Chunk, Fate
 
@@ -355,20 +355,20 @@ def test_studies_share_the_capacity_the_oldest_first() -> None:
 
 def test_a_crashing_chunk_is_run_again_whole_before_it_is_split() -> None:
     machine = Dispatch(1)
-    (first,) = machine.handle(Offered(0, [Chunk(0, 0, 8)]))
-    assert first == Run(1, Chunk(0, 0, 8))
+    (first,) = machine.handle(Offered(0, [Chunk(0, 0, 16)]))
+    assert first == Run(1, Chunk(0, 0, 16))
     assert machine.handle(Ended(1, Fate.CRASHED, "x")) == [
-        PutBack(Chunk(0, 0, 8, 1), "x"),
-        Run(2, Chunk(0, 0, 8, 1)),
+        PutBack(Chunk(0, 0, 16, 1), "x"),
+        Run(2, Chunk(0, 0, 16, 1)),
     ]
     split, again = machine.handle(Ended(2, Fate.CRASHED, "x"))
-    assert split == Split(Chunk(0, 0, 8, 1), (Chunk(0, 0, 4, 1), Chunk(0, 4, 4, 1)), "x")
-    assert again == Run(3, Chunk(0, 0, 4, 1))
+    assert split == Split(Chunk(0, 0, 16, 1), tuple(Chunk(0, k, 2, 1) for k in range(0, 16, 2)), "x")
+    assert again == Run(3, Chunk(0, 0, 2, 1))
 
 
 def test_a_case_alone_has_two_lives_of_its_own() -> None:
-    assert halves(Chunk(0, 6, 2, 1)) == (Chunk(0, 6, 1), Chunk(0, 7, 1))
-    assert halves(Chunk(0, 6, 3, 1)) == (Chunk(0, 6, 1), Chunk(0, 7, 2, 1))
+    assert pieces(Chunk(0, 6, 2, 1)) == (Chunk(0, 6, 1), Chunk(0, 7, 1))
+    assert pieces(Chunk(0, 6, 9, 1)) == (*(Chunk(0, case, 1) for case in range(6, 13)), Chunk(0, 13, 2, 1))
 
 
 def test_one_success_forgives_the_crashes_before_it() -> None:
