@@ -7,7 +7,7 @@ import os
 import signal
 import socket
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from service import logs
 from service.logs import LogFormat
 from service.schedules.scheduler import Scheduler
-from service.storage.lock import DispatcherLock
+from service.storage.lock import lock_of
 from service.storage.part import SystemClock
 from service.storage.store import Store
 from service.upkeep import Upkeep, UpkeepPlan
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from types import FrameType
 
     from service.settings import Settings
+    from service.storage.lock import OneHolder
     from worker.ports import Executor
 
 _LOG = logging.getLogger(__name__)
@@ -118,17 +119,22 @@ def run_dispatcher(
     chunking = Chunking(settings.chunk_cases, settings.processes, settings.chunk_timeout)
     with Store.open(settings.database_url, chunking=chunking) as store:
         store.require_sound()
-        scheduler, upkeep = Scheduler(store), Upkeep(store, settings.upkeep)
-        lock = DispatcherLock(store.session.path)
-        if take_over:
-            lock.seize()
-        elif not _stand_by(store, lock, stopping, say):
-            return
+        scheduler, upkeep = Scheduler(store), Upkeep(store, _possible(store, settings.upkeep, say))
+        lock = lock_of(store.session, owner_name())
         try:
+            if take_over:
+                lock.seize()
+            elif not _stand_by(store, lock, stopping, say):
+                return
             store.purge()
-            say(f"worker with {settings.processes} processes at work on {store.session.path}")
+            say(f"worker with {settings.processes} processes at work on {store.session.location}")
             dispatcher = Dispatcher(
-                store, executor(settings), SystemClock(), owner=owner_name(), renew=lambda: renewed(settings)
+                store,
+                executor(settings),
+                SystemClock(),
+                owner=owner_name(),
+                renew=lambda: renewed(settings),
+                news=store.session.news(),
             )
             scheduler.start()
             upkeep.start()
@@ -139,11 +145,19 @@ def run_dispatcher(
             lock.release()
 
 
-def _stand_by(store: Store, lock: DispatcherLock, stopping: Callable[[], bool], say: Callable[[str], None]) -> bool:
+def _possible(store: Store, plan: UpkeepPlan, say: Callable[[str], None]) -> UpkeepPlan:
+    """The plan without backups where the database is not ours to copy."""
+    if plan.folder is None or not store.session.on_server:
+        return plan
+    say(f"no backups are made of {store.session.location}: use PostgreSQL's own tools, such as pg_dump")
+    return replace(plan, folder=None)
+
+
+def _stand_by(store: Store, lock: OneHolder, stopping: Callable[[], bool], say: Callable[[str], None]) -> bool:
     """Wait for the lock; False when ``stopping()`` came first. A holder that is not heard of any more is told once."""
     if lock.take():
         return True
-    say(f"another worker (process {lock.holder()}) is at work on {store.session.path}; waiting for its end")
+    say(f"another worker (process {lock.holder()}) is at work on {store.session.location}; waiting for its end")
     told = False
     while not lock.take():
         if stopping():

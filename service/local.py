@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from service.dispatching import STANDBY_SECONDS, WorkerSettings, owner_name, pool, renewed_pool
 from service.leftovers import marked, sweep
-from service.storage.lock import DispatcherLock
+from service.storage.lock import lock_of
 from service.storage.part import SystemClock
 from service.storage.store import Store
 from worker.chunking import Chunking
@@ -72,19 +72,19 @@ def run_here(
             record = store.create_study(spec, study, warnings=warnings, fresh=fresh)
             settings = WorkerSettings(url, processes, chunk_timeout)
             watch = _Watch(store, record.id, on_progress)
-            lock = DispatcherLock(store.session.path)
-            while not watch.ended():
-                if lock.take():
-                    try:
+            lock = lock_of(store.session, owner_name())
+            try:
+                while not watch.ended():
+                    if lock.take():
                         runner = executor or (pool(settings) if processes else InlineExecutor())
                         renew = None if executor or not processes else partial(renewed_pool, settings)
                         Dispatcher(
                             store, runner, SystemClock(), owner=owner_name(), only=record.number, renew=renew
                         ).run(watch.ended)
-                    finally:
-                        lock.release()
-                else:
-                    time.sleep(STANDBY_SECONDS)
+                    else:
+                        time.sleep(STANDBY_SECONDS)
+            finally:
+                lock.release()
             yield LocalRun(store, watch.final())
 
 

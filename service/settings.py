@@ -45,7 +45,10 @@ class Settings(BaseSettings):
 
     database: str = Field(
         default="",
-        description=("path of an SQLite file or a SQLAlchemy URL; empty: `sprag.sqlite3` in the user's data directory"),
+        description=(
+            "path of an SQLite file, or a SQLAlchemy URL of one or of a PostgreSQL server "
+            "(`postgresql://user@host/sprag`); empty: `sprag.sqlite3` in the user's data directory"
+        ),
     )
     host: str = Field(
         default="127.0.0.1",

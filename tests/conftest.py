@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
+
+from tests import postgres
 
 # How long an example takes says something about the machine, not about the program. The gate draws the same examples
 # every time; on a developer's machine new ones are tried.
@@ -59,3 +61,26 @@ def sprag(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -
 def examples() -> Path:
     """Folder of the example studies."""
     return ROOT / "examples"
+
+
+@pytest.fixture(scope="session")
+def postgres_server() -> Iterator[postgres.Server]:
+    """A PostgreSQL server that tests leave running; skipped where there is none, and a failure in the gate."""
+    with postgres.running() as server:
+        yield server
+
+
+@pytest.fixture(scope="session")
+def _ready_database(postgres_server: postgres.Server) -> str:
+    from service.storage.store import Store
+
+    url = postgres_server.url(postgres_server.new_database())
+    Store.open(url).close()
+    return url
+
+
+@pytest.fixture
+def postgres_url(_ready_database: str) -> str:
+    """URL of a database on the server with the tables and nothing in them; one test after the other has it."""
+    postgres.empty(_ready_database)
+    return _ready_database

@@ -18,13 +18,15 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from worker.kernels import ChunkResult
-    from worker.ports import ActiveStudy, Clock, Executor, Known, Store
+    from worker.ports import ActiveStudy, Clock, Executor, Known, News, Store
     from worker.study import Study
 
 _LOG = logging.getLogger(__name__)
 
 #: Seconds between two looks at the store for new studies and wishes; also the longest wait for the executor.
 POLL_SECONDS = 0.2
+#: The same where news of the store come by themselves; only what nobody tells of is found by looking.
+QUIET_POLL_SECONDS = 2.0
 HEARTBEAT_SECONDS = 5.0
 #: Studies worked on side by side; the others wait in order of submission.
 OPEN_STUDIES = 8
@@ -39,7 +41,8 @@ class Dispatcher:
     """Runs every study of a store, or only study number ``only``.
 
     The caller sees to it that there is one dispatcher at a time (a lock); the epoch makes sure of it. ``renew`` gives a
-    new executor that compiles its kernels anew, in the place of one whose chunks all crash.
+    new executor that compiles its kernels anew, in the place of one whose chunks all crash. With ``news`` the store is
+    looked at when it has changed, and seldom otherwise.
     """
 
     def __init__(
@@ -51,6 +54,7 @@ class Dispatcher:
         owner: str = "dispatcher",
         only: int | None = None,
         renew: Callable[[], Executor] | None = None,
+        news: News | None = None,
     ) -> None:
         self._store = store
         self._executor = executor
@@ -58,6 +62,7 @@ class Dispatcher:
         self._owner = owner
         self._only = only
         self._renew = renew
+        self._news = news
         self._machine = Dispatch(executor.capacity)
         self._studies: dict[int, Study] = {}
         self._ids: dict[int, str] = {}
@@ -86,6 +91,8 @@ class Dispatcher:
                 self.step()
         finally:
             self._executor.close()
+            if self._news is not None:
+                self._news.close()
             # Whoever took over, or will, returns the claims.
             with suppress(EpochLostError, StoreFullError):
                 self._store.release(self._epoch)
@@ -100,10 +107,17 @@ class Dispatcher:
             if now >= self._next_beat:
                 self._store.heartbeat(self._epoch)
                 self._next_beat = now + HEARTBEAT_SECONDS
-            if now >= self._next_poll:
-                self._next_poll = now + POLL_SECONDS
+            if now >= self._next_poll or (self._news is not None and self._news.wait(0.0)):
                 self._poll()
+                # A kernel that is being compiled, or room, is told of by nobody.
+                quiet = self._news is not None and not self._compiling
+                self._next_poll = now + (QUIET_POLL_SECONDS if quiet else POLL_SECONDS)
             at_once, self._had_all = self._had_all, []
+            if self._news is not None and not (at_once or self._compiling or self._machine.in_flight):
+                # Nothing can come from the executor.
+                if self._news.wait(POLL_SECONDS):
+                    self._next_poll = now
+                return
             for outcome in (*at_once, *self._executor.wait(0.0 if at_once else POLL_SECONDS)):
                 self._handle(dispatch.Ended(outcome.ticket, outcome.fate, outcome.detail), outcome.result)
                 self._known.pop(outcome.ticket, None)

@@ -206,6 +206,16 @@ class Executor(Protocol):
         """Stop everything and leave no process behind."""
 
 
+class News(Protocol):
+    """Tells of changes in the store as soon as they are made, wherever that is."""
+
+    def wait(self, timeout: float) -> bool:
+        """Whether something has changed since the last call, or may have; waits for it at most ``timeout`` s."""
+
+    def close(self) -> None:
+        """Hear nothing more."""
+
+
 class Clock(Protocol):
     """Time, so that tests can hold it still."""
 

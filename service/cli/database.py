@@ -28,11 +28,11 @@ def upgrade(db: Database = None, as_json: JsonFlag = False) -> None:
     with _opened(db, existing=False) as session:
         before, after = bring_up(session)
     if as_json:
-        write_json({"database": str(session.path), "before": before, "after": after})
+        write_json({"database": session.location, "before": before, "after": after})
     elif before == after:
-        print(f"{session.path}: already at revision {after}")
+        print(f"{session.location}: already at revision {after}")
     else:
-        print(f"{session.path}: from revision {before or 'none'} to {after}")
+        print(f"{session.location}: from revision {before or 'none'} to {after}")
 
 
 @app.command()
@@ -67,7 +67,7 @@ def backup(
         write_copy(session, target)
     size = target.stat().st_size
     if as_json:
-        write_json({"database": str(session.path), "backup": str(target), "bytes": size})
+        write_json({"database": session.location, "backup": str(target), "bytes": size})
     else:
         say(f"{file}: {size} bytes")
 
@@ -107,7 +107,8 @@ def _opened(db: str | None, *, existing: bool = True) -> Iterator[Session]:
 
     location = read_settings(database=db).database_url
     with suppress(ArgumentError):  # which the session tells better
-        path = make_url(location).database
+        url = make_url(location)
+        path = url.database if url.get_backend_name() == "sqlite" else None
         if existing and path and not Path(path).exists():
             raise WrongInputError(f"{path}: there is no such database")
     session = Session(location)

@@ -103,13 +103,15 @@ def examine(db: str | None) -> Iterator[Finding]:
 
 
 def _checks(db: str | None) -> dict[str, Callable[[], tuple[bool, str]]]:
-    location = Path(read_settings(database=db).database_url.removeprefix("sqlite:///"))
+    url = read_settings(database=db).database_url
+    file = Path(url.removeprefix("sqlite:///")) if url.startswith("sqlite") else None
+    here: dict[str, Callable[[], tuple[bool, str]]] = {}
+    if file is not None:
+        here = {"SQLite": _sqlite, "disk": lambda: _disk(file), "backups": _backups}
     return {
         "versions": _versions,
-        "SQLite": _sqlite,
-        "database": lambda: _database(location),
-        "disk": lambda: _disk(location),
-        "backups": _backups,
+        "database": lambda: _database(url, file),
+        **here,
         "kernel cache": _cache,
         "engine": _known_values,
     }
@@ -128,16 +130,16 @@ def _sqlite() -> tuple[bool, str]:
     return warning is None, warning or ".".join(map(str, sqlite_version()))
 
 
-def _database(location: Path) -> tuple[bool, str]:
+def _database(url: str, file: Path | None) -> tuple[bool, str]:
     from service.storage.maintenance import revision
     from service.storage.session import Session
     from service.storage.tables import HEAD_REVISION
 
-    if not location.exists():
-        return True, f"{location} (not made yet)"
-    session = Session(f"sqlite:///{location}")
+    if file is not None and not file.exists():
+        return True, f"{file} (not made yet)"
+    session = Session(url)
     try:
-        found = revision(session)
+        found, location = revision(session), session.location
     finally:
         session.close()
     if found not in (None, HEAD_REVISION):

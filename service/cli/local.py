@@ -120,7 +120,7 @@ def _reusable(settings: Settings, parsed: ParsedSpec) -> int:
 
     session = Session(settings.database_url)
     session.close()
-    if not session.path.exists():
+    if not session.on_server and not session.path.exists():
         return 0
     with Store.open(settings.database_url) as store:
         return store.reusable(parsed.study)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sqlalchemy as sa
 
-from service.storage.part import Part
+from service.storage.part import MAX_INTEGER, Part
 from service.storage.records import CaseColumns, CaseRow, RowBlock
 from service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
 from worker import kernels
@@ -127,7 +127,7 @@ def _read(
     """Rows of the database: number, ending, flags, results."""
     c = rows.table.c
     query = sa.select(c.case_number, c.ending, c.flags, *(c[info.column] for info in rows.infos)).where(
-        c.study == rows.number, c.case_number > after_case
+        c.study == rows.number, c.case_number > min(after_case, MAX_INTEGER)
     )
     if ending is not None:
         ended = connection.execute(
@@ -145,7 +145,7 @@ def _never_run(connection: sa.Connection, rows: _Rows, after_case: int) -> Itera
     c = CHUNKS.c
     done = connection.execute(
         sa.select(c["first"], c["count"])
-        .where(c.study == rows.number, c.state == "done", c["first"] + c["count"] > after_case + 1)
+        .where(c.study == rows.number, c.state == "done", c["first"] + c["count"] > min(after_case + 1, MAX_INTEGER))
         .order_by(c["first"])
     )
     reached = after_case + 1

@@ -5,6 +5,31 @@ from __future__ import annotations
 import fcntl
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from service.storage.session import Session
+
+
+class OneHolder(Protocol):
+    """Held by at most one process; it goes with that process."""
+
+    def take(self) -> bool:
+        """Take the lock if it is free; True when it is ours."""
+
+    def seize(self) -> None:
+        """Take the lock from whoever has it, which only the epoch then keeps from the database."""
+
+    def holder(self) -> str:
+        """Whoever took the lock last, "" where nobody did."""
+
+    def release(self) -> None:
+        """Give the lock up."""
+
+
+def lock_of(session: Session, owner: str) -> OneHolder:
+    """The dispatcher's lock of a database: a file beside an SQLite file, an advisory lock of a server."""
+    return session.server_lock(owner) if session.on_server else DispatcherLock(session.path)
 
 
 class DispatcherLock:

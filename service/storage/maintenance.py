@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,7 +32,7 @@ def revision(session: Session) -> str | None:
             ).scalar_one_or_none()
             return found
     if names:
-        raise SchemaError(f"{session.path} is a database of another program; name another file")
+        raise SchemaError(f"{session.location} is a database of another program; name another one")
     return None
 
 
@@ -47,12 +48,12 @@ def require_current(session: Session) -> None:
 def _other_revision(session: Session, found: str) -> str:
     if found in known_revisions():
         return (
-            f"the database {session.path} has revision {found}, this program needs {HEAD_REVISION}: "
+            f"the database {session.location} has revision {found}, this program needs {HEAD_REVISION}: "
             "run `sprag db upgrade`"
         )
     return (
-        f"the database {session.path} has revision {found}, which is newer than this program knows ({HEAD_REVISION}): "
-        "install the newer Sprag and run its `sprag db upgrade`"
+        f"the database {session.location} has revision {found}, which is newer than this program knows "
+        f"({HEAD_REVISION}): install the newer Sprag and run its `sprag db upgrade`"
     )
 
 
@@ -94,9 +95,9 @@ def upgrade(session: Session) -> tuple[str | None, str]:
 def require_sound(session: Session) -> None:
     """Raise DatabaseError when the pages of the database are damaged; large ones are not looked over.
 
-    `check` looks at everything, and takes its time.
+    `check` looks at everything, and takes its time. A server sees to its pages by itself.
     """
-    if session.path.stat().st_size > CHECKED_BYTES:
+    if session.on_server or session.path.stat().st_size > CHECKED_BYTES:
         return
     with session.read() as connection:
         if connection.exec_driver_sql("PRAGMA quick_check(1)").scalar_one() != "ok":
@@ -113,24 +114,44 @@ def check(session: Session) -> CheckReport:
             problems.append("the database is empty: run `sprag db upgrade`")
         elif found != HEAD_REVISION:
             problems.append(_other_revision(session, found))
-        with session.read() as connection:
-            pages = connection.exec_driver_sql("PRAGMA integrity_check").scalars().all()
-            problems += [f"integrity: {line}" for line in pages if line != "ok"]
-            references = connection.exec_driver_sql("PRAGMA foreign_key_check").all()
-            problems += [f"a row of {row[0]} refers to a study that is not there" for row in references]
+        if not session.on_server:
+            problems += _look_over_file(session)
     except DatabaseError as error:
         problems.append(str(error))
-    if warning := sqlite_warning():
-        problems.append(warning)
-    version = ".".join(map(str, sqlite_version()))
-    return CheckReport(str(session.path), "SQLite", version, found, HEAD_REVISION, tuple(problems))
+    if session.on_server:
+        backend, version = "PostgreSQL", _server_version(session)
+    else:
+        backend, version = "SQLite", ".".join(map(str, sqlite_version()))
+        if warning := sqlite_warning():
+            problems.append(warning)
+    return CheckReport(session.location, backend, version, found, HEAD_REVISION, tuple(problems))
+
+
+def _look_over_file(session: Session) -> list[str]:
+    """What SQLite finds wrong in its file: pages and references. A server sees to both by itself."""
+    with session.read() as connection:
+        pages = connection.exec_driver_sql("PRAGMA integrity_check").scalars().all()
+        problems = [f"integrity: {line}" for line in pages if line != "ok"]
+        references = connection.exec_driver_sql("PRAGMA foreign_key_check").all()
+        return problems + [f"a row of {row[0]} refers to a study that is not there" for row in references]
+
+
+def _server_version(session: Session) -> str:
+    """Version of the server; "" where it does not answer, which is told elsewhere."""
+    with suppress(DatabaseError), session.read() as connection:
+        return str(connection.exec_driver_sql("SHOW server_version").scalar_one()).split()[0]
+    return ""
 
 
 def backup(session: Session, path: Path) -> None:
     """Write a consistent copy of the database to ``path`` while others go on working.
 
-    Raises DatabaseError when there is a file already or it cannot be written.
+    Raises DatabaseError when there is a file already or it cannot be written, or the database is on a server.
     """
+    if session.on_server:
+        raise DatabaseError(
+            f"{session.location} is backed up with PostgreSQL's own tools, such as `pg_dump --format=custom`"
+        )
     if path.exists():
         raise DatabaseError(f"{path} exists already; a backup never replaces a file")
     if not path.parent.is_dir():

@@ -42,6 +42,16 @@ def optional_moment(micros: int | None) -> datetime | None:
     return None if micros is None else moment(micros)
 
 
+#: The largest number that a column of integers takes on every server.
+MAX_INTEGER = 2**31 - 1
+
+
+def announce(connection: sa.Connection) -> None:
+    """Tell dispatchers, once this transaction is committed, that there is something new; where one can be told."""
+    if connection.dialect.name == "postgresql":
+        connection.exec_driver_sql("NOTIFY sprag")
+
+
 class Part:
     """A part of the store."""
 
@@ -94,4 +104,5 @@ class Part:
         elif before.terminal:
             values["finished_at"] = None
         connection.execute(sa.update(STUDIES).where(STUDIES.c.number == number).values(values))
+        announce(connection)
         return after

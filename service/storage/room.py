@@ -30,11 +30,18 @@ if TYPE_CHECKING:
 RESERVE_BYTES = 4 * 1024 * 1024
 #: Bytes of the file that is given up when not even that can be said.
 RESERVE_FILE_BYTES = 1024 * 1024
+#: Room where it is not known: enough for whatever is asked.
+UNKNOWN_BYTES = 1 << 62
 GOES_ON = "the study goes on by itself when there is room"
 
 
 def room(session: Session) -> tuple[int, str]:
-    """Bytes that the database can still take, and what sets the limit: the disk, or the largest file allowed."""
+    """Bytes that the database can still take, and what sets the limit: the disk, or the largest file allowed.
+
+    The disk of a server cannot be asked from here: it is full when the server says so at a write.
+    """
+    if session.on_server:
+        return UNKNOWN_BYTES, f"the server of {session.location} does not tell"
     free = shutil.disk_usage(session.path.parent).free
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
     size, log = _size(session.path), _size(session.path.with_name(f"{session.path.name}-wal"))
@@ -91,8 +98,8 @@ class Room(Part):
         return self.session.path.with_name(f"{self.session.path.name}.reserve")
 
     def _keep_reserve(self) -> None:
-        """Have the file there that is given up when the disk is full."""
-        if self._reserve.exists():
+        """Have the file there that is given up when the disk is full; a server has to see to that itself."""
+        if self.session.on_server or self._reserve.exists():
             return
         with suppress(OSError), self._reserve.open("xb") as file:
             file.write(os.urandom(RESERVE_FILE_BYTES))  # zeros could be stored as nothing
@@ -106,6 +113,8 @@ class Room(Part):
         try:
             self._hold(epoch, reason, returned)
         except DatabaseFullError:
+            if self.session.on_server:
+                raise
             self._reserve.unlink(missing_ok=True)
             self._hold(epoch, reason, returned)
 

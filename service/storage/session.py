@@ -1,4 +1,7 @@
-"""Opening the database: driver, pragmas, transactions, and one sentence for whatever fails."""
+"""Opening the database: driver, pragmas, transactions, and one sentence for whatever fails.
+
+What is particular to a PostgreSQL server is in `service.storage.postgres`; here are SQLite's files.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,10 @@ from service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFul
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from types import ModuleType
+
+    from service.storage.lock import OneHolder
+    from worker.ports import News
 
 #: Seconds a connection waits for another writer before it gives up.
 BUSY_SECONDS = 30.0
@@ -75,7 +82,8 @@ def file_system_of(path: Path, mounts: str | None = None) -> str:
 class Session:
     """Connections to one database.
 
-    ``url`` is a SQLAlchemy URL of an SQLite file. Raises DatabaseError, with one sentence, when it cannot be used.
+    ``url`` is a SQLAlchemy URL of an SQLite file or of a database on a PostgreSQL server. Raises DatabaseError, with
+    one sentence, when it cannot be used. ``location`` is the database as it may be shown to people.
     """
 
     def __init__(self, url: str) -> None:
@@ -85,27 +93,60 @@ class Session:
             raise DatabaseError(
                 f"{url!r} is no database URL; one looks like sqlite:////path/to/sprag.sqlite3"
             ) from None
-        if self.url.get_backend_name() != "sqlite":
-            raise DatabaseError(f"databases of kind {self.url.get_backend_name()!r} are not supported; use sqlite")
+        self._path: Path | None = None
+        match self.url.get_backend_name():
+            case "sqlite":
+                self._engine = self._open_file()
+                begin = {"read": "BEGIN", "write": "BEGIN IMMEDIATE"}
+                reading: dict[str, Any] = {}
+            case "postgresql":
+                self._engine = self._open_server()
+                begin = {"read": "", "write": _postgres().TAKE_WRITER}
+                reading = {"isolation_level": "REPEATABLE READ", "postgresql_readonly": True}
+            case other:
+                raise DatabaseError(f"databases of kind {other!r} are not supported; use sqlite or postgresql")
+        sa.event.listen(self._engine, "begin", _begin)
+        self._writing = Lock()
+        #: Told how long ("read" or "write", s) each transaction waited for its beginning.
+        self.on_wait: Callable[[str, float], None] | None = None
+        self._reader = self._engine.execution_options(**{_BEGIN: begin["read"]}, **reading)
+        self._writer = self._engine.execution_options(**{_BEGIN: begin["write"]})
+
+    def _open_file(self) -> sa.Engine:
         if self.url.query:
             raise DatabaseError(f"a database URL takes no options here ({', '.join(sorted(self.url.query))})")
         if self.url.database in (None, "", ":memory:"):
             raise DatabaseError("the database must be a file: several processes work on it")
-        self.path = Path(str(self.url.database)).absolute()
+        self._path = Path(str(self.url.database)).absolute()
+        self.location = str(self._path)
         self._check_place()
-        self._engine = sa.create_engine(
+        engine = sa.create_engine(
             self.url,
             module=sqlite_driver(),
             connect_args={"timeout": BUSY_SECONDS, "isolation_level": None},
             pool_size=POOL_CONNECTIONS,
             max_overflow=64,
         )
-        sa.event.listen(self._engine, "connect", _set_pragmas)
-        sa.event.listen(self._engine, "begin", _begin)
-        self._writing = Lock()
-        #: Told how long ("read" or "write", s) each transaction waited for its beginning.
-        self.on_wait: Callable[[str, float], None] | None = None
-        self._writer = self._engine.execution_options(**{_BEGIN: "BEGIN IMMEDIATE"})
+        sa.event.listen(engine, "connect", _set_pragmas)
+        return engine
+
+    def _open_server(self) -> sa.Engine:
+        postgres = _postgres()
+        self.url = postgres.checked(self.url)
+        self.location = postgres.location(self.url)
+        engine: sa.Engine = postgres.make_engine(self.url, lock_seconds=BUSY_SECONDS, connections=POOL_CONNECTIONS)
+        return engine
+
+    @property
+    def on_server(self) -> bool:
+        """Whether the database is on a PostgreSQL server and not in a file here."""
+        return self._path is None
+
+    @property
+    def path(self) -> Path:
+        """The file of an SQLite database; only for code that has asked `on_server`."""
+        assert self._path is not None
+        return self._path
 
     def _check_place(self) -> None:
         folder = self.path.parent
@@ -135,7 +176,7 @@ class Session:
     @contextmanager
     def read(self) -> Iterator[sa.Connection]:
         """A short read transaction: everything read inside is of one moment."""
-        with self._transaction(self._engine, "read", perf_counter()) as connection:
+        with self._transaction(self._reader, "read", perf_counter()) as connection:
             yield connection
 
     @contextmanager
@@ -144,7 +185,7 @@ class Session:
         # Threads of one process queue here: SQLite's own waiting is by sleeping ever longer, and the last wakes last.
         began = perf_counter()
         if not self._writing.acquire(timeout=BUSY_SECONDS):
-            raise DatabaseBusyError(_BUSY.format(self.path))
+            raise DatabaseBusyError(_BUSY.format(self.location))
         try:
             with self._transaction(self._writer, "write", began) as connection:
                 yield connection
@@ -159,16 +200,32 @@ class Session:
                     self.on_wait(kind, perf_counter() - began)
                 yield connection
         except sa.exc.DBAPIError as error:
-            raise explained(error, self.path) from error
+            raise self._explained(error) from error
 
     @contextmanager
     def plain(self) -> Iterator[sa.Connection]:
         """A connection outside any transaction, for statements that do not work inside one."""
         try:
-            with self._engine.connect().execution_options(**{_BEGIN: ""}) as connection:
+            options = {"isolation_level": "AUTOCOMMIT"} if self.on_server else {}
+            with self._engine.connect().execution_options(**{_BEGIN: ""}, **options) as connection:
                 yield connection
         except sa.exc.DBAPIError as error:
-            raise explained(error, self.path) from error
+            raise self._explained(error) from error
+
+    def server_lock(self, owner: str) -> OneHolder:
+        """The dispatcher's lock of a database on a server, for ``owner`` (a name for people)."""
+        lock: OneHolder = _postgres().ServerLock(self.url, owner, BUSY_SECONDS)
+        return lock
+
+    def news(self) -> News | None:
+        """What tells of changes at once; None where one has to look for them."""
+        news: News | None = _postgres().News(self.url, BUSY_SECONDS) if self.on_server else None
+        return news
+
+    def _explained(self, error: sa.exc.DBAPIError) -> Exception:
+        if self.on_server:
+            return (_postgres().explained(error.orig, self.location) if error.orig else None) or error
+        return explained(error, self.path)
 
     def close(self) -> None:
         """Close every connection."""
@@ -181,6 +238,15 @@ def damaged(path: Path) -> str:
         f"the database {path} is damaged; `sprag db check` tells where: put the latest copy that `sprag db backup` "
         "wrote in its place"
     )
+
+
+def _postgres() -> ModuleType:
+    """The module for servers, whose driver is installed only where it is wanted."""
+    try:
+        from service.storage import postgres
+    except ImportError:
+        raise DatabaseError("PostgreSQL needs a driver that is not installed: pip install 'sprag[postgres]'") from None
+    return postgres
 
 
 def explained(error: sa.exc.DBAPIError, path: Path) -> Exception:
@@ -214,5 +280,5 @@ def _set_pragmas(connection: Any, _record: object) -> None:
 def _begin(connection: sa.Connection) -> None:
     # The driver never begins by itself (isolation_level None). A transaction that began as a reader could not become
     # a writer once another process has written in between, so writers take the lock at once.
-    if statement := connection.get_execution_options().get(_BEGIN, "BEGIN"):
+    if statement := connection.get_execution_options().get(_BEGIN):
         connection.exec_driver_sql(statement)

@@ -30,7 +30,7 @@ class Store(Studies, Retries, Cases, Room, Schedules, Tokens, Totals, Work):
 
     @classmethod
     def open(cls, url: str, *, chunking: Chunking | None = None, clock: Clock | None = None) -> Store:
-        """Open the database at ``url`` (SQLAlchemy URL of an SQLite file), making a new one ready.
+        """Open the database at ``url`` (SQLAlchemy URL of an SQLite file or a PostgreSQL server), making it ready.
 
         Raises
         ------

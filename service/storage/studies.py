@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 
 from service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyNotFound
-from service.storage.part import EPOCH, Part
+from service.storage.part import EPOCH, MAX_INTEGER, Part, announce
 from service.storage.progress import RECENT_CHUNKS, FinishedChunk, estimate
 from service.storage.records import Progress, StudyPage, StudyRecord, record_of
 from service.storage.schedules import unbind
@@ -112,6 +112,7 @@ class Studies(Part):
                         key=idempotency_key, body_hash=body_hash, study=number, created_at=values["created_at"]
                     )
                 )
+            announce(connection)
             return record_of(connection.execute(sa.select(*RECORD_COLUMNS).where(STUDIES.c.number == number)).one())
 
     def get_study(self, study_id: str) -> StudyRecord:
@@ -147,7 +148,7 @@ class Studies(Part):
         size = min(max(page_size, 1), MAX_PAGE)
         query = sa.select(*RECORD_COLUMNS).where(STUDIES.c.deleted_at.is_(None))
         if page_token is not None:
-            query = query.where(STUDIES.c.number < _number_of(page_token))
+            query = query.where(STUDIES.c.number < min(_number_of(page_token), MAX_INTEGER))
         if state is not None:
             query = query.where(STUDIES.c.state == state.value)
         with self.session.read() as connection:
@@ -220,6 +221,7 @@ class Studies(Part):
                 .where(STUDIES.c.number == number, STUDIES.c.priority != priority)
                 .values(priority=priority, revision=STUDIES.c.revision + 1)
             )
+            announce(connection)
             return record_of(self._row(connection, study_id, *RECORD_COLUMNS))
 
     def study_of_key(self, idempotency_key: str, body_hash: str) -> StudyRecord | None:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from service.storage.errors import NothingToRetry, StudyNotFound
 from service.storage.records import StudyRecord
 from service.storage.store import Store
+from tests import postgres
 from tests.worker import fakes
 from worker import kernels
 from worker.chunking import Chunking
@@ -21,10 +22,15 @@ from worker.ports import Chunk
 from worker.states import StudyState, TransitionError
 
 
-@pytest.fixture(scope="module")
-def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
-    folder: Path = tmp_path_factory.mktemp("retry")
-    with Store.open(f"sqlite:///{folder / 'store.sqlite3'}", chunking=Chunking(cases=10)) as store:
+@pytest.fixture(scope="module", params=["sqlite", "postgresql"])
+def store(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
+    if request.param == "postgresql":
+        server: postgres.Server = request.getfixturevalue("postgres_server")
+        url = server.url(server.new_database())
+    else:
+        folder: Path = tmp_path_factory.mktemp("retry")
+        url = f"sqlite:///{folder / 'store.sqlite3'}"
+    with Store.open(url, chunking=Chunking(cases=10)) as store:
         yield store
 
 

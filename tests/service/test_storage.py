@@ -27,7 +27,7 @@ def url(tmp_path: Path) -> str:
     ("url", "message"),
     [
         ("no url", "is no database URL"),
-        ("postgresql://host/db", "kind 'postgresql' are not supported"),
+        ("mysql://host/db", "kind 'mysql' are not supported; use sqlite or postgresql"),
         ("sqlite://", "must be a file"),
         ("sqlite:///:memory:", "must be a file"),
         ("sqlite:///rel.db?mode=ro", r"takes no options here \(mode\)"),

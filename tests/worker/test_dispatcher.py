@@ -14,10 +14,18 @@ from service.storage.records import StudyRecord
 from service.storage.store import Store
 from tests.worker import fakes
 from worker.chunking import Chunking
-from worker.dispatcher import COMPILING, HEARTBEAT_SECONDS, NOTE_SECONDS, OPEN_STUDIES, POLL_SECONDS, Dispatcher
+from worker.dispatcher import (
+    COMPILING,
+    HEARTBEAT_SECONDS,
+    NOTE_SECONDS,
+    OPEN_STUDIES,
+    POLL_SECONDS,
+    QUIET_POLL_SECONDS,
+    Dispatcher,
+)
 from worker.executors.inline import InlineExecutor
 from worker.kernels import ChunkResult, ChunkTask
-from worker.ports import EpochLostError, Executor, KernelError, Outcome, StoreFullError
+from worker.ports import ActiveStudy, EpochLostError, Executor, KernelError, Outcome, StoreFullError
 from worker.states import StudyState
 from worker.study import Study
 
@@ -431,3 +439,57 @@ def test_rows_do_not_depend_on_chunks_and_processes(tmp_path: Path, size: int, p
         record = submit(store, 40)
         work(store, fakes.pool(processes))
         np.testing.assert_array_equal(store.case_rows(record.id).values, fakes.values(0, 40))
+
+
+class HandNews:
+    """News that are told by hand; notes what it was asked."""
+
+    def __init__(self) -> None:
+        self.told = True
+        self.waits: list[float] = []
+        self.closed = False
+
+    def wait(self, timeout: float) -> bool:
+        self.waits.append(timeout)
+        told, self.told = self.told, False
+        return told
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def test_with_news_the_store_is_looked_at_when_it_has_changed_and_seldom_otherwise(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks = 0
+    active = store.active_studies
+
+    def looked() -> list[ActiveStudy]:
+        nonlocal looks
+        looks += 1
+        return active()
+
+    monkeypatch.setattr(store, "active_studies", looked)
+    news, clock = HandNews(), fakes.HandClock()
+    dispatcher = Dispatcher(store, InlineExecutor(fakes.run), clock, news=news)
+    turns = iter(range(200))
+    seen: list[tuple[int, StudyState | None]] = []
+    records: list[StudyRecord] = []
+
+    def stopping() -> bool:
+        turn = next(turns)
+        seen.append((looks, store.get_study(records[0].id).state if records else None))
+        if turn == 50:
+            records.append(submit(store))
+            news.told = True
+        if turn == 100:
+            clock.seconds += QUIET_POLL_SECONDS
+        return turn == 150
+
+    dispatcher.run(stopping)
+    quiet = [count for count, _ in seen[3:51]]
+    assert quiet[0] == quiet[-1]
+    assert max(news.waits) == POLL_SECONDS  # it waited for news, not for an executor with nothing to do
+    assert seen[60][1] is StudyState.FINISHED
+    assert seen[100][0] + 1 == seen[-1][0]
+    assert news.closed

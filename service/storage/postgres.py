@@ -1,0 +1,235 @@
+"""PostgreSQL in the place of SQLite: its URL, connections and transactions, its lock, and news of changes.
+
+Writers take one advisory lock for the length of their transaction, so that the store has one writer at a time on a
+server too, and everything that was reasoned about SQLite's immediate transactions holds unchanged.
+"""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from typing import Any, Final
+
+import psycopg
+import sqlalchemy as sa
+from sqlalchemy.engine import URL
+
+from service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError
+
+#: First number of every advisory lock of Sprag ("SPRA" in ASCII); the second says what it is for.
+_LOCKS: Final = 0x53505241
+_WRITER, _DISPATCHER = 1, 2
+_HOLDER: Final = (
+    "FROM pg_locks AS l JOIN pg_stat_activity AS a ON a.pid = l.pid "
+    "WHERE l.locktype = 'advisory' AND l.granted AND l.classid = %s::oid AND l.objid = %s::oid "
+    "AND l.database = (SELECT oid FROM pg_database WHERE datname = current_database())"
+)
+#: Begins a write transaction.
+TAKE_WRITER: Final = f"SELECT pg_advisory_xact_lock({_LOCKS}, {_WRITER})"
+#: The channel on which changes of studies are told.
+CHANNEL: Final = "sprag"
+#: Older ones lack what is used here and are out of support.
+OLDEST_SERVER: Final = 140_000
+#: Seconds after which a connection that gives no sign of life counts as lost, on either side.
+LOST_SECONDS: Final = 5
+#: Seconds for which a process that was frozen in a transaction keeps the others waiting.
+FROZEN_SECONDS: Final = 60
+#: Options of the URL that are passed on to the driver.
+URL_OPTIONS: Final = frozenset({"host", "passfile", "sslcert", "sslkey", "sslmode", "sslrootcert"})
+_LOCAL: Final = frozenset({"", "localhost", "127.0.0.1", "::1"})
+
+
+def checked(url: URL) -> URL:
+    """The URL with the driver named, and with encryption asked of every server that is not on this machine.
+
+    Raises DatabaseError for a URL that is not understood.
+    """
+    if url.drivername not in {"postgresql", "postgresql+psycopg"}:
+        raise DatabaseError(f"the driver {url.get_driver_name()!r} is not supported; write postgresql://...")
+    unknown = sorted(set(url.query) - URL_OPTIONS)
+    if unknown:
+        raise DatabaseError(
+            f"a PostgreSQL URL takes no option {', '.join(unknown)} here; known are {', '.join(sorted(URL_OPTIONS))}"
+        )
+    if not url.database:
+        raise DatabaseError(f"{location(url)} names no database; a URL looks like postgresql://user@host/sprag")
+    host = str(url.query.get("host", url.host or ""))
+    if "sslmode" not in url.query and host not in _LOCAL and not host.startswith("/"):
+        url = url.update_query_dict({"sslmode": "require"})
+    return url.set(drivername="postgresql+psycopg")
+
+
+def location(url: URL) -> str:
+    """The database as it may be shown: without password and options."""
+    shown = URL.create("postgresql", url.username, None, url.host, url.port, url.database)
+    return shown.render_as_string()
+
+
+def _arguments(lock_seconds: float) -> dict[str, Any]:
+    """Of every connection: a partner that has gone is noticed by the client and by the server alike."""
+    server = {
+        "tcp_keepalives_idle": 2,
+        "tcp_keepalives_interval": 1,
+        "tcp_keepalives_count": LOST_SECONDS - 2,
+        "tcp_user_timeout": LOST_SECONDS * 1000,
+        "lock_timeout": int(lock_seconds * 1000),
+        "idle_in_transaction_session_timeout": FROZEN_SECONDS * 1000,
+    }
+    return {
+        "connect_timeout": LOST_SECONDS,
+        "keepalives_idle": 2,
+        "keepalives_interval": 1,
+        "keepalives_count": LOST_SECONDS - 2,
+        "tcp_user_timeout": LOST_SECONDS * 1000,
+        "application_name": "sprag",
+        "options": " ".join(f"-c {name}={value}" for name, value in server.items()),
+    }
+
+
+def make_engine(url: URL, *, lock_seconds: float, connections: int) -> sa.Engine:
+    """Connections to the server; one that was lost is replaced before it is used."""
+    engine = sa.create_engine(
+        url,
+        connect_args=_arguments(lock_seconds),
+        pool_size=connections,
+        max_overflow=64,
+        pool_pre_ping=True,
+    )
+    sa.event.listen(engine, "first_connect", _require_version)
+    return engine
+
+
+def _require_version(connection: Any, _record: object) -> None:
+    version = connection.info.server_version
+    if version < OLDEST_SERVER:
+        raise DatabaseError(
+            f"PostgreSQL {version // 10_000} is too old; Sprag needs {OLDEST_SERVER // 10_000} or newer"
+        )
+
+
+def connect(url: URL, lock_seconds: float, application: str = "sprag") -> psycopg.Connection[Any]:
+    """A connection beside the pool, each statement for itself. Raises DatabaseError."""
+    given = {**_arguments(lock_seconds), "application_name": application[:63]}
+    dialect = url.get_dialect()()
+    _, named = dialect.create_connect_args(url)
+    try:
+        return psycopg.connect(autocommit=True, **{**named, **given})
+    except psycopg.Error as error:
+        raise explained(error, location(url)) or DatabaseError(_unreachable(error, location(url))) from None
+
+
+def _first_line(error: BaseException) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return lines[0] if lines else type(error).__name__
+
+
+def _unreachable(error: BaseException, where: str) -> str:
+    return f"the database {where} cannot be reached: {_first_line(error)}"
+
+
+def explained(error: BaseException, where: str) -> DatabaseError | None:
+    """One sentence for an error of the driver whose cause is outside the program; None for the others."""
+    state = getattr(error, "sqlstate", None) or ""
+    if state in {"55P03", "40001", "40P01"}:
+        return DatabaseBusyError(f"another process kept the database {where} busy for too long; try again")
+    if state == "53100":
+        return DatabaseFullError(f"the disk of the server that holds {where} is full")
+    if state.startswith(("53", "58")):
+        return DatabaseBusyError(f"the server of the database {where} is in trouble: {_first_line(error)}")
+    if state == "42501":
+        return DatabaseError(f"the user may not do that in the database {where}: {_first_line(error)}")
+    if state == "25006":
+        return DatabaseError(f"the database {where} is read-only; name the primary server, not its copy")
+    # A lost connection has no state, or one of classes 08 (connection) and 57 (the server is shutting down).
+    if state.startswith(("08", "57")) or (not state and isinstance(error, psycopg.OperationalError)):
+        return DatabaseError(_unreachable(error, where))
+    return None
+
+
+class ServerLock:
+    """An advisory lock of the server: the server gives it up when the connection of its holder is gone.
+
+    A holder whose connection was lost without its knowledge meets the next one's epoch at its next write.
+    """
+
+    def __init__(self, url: URL, owner: str, lock_seconds: float) -> None:
+        self._url = url
+        self._owner = owner
+        self._lock_seconds = lock_seconds
+        self._connection: psycopg.Connection[Any] | None = None
+        self._held = False
+
+    def take(self) -> bool:
+        """Take the lock if it is free; True when it is ours. Raises DatabaseError when the server is not there."""
+        if not self._held:
+            row = self._ask("SELECT pg_try_advisory_lock(%s::int, %s::int)")
+            self._held = bool(row and row[0])
+        return self._held
+
+    def seize(self) -> None:
+        """Take the lock from whoever has it, by ending its connection; only the epoch then keeps it from the database.
+
+        Raises DatabaseError when the server does not let this user do that.
+        """
+        while not self.take():
+            self._ask(f"SELECT pg_terminate_backend(a.pid, {LOST_SECONDS * 1000}) {_HOLDER}")
+
+    def holder(self) -> str:
+        """Host and process of whoever has the lock, "" where nobody does."""
+        row = self._ask(f"SELECT a.application_name {_HOLDER}")
+        return str(row[0]) if row else ""
+
+    def _ask(self, statement: str) -> tuple[Any, ...] | None:
+        if self._connection is None or self._connection.closed:
+            self._held = False
+            self._connection = connect(self._url, self._lock_seconds, self._owner)
+        try:
+            return self._connection.execute(statement.encode(), (_LOCKS, _DISPATCHER)).fetchone()
+        except psycopg.Error as error:
+            self.release()
+            raise explained(error, location(self._url)) or error from None
+
+    def release(self) -> None:
+        """Give the lock up; never fails."""
+        held, self._held = self._held, False
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            with suppress(psycopg.Error):
+                if held:  # at once; the end of a connection is noticed a little later
+                    connection.execute("SELECT pg_advisory_unlock_all()")
+            with suppress(psycopg.Error):
+                connection.close()
+
+
+class News:
+    """Hears of changes of studies as soon as they are committed, wherever they are made."""
+
+    def __init__(self, url: URL, lock_seconds: float) -> None:
+        self._url = url
+        self._lock_seconds = lock_seconds
+        self._connection: psycopg.Connection[Any] | None = None
+
+    def wait(self, timeout: float) -> bool:
+        """Whether something has changed since the last call, or may have; waits for it at most ``timeout`` s."""
+        try:
+            if self._connection is None:
+                self._connection = connect(self._url, self._lock_seconds)
+                self._connection.execute(f"LISTEN {CHANNEL}".encode())
+                return True  # whatever happened before is not told
+            heard = False
+            for _ in self._connection.notifies(timeout=timeout, stop_after=1):
+                heard = True
+            for _ in self._connection.notifies(timeout=0.0):
+                heard = True
+        except (psycopg.Error, DatabaseError):
+            self.close()
+            time.sleep(timeout)
+            return True
+        return heard
+
+    def close(self) -> None:
+        """Hear nothing more."""
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            with suppress(psycopg.Error):
+                connection.close()
