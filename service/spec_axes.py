@@ -26,11 +26,11 @@ def read_axes(report: Report, data: object, combine: Combine, machine: Machine) 
     if not isinstance(data, list) or len(data) > MAX_AXES:
         report.problem("/axes", "must be a list of axes", data, allowed=f"a list of 0 to {MAX_AXES} axes")
         return None
-    before = len(report.problems)
+    before = report.found
     read = [read_axis(report, join("/axes", index), item, machine) for index, item in enumerate(data)]
     check_paths(report, [(paths or ()) for paths, _ in read])
     plans = [plan for _, plan in read if plan is not None]
-    if not _sizes_fit(report, plans, combine) or len(plans) < len(data) or len(report.problems) > before:
+    if not _sizes_fit(report, plans, combine) or len(plans) < len(data) or report.found > before:
         return None
     axes: list[Axis] = []
     for paths, plan in read:
@@ -123,13 +123,13 @@ def check_paths(report: Report, axes: Sequence[tuple[str, ...]], pointer: str = 
 
 def _sizes_fit(report: Report, plans: list[Plan], combine: Combine) -> bool:
     counts = [plan.count for plan in plans]
-    before = len(report.problems)
+    before = report.found
     for plan in plans:
         if plan.count > MAX_AXIS_VALUES:
             report.problem(
                 plan.pointer, f"asks for {count_text(plan.count)} values", allowed=f"at most {MAX_AXIS_VALUES:,} values"
             )
-    if len(report.problems) == before and sum(counts) > MAX_AXIS_VALUES:
+    if report.found == before and sum(counts) > MAX_AXIS_VALUES:
         report.problem(
             "/axes",
             f"the axes ask for {count_text(sum(counts))} values together",
@@ -141,12 +141,12 @@ def _sizes_fit(report: Report, plans: list[Plan], combine: Combine) -> bool:
                 "/axes", "axes that are zipped must have equally many values", [count_text(count) for count in counts],
                 allowed="axes of one length, or combine: 'grid'",
             )  # fmt: skip
-    elif len(report.problems) == before and math.prod(counts) > MAX_CASES:
+    elif report.found == before and math.prod(counts) > MAX_CASES:
         report.problem(
             "/axes", f"the grid has {count_text(math.prod(counts))} cases "
             f"({' x '.join(count_text(count) for count in counts)})", allowed=f"at most {MAX_CASES:,} cases",
         )  # fmt: skip
-    return len(report.problems) == before
+    return report.found == before
 
 
 def expand(report: Report, plan: Plan, parameters: list[Parameter], combine: Combine) -> tuple[float, ...] | None:

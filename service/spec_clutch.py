@@ -117,7 +117,7 @@ def _given(report: Report, pointer: str, data: Mapping[str, Any], prefix: str) -
 def _measured(
     report: Report, pointer: str, data: Mapping[str, Any], prefix: str, backlashes: Sequence[float]
 ) -> Clutch | None:
-    before = len(report.problems)
+    before = report.found
     rows = _rows(report, join(pointer, "data"), data.get("data"))
     accuracy = None
     if "accuracy" in data:
@@ -143,7 +143,7 @@ def _measured(
             options["backlash"] = backlashes[0]
         else:
             return None  # the backlash itself could not be read, which is noted already
-    if accuracy is None or len(report.problems) > before:
+    if accuracy is None or report.found > before:
         return None
     try:
         fit = kernels.fit_clutch(rows, accuracy, **options)

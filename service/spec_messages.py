@@ -68,12 +68,15 @@ class Report:
 
     def __init__(self) -> None:
         self.problems: list[Problem] = []
+        #: Problems that were found, those included that are not noted any more.
+        self.found = 0
         self.warnings: list[str] = []
 
     def problem(
         self, pointer: str, message: str, value: object = None, *, allowed: str | None = None, unit: str | None = None
     ) -> None:
         """Notes a problem, unless there are `MAX_PROBLEMS` already."""
+        self.found += 1
         if not self.full:
             self.problems.append(Problem(pointer, message, shorten(value), allowed, unit))
 

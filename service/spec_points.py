@@ -73,7 +73,7 @@ def _read_cells(
     report: Report, where: str, rows: list[list[str]], headings: list[tuple[Parameter, str]]
 ) -> list[NDArray[np.float64]] | None:
     columns = [np.empty(len(rows)) for _ in headings]
-    before = len(report.problems)
+    before = report.found
     for number, row in enumerate(rows):
         if len(row) != len(headings):
             report.problem(where, f"line {number + 2} has {len(row)} cells", allowed=f"{len(headings)} cells")
@@ -84,7 +84,7 @@ def _read_cells(
                 column[number] = value
         if report.full:
             break
-    return None if len(report.problems) > before else [column + 0.0 for column in columns]
+    return None if report.found > before else [column + 0.0 for column in columns]
 
 
 def _read_cell(report: Report, where: str, cell: str, parameter: Parameter, unit: str) -> float | None:

@@ -32,7 +32,7 @@ def read_run(report: Report, data: object, frequencies: Sequence[float]) -> dict
     found = read_object(report, "/run", data, FIELDS)
     if found is None:
         return run
-    before = len(report.problems)
+    before = report.found
     if "duration" in found:
         run["duration"] = _read_time(report, "/run/duration", found["duration"], positive=True)
     if "window" in found:
@@ -41,7 +41,7 @@ def read_run(report: Report, data: object, frequencies: Sequence[float]) -> dict
         run["tolerance"] = _read_tolerance(report, found["tolerance"])
     if "reset" in found:
         run["reset"] = _read_reset(report, found["reset"])
-    if len(report.problems) == before and frequencies:
+    if report.found == before and frequencies:
         _check_times(report, run, found, frequencies)
     return run
 

@@ -48,7 +48,7 @@ class SampleRange:
 
 def read_sample(report: Report, pointer: str, data: Mapping[str, Any], machine: Machine) -> Block | None:
     """The block of a sample; None, and problems noted, when something is wrong with it."""
-    before = len(report.problems)
+    before = report.found
     found = read_object(report, pointer, data, FIELDS) or {}
     method = _choice(report, join(pointer, "sample"), found.get("sample"), METHODS)
     count = read_whole(report, join(pointer, "count"), found.get("count"), 1, MAX_AXIS_VALUES)
@@ -64,7 +64,7 @@ def read_sample(report: Report, pointer: str, data: Mapping[str, Any], machine: 
             join(pointer, "count"), f"a {method} sample fills its ranges evenly only with a power of two", count,
             allowed="a power of 2",
         )  # fmt: skip
-    if len(report.problems) > before or method is None or count is None or seed is None:
+    if report.found > before or method is None or count is None or seed is None:
         return None
     known = tuple(item for item in ranges if item is not None)
     cases = count * (len(known) + 2) if method == "saltelli" else count

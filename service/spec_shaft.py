@@ -80,7 +80,7 @@ def read_shaft(report: Report, data: object) -> ShaftMachine:
     found = read_object(report, "/base", data, FIELDS)
     if found is None:
         return machine
-    before = len(report.problems)
+    before = report.found
     structure = _read_structure(report, found, machine.places)
     if structure is None:
         return machine
@@ -91,7 +91,7 @@ def read_shaft(report: Report, data: object) -> ShaftMachine:
         number = _read(report, found, path, entry)
         if number is not None:
             machine.values[path] = number
-    if len(report.problems) == before:
+    if report.found == before:
         check_machine(report, structure, machine.values, machine.places)
     return machine
 
@@ -105,10 +105,10 @@ def _read_structure(report: Report, found: Mapping[str, Any], places: dict[str, 
     constants = read_constants(report, found.get("constants", {}))
     balance = read_balance(report, found, drive)
     mean = read_choice(report, "/base", found, "mean_speed_is", MEAN_SPEEDS, MEAN_SPEEDS[0])
-    before = len(report.problems)
+    before = report.found
     phi_c = read_phi_c(report, found.get("phi_c"))
     parts = (drive, mechanism, operation, cycle, constants, balance, mean)
-    if any(part is None for part in parts) or len(report.problems) > before:
+    if any(part is None for part in parts) or report.found > before:
         return None
     return {
         "cycle": cycle, "mean_speed_is": mean, "balance": balance, "drive": drive, "mechanism": mechanism,

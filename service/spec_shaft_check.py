@@ -30,7 +30,7 @@ def check_machine(
     values : flat path -> SI number, all that the structure needs
     places : part -> JSON Pointer of its formula, its table, or all of it
     """
-    before = len(report.problems)
+    before = report.found
     for part in _PARTS:
         # Alone but for the mechanism, which an operation needs, so that a fault is told where it is.
         alone = {name: structure[name] if name in {part, "mechanism"} else _NEUTRAL[name] for name in _PARTS}
@@ -38,10 +38,10 @@ def check_machine(
         if part != "drive" and structure["balance"] == "motor":
             own["balance"] = "constant"
         _note(report, places[part], partial(machine_shaft.check_structure, own), structure[part].get("formula"))
-        if len(report.problems) > before:
+        if report.found > before:
             return
     _note(report, "/base", partial(machine_shaft.check_structure, structure))
-    if len(report.problems) > before:
+    if report.found > before:
         return
     try:
         machine_shaft.check(structure, values)

@@ -274,10 +274,10 @@ def _diagram(
         return None
     if given[0] == "formula":
         return _formula(report, pointer, found)
-    before = len(report.problems)
+    before = report.found
     rows = _rows(report, join(pointer, "table"), found["table"], place, value)
     interpolation = read_choice(report, pointer, found, "interpolation", INTERPOLATIONS, "smooth")
-    if len(report.problems) > before:
+    if report.found > before:
         return None
     return {"form": "table", "table": {"rows": rows, "interpolation": interpolation}, "formula": None}
 

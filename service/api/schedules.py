@@ -29,6 +29,7 @@ _TIME_OF_DAY: Final = {"type": "string", "pattern": "^([01]?[0-9]|2[0-3]):[0-5][
 _FIELDS: Final[dict[str, Any]] = {
     "name": {
         "type": ["string", "null"],
+        "minLength": 1,
         "maxLength": MAX_NAME_LENGTH,
         "description": "name of its studies; else the spec's own",
     },

@@ -112,8 +112,10 @@ def _read_spec(report: Report, found: Mapping[str, Any], old: ScheduleFields | N
 def _read_name(report: Report, value: object, title: str) -> str:
     if value is None:
         return title
-    if not isinstance(value, str) or len(value) > MAX_NAME_LENGTH:
-        report.problem("/name", "is no name", value, allowed=f"a text of at most {MAX_NAME_LENGTH} characters")
+    if not isinstance(value, str) or not value.isprintable() or not 1 <= len(value) <= MAX_NAME_LENGTH:
+        report.problem(
+            "/name", "must be a printable text in one line", value, allowed=f"1 to {MAX_NAME_LENGTH} characters"
+        )
         return ""
     return value
 

@@ -327,6 +327,8 @@ def test_the_interface_keeps_changes_disables_and_deletes(service: Service, cloc
         ({"cron": "0 1 * * *", "priority": 1e9}, "/priority"),
         ({"cron": "0 1 * * *", "fresh": 1}, "/fresh"),
         ({"cron": "0 1 * * *", "name": ["x"]}, "/name"),
+        ({"cron": "0 1 * * *", "name": "a\r\nb"}, "/name"),
+        ({"cron": "0 1 * * *", "name": ""}, "/name"),
         ({"cron": "0 1 * * *", "spec": {**SPEC, "model": "x"}}, "/spec/model"),
         ({"cron": "0 1 * * *", "wndow": None}, "/wndow"),
     ],

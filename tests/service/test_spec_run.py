@@ -8,6 +8,7 @@ import pytest
 
 from service.spec_run import in_periods, time_text
 from tests.service.spec_sample import parsed, problems
+from worker.limits import MAX_PROBLEMS
 
 
 @pytest.mark.parametrize(
@@ -135,3 +136,10 @@ def test_a_run_whose_last_third_is_shorter_than_a_period_is_said() -> None:
 def test_the_extremes_of_tolerance_and_reset() -> None:
     for tolerance in (1e-14, 1e-4):
         assert parsed({"/run/tolerance": tolerance, "/run/reset": "literal"}).study.run["tolerance"] == tolerance
+
+
+def test_what_is_wrong_beyond_the_problems_that_are_told_is_not_taken_for_right() -> None:
+    """Found by made-up requests: a run that could not be read was compared with its window."""
+    unknown = {f"field{number}": 0 for number in range(MAX_PROBLEMS)}
+    told = problems({"/base/shaft": unknown, "/run": {"duration": "long", "window": ["x", 1]}})
+    assert len(told) == MAX_PROBLEMS + 1
