@@ -31,4 +31,5 @@ def caller(number: int) -> int:
 def test_constants_make_no_copies() -> None:
     assert caller(4) == 4 * (14 + 3) + (2 + 3) * 6
     for function in (doubled, tripled):
-        assert len(cast(Any, function).signatures) == 1
+        # None where the caller was in the cache already, which a change of the engine empties.
+        assert len(cast(Any, function).signatures) <= 1
