@@ -53,6 +53,8 @@ class WorkerSettings:
     chunk_cases: int = 0
     upkeep: UpkeepPlan = field(default_factory=UpkeepPlan)
     log_format: LogFormat = "text"
+    #: Where chunks run (`Settings.executor`).
+    executor: str = "pool"
 
 
 def worker_settings(settings: Settings) -> WorkerSettings:
@@ -66,6 +68,7 @@ def worker_settings(settings: Settings) -> WorkerSettings:
         settings.chunk_cases,
         plan,
         settings.log_format,
+        settings.executor,
     )
 
 
@@ -89,10 +92,21 @@ def owner_name() -> str:
 
 
 def pool(settings: WorkerSettings) -> Executor:
-    """The process pool of these settings; its processes start with the first chunk."""
+    """Where the chunks of these settings run: a process pool, whose processes start with the first, or Dask."""
+    if settings.executor != "pool":
+        return _cluster(settings)
     from worker.executors.process_pool import ProcessPoolExecutor
 
     return ProcessPoolExecutor(settings.processes, chunk_timeout=settings.chunk_timeout)
+
+
+def _cluster(settings: WorkerSettings) -> Executor:
+    try:
+        from worker.executors.dask import DaskExecutor
+    except ImportError:
+        raise ExecutorError("Dask is not installed: pip install 'sprag[cluster]'") from None
+    url = settings.executor if "://" in settings.executor else ""
+    return DaskExecutor(url, settings.processes, chunk_timeout=settings.chunk_timeout)
 
 
 def renewed_pool(settings: WorkerSettings) -> Executor:
@@ -133,7 +147,8 @@ def run_dispatcher(
                 executor(settings),
                 SystemClock(),
                 owner=owner_name(),
-                renew=lambda: renewed(settings),
+                # The kernels of a cluster are not ours to throw away.
+                renew=None if "://" in settings.executor else lambda: renewed(settings),
                 news=store.session.news(),
             )
             scheduler.start()

@@ -67,6 +67,13 @@ class Settings(BaseSettings):
         description="names, separated by commas, by which clients may call the service beside localhost and the host",
     )
     processes: int = Field(default=0, ge=0, le=1024, description="processes of the pool; 0: one for each core")
+    executor: str = Field(
+        default="pool",
+        description=(
+            "where chunks run: `pool`, processes of the worker; `dask`, a Dask cluster of its own on this machine; "
+            "`dask://host:port`, the scheduler of a cluster"
+        ),
+    )
     chunk_cases: int = Field(
         default=0, ge=0, le=1_000_000, description="cases that one process takes at a time; 0: about a second of work"
     )
@@ -125,6 +132,13 @@ class Settings(BaseSettings):
     def _split_hosts(cls, value: object) -> object:
         if isinstance(value, str):
             return tuple(name.strip() for name in value.split(",") if name.strip())
+        return value
+
+    @field_validator("executor")
+    @classmethod
+    def _known_executor(cls, value: str) -> str:
+        if not re.fullmatch(r"pool|dask|dask://(\[[0-9a-fA-F:]+\]|[^\s:/]+):[0-9]{1,5}", value):
+            raise ValueError("it is pool, dask, or dask://host:port")
         return value
 
     @field_validator("token")

@@ -156,6 +156,7 @@ class Dispatcher:
 
     def _poll(self) -> None:
         """Tell the state machine what the store says of every study; what it knows already changes nothing."""
+        self._machine.capacity = self._executor.capacity  # where workers join or leave, it changes
         studies = self._store.active_studies()
         if not self._has_room(studies):
             studies = self._store.active_studies()

@@ -1,0 +1,315 @@
+"""The Dask executor: the same bits as the others, one chunk to a death, and a cluster whose parts come and go."""
+
+from __future__ import annotations
+
+import os
+import random
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+from pydantic import ValidationError
+
+from service.dispatching import WorkerSettings, pool
+from service.settings import Settings
+from service.storage.part import SystemClock
+from service.storage.store import Store
+from tests.conftest import ROOT
+from tests.worker import fakes
+from worker import kernels
+from worker.chunking import Chunking
+from worker.dispatcher import Dispatcher
+from worker.executors.dask import DaskExecutor
+from worker.executors.dask_tasks import scheduler_address
+from worker.executors.inline import InlineExecutor
+from worker.executors.process_pool import SPARE_CHUNKS, ProcessPoolExecutor
+from worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
+from worker.states import StudyState
+from worker.study import Study
+
+DEADLINE = 120.0
+#: Without a dashboard there is still a server of health and metrics; any port will do.
+_QUIET = ("--dashboard-address", "127.0.0.1:0")
+
+
+def eventually(true: Callable[[], object]) -> None:
+    begin = time.monotonic()
+    while not true():
+        assert time.monotonic() - begin < DEADLINE
+        time.sleep(0.02)
+
+
+def ready(executor: Executor, study: Study) -> None:
+    begin = time.monotonic()
+    while not executor.ready(study):
+        assert time.monotonic() - begin < DEADLINE
+        executor.wait(0.05)
+
+
+def gather(executor: Executor, count: int) -> dict[int, Outcome]:
+    found: dict[int, Outcome] = {}
+    begin = time.monotonic()
+    while len(found) < count:
+        assert time.monotonic() - begin < DEADLINE
+        for outcome in executor.wait(0.1):
+            assert outcome.ticket not in found
+            found[outcome.ticket] = outcome
+    return found
+
+
+def run_all(executor: Executor, study: Study, size: int) -> dict[int, Outcome]:
+    ready(executor, study)
+    spans = range(0, study.cases, size)
+    for ticket, first in enumerate(spans):
+        executor.submit(ticket, study, Chunk(1, first, min(size, study.cases - first)))
+    return gather(executor, len(spans))
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Cluster]:
+    """A scheduler and two workers, as processes."""
+    with clusters() as made:
+        made.start_scheduler()
+        made.start_worker()
+        made.start_worker()
+        yield made
+
+
+@dataclass
+class Cluster:
+    """Processes of a cluster on this machine."""
+
+    port: int
+    scheduler: subprocess.Popen[bytes] | None = None
+    workers: list[subprocess.Popen[bytes]] = field(default_factory=list)
+
+    @property
+    def url(self) -> str:
+        return f"dask://127.0.0.1:{self.port}"
+
+    def start_scheduler(self) -> None:
+        self.scheduler = _dask("scheduler", "--host", "127.0.0.1", "--port", self.port, "--no-dashboard", *_QUIET)
+
+    def start_worker(self) -> None:
+        options = ("--nthreads", 1, "--no-dashboard", "--memory-limit", 0, "--host", "127.0.0.1")
+        self.workers.append(_dask("worker", f"tcp://127.0.0.1:{self.port}", *options, "--death-timeout", DEADLINE))
+
+    def computing(self) -> list[psutil.Process]:
+        """The processes that run chunks: children of the workers' nannies."""
+        found = []
+        for worker in self.workers:
+            with suppress(psutil.NoSuchProcess):
+                found += [c for c in psutil.Process(worker.pid).children() if "spawn_main" in " ".join(c.cmdline())]
+        return found
+
+
+def _dask(*arguments: object) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-W", "ignore", "-m", "distributed.cli.dask_" + str(arguments[0])]
+    return subprocess.Popen(
+        [*command, *map(str, arguments[1:])], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+
+
+@contextmanager
+def clusters() -> Iterator[Cluster]:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    made = Cluster(port)
+    try:
+        yield made
+    finally:
+        for process in (*made.workers, made.scheduler):
+            if process is not None:
+                family = []
+                with suppress(psutil.NoSuchProcess):
+                    family = psutil.Process(process.pid).children(recursive=True)
+                process.kill()
+                process.wait()
+                for child in family:
+                    with suppress(psutil.NoSuchProcess):
+                        child.kill()
+
+
+@pytest.fixture
+def start(cluster: Cluster) -> Iterator[Callable[..., DaskExecutor]]:
+    made: list[DaskExecutor] = []
+
+    def begin(**options: object) -> DaskExecutor:
+        given = {"chunk_timeout": 60.0, "run": fakes.run, "load": fakes.load} | options
+        made.append(DaskExecutor(cluster.url, 0, **given))  # type: ignore[arg-type]
+        return made[-1]
+
+    yield begin
+    for executor in made:
+        executor.close()
+
+
+def test_inline_pool_and_dask_give_the_same_bits(start: Callable[..., DaskExecutor]) -> None:
+    study = fakes.study(30)
+    dask = start(run=kernels.run_task, load=kernels.load)
+    processes = ProcessPoolExecutor(2, chunk_timeout=60.0)
+    cuts = ((InlineExecutor(), 30), (processes, 4), (dask, 7))
+    try:
+        found = [run_all(executor, study, size) for executor, size in cuts]
+    finally:
+        processes.close()
+    rows = []
+    for outcomes in found:
+        results = [outcomes[ticket].result for ticket in sorted(outcomes)]
+        rows.append(
+            (
+                np.concatenate([result.values for result in results if result]).tobytes(),
+                [ending for result in results if result for ending in result.endings],
+                [flag for result in results if result for flag in result.flags],
+            )
+        )
+    assert rows[0] == rows[1] == rows[2]
+    assert len(rows[0][1]) == 30
+
+
+def test_a_death_costs_one_chunk_and_the_worker_comes_back(start: Callable[..., DaskExecutor]) -> None:
+    executor = start(run=fakes.faulty(crash=frozenset({9})))
+    eventually(lambda: executor.wait(0.05) or executor.capacity == 2 + SPARE_CHUNKS)
+    outcomes = run_all(executor, fakes.study(40), 4)
+    assert {ticket: outcome.fate for ticket, outcome in outcomes.items() if outcome.fate is not Fate.DONE} == {
+        2: Fate.CRASHED
+    }
+    for ticket, outcome in outcomes.items():
+        if ticket != 2:
+            assert outcome.result is not None
+            np.testing.assert_array_equal(outcome.result.values, fakes.values(ticket * 4, 4))
+    eventually(lambda: executor.wait(0.05) or executor.capacity == 2 + SPARE_CHUNKS)
+
+
+def test_what_never_returns_ends_with_its_worker(start: Callable[..., DaskExecutor]) -> None:
+    executor = start(run=fakes.faulty(hang=frozenset({0})), chunk_timeout=1.0)
+    outcomes = run_all(executor, fakes.study(12), 4)
+    assert {ticket: outcome.fate for ticket, outcome in outcomes.items()} == {
+        0: Fate.TIMED_OUT, 1: Fate.DONE, 2: Fate.DONE,
+    }  # fmt: skip
+    assert outcomes[0].detail == "killed after 1 s"
+
+
+def test_a_fault_of_the_program_is_told_by_its_name(start: Callable[..., DaskExecutor]) -> None:
+    outcomes = run_all(start(run=fakes.raising), fakes.study(4), 4)
+    assert (outcomes[0].fate, outcomes[0].detail) == (Fate.CRASHED, "ZeroDivisionError: no such thing")
+
+
+def test_chunks_are_stopped_whether_they_run_or_not(start: Callable[..., DaskExecutor]) -> None:
+    executor = start(run=fakes.faulty(hang=frozenset(range(8))), chunk_timeout=3.0)
+    study = fakes.study(12)
+    ready(executor, study)
+    for ticket in range(3):
+        executor.submit(ticket, study, Chunk(1, 4 * ticket, 4))
+    for ticket in range(2):
+        executor.stop(ticket)
+        executor.stop(ticket)
+    executor.stop(99)
+    outcomes = gather(executor, 3)  # the third one runs when a worker is back
+    assert [outcomes[ticket].fate for ticket in range(3)] == [Fate.STOPPED, Fate.STOPPED, Fate.DONE]
+    assert executor.wait(0.0) == []
+
+
+def test_a_worker_with_another_engine_is_not_used(
+    start: Callable[..., DaskExecutor], caplog: pytest.LogCaptureFixture
+) -> None:
+    executor = start(engine="another")
+    eventually(lambda: executor.wait(0.05) or caplog.text.count("is not used") == 2)
+    assert f"has engine {kernels.ENGINE_VERSION} and is not used; this is engine another" in caplog.text
+    assert executor.capacity == SPARE_CHUNKS
+    assert not executor.ready(fakes.study(1))
+
+
+def test_a_kernel_that_cannot_be_had_is_told(start: Callable[..., DaskExecutor]) -> None:
+    executor = start(load=fakes.raising)
+    with pytest.raises(KernelError, match=r"cannot be compiled \(ZeroDivisionError: no such thing\)"):
+        ready(executor, fakes.study(1))
+
+
+def test_other_machines_need_certificates(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ExecutorError, match="TLS is required: set DASK_DISTRIBUTED__COMM__TLS__CA_FILE"):
+        scheduler_address("dask://cluster.example:8786")
+    assert scheduler_address("dask://localhost:8786") == ("tcp://localhost:8786", None)
+    assert scheduler_address("dask://[::1]:8786") == ("tcp://[::1]:8786", None)
+
+
+def test_a_scheduler_that_stays_away_ends_the_executor_with_a_sentence() -> None:
+    with clusters() as made:
+        executor = DaskExecutor(made.url, 0, chunk_timeout=1.0, scheduler_seconds=0.0)
+        with pytest.raises(ExecutorError, match=rf"127.0.0.1:{made.port} was not there for 0 s"):
+            eventually(lambda: executor.wait(0.05))
+        executor.close()
+
+
+def test_a_cluster_of_its_own_runs_chunks() -> None:
+    executor = pool(WorkerSettings("", 1, 60.0, executor="dask"))
+    try:
+        study = fakes.study(3)
+        result = run_all(executor, study, 3)[0].result
+        assert result is not None
+        assert result.values.tobytes() == kernels.run_chunk(study, 0, 3).values.tobytes()
+    finally:
+        executor.close()
+
+
+def test_a_study_survives_what_happens_to_a_cluster(tmp_path: Path) -> None:
+    """Workers are killed and join, the scheduler is killed with all it knows; no row is lost, doubled or wrong."""
+    cases = int(os.environ.get("SPRAG_TEST_CASES", "3000"))
+    chosen = random.Random(3)
+    kills: list[str] = []
+    with clusters() as made, Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}", chunking=Chunking(cases=20)) as store:
+        made.start_scheduler()
+        made.start_worker()
+        record = store.create_study({}, fakes.study(cases))
+        executor = DaskExecutor(made.url, 0, chunk_timeout=60.0, run=fakes.run, load=fakes.load)
+        marks = sorted(chosen.sample(range(cases // 20, cases - cases // 10), 2 + cases // 1500))
+
+        def stopping() -> bool:
+            now = store.get_study(record.id)
+            if len(kills) < len(marks) and now.done >= marks[len(kills)]:
+                if len(kills) % 3 == 1 and made.scheduler is not None:
+                    made.scheduler.kill()
+                    made.scheduler.wait()
+                    for worker in made.workers:  # which end without it, in their own time
+                        worker.kill()
+                        worker.wait()
+                    made.workers.clear()
+                    made.start_scheduler()
+                    made.start_worker()
+                    kills.append("scheduler")
+                elif victims := made.computing():
+                    chosen.choice(victims).kill()
+                    made.start_worker()  # another joins
+                    kills.append("worker")
+            return now.state.terminal
+
+        Dispatcher(store, executor, SystemClock()).run(stopping)
+        ended = store.get_study(record.id)
+        assert (ended.state, ended.done, ended.ok) == (StudyState.FINISHED, cases, cases)
+        assert set(kills) == {"worker", "scheduler"}
+        blocks = list(store.iter_rows(record.id))
+        assert np.concatenate([block.cases for block in blocks]).tolist() == list(range(cases))
+        np.testing.assert_array_equal(np.concatenate([block.values for block in blocks]), fakes.values(0, cases))
+
+
+def test_the_setting_is_checked() -> None:
+    for good in ("pool", "dask", "dask://head.example:8786", "dask://[::1]:8786"):
+        assert Settings(executor=good).executor == good
+    for wrong in ("dusk", "dask://", "dask://head.example", "tcp://head.example:8786"):
+        with pytest.raises(ValidationError, match="it is pool, dask, or dask://host:port"):
+            Settings(executor=wrong)
+
+
+def test_without_dask_the_command_that_brings_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "worker.executors.dask", None)
+    with pytest.raises(ExecutorError, match=r"pip install 'sprag\[cluster\]'"):
+        pool(WorkerSettings("", 1, 60.0, executor="dask"))

@@ -1,0 +1,81 @@
+"""What Dask's processes are asked to do, and where the scheduler is. Everything here is importable by name."""
+
+from __future__ import annotations
+
+import faulthandler
+import ipaddress
+import os
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from distributed import Security
+
+from worker import kernels
+from worker.limits import LOAD_SECONDS
+from worker.ports import ExecutorError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_T = TypeVar("_T")
+
+
+def introduce() -> str:
+    """Run by each worker that joins: which engine it has."""
+    return kernels.ENGINE_VERSION
+
+
+def load_kernel(load: Callable[[kernels.KernelShape], None], shape: kernels.KernelShape) -> None:
+    """Run by each worker before its first chunk of a shape."""
+    _within(LOAD_SECONDS, partial(load, shape))
+
+
+def run_chunk(
+    run: Callable[[kernels.ChunkTask], kernels.ChunkResult], task: kernels.ChunkTask, seconds: float
+) -> kernels.ChunkResult:
+    """Run by a worker for each chunk."""
+    return _within(seconds, partial(run, task))
+
+
+def _within(seconds: float, function: Callable[[], _T]) -> _T:
+    """The value of the function, or the end of this process after ``seconds``, whatever it is busy with.
+
+    The watch needs no Python to go off, and neither the scheduler nor whoever submitted the chunk.
+    """
+    with open(os.devnull, "w", encoding="ascii") as nowhere:
+        faulthandler.dump_traceback_later(seconds, exit=True, file=nowhere)
+        try:
+            return function()
+        finally:
+            faulthandler.cancel_dump_traceback_later()
+
+
+def scheduler_address(url: str) -> tuple[str, Security | None]:
+    """Dask's address of the scheduler at ``dask://host:port``, with TLS unless it is on this machine.
+
+    Raises ExecutorError when certificates are needed and Dask's own configuration names none.
+    """
+    place = url.removeprefix("dask://")
+    host = place.rpartition(":")[0].strip("[]")
+    if _is_loopback(host):
+        return f"tcp://{place}", None
+    security = Security(require_encryption=True)
+    if not all(getattr(security, name) for name in ("tls_ca_file", "tls_client_cert", "tls_client_key")):
+        raise ExecutorError(
+            f"the scheduler {place} is on another machine, so TLS is required: set "
+            "DASK_DISTRIBUTED__COMM__TLS__CA_FILE, DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT and "
+            "DASK_DISTRIBUTED__COMM__TLS__CLIENT__KEY"
+        )
+    return f"tls://{place}", security
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def blame_at_once(dask_scheduler: Any) -> None:
+    """Run in the scheduler: a task whose worker dies has failed."""
+    dask_scheduler.allowed_failures = 0
