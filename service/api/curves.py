@@ -148,7 +148,7 @@ def get_results(
         study = context.store.study(study_id)
         about = {"study": study_id, "name": record.name, "model": record.model, "engine_version": record.engine_version}
         blocks = context.store.iter_rows(study_id)
-        source = exports.Source(study, kernels.study_results(study), blocks, about)
+        source = exports.Source(study, kernels.study_results(study), blocks, about, context.store.spec(study_id))
         form = next(form for form in exports.FORMATS if form == chosen)
         return streamed(
             exports.export(source, form), exports.MEDIA_TYPES[form], f"{study_id}.{exports.SUFFIXES[form][0]}"

@@ -277,5 +277,5 @@ def _rows(done: LocalRun, study: Study, form: Format | ReportFormat) -> Iterator
     if form == "html" or form == "pdf":  # noqa: PLR1714 - so that the types are told apart
         return iter([write_report(report_of(done.store, record.id), form)])
     about = {"study": record.id, "name": record.name, "model": record.model, "engine_version": record.engine_version}
-    source = Source(study, study_results(study), done.store.iter_rows(record.id), about)
+    source = Source(study, study_results(study), done.store.iter_rows(record.id), about, done.store.spec(record.id))
     return export(source, form)

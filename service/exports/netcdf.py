@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from service.catalogue import unit_of
-from service.exports.source import description_of
+from service.exports.source import description_of, given
 from service.exports.spool import spooled
 
 if TYPE_CHECKING:
@@ -76,6 +76,7 @@ def _about(source: Source) -> dict[str, Any]:
         "base": json.dumps(study.base),
         "run": json.dumps(study.run),
         "combine": study.combine,
+        "given": json.dumps(given(source.spec)),
     }
 
 

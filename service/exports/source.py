@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
 
 from service.catalogue import parameter_of, unit_of
 
@@ -14,14 +15,22 @@ if TYPE_CHECKING:
     from worker.study import Study
 
 
+#: Parts of a spec that describe the machine and its run; the axes stand in the rows themselves.
+_GIVEN: Final = ("base", "run")
+
+
 @dataclass(frozen=True, slots=True)
 class Source:
-    """What is exported: a study, the description of its results, and where its rows come from, in order of cases."""
+    """What is exported: a study, the description of its results, and where its rows come from, in order of cases.
+
+    ``spec`` is the user's own, which has what is no number: kinds, formulas, tables, measured points.
+    """
 
     study: Study
     infos: tuple[ResultInfo, ...]
     blocks: Iterable[RowBlock]
     about: dict[str, Any]
+    spec: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +64,28 @@ def inputs(study: Study) -> tuple[Input, ...]:
         )
         for path in paths
     )
+
+
+def given(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """The machine and its run as the user wrote them, with their units: plain JSON data."""
+    return {name: spec[name] for name in _GIVEN if spec.get(name)}
+
+
+def given_texts(spec: Mapping[str, Any]) -> dict[str, str]:
+    """The same, flat: ``base.mechanism.slider_crank.crank`` -> ``40 mm``; tables and lists as JSON text."""
+    return {path: text for name, part in given(spec).items() for path, text in _flat(name, part)}
+
+
+def _flat(path: str, value: object) -> Iterator[tuple[str, str]]:
+    if isinstance(value, Mapping) and value:
+        for name, item in value.items():
+            yield from _flat(f"{path}.{name}", item)
+    elif isinstance(value, list) and any(isinstance(item, Mapping) for item in value):
+        for index, item in enumerate(value):
+            yield from _flat(f"{path}.{index}", item)
+    else:
+        text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+        yield path, text.encode("utf-8", "backslashreplace").decode()
 
 
 def run_texts(study: Study) -> dict[str, str]:

@@ -12,7 +12,7 @@ import xlsxwriter
 from xlsxwriter.worksheet import Worksheet
 
 from service.catalogue import unit_of
-from service.exports.source import inputs, run_texts
+from service.exports.source import given_texts, inputs, run_texts
 from service.exports.spool import spooled
 
 if TYPE_CHECKING:
@@ -119,14 +119,20 @@ def _inputs(book: Any, source: Source, title: Any) -> None:
     for name, value in source.about.items():
         line(name, value)
     line()
-    line("run", style=title)
-    for name, text in run_texts(source.study).items():
-        line(name, text)
-    line()
+    if run := run_texts(source.study):
+        line("run", style=title)
+        for name, text in run.items():
+            line(name, text)
+        line()
     line("parameter", "value", "unit", "meaning", style=title)
     for item in inputs(source.study):
         line(item.path, "varies" if item.varies else item.value, item.unit, item.description)
     line()
+    if texts := given_texts(source.spec):
+        line("as given", "value", style=title)
+        for name, text in texts.items():
+            line(name, text)
+        line()
     line("result", "", "unit", "meaning", style=title)
     for info in source.infos:
         line(info.name, "", info.unit, info.description)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from service.catalogue import unit_of
 from service.curves import Curves, Fetch, draw, select
-from service.exports.source import Input, inputs, run_texts
+from service.exports.source import Input, given_texts, inputs, run_texts
 from service.main_curve import main_query
 from service.plots import require_drawable
 from service.selection import SelectionError
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 _CHECKS: Final = ("balance", "run", "reset")
 _RESULTS_A_PICTURE: Final = 3
 _MOST_PICTURES: Final = 24
+_LONGEST_GIVEN: Final = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +65,7 @@ class Report:
     run: dict[str, str]
     endings: tuple[tuple[str, int, str], ...]
     inputs: tuple[Input, ...]
+    given: dict[str, str]
     ranges: tuple[Range, ...]
     pictures: tuple[Curves, ...]
     note: str
@@ -77,13 +79,19 @@ def report_of(store: Store, study_id: str) -> Report:
         store.progress(study_id).endings,
         store.iter_rows(study_id),
         partial(store.rows_for_cases, study_id),
+        store.spec(study_id),
     )
 
 
 def make_report(
-    record: StudyRecord, study: Study, endings: dict[str, int], blocks: Iterable[RowBlock], fetch: Fetch
+    record: StudyRecord,
+    study: Study,
+    endings: dict[str, int],
+    blocks: Iterable[RowBlock],
+    fetch: Fetch,
+    spec: Mapping[str, Any],
 ) -> Report:
-    """The report of a study as it is now; reads all its rows once."""
+    """The report of a study as it is now; reads all its rows once. ``spec`` is the user's own."""
     infos = kernels.study_results(study)
     pictures, note = _pictures(study, infos, fetch)
     return Report(
@@ -97,10 +105,16 @@ def make_report(
         run_texts(study),
         tuple((name, count, kernels.ENDING_SENTENCES.get(name, "")) for name, count in endings.items()),
         inputs(study),
+        {path: _shortened(text) for path, text in given_texts(spec).items()},
         ranges(infos, blocks),
         pictures,
         note,
     )
+
+
+def _shortened(text: str) -> str:
+    """A long table cut: a report is to be read, the exports have all of it."""
+    return text if len(text) <= _LONGEST_GIVEN else f"{text[:_LONGEST_GIVEN]} ... ({len(text)} characters in all)"
 
 
 def _facts(record: StudyRecord, study: Study) -> tuple[tuple[str, str], ...]:

@@ -86,6 +86,7 @@ def _lines(report: Report) -> Iterator[str]:
             for item in report.inputs
         ],
     )
+    yield from _section("Machine and run as given", [f"{path:40} {text}" for path, text in report.given.items()])
     if report.note:
         yield from _section("Curves", [report.note])
 
