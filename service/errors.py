@@ -47,6 +47,7 @@ PROBLEM_TYPES: dict[str, ProblemType] = _catalogue(
     _P("case-not-found", 404, "There is no such case in the study", "Cases are numbered from 0."),
     _P("not-found", 404, "There is nothing at this address", "The addresses of the interface are listed at /docs."),
     _P("method-not-allowed", 405, "This address does not take this method", "The header Allow lists those it takes."),
+    _P("not-acceptable", 406, "No format that Accept allows", "`detail` names the media types that there are."),
     _P("wrong-state", 409, "The state of the study does not allow this", "Look at the state of the study first."),
     _P("not-computed", 409, "The case cannot be computed", "Its run takes down the process that computes it."),
     _P("body-too-large", 413, "The request body is too large", "A study is a small document: give axes as ranges."),

@@ -85,7 +85,7 @@ def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
     response_model=m.Trajectory | m.AngleTable,
     responses={
         **files("Instantaneous values, as JSON or CSV.", (MEDIA_TYPES["json"], MEDIA_TYPES["csv"])),
-        **problems(*_CASE_PROBLEMS, "not-computed", "timed-out", "unavailable"),
+        **problems(*_CASE_PROBLEMS, "not-acceptable", "not-computed", "timed-out", "unavailable"),
     },
 )
 async def get_trajectory(

@@ -30,7 +30,7 @@ _PICTURES: dict[str, str] = {str(picture): media for picture, media in plots.MED
 _JSON = {"json": "application/json"}
 _CURVE_FORMATS = _JSON | {"csv": exports.MEDIA_TYPES["csv"]} | _PICTURES
 _MAP_FORMATS = _JSON | _PICTURES
-_PROBLEMS = ("invalid-parameter", "invalid-selection", "study-not-found")
+_PROBLEMS = ("invalid-parameter", "invalid-selection", "study-not-found", "not-acceptable")
 #: matplotlib puts its styles into the picture, which the pages' policy forbids; a picture can do nothing else.
 _PICTURE_POLICY = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
 
@@ -131,7 +131,7 @@ def get_map(
     response_class=Response,
     responses={
         **files("All finished cases, in the format asked for.", exports.MEDIA_TYPES.values()),
-        **problems("invalid-parameter", "study-not-found"),
+        **problems("invalid-parameter", "study-not-found", "not-acceptable"),
         **documented_304(),
     },
 )
@@ -162,7 +162,7 @@ def get_results(
     response_class=Response,
     responses={
         **files("The study as a document to be printed.", report.MEDIA_TYPES.values()),
-        **problems("invalid-parameter", "study-not-found"),
+        **problems("invalid-parameter", "study-not-found", "not-acceptable"),
         **documented_304(),
     },
 )

@@ -12,7 +12,7 @@ from starlette.concurrency import iterate_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 
-from service.errors import parameter_error, to_bytes
+from service.errors import ApiError, parameter_error, shown, to_bytes
 
 JSON = "application/json"
 
@@ -56,7 +56,8 @@ def streamed(pieces: Iterable[bytes], media_type: str, filename: str) -> Streami
 def choose_format(request: Request, wanted: str | None, media_types: Mapping[str, str]) -> str:
     """The format of the answer: ``wanted`` (the query's ``format``), else the one Accept likes best, else the first.
 
-    Raises ApiError when the query names a format that there is not.
+    A type that Accept names goes before one that it only allows (``image/*``, ``*/*``). Raises ApiError when the query
+    names a format that there is not, and when Accept allows none.
     """
     formats: Sequence[str] = tuple(media_types)
     if wanted is not None:
@@ -64,23 +65,41 @@ def choose_format(request: Request, wanted: str | None, media_types: Mapping[str
             raise parameter_error("format", "there is no such format", wanted, ", ".join(formats))
         return wanted
     by_type = {media.partition(";")[0]: name for name, media in reversed(list(media_types.items()))}
-    best, best_quality = formats[0], 0.0
-    for item in request.headers.get("accept", "").split(","):
+    accept = ",".join(request.headers.getlist("accept"))
+    liked = _liked(accept)
+    named = {by_type[media]: quality for media, quality in liked.items() if media in by_type}
+    best = max(named, key=lambda name: named[name], default=None)
+    if best is not None and named[best] > 0:
+        return best
+    ranges = {media for media, quality in liked.items() if quality > 0}
+    for name, media in media_types.items():
+        if name not in named and ranges & {"*/*", media.partition("/")[0] + "/*"}:
+            return name
+    if liked:
+        detail = f"Accept is {shown(accept)}; the answer can be {', '.join(by_type)}."
+        raise ApiError("not-acceptable", detail)
+    return formats[0]
+
+
+def _liked(accept: str) -> dict[str, float]:
+    """Media types and ranges of an Accept header with their quality; what cannot be read is left out."""
+    found: dict[str, float] = {}
+    for item in accept.split(","):
         media, *parameters = (part.strip().lower() for part in item.split(";"))
         quality = _quality(parameters)
-        if media in by_type and quality > best_quality:
-            best, best_quality = by_type[media], quality
-    return best
+        if "/" in media and quality is not None:
+            found.setdefault(media, quality)
+    return found
 
 
-def _quality(parameters: Iterable[str]) -> float:
+def _quality(parameters: Iterable[str]) -> float | None:
     for parameter in parameters:
         name, _, value = parameter.partition("=")
         if name.strip() == "q":
             try:
                 return float(value)
             except ValueError:
-                return 0.0
+                return None
     return 1.0
 
 

@@ -36,7 +36,7 @@ _FORMATS: dict[str, str] = {
     response_model=m.SensitivityReport,
     responses={
         **files("Effects, as JSON, a table of indices or a picture.", _FORMATS.values()),
-        **problems("invalid-parameter", "invalid-selection", "study-not-found"),
+        **problems("invalid-parameter", "invalid-selection", "study-not-found", "not-acceptable"),
         **documented_304(),
     },
 )

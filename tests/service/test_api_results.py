@@ -177,11 +177,26 @@ def test_the_format_follows_what_is_liked_best(service: Service) -> None:
         ("text/csv;q=0.5, application/json", "application/json"),
         ("image/webp, */*", "application/json"),
         ("text/csv;q=x", "application/json"),
+        ("text/csv;q=0.1, */*", "text/csv"),
+        ("text/*", "text/csv"),
+        ("application/json;q=0, */*;q=0.1", "text/csv"),
+        ("text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8", "application/json"),
         ("", "application/json"),
     ):
         response = service.http.get(f"{API}/studies/{study_id}/results", headers={"Accept": accept})
         assert response.headers["content-type"].startswith(media), accept
     assert service.http.get(f"{API}/studies/{study_id}/results?format=exe").status_code == 422
+
+
+@pytest.mark.parametrize("accept", ["application/pdf", "application/foo, image/*", "text/csv;q=0"])
+def test_a_format_that_there_is_not_is_told_instead_of_another_being_sent(service: Service, accept: str) -> None:
+    address = f"{API}/studies/{service.submit()}/results"
+    refused = service.http.get(address, headers={"Accept": accept})
+    assert (refused.status_code, refused.headers["content-type"]) == (406, "application/problem+json")
+    assert refused.json()["type"] == "/problems/not-acceptable"
+    assert "text/csv" in refused.json()["detail"]
+    # Who names the format has chosen already.
+    assert service.http.get(f"{address}?format=csv", headers={"Accept": accept}).status_code == 200
 
 
 def test_rows_are_written_as_they_come(service: Service) -> None:
