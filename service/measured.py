@@ -1,6 +1,6 @@
 """Measured data of a clutch as test benches write them: two columns, angle and torque, in a text file.
 
-Columns stand apart by comma, semicolon (then a decimal comma is understood), tab or blanks. A header is optional and
+Columns stand apart by comma, semicolon or tab (then a decimal comma is understood), or blanks. A header is optional and
 may name the units: ``angle_deg, torque_Nmm`` or ``angle [mrad]; torque [N*m]``. Without units the numbers are rad
 and N*m, which is said; a header of other words is refused. Cells may stand in quotation marks. Empty lines and lines
 that begin with ``#`` are passed over.
@@ -91,6 +91,9 @@ def parse_measured(text: str, convert: Callable[[str, str], float]) -> MeasuredD
 def _cells(line: str) -> list[str]:
     if ";" in line:
         return [_unquoted(cell).replace(",", ".") for cell in line.split(";")]
+    parts = line.split("\t")
+    if len(parts) == 2 and not any(part.strip().endswith(",") for part in parts):
+        return [_unquoted(part).replace(",", ".") for part in parts]
     separator = "," if "," in line else "\t" if "\t" in line else None
     return [_unquoted(cell) for cell in line.split(separator)]
 
@@ -173,7 +176,11 @@ def _wrong_rows(lines: list[tuple[int, str]]) -> Iterator[Problem]:
     for number, line in lines:
         cells = _cells(line)
         if len(cells) != 2:
-            yield Problem(f"line {number}", f"{len(cells)} columns", line[:80], "two columns: angle, torque")
+            few = f"{len(cells)} column" + ("" if len(cells) == 1 else "s")
+            allowed = "two columns: angle, torque"
+            if "," in line:
+                allowed += "; decimal commas only where tabs or semicolons part the columns, else 0.25"
+            yield Problem(f"line {number}", few, line.replace("\t", " ")[:80], allowed)
             continue
         for cell, (name, _) in zip(cells, _QUANTITIES, strict=True):
             value = _number(cell)

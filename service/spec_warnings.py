@@ -29,7 +29,7 @@ _PLAUSIBLE: Final[dict[str, tuple[float, str, str]]] = {
     "spring_arm": (1.0, "m", "was it in mm?"),
     "spring_rate": (1e8, "N/m", "was it in another unit?"),
     "damping": (100.0, "N*m*s/rad", "was it in another unit?"),
-    "backlash": (0.5, "rad", "was it in degrees?"),
+    "backlash": (0.1, "rad", "was it in degrees?"),
     "initial_angle": (math.pi, "rad", "was it in degrees?"),
     "initial_speed": (1e3, "rad/s", "was it in rpm?"),
     "load": (1e4, "N*m", "was it in N*mm?"),

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from service.curves import numbers
+from service.curves import PENDING, numbers
 from service.web.templates import number, unit_text, words
 from service.web.thinning import thin
+from worker.kernels import WorkerEnding
 
 if TYPE_CHECKING:
     from service.curves import Curve, Curves, Map
@@ -31,7 +32,11 @@ _LEAST_POINTS: Final = 400
 _LINE_POINTS: Final = 6_000
 #: Lines with more points are drawn without markers.
 _MARKED: Final = 60
-_PANEL_HEIGHT: Final = 280
+#: Pixels of a panel, alone and among others, and of what lies between two rows of panels.
+_ALONE: Final = 360
+_PANEL_HEIGHT: Final = 230
+_ROW_GAP: Final = 45
+#: Share of the width between two panels side by side.
 _GAP: Final = 0.1
 
 
@@ -57,6 +62,8 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1) -> Figu
         Panels side by side.
     """
     chosen = drawn[0][1].selection
+    if told := _nothing(drawn):
+        return {"data": [], "layout": {}, "note": told}
     rows = math.ceil(len(chosen.results) / columns)
     lines = [(label, curve) for label, curves in drawn for curve in curves.curves]
     traces = [
@@ -66,9 +73,10 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1) -> Figu
             lines, info, panel, min(max(_MOST_POINTS // len(lines), _LEAST_POINTS), _LINE_POINTS)
         )
     ]
+    margin = {"t": 60 if 1 < len(lines) <= len(PALETTE) else 20, "r": 20, "b": 60, "l": 70}
     layout: Figure = {
-        "height": 440 if rows == 1 else rows * _PANEL_HEIGHT + 90,
-        "margin": {"t": 60 if 1 < len(lines) <= len(PALETTE) else 20, "r": 20, "b": 60, "l": 70},
+        "height": _pixels(rows) + margin["t"] + margin["b"],
+        "margin": margin,
         "hovermode": "closest",
         "showlegend": len(lines) > 1,
         "legend": _legend(drawn, len(lines)),
@@ -87,11 +95,35 @@ def _axis(name: str, panel: int) -> str:
     return name if panel == 0 else f"{name}{panel + 1}"
 
 
+def _nothing(drawn: Sequence[tuple[str, Curves]]) -> str:
+    """Why there is nothing to draw, as a sentence; "" where there is anything: empty axes would be made-up scales."""
+    curves = [curve for _, found in drawn for curve in found.curves]
+    if any(not np.all(np.isnan(y)) for curve in curves for y in curve.y.values()):
+        return ""
+    chosen = drawn[0][1].selection
+    at = curves[0].line.at if curves else {}
+    held = [f"{axis_name} = {number(value)} {unit_text(chosen.units[axis_name])}" for axis_name, value in at.items()]
+    cases = (
+        f"case at {', '.join(text.strip() for text in held)}" if held and len(drawn) == 1 else "case that is drawn here"
+    )
+    endings = {ending for curve in curves for ending in curve.endings}
+    if endings <= {PENDING, WorkerEnding.CANCELLED}:
+        return f"No {cases} {'is done yet' if PENDING in endings else 'was run before the study was cancelled'}."
+    others = ", ".join(sorted(endings - {PENDING, WorkerEnding.CANCELLED}))
+    return f"No {cases} has a result; they ended with: {others}."
+
+
+def _pixels(rows: int) -> int:
+    """Height of all rows of panels: each as high as in any other figure, however many there are."""
+    return _ALONE if rows == 1 else rows * _PANEL_HEIGHT + (rows - 1) * _ROW_GAP
+
+
 def _panel_axes(panel: int, info: ResultInfo, row: tuple[int, int], column: tuple[int, int]) -> Figure:
     """The axes of one panel of a grid; all x axes zoom together."""
     width = (1.0 - _GAP * (column[1] - 1)) / column[1]
-    height = (1.0 - _GAP * (row[1] - 1)) / row[1]
-    left, top = column[0] * (width + _GAP), 1.0 - row[0] * (height + _GAP)
+    gap = _ROW_GAP / _pixels(row[1])
+    height = (1.0 - gap * (row[1] - 1)) / row[1]
+    left, top = column[0] * (width + _GAP), 1.0 - row[0] * (height + gap)
     suffix = "" if panel == 0 else str(panel + 1)
     x_axis: Figure = {"domain": [left, left + width], "anchor": f"y{suffix}", "zeroline": False}
     if panel:

@@ -21,7 +21,15 @@ from service.intake import accept
 from service.presets import preset_names
 from service.web.form_check import Checked, check_form, check_text
 from service.web.form_fields import FORM_MODEL, path_choices, pendulum, sections
-from service.web.form_spec import Values, axes_of, clutch_pointers, pendulums_of, spec_of, values_of
+from service.web.form_spec import (
+    Values,
+    axes_of,
+    clutch_pointers,
+    pendulums_of,
+    spec_of,
+    values_of,
+    with_clutch_defaults,
+)
 from service.web.templates import fragment, page, spec_text
 from worker import kernels
 from worker.kernels import MAX_PENDULUMS
@@ -41,7 +49,6 @@ _EMPTY: Final[Values] = {
     "/run/tolerance": "1e-9",
     "/run/reset": "contact",
     "/base/clutch/kind": "law",
-    "/base/clutch/through_origin": "on",
     "/axes/0/way": "linspace",
 }
 
@@ -71,7 +78,7 @@ def new_study(
     """The form, empty or filled in from an example or from another study."""
     spec = _start(context, preset, clone)
     if spec is None:
-        values = {"/text": "", "format": "json"} if mode == "text" else dict(_EMPTY)
+        values = {"/text": "", "format": "json"} if mode == "text" else with_clutch_defaults(dict(_EMPTY))
         return form_page(request, values, None)
     try:
         values = values_of(spec)
@@ -100,6 +107,7 @@ def _start(context: Context, preset: str | None, clone: str | None) -> dict[str,
 async def send_form(context: Ctx, request: Request, values: Form) -> Response:
     """What the pressed button asks for: look the form over, change its shape, or submit the study."""
     wanted = values.pop("do", "check")
+    share_clutches(values)
     if wanted == "submit":
         return await run_in_threadpool(_submit, context, request, values)
     reshape(values, wanted)
@@ -167,6 +175,20 @@ def reshape(values: Values, wanted: str) -> None:
             _drop(values, f"/axes/{number}/")
             _copy(values, f"/axes/{number + 1}/", f"/axes/{number}/")
         values["axes"] = str(axes_of(values) - 1)
+
+
+def share_clutches(values: Values) -> None:
+    """Own laws begin as the common one, and the common one as the first's: what is filled in is not lost on the way."""
+    common, first = "/base/clutch/", "/base/pendulums/0/clutch/"
+    own = values.get("clutches") == "own"
+    if own and f"{common}kind" in values:
+        for index in range(pendulums_of(values)):
+            _copy(values, common, f"/base/pendulums/{index}/clutch/")
+        _drop(values, common)
+    elif not own and f"{common}kind" not in values and f"{first}kind" in values:
+        _copy(values, first, common)
+        for index in range(pendulums_of(values)):
+            _drop(values, f"/base/pendulums/{index}/clutch/")
 
 
 def _copy(values: Values, source: str, target: str) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from service.errors import ErrorItem, spec_items
 from service.fits import fit_json
+from service.measured import MeasuredDataError, parse_measured
 from service.preview import preview_json
 from service.spec import ParsedSpec, SpecError, load_spec, parse_spec
 from service.spec_clutch import read_clutch
@@ -26,7 +27,8 @@ class Checked:
     """A filled form, looked over.
 
     ``faults`` has the messages by field ("" for those of no field); ``preview`` is None while there are any. ``fits``
-    has the report and the picture of each clutch that could be fitted, whatever else is wrong.
+    has the report and the picture of each clutch that could be fitted, whatever else is wrong; ``notes`` what was taken
+    for granted in measured data.
     """
 
     spec: dict[str, Any]
@@ -34,12 +36,24 @@ class Checked:
     faults: Faults = field(default_factory=dict)
     preview: dict[str, Any] | None = None
     fits: dict[str, tuple[dict[str, Any], FitChart]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    empty: frozenset[str] = frozenset()
+
+    @property
+    def missing(self) -> int:
+        """Number of required fields that are still empty; beside them it is said once they were left."""
+        return sum(name in self.empty for name in self.faults)
+
+    @property
+    def attention(self) -> int:
+        """Number of messages beside fields that are filled in."""
+        return sum(len(texts) for name, texts in self.faults.items() if name and name not in self.empty)
 
 
 def check_form(values: Mapping[str, str], chunking: Chunking) -> Checked:
     """Look a filled form over."""
     spec, faults = spec_of(values)
-    found = Checked(spec, faults=faults)
+    found = Checked(spec, faults=faults, empty=frozenset(name for name, text in values.items() if not text.strip()))
     try:
         found.parsed = parse_spec(spec)
     except SpecError as error:
@@ -54,8 +68,17 @@ def check_form(values: Mapping[str, str], chunking: Chunking) -> Checked:
         found.preview = preview_json(found.parsed, chunking)
     for pointer in clutch_pointers(values):
         if values.get(f"{pointer}/kind") == "data":
+            found.notes += _assumed(values.get(f"{pointer}/data", ""))
             _fit(found, pointer, values)
     return found
+
+
+def _assumed(text: str) -> list[str]:
+    """What is taken for granted of pasted data; nothing of such as cannot be read, which is told elsewhere."""
+    try:
+        return [f"Measured data: {note}." for note in parse_measured(text, parse_quantity).warnings]
+    except MeasuredDataError:
+        return []
 
 
 def check_text(text: str, form: str, chunking: Chunking) -> Checked:
@@ -81,12 +104,17 @@ def message(item: ErrorItem) -> str:
     """A fault as a sentence beside its field."""
     parts = [item.message]
     if item.value is not None and not isinstance(item.value, list | dict):
-        parts.append(f"got {item.value}")
+        parts.append(f"got {plainly(item.value)}")
     if item.allowed:
         parts.append(f"allowed: {unit_text(item.allowed)}")
     elif item.unit and item.unit != "1":
         parts.append(f"in {unit_text(item.unit)}")
     return "; ".join(parts)
+
+
+def plainly(value: object) -> object:
+    """A value as a person would have written it: a whole number without decimals."""
+    return int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 1e15 else value
 
 
 def backlashes(spec: Mapping[str, Any], pointer: str) -> list[float]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from service.measured import MeasuredDataError, parse_measured
+from service.spec_messages import Problem
 from service.units import QuantityError, parse_quantity
 from service.web.form_fields import FORM_MODEL, pendulum, sections
 from worker.kernels import MAX_PENDULUMS
@@ -119,12 +120,18 @@ def _clutch(values: Mapping[str, str], pointer: str, faults: Faults) -> dict[str
             measured = parse_measured(text, parse_quantity)
             found["data"] = measured.rows.tolist()
         except MeasuredDataError as error:
-            faults[f"{pointer}/data"] = [str(problem) for problem in error.problems]
+            faults[f"{pointer}/data"] = [_told(problem) for problem in error.problems]
     found |= _given(values, f"{pointer}/accuracy", "accuracy") | _given(values, f"{pointer}/max_degree", "max_degree")
     # A box that is not ticked is not sent, so that both are always said.
     found["through_origin"] = values.get(f"{pointer}/through_origin") == "on"
     found["angles_include_backlash"] = values.get(f"{pointer}/angles_include_backlash") == "on"
     return found
+
+
+def _told(problem: Problem) -> str:
+    """A problem of measured data as a sentence: the line, what is wrong, what stands there, what may."""
+    parts = [f"{problem.pointer}: {problem.message}", *([] if problem.value is None else [f"got {problem.value}"])]
+    return "; ".join([*parts, *([f"allowed: {problem.allowed}"] if problem.allowed else [])])
 
 
 def _run(values: Mapping[str, str]) -> dict[str, Any]:
@@ -211,6 +218,11 @@ def values_of(spec: Mapping[str, Any]) -> Values:
     return values
 
 
+def with_clutch_defaults(values: Values) -> Values:
+    """The values, with the box ticked of each clutch that the spec has ticked where nothing is said."""
+    return values | {f"{pointer}/through_origin": "on" for pointer in clutch_pointers(values)}
+
+
 def _plain_axis(axis: Mapping[str, Any]) -> bool:
     """Whether an axis gives its values in one of the form's ways."""
     return any(set(axis) == {"path", way} for way in WAYS)
@@ -223,6 +235,8 @@ def _text(value: Any) -> str:
 def _clutch_values(pointer: str, clutch: Mapping[str, Any]) -> Values:
     if "data" not in clutch:
         found = {f"{pointer}/kind": "law", f"{pointer}/coefficients": "; ".join(map(_text, clutch["coefficients"]))}
+        # Ticked for when measured data take the place of the coefficients, as the spec has it.
+        found[f"{pointer}/through_origin"] = "on"
         return found | {f"{pointer}/windup_limit": _text(clutch[key]) for key in ("windup_limit",) if key in clutch}
     rows = [f"{_si(angle, 'rad')!r}\t{_si(torque, 'N*m')!r}" for angle, torque in clutch["data"]]
     found = {f"{pointer}/kind": "data", f"{pointer}/data": "\n".join(["angle_rad\ttorque_Nm", *rows])}

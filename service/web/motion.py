@@ -10,7 +10,7 @@ import numpy as np
 from service.curves import numbers
 from service.web.figures import DASHES, PALETTE, Figure, axis_title
 from service.web.shaft_figures import shaft_figure
-from service.web.templates import words
+from service.web.templates import number, words
 from service.web.thinning import thin
 from worker import kernels
 
@@ -71,10 +71,24 @@ def spans_of(states: list[str]) -> Iterator[tuple[str, int, int]]:
 def motion_figures(study: Study, case: int, start: float, end: float) -> dict[str, Figure]:
     """The case run again and drawn. For the computing process."""
     made = kernels.run_trajectory(study, case, start, end, SAMPLES)
+    if made.times.size == 0 or made.times[-1] == start < end:
+        told = {"data": [], "layout": {}, "note": _no_motion(study, case, made.ending)}
+        return {"motion": told, **({} if made.along == "angle" else {"phase": told})}
     if made.along == "angle":
         return {"motion": shaft_figure(made)}
     column = {name: made.values[:, index] for index, name in enumerate(made.names)}
     return {"motion": _histories(made, column), "phase": _phase(made, column)}
+
+
+def _no_motion(study: Study, case: int, ending: str) -> str:
+    """Why a part has no motion: the run stopped before."""
+    extent = kernels.extent(study, case)
+    if extent.along == "angle":
+        return f"There is no motion: the case ended with {ending}."
+    times = kernels.run_trajectory(study, case, 0.0, extent.end, SAMPLES).times
+    last = float(times[-1]) if times.size else 0.0
+    when = f"about t = {number(last, 3)} s" if last > 0.0 else "t = 0"
+    return f"There is no motion in this part: the run stopped at {when} with {ending}."
 
 
 def _histories(made: Trajectory, column: dict[str, NDArray[np.float64]]) -> Figure:
@@ -100,7 +114,7 @@ def _histories(made: Trajectory, column: dict[str, NDArray[np.float64]]) -> Figu
             "title": {"text": axis_title(title, unit)},
             "zeroline": True,
         }
-        for number, (name, label) in enumerate(lines):
+        for index_of, (name, label) in enumerate(lines):
             y = column[name]
             kept = thin(y, _MOST_POINTS)
             traces.append(
@@ -115,8 +129,8 @@ def _histories(made: Trajectory, column: dict[str, NDArray[np.float64]]) -> Figu
                     "yaxis": f"y{index + 2}",
                     "line": {
                         "width": 1.6,
-                        "color": PALETTE[number % len(PALETTE)],
-                        "dash": DASHES[number % len(DASHES)],
+                        "color": PALETTE[index_of % len(PALETTE)],
+                        "dash": DASHES[index_of % len(DASHES)],
                     },
                 }
             )

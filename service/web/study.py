@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
+import numpy as np
 from fastapi import APIRouter
 from starlette.responses import RedirectResponse, Response
 
@@ -14,9 +16,11 @@ from service.api import views
 from service.api.context import Context, Ctx, StudyId
 from service.api.respond import timestamp
 from service.catalogue import parameter_of, unit_of
+from service.curves import select
 from service.errors import ApiError
 from service.fits import fit_json
 from service.main_curve import caption, drawn_numbers
+from service.selection import SelectionError
 from service.spec import parse_spec
 from service.web.choice import characteristic, map_query, pairs_of
 from service.web.fit_chart import FitChart, fit_chart
@@ -28,6 +32,7 @@ from worker.states import TRANSITIONS, StudyEvent, StudyState
 if TYPE_CHECKING:
     from starlette.datastructures import QueryParams
 
+    from service.curves import CurveQuery
     from worker.study import Study
 
 router = APIRouter(include_in_schema=False)
@@ -69,8 +74,8 @@ def _verbs(state: StudyState, some_failed: bool) -> list[str]:
 def study_page(context: Ctx, study_id: StudyId) -> Response:
     """One study: how far it is, its mechanical characteristic, its inputs."""
     study = context.store.study(study_id)
-    query = characteristic(study, kernels.study_results(study))
     frame = study_frame(context, study_id)
+    query = _with_rows(context, study, study_id, characteristic(study, kernels.study_results(study)))
     first = context.store.case_row(study_id, 0) if query is None else None
     too_many = query is not None and drawn_numbers(study, query) > plots.MAX_PICTURE_POINTS
     address = views.study_address(study_id)
@@ -89,6 +94,22 @@ def study_page(context: Ctx, study_id: StudyId) -> Response:
         run=run_lines(study),
         fits=fits_of(frame["study"]["spec"]),
     )
+
+
+def _with_rows(context: Context, study: Study, study_id: str, query: CurveQuery | None) -> CurveQuery | None:
+    """The same curves, with the axes that are not drawn held where cases are done, should none be where they were."""
+    if query is None or not query.at or StudyState(context.store.get_study(study_id).state) is StudyState.FINISHED:
+        return query
+    try:
+        cases = [line.cases for line in select(study, kernels.study_results(study), query).lines]
+    except SelectionError:
+        return query
+    found = context.store.rows_for_cases(study_id, np.concatenate(cases), ())
+    done = context.store.case_rows(study_id, limit=1).cases
+    if not {None, kernels.WorkerEnding.CANCELLED}.issuperset(found.endings) or not len(done):
+        return query
+    values = study.case_parameters(int(done[0]))
+    return replace(query, at=tuple((path, repr(values[path])) for path, _ in query.at))
 
 
 def inputs(study: Study) -> list[tuple[str, list[dict[str, Any]]]]:

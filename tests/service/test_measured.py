@@ -31,6 +31,8 @@ def problems(text: str) -> list[str]:
         '"angle_rad","torque_Nm"\n0.01,2.5\n0.02,5.25\n',
         '"0.01","2.5"\n"0.02","5.25"\n',
         "angle mrad,torque Nmm\n10,2500\n20,5250\n",
+        "0,01\t2,5\n0,02\t5,25\n",
+        "0.01,\t2.5\n0.02,\t5.25\n",
         "rad,Nm\n0.01,2.5\n0.02,5.25\n",
         "0.01 2.5\r\n0.02 5.25\r\n",
         "angle [rad]  torque [N*m]\n0.01 2.5\n0.02 5.25\n",
@@ -77,7 +79,7 @@ def test_every_wrong_row_is_told_with_its_line() -> None:
     text = "angle,torque\n0.01,2\n0.02,two\n0.03\n0.04,inf\n1_0,3\n"
     assert problems(text) == [
         "line 3: the torque is no number",
-        "line 4: 1 columns",
+        "line 4: 1 column",
         "line 5: the torque is not finite",
         "line 6: the angle is no number",
     ]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any
 
 import pytest
+
+from worker import kernels
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
@@ -70,6 +73,38 @@ def test_a_long_curve_is_thinned_and_keeps_its_highest_point(service: Service, s
     known = [value for value in told if value is not None]
     drawn = [value for value in line["y"] if value is not None]
     assert (max(drawn), min(drawn)) == (max(known), min(known))
+
+
+def test_panels_are_as_high_among_many_as_among_few(service: Service) -> None:
+    study_id = service.submit()
+    service.fill(study_id)
+    names = [info.name for info in kernels.study_results(service.store.study(study_id))]
+    for count in (2, 12, 24):
+        query = {"x": "shaft.load", "y": names[:count]}
+        layout = service.http.get(f"/studies/{study_id}/figures/curves", params=query).json()["layout"]
+        inner = layout["height"] - layout["margin"]["t"] - layout["margin"]["b"]
+        spans = sorted(axis["domain"] for name, axis in layout.items() if name.startswith("yaxis"))
+        assert len(spans) == count
+        assert [(top - low) * inner for low, top in spans] == pytest.approx([230.0] * count)
+        gaps = [(after[0] - before[1]) * inner for before, after in itertools.pairwise(spans)]
+        assert gaps == pytest.approx([45.0] * (count - 1))
+
+
+def test_a_picture_without_rows_is_a_sentence_and_the_first_one_has_rows(
+    service: Service, spec: dict[str, Any]
+) -> None:
+    masses = {"path": "pendulums.0.mass", "linspace": [0.4, 0.6, 3]}
+    frequencies = {"path": "excitation.frequency", "values": [21, 25, 30]}
+    loads = {"path": "shaft.load", "linspace": [0, 0.5, 40]}
+    study_id = service.submit({**spec, "axes": [masses, frequencies, loads]})
+    query = {"x": "shaft.load", "y": "efficiency", "at": ["excitation.frequency=30", "pendulums.0.mass=0.5"]}
+    figure = service.http.get(f"/studies/{study_id}/figures/curves", params=query).json()
+    assert figure["note"] == "No case at excitation.frequency = 30 Hz, pendulums.0.mass = 0.5 kg is done yet."
+    assert figure["data"] == []
+    assert "at=pendulums.0.mass%3D0.5" in service.http.get(f"/studies/{study_id}").text
+    service.fill(study_id, range(1))
+    page = service.http.get(f"/studies/{study_id}").text
+    assert "at=pendulums.0.mass%3D0.4" in page
 
 
 @pytest.mark.parametrize(

@@ -12,12 +12,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from service.errors import ErrorItem
 from service.presets import preset_names, preset_text
 from service.spec import format_of, load_spec, parse_spec
-from service.web.form_check import check_form, check_text
-from service.web.form_spec import field_of, plain, spec_of, values_of
-from service.web.templates import duration, number, unit_text
+from service.web.form import share_clutches
+from service.web.form_check import check_form, check_text, message
+from service.web.form_spec import field_of, plain, spec_of, values_of, with_clutch_defaults
+from service.web.motion import motion_figures
+from service.web.templates import duration, fragment, number, unit_text
 from service.web.thinning import thin
+from worker import kernels
 from worker.chunking import Chunking
 from worker.study import Study
 
@@ -171,3 +175,66 @@ def test_numbers_are_written_for_people() -> None:
         "2.5 h",
         "4.6 days",
     ]
+
+
+def test_clutches_of_their_own_begin_as_the_common_one_and_go_back_to_the_first_ones() -> None:
+    values = {**filled(), "pendulums": "2", "clutches": "own"}
+    law = values["/base/clutch/coefficients"]
+    share_clutches(values)
+    assert [values[f"/base/pendulums/{index}/clutch/coefficients"] for index in (0, 1)] == [law, law]
+    values |= {"/base/pendulums/0/clutch/coefficients": "0; 7", "/base/pendulums/1/clutch/coefficients": "0; 9"}
+    share_clutches(values)
+    assert values["/base/pendulums/1/clutch/coefficients"] == "0; 9"
+    values["clutches"] = "common"
+    share_clutches(values)
+    assert values["/base/clutch/coefficients"] == "0; 7"
+    assert not [name for name in values if "pendulums" in name and "clutch" in name]
+
+
+def test_no_torque_at_zero_windup_is_ticked_unless_said_otherwise() -> None:
+    for values in (with_clutch_defaults({}), filled()):
+        changed = {**values, "/base/clutch/kind": "data"}
+        assert spec_of(changed)[0]["base"]["clutch"]["through_origin"] is True
+    measured = {"data": [[0, 1], [0.1, 2]], "accuracy": 1, "through_origin": False}
+    spec = spec_of(values_of({**spec_of(filled())[0], "base": {"clutch": measured, "pendulums": []}}))[0]
+    assert spec["base"]["clutch"]["through_origin"] is False
+
+
+def test_empty_fields_and_wrong_ones_are_counted_apart() -> None:
+    checked = check_form(
+        {**filled(), "/base/shaft/inertia": "", "/base/excitation/frequency": " ", "/base/gravity": "much"}, Chunking()
+    )
+    assert (checked.missing, checked.attention) == (2, 1)
+    told = str(fragment("_form_panel.html", checked=checked, address=""))
+    assert "1 entry needs attention" in told
+    assert "2 required fields are still empty" in told
+
+
+def test_units_of_pasted_data_that_are_taken_for_granted_are_told() -> None:
+    data = {"/base/clutch/kind": "data", "/base/clutch/data": "0\t0\n0,25\t0,878\n2\t7", "/base/clutch/accuracy": "9"}
+    checked = check_form({**filled(), **data}, Chunking())
+    assert checked.spec["base"]["clutch"]["data"][1] == [0.25, 0.878]
+    assert [note for note in checked.notes if "taken in rad" in note and "taken in N*m" in note]
+    assert [note for note in checked.notes if "was it in degrees?" in note]
+    checked = check_form({**filled(), **data, "/base/clutch/data": "0,25 0,878\n"}, Chunking())
+    assert checked.faults["/base/clutch/data"][0].startswith("line 1: 3 columns; got 0,25 0,878; allowed: two columns")
+
+
+def test_values_are_repeated_as_people_write_them() -> None:
+    assert "got 25;" in message(ErrorItem("is wrong", value=25.0, allowed="0 .. 1"))
+    assert "got 25.5;" in message(ErrorItem("is wrong", value=25.5, allowed="0 .. 1"))
+
+
+def test_a_part_after_the_run_stopped_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = parse_spec(drives()[0]).study
+
+    def stopped(study: Study, case: int, start: float, end: float, points: int) -> kernels.Trajectory:
+        times = np.linspace(start, end, points)
+        times = times[times <= 0.0125]
+        return kernels.Trajectory(times, (), (), np.zeros((times.size, 0)), {}, "chatter")
+
+    monkeypatch.setattr(kernels, "run_trajectory", stopped)
+    figures = motion_figures(study, 0, 0.5, 0.6)
+    sentence = "There is no motion in this part: the run stopped at about t = 0.012 s with chatter."
+    assert {name: figure["note"] for name, figure in figures.items()} == {"motion": sentence, "phase": sentence}
+    assert figures["motion"]["layout"] == {}

@@ -24,7 +24,7 @@ if (motion) {
       sprag.say(motion, error.message);
       return;
     }
-    if (sprag.figures.get(motion).zoom) motion.on("plotly_relayout", (event) => {
+    if (sprag.figures.get(motion)?.zoom) motion.on("plotly_relayout", (event) => {
       const low = event["xaxis.range[0]"], high = event["xaxis.range[1]"];
       if (low !== undefined && high > low) {
         const url = new URL(whole, location.href), ends = [Number(url.searchParams.get("from")), Number(url.searchParams.get("to"))];

@@ -88,8 +88,12 @@ function listen() {
   });
 }
 
-if (form.querySelector("[aria-invalid]")) {
+// After a submission that was refused: to the first field at fault, or to the first message where no field is.
+const refused = form.querySelector("[aria-invalid]") || form.querySelector(".wrong:not(:empty), #panel .fault");
+if (refused) {
   whole = true;
-  form.querySelector("[aria-invalid]").focus();
+  if (!refused.matches("input, select, textarea")) refused.tabIndex = -1;
+  refused.focus();
+  refused.scrollIntoView({ block: "center" });
 }
 listen();

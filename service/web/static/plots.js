@@ -41,6 +41,13 @@ sprag.fetchJson = async (address, options) => {
 };
 
 sprag.show = async (element, figure) => {
+  if (figure.note) {
+    if (sprag.figures.delete(element)) Plotly.purge(element);
+    sprag.say(element, figure.note);
+    element.firstChild.className = "soft";
+    element.dataset.drawn = String(Number(element.dataset.drawn || 0) + 1);
+    return;
+  }
   const first = !sprag.figures.has(element);
   if (first) element.replaceChildren();
   sprag.figures.set(element, figure);
