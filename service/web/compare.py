@@ -127,11 +127,12 @@ def compare_page(context: Ctx, request: Request) -> Response:
     given = request.query_params
     faults: tuple[Any, ...] = ()
     chosen: Comparison | None = None
+    held_at: list[tuple[str, ...]] = []
     if given.get("study"):
         try:
             chosen = comparison(context, given)
             for position, study in enumerate(chosen.studies):
-                select(study, kernels.study_results(study), chosen.query(position))
+                held_at.append(select(study, kernels.study_results(study), chosen.query(position)).held)
         except SelectionError as error:
             faults = error.errors
     query = "" if chosen is None else urlencode(chosen.pairs())
@@ -143,7 +144,7 @@ def compare_page(context: Ctx, request: Request) -> Response:
         faults=faults,
         listed=[views.summary(record) for record in context.store.list_studies(page_size=_LISTED).studies],
         units={} if chosen is None else {path: unit_of(chosen.studies[0], path) for path in chosen.axes},
-        held=[] if chosen is None else [chosen.query(position).at for position in range(len(chosen.studies))],
+        held=held_at,
         fixed=[] if chosen is None else _fixed(chosen),
         figure=f"/compare/figure?{query}",
         picture=f"/compare/picture.svg?{query}",

@@ -32,6 +32,8 @@ _LEAST_POINTS: Final = 400
 _LINE_POINTS: Final = 6_000
 #: Lines with more points are drawn without markers.
 _MARKED: Final = 60
+#: Characters of the name of a study in a legend.
+_MOST_LABEL: Final = 60
 #: Pixels of a panel, alone and among others, and of what lies between two rows of panels.
 _ALONE: Final = 360
 _PANEL_HEIGHT: Final = 230
@@ -155,6 +157,11 @@ def _legend_title(drawn: Sequence[tuple[str, Curves]]) -> str:
     return ", ".join(["Study", *titles] if len(drawn) > 1 else titles)
 
 
+def _short(label: str) -> str:
+    """A long name without its middle: a legend has little room, and ends tell more of similar names apart."""
+    return label if len(label) <= _MOST_LABEL else f"{label[: _MOST_LABEL - 25]}…{label[-24:]}"
+
+
 def _panel_traces(lines: Sequence[tuple[str, Curve]], info: ResultInfo, panel: int, most: int) -> Iterator[Figure]:
     colours = line_colours(len(lines))
     styles = zip(colours, itertools.cycle(SYMBOLS), strict=False)
@@ -164,7 +171,9 @@ def _panel_traces(lines: Sequence[tuple[str, Curve]], info: ResultInfo, panel: i
         kept = thin(y, most)
         x = np.array(curve.line.x)
         joined = bool(np.all(np.diff(x) > 0.0))
-        name = ", ".join([*([escaped(label)] if label else []), *(number(value) for value in curve.line.by.values())])
+        name = ", ".join(
+            [*([escaped(_short(label))] if label else []), *(number(value) for value in curve.line.by.values())]
+        )
         yield {
             "type": "scatter",
             "mode": ("lines+markers" if kept.size <= _MARKED else "lines") if joined else "markers",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, Final
 
@@ -29,6 +30,7 @@ _SYMBOLS: Final = {
     "c_(K+1)": ("c", "k"),
     "u_end": ("u", "end"),
 }
+_GREEK: Final = {"beta": "β", "delta": "δ", "phi": "φ", "w": "ω"}
 
 
 @lru_cache(maxsize=1)
@@ -49,6 +51,7 @@ def _templates() -> Environment:
         "words": words,
         "moment": moment,
         "duration": duration,
+        "time_left": time_left,
         "bytes": bytes_text,
     }
     return environment
@@ -73,8 +76,9 @@ def number(value: float | None, digits: int = _DIGITS) -> str:
         return f"{value:,}".replace(",", _THIN)
     text = f"{value:.{digits}g}".replace("-", "−", 1 if value < 0 else 0)
     mantissa, _, exponent = text.partition("e")
-    if 1e4 <= abs(value) < 1e7 and (exponent or "." not in text):
-        return _grouped(float(f"{value:.{digits}g}"))
+    rounded = float(f"{value:.{digits}g}")
+    if 1e3 <= abs(rounded) < 1e7 and (exponent or ("." not in text and abs(value) >= 1e4)):
+        return _grouped(rounded)
     if not exponent:
         return text
     return f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}"
@@ -95,7 +99,9 @@ def unit_text(unit: str | None) -> str:
 def symbol(text: str) -> Markup:
     """A letter of the model with its index, as books print it."""
     base, _, index = text.partition("_")
-    base, index = _SYMBOLS.get(text, (base, index))
+    if not index and (found := re.fullmatch(r"([A-Za-z]+)(\d+)", text)):
+        base, index = found[1], found[2]
+    base, index = _SYMBOLS.get(text, (_GREEK.get(base, base), index))
     return Markup("<i>{}</i>{}").format(base, Markup("<sub>{}</sub>").format(index) if index else "")
 
 
@@ -129,6 +135,12 @@ def duration(seconds: float) -> str:
         if seconds < limit:
             return f"{float(f'{seconds / divisor:.2g}'):g} {unit}"
     return f"{float(f'{seconds / 86400.0:.2g}'):g} days"
+
+
+def time_left(seconds: Mapping[str, float]) -> str:
+    """The bounds of a time that is left, or the one where both read the same."""
+    low, high = duration(seconds["low"]), duration(seconds["high"])
+    return low if low == high else f"{low} to {high}"
 
 
 def bytes_text(count: float) -> str:

@@ -90,6 +90,21 @@ def test_panels_are_as_high_among_many_as_among_few(service: Service) -> None:
         assert gaps == pytest.approx([45.0] * (count - 1))
 
 
+def test_compared_studies_tell_what_is_held_with_its_unit(service: Service, spec: dict[str, Any]) -> None:
+    names = ["a", "A name that goes on and on, longer than any legend has room for: the end"]
+    ids = [service.submit({**spec, "name": name, "axes": [LOAD, FREQUENCY]}) for name in names]
+    for study_id in ids:
+        service.fill(study_id)
+    query = {"study": ids, "x": "shaft.load"}
+    page = service.http.get("/compare", params=query).text
+    assert page.count("excitation.frequency = 25 Hz") == 2
+    figure = service.http.get("/compare/figure", params=query).json()
+    first, second = (line["name"] for line in figure["data"])
+    assert (first, len(second)) == ("a", 60)
+    assert second.startswith("A name that goes on")
+    assert second.endswith("room for: the end")
+
+
 def test_a_picture_without_rows_is_a_sentence_and_the_first_one_has_rows(
     service: Service, spec: dict[str, Any]
 ) -> None:

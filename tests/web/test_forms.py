@@ -19,7 +19,7 @@ from service.web.form import share_clutches
 from service.web.form_check import check_form, check_text, message
 from service.web.form_spec import field_of, plain, spec_of, values_of, with_clutch_defaults
 from service.web.motion import motion_figures
-from service.web.templates import duration, fragment, number, unit_text
+from service.web.templates import duration, fragment, number, symbol, time_left, unit_text
 from service.web.thinning import thin
 from worker import kernels
 from worker.chunking import Chunking
@@ -168,6 +168,14 @@ def test_numbers_are_written_for_people() -> None:
         "–", "0", "1\u202f234\u202f567", "123\u202f460", "−4.5548·10⁻⁶", "0.3",
     ]  # fmt: skip
     assert [unit_text(u) for u in ("1", "kg*m^2", "N*m/rad^10")] == ["", "kg·m²", "N·m/rad¹⁰"]
+    assert [number(v, 3) for v in (1130.4, 999.7, -4321.0)] == ["1\u202f130", "1\u202f000", "−4\u202f320"]
+    assert time_left({"low": 0.2, "high": 0.6}) == "less than 1 s"
+    assert time_left({"low": 0.2, "high": 12.0}) == "less than 1 s to 12 s"
+    letters = ("m2", "beta", "beta_1", "w_m", "M_c", "lambda", "nu/2pi")
+    assert [str(symbol(letter)) for letter in letters] == [
+        "<i>m</i><sub>2</sub>", "<i>β</i>", "<i>β</i><sub>1</sub>", "<i>ω</i><sub>m</sub>", "<i>M</i><sub>c</sub>",
+        "<i>λ</i>", "<i>f</i>",
+    ]  # fmt: skip
     assert [duration(s) for s in (0.2, 45.2, 400.0, 9000.0, 4e5)] == [
         "less than 1 s",
         "45 s",

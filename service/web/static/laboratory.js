@@ -29,8 +29,10 @@ const ask = async () => {
       place.textContent = texts.join("; ");
     }
     answer.innerHTML = found.answer;
+    plot.classList.toggle("stale", !found.figure);
     if (found.figure) await sprag.show(plot, found.figure);
   } catch (error) {
+    plot.classList.add("stale");
     answer.textContent = error.message;
   } finally {
     busy = false;

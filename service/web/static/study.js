@@ -44,7 +44,7 @@ if (running) {
   const refresh = async (ended) => {
     timer = null;
     const page = await pageOf(location.href);
-    for (const part of ["#head", "#progress", "#endings"]) {
+    for (const part of ["#head", "#progress", "#endings", "#particulars"]) {
       const inside = document.querySelector(part);
       if (inside && inside.contains(document.activeElement)) {
         const index = [...inside.querySelectorAll("a,button")].indexOf(document.activeElement);
