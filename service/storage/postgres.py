@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import time
 from contextlib import suppress
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import psycopg
 import sqlalchemy as sa
 from sqlalchemy.engine import URL
 
 from service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
 
 #: First number of every advisory lock of Sprag ("SPRA" in ASCII); the second says what it is for.
 _LOCKS: Final = 0x53505241
@@ -144,6 +147,19 @@ def explained(error: BaseException, where: str) -> DatabaseError | None:
     if state.startswith(("08", "57")) or (not state and isinstance(error, psycopg.OperationalError)):
         return DatabaseError(_unreachable(error, where))
     return None
+
+
+def copy_in(connection: sa.Connection, table: str, columns: Sequence[str], rows: Iterable[tuple[Any, ...]]) -> None:
+    """Insert many rows by COPY, which is several times faster than INSERT. Raises sqlalchemy.exc.DBAPIError."""
+    driver: psycopg.Connection[Any] | None = connection.connection.driver_connection
+    assert driver is not None
+    statement = f"COPY {table} ({', '.join(columns)}) FROM STDIN"
+    try:
+        with driver.cursor() as cursor, cursor.copy(statement.encode()) as copy:
+            for row in rows:
+                copy.write_row(row)
+    except psycopg.Error as error:
+        raise sa.exc.DBAPIError(statement, None, error) from error
 
 
 class ServerLock:

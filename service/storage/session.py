@@ -18,7 +18,7 @@ from sqlalchemy.engine import URL, make_url
 from service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
     from types import ModuleType
 
     from service.storage.lock import OneHolder
@@ -201,6 +201,16 @@ class Session:
                 yield connection
         except sa.exc.DBAPIError as error:
             raise self._explained(error) from error
+
+    def insert_rows(
+        self, connection: sa.Connection, table: str, columns: Sequence[str], rows: Sequence[tuple[Any, ...]]
+    ) -> None:
+        """Insert rows into one of our own tables; they go past SQLAlchemy for speed."""
+        if self.on_server:
+            _postgres().copy_in(connection, table, columns, rows)
+            return
+        marks = ", ".join("?" * len(columns))
+        connection.exec_driver_sql(f"INSERT INTO {table} ({', '.join(columns)}) VALUES ({marks})", list(rows))  # noqa: S608
 
     @contextmanager
     def plain(self) -> Iterator[sa.Connection]:

@@ -185,11 +185,10 @@ class Work(Reuse):
         model, pendulums = connection.execute(
             sa.select(STUDIES.c.model, STUDIES.c.pendulums).where(STUDIES.c.number == chunk.study)
         ).one()
-        statement = _insert(model, pendulums, self.session.dialect.name)
         numbers = range(chunk.first, chunk.last + 1) if known is None else known.missing.tolist()
         if result.count:
             rows = _tuples(chunk.study, numbers, result, kernels.result_infos(model, pendulums))
-            connection.exec_driver_sql(statement, rows)
+            self.session.insert_rows(connection, *_target(model, pendulums), rows)
         if known is not None and not copy_rows(connection, model, pendulums, chunk, known):
             raise _SourceGoneError
         connection.execute(
@@ -322,18 +321,16 @@ def _is(chunk: Chunk) -> sa.ColumnElement[bool]:
 
 
 @lru_cache(maxsize=64)
-def _insert(model: str, pendulums: int, dialect: str) -> str:
-    """The INSERT statement of a results table with positional parameters; the rows go past SQLAlchemy for speed."""
-    table = results_table(model, pendulums)
-    names = [*KEY_COLUMNS, *(info.column for info in kernels.result_infos(model, pendulums))]
-    mark = "?" if dialect == "sqlite" else "%s"
-    return f"INSERT INTO {table.name} ({', '.join(names)}) VALUES ({', '.join([mark] * len(names))})"  # noqa: S608
+def _target(model: str, pendulums: int) -> tuple[str, tuple[str, ...]]:
+    """A results table and its columns in the order of `_tuples`."""
+    names = (*KEY_COLUMNS, *(info.column for info in kernels.result_infos(model, pendulums)))
+    return results_table(model, pendulums).name, names
 
 
 def _tuples(
     study: int, numbers: Sequence[int], result: ChunkResult, infos: Sequence[kernels.ResultInfo]
 ) -> list[tuple[Any, ...]]:
-    """Rows for `_insert`, of the cases with those numbers: NaN and infinities become NULL, counts whole numbers."""
+    """Rows for `_target`, of the cases with those numbers: NaN and infinities become NULL, counts whole numbers."""
     columns: list[list[Any]] = []
     for index, info in enumerate(infos):
         column = result.values[:, index]
