@@ -28,7 +28,8 @@ from service.web import schedules as schedule_pages
 from worker.chunking import Chunking
 
 DESCRIPTION = """\
-Design studies of vibration drives with freewheel clutches: a study spec in, curves of mechanical characteristics out.
+Design studies of vibration drives with freewheel clutches and of main shafts of machines:
+a study spec in, curves of mechanical characteristics out.
 
 Numbers are SI (frequencies in Hz, angles in rad); in a spec a text carries its own unit, such as `"1500 rpm"`.
 What could not be computed is `null`, never 0. Every error is a problem document (RFC 9457).
@@ -107,7 +108,7 @@ def create_app(
         access,
         metrics,
         title="Sprag",
-        summary="Parameter studies of vibration drives with freewheel clutches",
+        summary="Parameter studies of vibration drives with freewheel clutches and of machine shafts",
         description=DESCRIPTION,
         version=version("sprag"),
         openapi_tags=TAGS,

@@ -127,6 +127,7 @@ class Map:
     x_values: tuple[float, ...]
     y_values: tuple[float, ...]
     at: dict[str, float]
+    at_units: dict[str, str]
     result: ResultInfo
     cases: NDArray[np.int64]
     values: NDArray[np.float64]
@@ -144,6 +145,7 @@ class Map:
                 "description": self.result.description,
                 "values": [numbers(row, count) for row in self.values],
             },
+            "units": {self.x: self.units[0], self.y: self.units[1], **self.at_units},
             "at": self.at,
             "cases": self.cases.tolist(),
             "endings": self.endings,
@@ -222,6 +224,7 @@ def draw_map(
         x_values,
         tuple(row.by[y] for row in rows),
         rows[0].at,
+        {path: unit_of(study, path) for path in rows[0].at},
         result,
         cases,
         columns.values[z].reshape(cases.shape),

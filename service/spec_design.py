@@ -18,7 +18,7 @@ from service.spec_axes import check_paths, expand, read_axes, read_axis
 from service.spec_blocks import Block, as_axes, chosen, first_rows, made, one_after_another, product, side_by_side
 from service.spec_exclude import kept, read_exclude
 from service.spec_fields import read_object
-from service.spec_messages import Report, did_you_mean, join
+from service.spec_messages import Report, did_you_mean, join, shorten_text
 from service.spec_points import read_points
 from service.spec_sample import read_sample
 from service.spec_values import count_text
@@ -64,8 +64,13 @@ def _as_axes(report: Report, columns: dict[str, NDArray[np.float64]], excluded: 
         message = "every case is excluded" if excluded else "nothing varies"
         report.problem("/exclude" if excluded else "/axes", message, allowed="at least one case that is left")
         return None
-    if first_rows(columns).size < count:
-        report.problem("/axes", "two of the cases are the same", allowed="each combination of values once")
+    first = first_rows(columns)
+    if first.size < count:
+        again = int(np.setdiff1d(np.arange(count), first)[0])
+        alike = np.all([column == column[again] for column in columns.values()], axis=0)
+        values = ", ".join(f"{path} = {column[again]:.10g}" for path, column in columns.items())
+        message = f"cases {int(np.flatnonzero(alike)[0])} and {again}, counted from 0, are the same"
+        report.problem("/axes", message, shorten_text(values), allowed="each combination of values once")
         return None
     return as_axes(columns)
 

@@ -36,7 +36,7 @@ def read_points(report: Report, pointer: str, data: Mapping[str, Any], machine: 
         report.problem(where, "must be the text of a CSV file", text, allowed=allowed)
         return None
     try:
-        rows = [row for row in csv.reader(io.StringIO(text.removeprefix("\ufeff")), strict=True) if any(row)]
+        rows = _rows(text.removeprefix("\ufeff"))
     except csv.Error as error:
         report.problem(where, f"is no CSV text: {error}")
         return None
@@ -58,6 +58,13 @@ def read_points(report: Report, pointer: str, data: Mapping[str, Any], machine: 
         report.problem(where, "names the same path twice", [shorten_text(path) for path in paths])
         return None
     return Block(pointer, paths, len(rows) - 1, lambda: dict(zip(paths, columns, strict=True)))
+
+
+def _rows(text: str) -> list[list[str]]:
+    """Rows that are not empty. What the header is parted by, parts all of it: commas, or semicolons, or tabs."""
+    header = text.lstrip().partition("\n")[0]
+    delimiter = next((sign for sign in ",;\t" if sign in header), ",")
+    return [row for row in csv.reader(io.StringIO(text), delimiter=delimiter, strict=True) if any(row)]
 
 
 def _read_heading(report: Report, where: str, cell: str, machine: Machine) -> tuple[Parameter, str] | None:

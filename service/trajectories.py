@@ -67,6 +67,7 @@ def trajectory_json(made: Trajectory, case: int, parameters: dict[str, float]) -
         return {
             "case": case,
             "parameters": parameters,
+            "axis": {"name": "angles", "unit": "rad"},
             "angles": made.times.tolist(),
             "variables": variables,
             "values": values,
@@ -76,6 +77,7 @@ def trajectory_json(made: Trajectory, case: int, parameters: dict[str, float]) -
     return {
         "case": case,
         "parameters": parameters,
+        "axis": {"name": "times", "unit": "s"},
         "times": made.times.tolist(),
         "variables": variables,
         "values": values,

@@ -161,11 +161,19 @@ class CasePage(Body):
     next_page_token: str | None = Field(description="token of the next page; null on the last")
 
 
+class ValueAxis(Body):
+    """What instantaneous values stand over."""
+
+    name: str = Field(description="field of the document with its values: times or angles")
+    unit: str
+
+
 class Trajectory(Body):
     """Instantaneous values of one case."""
 
     case: int
     parameters: dict[str, float]
+    axis: ValueAxis = Field(description="what the values stand over")
     times: list[float] = Field(description="s, from the start of the run")
     variables: dict[str, dict[str, str]] = Field(description="unit of each variable")
     values: dict[str, list[Number]] = Field(description="values at the times, by variable")
@@ -178,6 +186,7 @@ class AngleTable(Body):
 
     case: int
     parameters: dict[str, float]
+    axis: ValueAxis = Field(description="what the values stand over")
     angles: list[float] = Field(description="rad, from the start of the cycle; none where the case has no motion")
     variables: dict[str, dict[str, str]] = Field(description="unit of each variable")
     values: dict[str, list[Number]] = Field(description="values at the angles, by variable")
@@ -237,6 +246,7 @@ class Map(Body):
     x: CurveAxis
     y: CurveAxis
     z: MapResult
+    units: dict[str, str] = Field(description="SI unit of every parameter in x, y and at")
     at: dict[str, float]
     cases: list[list[int]]
     endings: list[list[str]]

@@ -20,7 +20,7 @@ DEBUG_VARIABLE = "SPRAG_DEBUG"
 
 app = typer.Typer(
     name="sprag",
-    help="Design studies of vibration drives with freewheel clutches.",
+    help="Design studies of vibration drives with freewheel clutches and of main shafts of machines.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,

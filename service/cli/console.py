@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 #: Width of tables that do not go to a terminal: wide enough that no number is cut.
 _PLAIN_WIDTH = 160
+_WIDEST = 100_000
 
 
 class ExitCode(IntEnum):
@@ -105,16 +106,23 @@ def table(title: str, columns: Iterable[tuple[str, bool]], rows: Iterable[Sequen
     from rich.text import Text
 
     made = Table(title=Text(title) if title else None, title_justify="left", box=SIMPLE_HEAD, header_style="bold")
-    for heading, numeric in columns:
-        made.add_column(Text(heading), justify="right" if numeric else "left")
-    for row in rows:
-        made.add_row(*(Text(cell_text(cell)) for cell in row))
+    texts = [[cell_text(cell) for cell in row] for row in rows]
+    for index, (heading, numeric) in enumerate(columns):
+        # Half a number is worse than a wide table.
+        longest = max((len(row[index]) for row in texts), default=0) if numeric else None
+        made.add_column(Text(heading), justify="right" if numeric else "left", min_width=longest)
+    for row in texts:
+        made.add_row(*map(Text, row))
     return made
 
 
 def show_table(title: str, columns: Iterable[tuple[str, bool]], rows: Iterable[Sequence[object]]) -> None:
-    """Print a table on standard output."""
-    console().print(table(title, columns, rows))
+    """Print a table on standard output, as wide as its numbers need."""
+    from rich.measure import Measurement
+
+    out, made = console(), table(title, columns, rows)
+    out.width = max(out.width, Measurement.get(out, out.options.update(max_width=_WIDEST), made).minimum)
+    out.print(made)
 
 
 def cell_text(cell: object) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import typer
@@ -33,13 +34,23 @@ def extend(
     """Submit a study with more values on the axes of an old one, or more cases; only what is new is run."""
     addition = _addition(axis or [], points)
     with connection(server, token) as client:
+        old = client.study(study_id)
         study = client.extend(study_id, addition)
+        say(_what_is_new(old, study))
         say(*(f"warning: {warning}" for warning in study.get("warnings", ())))
         if wait:
             study = follow(client, study["id"])
     show_study(study, as_json)
     if wait:
         exit_as(study)
+
+
+def _what_is_new(old: Mapping[str, Any], study: Mapping[str, Any]) -> str:
+    """How many of the cases the old study has already."""
+    new = study["cases"] - old["cases"]
+    if not new:
+        return f"nothing is new: {old['id']} has all of the {old['cases']} cases"
+    return f"{new} of the {study['cases']} cases {'is' if new == 1 else 'are'} new, the others are those of {old['id']}"
 
 
 def _addition(axes: list[str], points: str | None) -> dict[str, Any]:

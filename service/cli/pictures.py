@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import typer
@@ -92,7 +93,7 @@ def draw_map(
 
 def _show_map(found: dict[str, Any]) -> None:
     """A line for each value of y, a column for each of x."""
-    held = ", ".join(f"{path} = {cell_text(value)}" for path, value in found["at"].items())
+    held = _held(found["at"], found["units"])
     title = _heading(found["z"]["name"], found["z"]["unit"]) + (f"; {held}" if held else "")
     corner = f"{_heading(found['y']['path'], found['y']['unit'])} \\ {_heading(found['x']['path'], found['x']['unit'])}"
     columns = [(corner, True), *((cell_text(value), True) for value in found["x"]["values"])]
@@ -149,10 +150,15 @@ def show_curves(found: dict[str, Any]) -> None:
     columns += [(_heading(name, result["unit"]), True) for name, result in found["results"].items()]
     columns.append(("ending", False))
     for drawn in found["curves"]:
-        held = {**drawn["by"], **drawn["at"]}
-        title = ", ".join(f"{path} = {cell_text(value)}" for path, value in held.items())
+        title = _held({**drawn["by"], **drawn["at"]}, found["units"])
         rows = zip(drawn["x"], *drawn["y"].values(), drawn["endings"], strict=True)
         show_table(title, columns, [(*row[:-1], "" if row[-1] == OK else row[-1]) for row in rows])
+
+
+def _held(values: Mapping[str, float], units: Mapping[str, str]) -> str:
+    """What is held at which value, with its unit."""
+    texts = ((path, cell_text(value), units.get(path, "1")) for path, value in values.items())
+    return ", ".join(f"{path} = {value}" + ("" if unit == "1" else f" {unit}") for path, value, unit in texts)
 
 
 def _heading(name: str, unit: str) -> str:

@@ -183,7 +183,9 @@ def show_study(study: dict[str, Any], as_json: bool) -> None:
     endings = ", ".join(f"{count} {name}" for name, count in progress.get("endings", {}).items() if name != OK)
     say(
         f"{study['name'] or study['model']}: {study['state']}, {progress['done']} of {progress['total']} cases done, "
-        f"{progress['ok']} ok" + (f" ({endings})" if endings else "")
+        f"{progress['ok']} ok"
+        + (f" ({endings})" if endings else "")
+        + (f"; {study['reused']} taken from other studies" if study.get("reused") else "")
     )
 
 

@@ -12,7 +12,7 @@
 """
 
 from service.client.aio import AsyncClient, AsyncStudy
-from service.client.errors import RefusedError, ServiceError, StudyTimeoutError, UnreachableError
+from service.client.errors import RefusedError, ServiceError, SpecFileError, StudyTimeoutError, UnreachableError
 from service.client.frames import Curves
 from service.client.plain import ServiceClient
 from service.client.study import Client, Study
@@ -27,6 +27,7 @@ __all__ = [
     "RefusedError",
     "ServiceClient",
     "ServiceError",
+    "SpecFileError",
     "Study",
     "StudyTimeoutError",
     "UnreachableError",

@@ -10,6 +10,10 @@ class ServiceError(Exception):
     """The service did not do what it was asked to."""
 
 
+class SpecFileError(ServiceError, ValueError):
+    """A spec was given as the name of a file, and there is none that can be read."""
+
+
 class UnreachableError(ServiceError):
     """Nobody answered, or what answered is not the service. ``address`` is what was asked."""
 

@@ -9,6 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Protocol, cast
 
+from service.client.errors import SpecFileError
 from worker.states import TERMINAL
 
 if TYPE_CHECKING:
@@ -29,15 +30,24 @@ class Progressing(Protocol):
 
 
 def spec_of(spec: Spec | str | PathLike[str]) -> Spec:
-    """A spec given as data, or the data of the JSON or TOML file of that name."""
+    """A spec given as data, or the data of the JSON or TOML file of that name; raises SpecFileError about the file."""
     if isinstance(spec, Mapping):
         return spec
     path = Path(spec)
-    if path.suffix.lower() == ".toml":
-        import tomllib
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise SpecFileError(f"no spec can be read from the file {str(path)!r}: {reason}") from error
+    try:
+        if path.suffix.lower() == ".toml":
+            import tomllib
 
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    return cast("Spec", json.loads(path.read_text(encoding="utf-8")))
+            return tomllib.loads(text)
+        return cast("Spec", json.loads(text))
+    except ValueError as error:
+        kind = "TOML" if path.suffix.lower() == ".toml" else "JSON"
+        raise SpecFileError(f"the file {str(path)!r} is no {kind}: {error}") from error
 
 
 def curve_query(

@@ -151,8 +151,8 @@ async def check(context: Ctx, request: Request, values: Form) -> Response:
 def look_over(context: Context, values: Mapping[str, str]) -> Checked:
     """A form, field by field or as text, looked over."""
     if "/text" in values:
-        return check_text(values["/text"], values.get("format", "json"), context.store.chunking)
-    return check_form(values, context.store.chunking)
+        return check_text(values["/text"], values.get("format", "json"), context.store.chunking, context.store.reusable)
+    return check_form(values, context.store.chunking, context.store.reusable)
 
 
 def reshape(values: Values, wanted: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,9 @@ from service.web.templates import unit_text
 
 if TYPE_CHECKING:
     from worker.chunking import Chunking
+    from worker.study import Study
+
+    Known = Callable[[Study], int]
 
 
 @dataclass(slots=True)
@@ -50,8 +53,12 @@ class Checked:
         return sum(len(texts) for name, texts in self.faults.items() if name and name not in self.empty)
 
 
-def check_form(values: Mapping[str, str], chunking: Chunking) -> Checked:
-    """Look a filled form over."""
+def _none_known(_study: Study) -> int:
+    return 0
+
+
+def check_form(values: Mapping[str, str], chunking: Chunking, known: Known = _none_known) -> Checked:
+    """Look a filled form over; ``known`` tells how many cases of a study need not be run."""
     spec, faults = spec_of(values)
     found = Checked(spec, faults=faults, empty=frozenset(name for name, text in values.items() if not text.strip()))
     try:
@@ -65,7 +72,7 @@ def check_form(values: Mapping[str, str], chunking: Chunking) -> Checked:
     if found.faults:
         found.parsed = None
     if found.parsed is not None:
-        found.preview = preview_json(found.parsed, chunking)
+        found.preview = preview_json(found.parsed, chunking, known(found.parsed.study))
     for pointer in clutch_pointers(values):
         if values.get(f"{pointer}/kind") == "data":
             found.notes += _assumed(values.get(f"{pointer}/data", ""))
@@ -81,7 +88,7 @@ def _assumed(text: str) -> list[str]:
         return []
 
 
-def check_text(text: str, form: str, chunking: Chunking) -> Checked:
+def check_text(text: str, form: str, chunking: Chunking, known: Known = _none_known) -> Checked:
     """Look a spec over that is given as text, JSON or TOML."""
     found = Checked({})
     try:
@@ -92,7 +99,7 @@ def check_text(text: str, form: str, chunking: Chunking) -> Checked:
         found.faults["/text"] = [f"{pointer}: {message(item)}" for pointer, item in places]
         return found
     found.spec = found.parsed.spec
-    found.preview = preview_json(found.parsed, chunking)
+    found.preview = preview_json(found.parsed, chunking, known(found.parsed.study))
     return found
 
 

@@ -244,6 +244,7 @@ def test_instantaneous_values_of_a_case(service: Service, one_case: str) -> None
     assert response.status_code == 200, response.text
     body = response.json()
     m.Trajectory.model_validate(body)
+    assert body["axis"] == {"name": "times", "unit": "s"}
     assert (body["times"][0], body["times"][-1], len(body["times"])) == (0.01, 0.02, 50)
     assert body["parameters"] == {"excitation.frequency": 25.5, "shaft.load": 0.1}
     assert {len(values) for values in body["values"].values()} == {50}

@@ -21,6 +21,8 @@ from service.cli.console import (
     show_table,
     write_json,
 )
+from service.cli.extend import _what_is_new
+from service.cli.pictures import show_curves
 from service.spec_messages import Problem
 
 
@@ -77,6 +79,31 @@ def test_data_and_messages_go_apart(capsys: pytest.CaptureFixture[str]) -> None:
     for text in ("Title [x]", "name [m]", "[red]", "1.5"):
         assert text in rest
     assert "\x1b" not in captured.out
+
+
+def test_a_wide_table_keeps_all_its_digits(capsys: pytest.CaptureFixture[str]) -> None:
+    numbers = [0.0937412 + index for index in range(40)]
+    columns = [("machine", False), *((f"column {index}", True) for index in range(40))]
+    show_table("", columns, [("a drive", *numbers)])
+    shown = capsys.readouterr().out
+    assert all(f"{number:.6g}" in shown for number in numbers)
+    assert "\N{HORIZONTAL ELLIPSIS}" not in shown
+
+
+def test_what_is_held_has_its_unit(capsys: pytest.CaptureFixture[str]) -> None:
+    axis = {"path": "drive.inertia", "unit": "kg*m^2", "values": [1.0]}
+    units = {"mean_speed": "rad/s", "wanted_irregularity": "1"}
+    held = {"mean_speed": 6.283185307, "wanted_irregularity": 0.1}
+    drawn = {"by": {}, "at": held, "x": [1.0], "y": {"irregularity": [0.2]}, "endings": ["ok"]}
+    show_curves({"x": axis, "units": units, "results": {"irregularity": {"unit": "1"}}, "curves": [drawn]})
+    assert "mean_speed = 6.28319 rad/s, wanted_irregularity = 0.1 " in " ".join(capsys.readouterr().out.split())
+
+
+def test_what_an_extension_adds_is_told() -> None:
+    old = {"id": "st_1", "cases": 12}
+    assert _what_is_new(old, {"cases": 12}) == "nothing is new: st_1 has all of the 12 cases"
+    assert _what_is_new(old, {"cases": 13}) == "1 of the 13 cases is new, the others are those of st_1"
+    assert _what_is_new(old, {"cases": 15}) == "3 of the 15 cases are new, the others are those of st_1"
 
 
 def test_a_bar_on_a_terminal_and_nothing_elsewhere() -> None:

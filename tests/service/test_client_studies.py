@@ -15,7 +15,15 @@ import pandas as pd
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from service.client import AsyncClient, Client, Curves, RefusedError, StudyTimeoutError, UnreachableError
+from service.client import (
+    AsyncClient,
+    Client,
+    Curves,
+    RefusedError,
+    SpecFileError,
+    StudyTimeoutError,
+    UnreachableError,
+)
 from service.client.types import StudyDetail
 from tests.service.conftest import PortalTransport, Service
 
@@ -96,6 +104,25 @@ def test_a_study_from_submission_to_table_grid_and_curves(
 def test_specs_come_from_files_too(client: Client, examples: Path) -> None:
     for name in ("one_pendulum.json", "two_pendulums.toml"):
         assert client.preview(examples / name)["cases"] > 50
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "part"),
+    [
+        ("none.toml", None, "No such file"),
+        ("bad.toml", b"a = = 1", "is no TOML"),
+        ("bad.json", b"{", "is no JSON"),
+        ("binary.json", b"\xff\xfe", "can't decode"),
+    ],
+)
+def test_a_file_without_a_spec_is_named(
+    client: Client, tmp_path: Path, name: str, content: bytes | None, part: str
+) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(SpecFileError, match=part) as caught:
+        client.submit(tmp_path / name)
+    assert name in str(caught.value)
 
 
 def test_refusals_carry_the_fields_of_the_problem(client: Client, spec: dict[str, Any]) -> None:

@@ -113,6 +113,7 @@ def test_trajectories_are_tables_over_the_angle(filled: tuple[Service, str]) -> 
     own = NUMBERS | study.case_parameters(case)
     table = service.get(f"/studies/{study_id}/cases/{case}/trajectory", points=73)
     m.AngleTable.model_validate(table)
+    assert table["axis"] == {"name": "angles", "unit": "rad"}
     assert table["angles"] == np.linspace(0.0, 2.0 * math.pi, 73).tolist()
     expected = trajectory(STRUCTURE, own, table["angles"])
     assert {name: entry["unit"] for name, entry in table["variables"].items()} == dict(

@@ -110,6 +110,13 @@ def test_points_have_units_in_their_header_or_their_cells() -> None:
     assert rows(study, "excitation.frequency", "shaft.load") == [(25.0, 0.1), (30.0, 0.25)]
 
 
+@pytest.mark.parametrize("sign", [";", "\t"])
+def test_points_may_be_parted_as_spreadsheets_do(sign: str) -> None:
+    text = "\ufeffexcitation.frequency [rpm],shaft.load\r\n1500,0.1\r\n1800, 250 N*mm\r\n".replace(",", sign)
+    study = study_of([{"points": text}])
+    assert rows(study, "excitation.frequency", "shaft.load") == [(25.0, 0.1), (30.0, 0.25)]
+
+
 @pytest.mark.parametrize(
     ("exclude", "left"),
     [
@@ -148,7 +155,9 @@ def test_cases_are_left_out(exclude: list[Any], left: set[tuple[float, float]] |
         ({"/axes": [{"points": "shaft.load\n1,2\n"}]}, "/axes/0/points", "line 2 has 2 cells"),
         ({"/axes": [{"points": "shaft.load\n"}]}, "/axes/0/points", "0 lines"),
         ({"/axes": [{"points": 7}]}, "/axes/0/points", "the text of a CSV file"),
-        ({"/axes": [{"points": "shaft.load\n1\n1\n"}]}, "/axes", "two of the cases are the same"),
+        ({"/axes": [{"points": "shaft.load\n1\n1\n"}]}, "/axes", "cases 0 and 1, counted from 0, are the same"),
+        ({"/axes": [{"points": "shaft.load\n3\n1\n2\n1\n"}]}, "/axes", "cases 1 and 3"),
+        ({"/axes": [{"points": "shaft.load;excitation.frequency\n0,1;20\n"}]}, "/axes/0/points line 2", "0,1"),
         ({"/axes": [{"axes": [LOAD]}, {"axes": [LOAD]}]}, "/axes/1/path", "already stands on axis 0"),
         ({"/axes": [{"axes": [{"axes": [LOAD]}]}]}, "/axes/0/axes/0", "a group inside a group"),
         ({"/axes": [{"axes": [LOAD, FREQUENCY], "combine": "zip"}]}, "/axes/0/axes", "equally many values"),

@@ -139,6 +139,16 @@ def test_a_spec_as_text_is_looked_over() -> None:
     assert (checked.faults, checked.preview and checked.preview["cases"]) == ({}, 96)
 
 
+def test_what_is_known_already_is_told() -> None:
+    checked = check_text(preset_text("two_pendulums")[1], "toml", Chunking(), lambda study: study.cases - 1)
+    assert checked.preview is not None
+    assert checked.preview["reusable"] == 95
+    assert check_form(filled(), Chunking(), lambda _: 3).preview["reusable"] == 3  # type: ignore[index]
+    assert 'data-reusable="95"' in fragment("_form_panel.html", checked=checked, address="")
+    checked.preview["reusable"] = 0
+    assert "data-reusable" not in fragment("_form_panel.html", checked=checked, address="")
+
+
 VALUES = arrays(np.float64, st.integers(1, 400), elements=st.floats(-1e9, 1e9) | st.just(float("nan")))
 
 
