@@ -143,14 +143,17 @@ def trajectory(
     as_json: JsonFlag = False,
 ) -> None:
     """Write the instantaneous values of one case: angles, speeds, torques, powers, states."""
-    from worker.kernels import OK
+    from worker.kernels import ENDING_SENTENCES, OK
 
     study = read_study(spec).study
     with output(file) as write:
         made = _trajectory(study, case, start, end, points)
         as_text = as_json or (file or "").lower().endswith(".json") if form is None else form is ValueFormat.JSON
         write(_trajectory_bytes(made, study, case, as_text))
-    say(f"case {case}: {made.ending}, {points} points {'in time' if made.along == 'time' else 'over the angle'}")
+    told = f"{points} points {'in time' if made.along == 'time' else 'over the angle'}"
+    if not len(made.values):
+        told = f"no points: {ENDING_SENTENCES[made.ending]}"
+    say(f"case {case}: {made.ending}, {told}")
     if made.ending != OK:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
 
