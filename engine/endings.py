@@ -46,8 +46,9 @@ _SENTENCES = {
         "An angle or a speed grew beyond every bound (or was no number): the parameters describe no steady machine."
     ),
     Ending.INERTIA_INSUFFICIENT: (
-        "The inertia is insufficient for the mean speed asked for: the shaft would stop within the cycle. The result "
-        "least_mean_speed tells the least feasible mean speed."
+        "The inertia is insufficient for the mean speed asked for: the shaft would stop, or all but stop, within the "
+        "cycle. The result least_mean_speed tells the speed that has to be exceeded; a mean over time may have to by "
+        "far."
     ),
     Ending.UNBALANCED_WORK: (
         "Drive and resistance do not do opposite work over the cycle, so there is no steady motion: scale the drive, "
@@ -55,7 +56,7 @@ _SENTENCES = {
     ),
     Ending.CANNOT_ASSEMBLE: (
         "The mechanism cannot be assembled at every angle of the shaft: the result assembly.angle tells the first "
-        "angle at which its links do not reach each other."
+        "angle at which its links do not reach each other, or its motions take more than a revolution."
     ),
     Ending.NEGATIVE_INERTIA: "The reduced inertia is not positive at every angle of the shaft.",
     Ending.MOTOR_STALLED: (
@@ -64,7 +65,7 @@ _SENTENCES = {
     ),
     Ending.QUADRATURE_NOT_REACHED: (
         "A torque or the inertia changes too abruptly for its integral to be found to 1e-10: split the formula where "
-        "it jumps, or smooth the table."
+        "it jumps, or smooth the table; an inertia may not jump at all."
     ),
 }
 

@@ -50,6 +50,8 @@ def check_machine(
     except InsufficientInertiaError as error:
         allowed = f"> {error.least_mean_speed:.6g} rad/s"
         report.problem("/base/mean_speed", str(error), error.asked, allowed=allowed, unit="rad/s")
+    except machine_shaft.RelationError as error:
+        report.problem("/base/" + error.path.replace(".", "/"), str(error), error.value, allowed=error.allowed)
     except MachineError as error:
         pointer = _POINTERS.get(error.ending)
         if error.ending is Ending.CANNOT_ASSEMBLE:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from service.spec_axes import varied_values
 from service.spec_messages import Report
+from worker.kernels import machine_shaft
 from worker.study import Axis, Study
 
 #: Combinations of the axes involved that are looked at one by one; of more, only the ends of the axes.
@@ -79,6 +80,63 @@ def warn_machine_shaft(report: Report, study: Study) -> None:
         report.warn("/base/wanted_irregularity: is not used: with a motor no required inertia is computed")
     if structure["operation"]["quantity"] == "none" and structure["mechanism"]["kind"] == "none":
         report.warn("/base: neither mechanism nor operation, so that the shaft turns evenly")
+    _shaft_relations(report, study)
+
+
+def _shaft_relations(report: Report, study: Study) -> None:
+    """Notes cases whose numbers do not go together, which the base alone would be refused for."""
+    operation = (study.structure or {})["operation"]
+    if operation["quantity"] == "gas":
+        _discharge(report, study)
+    elif operation.get("form") == "steps":
+        for k in range(operation["steps"]):
+            _turned_step(report, study, k, wraps=operation["over"] == "angle")
+    _chosen_angle(report, study)
+
+
+def _discharge(report: Report, study: Study) -> None:
+    names = ("suction_pressure", "discharge_pressure", "clearance", "exponent")
+    low, high, clearance, exponent, weight = _columns(study, [f"operation.gas.{name}" for name in names])
+    low, high, most = np.broadcast_arrays(low, high, machine_shaft.reachable_pressure(low, clearance, exponent))
+    where = _pointer(study, "operation.gas.discharge_pressure")
+    beyond, below = high > most, high < low
+    if beyond.any():
+        report.warn(
+            f"{where}: the compressor comes to {most[beyond].min():.6g} Pa at most, and discharges nothing at a higher "
+            "pressure: its valves stay shut" + _share(beyond, weight)
+        )
+    if below.any():
+        report.warn(f"{where}: is below the pressure of suction: nothing is compressed" + _share(below, weight))
+
+
+def _turned_step(report: Report, study: Study, index: int, *, wraps: bool) -> None:
+    paths = [f"operation.steps.{index}.{end}" for end in ("from", "to")]
+    first, last, weight = _columns(study, paths)
+    turned = np.asarray(first > last)
+    varied = [path for path in paths if path in study.axis_paths]
+    if not varied or not turned.any() or (wraps and turned.all()):
+        return
+    what = (
+        "where `from` passes `to` the step goes on over the end of the cycle, and acts in nearly all of it"
+        if wraps
+        else "where `from` passes `to` the step over the stroke never acts"
+    )
+    report.warn(f"{_pointer(study, varied[0])}: {what}" + _share(turned, weight))
+
+
+def _chosen_angle(report: Report, study: Study) -> None:
+    """The base machine tells how many angles with the mean energy there are to choose from."""
+    structure = study.structure or {}
+    chosen = structure["phi_c"]
+    if chosen is None:
+        return
+    count = machine_shaft.base_results(structure, study.base)["phi_c.count"]
+    # Where there is none at all, works are counted from the angle 0 whatever was chosen.
+    if 0 < count <= chosen:
+        report.warn(
+            f"/base/phi_c: {chosen} is out of reach: the machine of base has {count:.0f} angles with T = T_mean, "
+            f"numbered 0 to {count - 1:.0f}; phi_c and the results of s3 and s4 stay empty"
+        )
 
 
 def _values(study: Study, path: str) -> tuple[float, ...]:

@@ -1,12 +1,13 @@
 """Cam and follower: rise, dwell, fall, dwell, by the laws of motion that designers use."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, reduced
+from engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, number_of, reduced
 
 Floats = NDArray[np.float64]
 CamLaw = Literal["cycloidal", "polynomial_345"]
@@ -74,6 +75,14 @@ class Cam(Mechanism):
         used = values["rise_angle"] + values["dwell_angle"] + values["fall_angle"]
         late = np.where(phi >= 2.0 * np.pi, 2.0 * np.pi - used, 1.0)
         return np.asarray(np.where(late >= -1e-12, 1.0, -1.0))
+
+    def broken_rule(self, values: Values) -> str | None:
+        """See Mechanism."""
+        rise, dwell, fall = (math.degrees(number_of(values, f"{name}_angle")) for name in ("rise", "dwell", "fall"))
+        return (
+            f"rise, dwell and fall of the cam take {rise:.6g} + {dwell:.6g} + {fall:.6g} = {rise + dwell + fall:.6g} "
+            "deg, more than the 360 deg of a revolution"
+        )
 
     def worst_angles(self, values: Values) -> Sequence[Floats]:
         """See Mechanism."""

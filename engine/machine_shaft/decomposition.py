@@ -31,6 +31,10 @@ class Work:
         """The work of ``torque`` at the nodes."""
         return cls(torque, *panels.running(torque))
 
+    def largest(self, panels: Panels) -> Floats:
+        """Largest size of the work, (cases,)."""
+        return np.asarray(np.maximum(panels.largest(self.nodes), np.abs(self.ends).max(axis=1)))
+
 
 class Decomposition:
     """The steady motion of a block of cases.
@@ -59,7 +63,11 @@ class Decomposition:
         self.mean_energy = start + self.mean_work
         self.least_energy = start + self.work_extremes.lowest
         self.largest_energy = start + self.work_extremes.highest
-        self.crossings = panels.crossings(self.total.torque, self.total.nodes, self.total.ends, self.mean_work)
+        # Works that cancel at every angle leave rounding, whose angles mean nothing.
+        most = np.maximum(self.drive.largest(panels), self.resistance.largest(panels))
+        even = self.work_extremes.highest - self.work_extremes.lowest <= 1e-12 * most
+        level = np.where(even, np.inf, self.mean_work)
+        self.crossings = panels.crossings(self.total.torque, self.total.nodes, self.total.ends, level)
 
     def reference(self, chosen: int | None) -> tuple[Points, Floats]:
         """phi_c of every case and how many there are; by default the first at which T rises.

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, reduced
+from engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, number_of, reduced
 
 Floats = NDArray[np.float64]
 
@@ -169,6 +169,15 @@ class FourBar(Mechanism):
         rocking = np.minimum(values["frame"], values["coupler"]) - values["crank"]
         return np.asarray(np.minimum(1.0 - np.abs(cos_gamma), rocking / values["frame"]))
 
+    def broken_rule(self, values: Values) -> str | None:
+        """See Mechanism."""
+        crank = number_of(values, "crank")
+        short = [name for name in ("frame", "coupler") if number_of(values, name) <= crank]
+        if not short:
+            return None
+        told = " and ".join(f"the {name} ({number_of(values, name):.6g} m)" for name in short)
+        return f"the crank ({crank:.6g} m) of a crank-rocker is shorter than {told}, here it is not"
+
     def worst_angles(self, values: Values) -> Sequence[Floats]:
         """See Mechanism."""
         one = np.ones_like(values["crank"])
@@ -230,6 +239,16 @@ class Whitworth(_QuickReturn):
         rod = _slider_margin(values["link_arm"], values, self._link(values, phi)[0])
         return np.asarray(np.minimum(rod, (values["crank"] - values["pivot_distance"]) / values["crank"]))
 
+    def broken_rule(self, values: Values) -> str | None:
+        """See Mechanism."""
+        crank, distance = number_of(values, "crank"), number_of(values, "pivot_distance")
+        if crank > distance:
+            return None
+        return (
+            f"the pivot_distance ({distance:.6g} m) of a whitworth is less than the crank ({crank:.6g} m), its pivot "
+            "lying within the crank's circle, and here it is not"
+        )
+
     def worst_angles(self, values: Values) -> Sequence[Floats]:
         """See Mechanism."""
         one = np.ones_like(values["crank"])
@@ -253,6 +272,16 @@ class CrankShaper(_QuickReturn):
         straight = np.sin(theta + np.arcsin(self._slider(values, theta).sin_b))
         swing = (values["pivot_distance"] - values["crank"]) / values["pivot_distance"]
         return np.asarray(np.minimum(np.minimum(rod, swing), straight))
+
+    def broken_rule(self, values: Values) -> str | None:
+        """See Mechanism."""
+        crank, distance = number_of(values, "crank"), number_of(values, "pivot_distance")
+        if distance > crank:
+            return None
+        return (
+            f"the pivot_distance ({distance:.6g} m) of a crank_shaper is more than the crank ({crank:.6g} m), its "
+            "pivot lying outside the crank's circle, and here it is not"
+        )
 
     def worst_angles(self, values: Values) -> Sequence[Floats]:
         """See Mechanism."""

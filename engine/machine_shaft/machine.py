@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +14,7 @@ from engine.machine_shaft.linkages import CrankShaper, FourBar, SliderCrank, Whi
 from engine.machine_shaft.mechanisms import Mechanism, Motion
 from engine.machine_shaft.operations import Operation, Stroke, every_revolution, formula_breaks
 from engine.machine_shaft.parameters import parameters
-from engine.machine_shaft.problems import ExpressionError, StructureError
+from engine.machine_shaft.problems import ExpressionError, StructureError, TableError
 from engine.machine_shaft.spec import LINKED, MAX_CONSTANTS, MAX_STEPS, REVOLUTIONS, MachineSpec, MechanismChoice
 from engine.machine_shaft.tables import Curve, periodic
 
@@ -82,6 +84,12 @@ def _mechanism_curve(spec: MachineSpec) -> Curve | None:
     table = spec.mechanism.table
     if spec.mechanism.kind != "table" or table is None:
         return None
+    for number, (row, following) in enumerate(pairwise(table.rows), start=1):
+        if row[0] == following[0]:
+            raise TableError(
+                f"Rows {number} and {number + 1} of the inertia both have {row[0]:g} rad, with {row[1]:g} and "
+                f"{following[1]:g} kg*m^2: an inertia does not jump, only a torque may."
+            )
     within_one = len(table.rows) > 0 and table.rows[-1][0] - table.rows[0][0] <= _TURN * (1.0 + 1e-9)
     return periodic(table, _TURN if within_one else _TURN * spec.cycle)
 
@@ -149,6 +157,14 @@ class Fields:
     resistance: Floats
 
 
+class Jumps(NamedTuple):
+    """Jumps of the inertia, one a case: the angle in rad, and the values there in kg*m^2; NaN where there is none."""
+
+    angle: Floats
+    before: Floats
+    after: Floats
+
+
 class Machine:
     """A structure with the numbers of a block of cases."""
 
@@ -178,6 +194,10 @@ class Machine:
         if self.mechanism is None:
             return np.full(self.columns.cases, np.nan)
         return np.broadcast_to(self.mechanism.unassembled(self.mechanism_values), (self.columns.cases,))
+
+    def broken_rule(self) -> str | None:
+        """What the dimensions of the first case break, None where its links only do not reach each other."""
+        return None if self.mechanism is None else self.mechanism.broken_rule(self.mechanism_values)
 
     def _environment(self, phi: Floats) -> dict[str, tuple[Floats, Floats | float]]:
         return {"phi": (phi, np.ones(1)), **{name: (value, 0.0) for name, value in self.constants.items()}}
@@ -247,6 +267,56 @@ class Machine:
         parts = (inertia + self.columns.values["drive.inertia"], slope, self._drive(phi), resistance)
         return Fields(*(np.ascontiguousarray(np.broadcast_to(part, shape)) for part in parts))
 
+    def inertia_jumps(self) -> Jumps:
+        """Where a formula of the inertia jumps first, within the cycle or from its end to its start."""
+        jumps = Jumps(*(np.full(self.columns.cases, np.nan) for _ in range(3)))
+        if self._inertia_formula is None:
+            return jumps
+        ends = np.array([[[0.0, self.cycle]]])
+        exact = self.fields(ends).inertia
+        angles = [np.zeros((1, 1))]
+        angles += [np.sort(found, axis=1) for found in formula_breaks(self._inertia_formula, self._environment,
+                                                                      self.spec.cycle)]  # fmt: skip
+        for found in angles:
+            for column in range(found.shape[1]):
+                angle = found[:, column][:, None, None]
+                closing = np.minimum(angle, self.cycle - angle) < 1e-6
+                before, after = self._limits(np.where(closing, self.cycle, angle), np.where(closing, 0.0, angle))
+                # What is smooth is compared as it is; a root has an infinite slope beside a kink, and no jump.
+                apart = np.abs(exact[..., :1] - exact[..., 1:]) > 1e-9 * np.abs(exact[..., :1])
+                least = np.where(closing & apart, 1e-9, 1e-6)
+                jump = np.abs(after - before) > least * np.maximum(np.abs(before), np.abs(after))
+                first = (jump & ~np.isnan(angle))[:, 0, 0] & ~(jumps.angle <= angle[:, 0, 0])
+                for kept, value in ((jumps.angle, angle), (jumps.before, before), (jumps.after, after)):
+                    kept[first] = np.broadcast_to(value[:, 0, 0], first.shape)[first]
+        return jumps
+
+    def _limits(self, left: Floats, right: Floats) -> tuple[Floats, Floats]:
+        """Inertia as the angle comes to ``left`` from below and to ``right`` from above; arrays (cases, 1, 1)."""
+        near = 1e-12 * self.cycle
+        with np.errstate(all="ignore"):
+            below, above = self.fields(left - near), self.fields(right + near)
+            return below.inertia + near * below.slope, above.inertia - near * above.slope
+
+    def check_closed(self) -> None:
+        """Refuse a formula of the inertia that jumps somewhere in the cycle (of the first case).
+
+        Raises
+        ------
+        ExpressionError
+        """
+        angle, before, after = (float(values[0]) for values in self.inertia_jumps())
+        if np.isnan(angle):
+            return
+        end = min(angle, self.cycle - angle) < 1e-6
+        what = (
+            f"The inertia does not close on itself: it begins with {after:.6g} kg*m^2 and ends, a cycle later, with "
+            f"{before:.6g} kg*m^2"
+            if end
+            else f"The inertia jumps at {np.degrees(angle):.6g} deg from {before:.6g} to {after:.6g} kg*m^2"
+        )
+        raise ExpressionError(f"{what} (the drive's with it). Only a torque may jump.", None, "mechanism")
+
     def check_finite(self) -> None:
         """Refuse a formula that gives no number somewhere in the cycle (of the first case).
 
@@ -255,7 +325,8 @@ class Machine:
         ExpressionError
         """
         phi = np.asarray((np.arange(720 * self.spec.cycle) + 0.5) * np.pi / 360.0, dtype=np.float64)[None, None, :]
-        fields = self.fields(phi)
+        with np.errstate(all="ignore"):
+            fields = self.fields(phi)
         for part, name, values in (
             ("mechanism", "inertia of the mechanism", fields.inertia), ("drive", "driving torque", fields.drive),
             ("operation", "torque of the operation", fields.resistance),

@@ -20,6 +20,11 @@ Values = Mapping[str, Floats]
 _SCAN = 3_600
 
 
+def number_of(values: Values, name: str) -> float:
+    """A value of the first case."""
+    return float(values[name].flat[0])
+
+
 class Body(NamedTuple):
     """A body in plane motion: first and second derivatives of its centre and its angle by the shaft's angle."""
 
@@ -87,6 +92,13 @@ class Mechanism(ABC):
         """Angles at which the inertia or the way has a kink, of the parameters' shape."""
         del values
         return ()
+
+    def broken_rule(self, values: Values) -> str | None:
+        """What the dimensions of a case that cannot be assembled break, as half a sentence; None where links are
+        too short to reach each other.
+        """
+        del values
+        return None
 
     def unassembled(self, values: Values) -> Floats:
         """First angle at which the mechanism cannot be assembled, in 0 .. 2 pi; NaN where it always can.

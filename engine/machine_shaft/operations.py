@@ -104,6 +104,12 @@ def formula_breaks(
     return breaks
 
 
+def reachable_pressure(suction: Floats, clearance: Floats, exponent: Floats) -> Floats:
+    """Pressure in Pa to which a compressor brings the gas at its head; without clearance it is without bound."""
+    with np.errstate(divide="ignore", over="ignore"):
+        return np.asarray(suction * ((1.0 + clearance) / clearance) ** exponent)
+
+
 class Operation:
     """The operation's resistance made ready.
 
@@ -195,9 +201,8 @@ class Operation:
     def _gas(self, phi: Floats, stroke: Stroke) -> Floats:
         """Force on the piston towards the forward stroke, in N; the cylinder's head is where that stroke starts."""
         v = self._values
-        low, high, clearance, n = (
-            v[f"gas.{name}"] for name in ("suction_pressure", "discharge_pressure", "clearance", "exponent")
-        )
+        low, clearance, n = (v[f"gas.{name}"] for name in ("suction_pressure", "clearance", "exponent"))
+        high = self._delivered()
         x = stroke.fraction(phi)
         # Without clearance the pressure at the head is 0/0: the other bound holds there.
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -205,6 +210,16 @@ class Operation:
             compressing = np.fmin(high, low * ((1.0 + clearance) / (clearance + x)) ** n)
         pressure = np.where(stroke.forward(phi), expanding, compressing)
         return np.asarray((pressure - v["gas.back_pressure"]) * v["gas.piston_area"])
+
+    def _delivered(self) -> Floats:
+        """Highest pressure in the cylinder, in Pa: that of discharge where the compressor reaches it.
+
+        Otherwise the valves stay shut, and what is compressed expands again on the same line. Below the suction the
+        gas flows through without work.
+        """
+        v = self._values
+        low, high = v["gas.suction_pressure"], v["gas.discharge_pressure"]
+        return np.minimum(np.maximum(high, low), reachable_pressure(low, v["gas.clearance"], v["gas.exponent"]))
 
     def breaks(self) -> list[Floats]:
         """Angles at which the torque jumps or has a kink, arrays of shape (cases or 1, n); NaN is none."""
@@ -234,7 +249,7 @@ class Operation:
     def _gas_breaks(self, stroke: Stroke) -> list[Floats]:
         v = self._values
         clearance = v["gas.clearance"]
-        ratio = (v["gas.discharge_pressure"] / v["gas.suction_pressure"]) ** (1.0 / v["gas.exponent"])
+        ratio = (self._delivered() / v["gas.suction_pressure"]) ** (1.0 / v["gas.exponent"])
         opens_suction = stroke.angles(clearance * (ratio - 1.0), forward=True)
         opens_discharge = stroke.angles((1.0 + clearance) / ratio - clearance, forward=False)
         return [every_revolution(angle, self._revolutions) for angle in (opens_suction, opens_discharge)]

@@ -41,15 +41,33 @@ class ExpressionError(MachineError):
         self.position, self.part = position, part
 
 
+class RelationError(MachineError):
+    """A number does not go together with others.
+
+    Attributes
+    ----------
+    path : str
+        Of the number.
+    value : float
+    allowed : str
+        Its range beside the others, with the unit.
+    """
+
+    def __init__(self, path: str, value: float, message: str, allowed: str) -> None:
+        super().__init__(message)
+        self.path, self.value, self.allowed = path, value, allowed
+
+
 class AssemblyError(MachineError):
-    """The mechanism cannot be assembled at ``angle`` (rad)."""
+    """The mechanism cannot be assembled at ``angle`` (rad); ``rule`` says what its dimensions break, if known."""
 
     ending = Ending.CANNOT_ASSEMBLE
 
-    def __init__(self, angle: float) -> None:
+    def __init__(self, angle: float, rule: str | None = None) -> None:
+        why = rule or "its links do not reach each other there"
         super().__init__(
-            f"The mechanism cannot be assembled at a shaft angle of {math.degrees(angle):.6g} deg: its links do not "
-            "reach each other there, or its motions take more than a revolution. Change the dimensions."
+            f"The mechanism cannot be assembled at a shaft angle of {math.degrees(angle):.6g} deg: {why}. "
+            "Change the dimensions."
         )
         self.angle = angle
 

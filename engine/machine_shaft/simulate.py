@@ -22,6 +22,7 @@ from engine.machine_shaft.problems import (
     QuadratureError,
     UnbalancedWorkError,
 )
+from engine.machine_shaft.relations import check_relations
 from engine.machine_shaft.results import result_infos
 from engine.machine_shaft.spec import MachineSpec
 from engine.machine_shaft.start import Shape, Stop, least_mean_speed, start_energy
@@ -39,7 +40,7 @@ BLOCK = 64
 _NAMES = tuple(info.name for info in result_infos())
 _OF_TIME = np.array([_NAMES.index("omega.mean_time"), _NAMES.index("irregularity.time")])
 #: Beginnings of the names of results that a case without motion does not have.
-_OF_MOTION = ("omega.", "irregularity", "acceleration.", "s1.", "s2.", "power.", "energy.m", "required_")
+_OF_MOTION = ("omega.", "irregularity", "acceleration.", "s1.", "s2.", "power.", "energy.m")
 #: The same for a motor that has no steady torque.
 _OF_MOTOR = ("drive_torque.", "work.drive", "balance.work", "energy.", "s3.", "s4.", "phi_c")
 _CODE = {ending: np.int8(code) for code, ending in enumerate(ENDING_CODES)}
@@ -71,19 +72,21 @@ class Solved:
     results : dict
         Every result but the angle of assembly by name, each (cases,).
     endings : int8 array, shape (cases,)
-    rough, rough_pace : arrays of bool, shape (cases, panels)
-        Panels that do not resolve their torques, inertia or speed, and those that do not resolve 1/omega.
+    rough, slow, rough_pace : arrays of bool, shape (cases, panels)
+        Panels that do not resolve their torques or inertia; those in which the shaft is too near to rest for the
+        speed, or its mean over time where that is asked for, to be resolved; and those that do not resolve 1/omega.
     """
 
     decomposition: Decomposition
     results: dict[str, Floats]
     endings: Codes
     rough: Bools
+    slow: Bools
     rough_pace: Bools
 
 
-def _rough(d: Decomposition) -> Bools:
-    """Panels that do not resolve their torques, inertia or speed."""
+def _rough(d: Decomposition) -> tuple[Bools, Bools]:
+    """Panels that do not resolve their torques or inertia, and those that do not resolve a speed near to rest."""
     panels, still = d.panels, np.isnan(d.start)[:, None]
     # A case without motion is judged by what was given.
     drive = np.where(still[..., None], d.fields.drive, d.drive.torque)
@@ -91,9 +94,11 @@ def _rough(d: Decomposition) -> Bools:
     scale = largest_work(panels, drive, d.fields.resistance)[:, None]
     fine = (torque * panels.half <= 1e-10 * scale) & _resolved(panels, d.fields.inertia, 1e-11)
     with np.errstate(invalid="ignore"):
-        for values, limit in ((d.squares, 1e-10), (np.sqrt(d.squares), 1e-6)):
-            fine &= _resolved(panels, values, limit) | still
-    return np.asarray(~fine)
+        square = _resolved(panels, d.squares, 1e-10) | still
+        speed = _resolved(panels, np.sqrt(d.squares), 1e-6) | still
+        resting = (panels.extremes(d.squares).lowest <= 1e-6 * panels.largest(d.squares))[:, None]
+    fine &= square | resting
+    return np.asarray(~fine), np.asarray(~(square & speed))
 
 
 def _rough_pace(d: Decomposition) -> Bools:
@@ -120,7 +125,7 @@ def attempts(spec: MachineSpec, columns: Columns) -> Iterator[tuple[NDArray[np.i
         solved = _attempt(spec, columns.take(rows), cuts)
         _mark_unreached(spec, columns.take(rows), solved)
         yield rows, solved
-        chosen = solved.rough | solved.rough_pace
+        chosen = solved.rough | solved.slow | solved.rough_pace
         panels = solved.decomposition.panels
         real = np.broadcast_to((panels.half > 0.0).sum(axis=1), rows.shape)
         again = np.nonzero(chosen.any(axis=1) & (real <= MAX_PANELS * spec.cycle))[0]
@@ -138,10 +143,32 @@ def _mark_unreached(spec: MachineSpec, columns: Columns, solved: Solved) -> None
     wanted = columns.row("mean_speed")
     far = ~(np.abs(solved.results["omega.mean"] - wanted) <= 1e-6 * wanted)
     far &= solved.endings == _CODE[Ending.OK]
-    solved.endings[far] = _CODE[Ending.INERTIA_INSUFFICIENT]
+    _stop(solved, far)
+
+
+def _stop(solved: Solved, cases: Bools) -> None:
+    """Let ``cases`` end for want of inertia, without what only a motion has."""
+    solved.endings[cases] = _CODE[Ending.INERTIA_INSUFFICIENT]
     for name, values in solved.results.items():
         if name.startswith(_OF_MOTION):
-            solved.results[name] = np.where(far, np.nan, values)
+            solved.results[name] = np.where(cases, np.nan, values)
+
+
+def settle(spec: MachineSpec, columns: Columns, solved: Solved) -> Bools:
+    """Say how the cases end whose last attempt this was; True for those that were not resolved.
+
+    Torques and inertia being resolved, only a shaft that all but stops has a speed that is not. A formula that
+    gives an inertia with a jump gives no motion at all.
+    """
+    ok = solved.endings == _CODE[Ending.OK]
+    slow = ok & solved.slow.any(axis=1)
+    lost = solved.rough.any(axis=1) | (slow & (spec.balance == "motor"))
+    if spec.mechanism.kind == "formula":
+        lost |= ~np.isnan(Machine(spec, columns).inertia_jumps().angle)
+    lost &= solved.endings != _CODE[Ending.NEGATIVE_INERTIA]
+    _stop(solved, slow & ~lost)
+    solved.endings[lost] = _CODE[Ending.QUADRATURE_NOT_REACHED]
+    return np.asarray(lost)
 
 
 def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
@@ -172,14 +199,15 @@ def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
     for name in ("omega.angle_at_max", "omega.angle_at_min"):
         results[name] = np.where(np.isnan(start), np.nan, results[name])
     results["inertia.min"] = np.where(negative, least_inertia, results["inertia.min"])
-    _by_definition(spec, columns, d, results)
+    _by_definition(spec, d, results)
+    results["required_inertia"] = _required(spec, columns, d, endings)
     stalled = endings == _CODE[Ending.MOTOR_STALLED]
     if stalled.any():
         for name, values in results.items():
             if name.startswith(_OF_MOTOR):
                 results[name] = np.where(stalled, np.nan, values)
-    rough, rough_pace = _rough(d), _rough_pace(d)
-    return Solved(d, results, endings, rough | rough_pace if spec.mean_speed_is == "time" else rough, rough_pace)
+    (rough, slow), rough_pace = _rough(d), _rough_pace(d)
+    return Solved(d, results, endings, rough, slow | rough_pace if spec.mean_speed_is == "time" else slow, rough_pace)
 
 
 def _motored(
@@ -201,11 +229,11 @@ def _started(
     rows = np.nonzero(endings == _CODE[Ending.OK])[0]
     if rows.size == 0:
         return start, least
-    torque = (drive + fields.resistance)[rows]
     own = panels.take(rows)
-    shape = Shape(own, cycle, fields.inertia[rows], own.running(torque)[0])
-    stop = Stop.of(shape)
     with np.errstate(all="ignore"):
+        torque = (drive + fields.resistance)[rows]
+        shape = Shape(own, cycle, fields.inertia[rows], own.running(torque)[0])
+        stop = Stop.of(shape)
         least[rows] = least_mean_speed(shape, stop, kind, torque)
         feasible = wanted[rows] > least[rows]
         endings[rows[~feasible]] = _CODE[Ending.INERTIA_INSUFFICIENT]
@@ -215,8 +243,8 @@ def _started(
     return start, least
 
 
-def _by_definition(spec: MachineSpec, columns: Columns, d: Decomposition, out: dict[str, Floats]) -> None:
-    """Results that depend on which mean is meant, and the flywheel."""
+def _by_definition(spec: MachineSpec, d: Decomposition, out: dict[str, Floats]) -> None:
+    """Results that depend on which mean is meant, and the balance of works."""
     kind = spec.mean_speed_is
     out["omega.mean"] = out["omega.midrange" if kind == "midrange" else f"omega.mean_{kind}"]
     out["irregularity"] = out[f"irregularity.{kind}"]
@@ -224,16 +252,22 @@ def _by_definition(spec: MachineSpec, columns: Columns, d: Decomposition, out: d
     left = d.total.ends[:, -1]
     largest = largest_work(d.panels, d.drive.torque, d.fields.resistance)
     out["balance.work"] = np.abs(left) / np.where(largest > 0.0, largest, 1.0)
+
+
+def _required(spec: MachineSpec, columns: Columns, d: Decomposition, endings: Codes) -> Floats:
+    """The flywheel, (cases,): the drive's inertia as it is has no say in it, and may be too little."""
     required = np.full(columns.cases, np.nan)
     wanted = columns.row("wanted_irregularity")
-    rows = np.nonzero(np.isfinite(wanted) & np.isfinite(d.start))[0]
+    known = (endings == _CODE[Ending.OK]) | (endings == _CODE[Ending.INERTIA_INSUFFICIENT])
+    rows = np.nonzero(np.isfinite(wanted) & known)[0]
     if rows.size and spec.balance != "motor":
         mechanism = d.fields.inertia[rows] - columns.row("drive.inertia")[rows, None, None]
-        required[rows] = required_inertia(
-            d.panels.take(rows), d.cycle, mechanism, d.total.nodes[rows], kind, columns.row("mean_speed")[rows],
-            wanted[rows],
-        )  # fmt: skip
-    out["required_inertia"] = required
+        with np.errstate(all="ignore"):
+            required[rows] = required_inertia(
+                Shape(d.panels.take(rows), d.cycle, mechanism, d.total.nodes[rows]), d.total.torque[rows],
+                spec.mean_speed_is, columns.row("mean_speed")[rows], wanted[rows],
+            )  # fmt: skip
+    return required
 
 
 def _block(spec: MachineSpec, columns: Columns) -> tuple[Floats, Codes]:
@@ -245,14 +279,13 @@ def _block(spec: MachineSpec, columns: Columns) -> tuple[Floats, Codes]:
     assembled = np.nonzero(np.isnan(angle))[0]
     for found, solved in attempts(spec, columns.take(assembled)):
         rows = assembled[found]
+        lost = settle(spec, columns.take(rows), solved)
         for position, name in enumerate(_NAMES):
             if name != "assembly.angle":
                 values[rows, position] = solved.results[name]
         values[np.ix_(rows[solved.rough_pace.any(axis=1)], _OF_TIME)] = np.nan
         endings[rows] = solved.endings
-        lost = rows[solved.rough.any(axis=1) & (solved.endings != _CODE[Ending.NEGATIVE_INERTIA])]
-        values[lost] = np.nan
-        endings[lost] = _CODE[Ending.QUADRATURE_NOT_REACHED]
+        values[rows[lost]] = np.nan
     values[~np.isfinite(values)] = np.nan
     return values, endings
 
@@ -289,7 +322,9 @@ def simulate(model: MachineSpec, columns: Mapping[str, ArrayLike], *, cases: int
     endings = np.empty(cases, dtype=np.int8)
     for first in range(0, cases, BLOCK):
         part = slice(first, min(first + BLOCK, cases))
-        values[part], endings[part] = _block(model, block.take(part))
+        # Formulas and torques without bound run into infinities, which the endings and empty results tell of.
+        with np.errstate(all="ignore"):
+            values[part], endings[part] = _block(model, block.take(part))
     return Batch(values, endings)
 
 
@@ -309,18 +344,21 @@ def check(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> None:
     """
     check_structure(model)
     row = Columns.of(model, columns, 1)
+    check_relations(model, row)
     batch = simulate(model, columns, cases=1)
     ending, result = ENDING_CODES[int(batch.endings[0])], dict(zip(_NAMES, batch.values[0], strict=True))
     if ending is not Ending.CANNOT_ASSEMBLE:
-        Machine(model, row).check_finite()
-    problem = _problem(ending, result, row)
+        machine = Machine(model, row)
+        machine.check_finite()
+        machine.check_closed()
+    problem = _problem(ending, result, row, Machine(model, row).broken_rule())
     if problem is not None:
         raise problem
 
 
-def _problem(ending: Ending, result: Mapping[str, float], row: Columns) -> MachineError | None:
+def _problem(ending: Ending, result: Mapping[str, float], row: Columns, rule: str | None) -> MachineError | None:
     if ending is Ending.CANNOT_ASSEMBLE:
-        return AssemblyError(float(result["assembly.angle"]))
+        return AssemblyError(float(result["assembly.angle"]), rule)
     if ending is Ending.NEGATIVE_INERTIA:
         return NegativeInertiaError(float(result["inertia.min"]))
     if ending is Ending.UNBALANCED_WORK:

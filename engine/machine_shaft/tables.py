@@ -84,7 +84,9 @@ def _smooth(x: Floats, y: Floats) -> "PPoly":
 
     if len(x) == 2:
         return PPoly(np.array([[(y[1] - y[0]) / (x[1] - x[0])], [y[0]]]), x)
-    cubic = PchipInterpolator(x, y)
+    # A slope near the least of numbers has a reciprocal beyond them, which makes it 0 as it should.
+    with np.errstate(over="ignore"):
+        cubic = PchipInterpolator(x, y)
     return PPoly(cubic.c, cubic.x)
 
 

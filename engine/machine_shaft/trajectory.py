@@ -10,7 +10,7 @@ from engine.endings import ENDING_CODES, Ending
 from engine.machine_shaft.decomposition import Decomposition
 from engine.machine_shaft.machine import Columns, Machine, check_structure
 from engine.machine_shaft.panels import Points
-from engine.machine_shaft.simulate import attempts
+from engine.machine_shaft.simulate import attempts, settle
 from engine.machine_shaft.spec import MachineSpec
 
 Floats = NDArray[np.float64]
@@ -90,8 +90,10 @@ def trajectory(model: MachineSpec, columns: Mapping[str, ArrayLike], angles: Arr
     none = Trajectory(np.empty(0), names, units, np.empty((0, len(names))), (), Ending.CANNOT_ASSEMBLE)
     if not np.isnan(Machine(model, row).unassembled()[0]):
         return none
-    *_, (_, solved) = attempts(model, row)
-    ending = Ending.QUADRATURE_NOT_REACHED if solved.rough.any() else ENDING_CODES[int(solved.endings[0])]
+    with np.errstate(all="ignore"):
+        *_, (_, solved) = attempts(model, row)
+        settle(model, row, solved)
+    ending = ENDING_CODES[int(solved.endings[0])]
     if ending is not Ending.OK:
         return Trajectory(none.angles, names, units, none.values, (), ending)
     table = _table(solved.decomposition, model.phi_c, np.minimum(asked, cycle))

@@ -195,6 +195,34 @@ WRONG: list[tuple[dict[str, Any], str, str]] = [
     ({"/base/operation/quantity": ...}, "/base/operation/quantity", "is required"),
     ({"/base/operation/value": 1}, "/base/operation", "2 are given: value, steps"),
     ({"/base/operation": {"gas": GAS, "over": "stroke"}}, "/base/operation/over", "does not belong to a gas"),
+    (
+        {"/base/operation": {"gas": GAS | {"clearance": 0.5}}, "/axes": []},
+        "/base/operation/gas/discharge_pressure",
+        "got 700000.0; allowed: >= 100000 Pa and <= 417117 Pa",
+    ),
+    (
+        {"/base/operation": {"gas": GAS | {"discharge_pressure": "0.5 bar"}}, "/axes": []},
+        "/base/operation/gas/discharge_pressure",
+        "below the pressure of suction",
+    ),
+    (
+        {
+            "/base/operation": {"quantity": "force", "over": "stroke", "steps": [{"from": 0.9, "to": 0.4, "value": 1}]},
+            "/axes": [],
+        },
+        "/base/operation/steps/0/to",
+        "got 0.4; allowed: >= 0.9 and <= 1",
+    ),
+    (
+        {"/base/mechanism": {"formula": "1 + phi"}, "/base/operation": ..., "/axes": []},
+        "/base/mechanism/formula",
+        "does not close on itself",
+    ),
+    (
+        {"/base/mechanism": {"table": [[0, 1], [1, 2], [1, 3]]}, "/base/operation": ..., "/axes": []},
+        "/base/mechanism/table",
+        "Rows 2 and 3 of the inertia both have 1 rad",
+    ),
     ({"/base/cycle": "2.5 rev"}, "/base/cycle", "whole number of revolutions"),
     ({"/base/cycle": "2 m"}, "/base/cycle", "expected rad"),
     ({"/base/constants": {"sin": 3}}, "/base", "that name has a meaning"),
@@ -259,8 +287,32 @@ def test_what_is_odd_is_warned_of() -> None:
     assert warnings({}) == ""
     assert "is not used" in warnings({"/base/drive/torque": 50})
     assert "was it in mm?" in warnings({"/axes/1": {"path": "mechanism.slider_crank.rod", "values": [0.4, 400]}})
+    assert "/base/phi_c: 7 is out of reach: the machine of base has 2 angles" in warnings({"/base/phi_c": 7})
+    assert warnings({"/base/phi_c": 1}) == ""
     motor = {"/base/drive/motor": LINEAR, "/base/balance": ..., "/base/mean_speed": ..., "/axes": []}
     assert "wanted_irregularity: is not used" in warnings(motor)
+
+
+def test_axes_that_lead_beyond_what_goes_together_are_warned_of() -> None:
+    def warnings(operation: dict[str, Any], axis: str, values: list[Any]) -> str:
+        axes = [{"path": f"operation.{axis}", "values": values}]
+        return "\n".join(parse_spec(changed({"/base/operation": operation, "/axes": axes})).warnings)
+
+    gas = {"gas": GAS | {"clearance": 0.25}}
+    above = warnings(gas, "gas.discharge_pressure", ["7 bar", "9 bar", "10 bar"])
+    assert "/axes/0 (operation.gas.discharge_pressure): the compressor comes to 810328 Pa at most" in above
+    assert "in 2 of 3 cases" in above
+    assert "below the pressure of suction" in warnings(gas, "gas.suction_pressure", ["1 bar", "8 bar"])
+    assert warnings(gas, "gas.discharge_pressure", ["7 bar", "8 bar"]) == ""
+
+    step = {"quantity": "force", "over": "stroke", "steps": [{"from": 0.2, "to": 0.8, "value": 100}]}
+    assert "never acts (in 1 of 2 cases)" in warnings(step, "steps.0.from", [0.5, 0.9])
+    over_angle = {"quantity": "torque", "steps": [{"from": 1, "to": 2, "value": 100}]}
+    assert "goes on over the end of the cycle" in warnings(over_angle, "steps.0.to", [0.5, 2, 3])
+    assert warnings(over_angle, "steps.0.to", [1.5, 2, 3]) == ""
+    assert warnings(over_angle, "steps.0.value", [10, 20]) == ""
+    over_angle["steps"][0]["from"] = 6  # type: ignore[index]
+    assert warnings(over_angle, "steps.0.to", [1, 2]) == ""
 
 
 def test_the_structure_is_part_of_the_physics() -> None:

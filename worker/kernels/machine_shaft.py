@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from engine.machine_shaft.parameters import parameters as _engine_parameters
-from engine.machine_shaft.problems import ExpressionError, MachineError
+from engine.machine_shaft.problems import ExpressionError, MachineError, RelationError
 from engine.machine_shaft.results import result_infos as _engine_results
 from engine.machine_shaft.spec import (
     LINKED,
@@ -30,6 +30,8 @@ from worker.kernels.common import ChunkResult, ChunkTask, Extent, KernelShape, T
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from numpy.typing import ArrayLike, NDArray
+
     from engine.machine_shaft.spec import MechanismKind
     from engine.vibration_drive.parameters import Parameter
     from engine.vibration_drive.results import ResultInfo
@@ -43,9 +45,12 @@ __all__ = [
     "REVOLUTIONS",
     "ExpressionError",
     "MachineError",
+    "RelationError",
+    "base_results",
     "check",
     "check_structure",
     "parameters_of",
+    "reachable_pressure",
 ]
 
 MODEL = "machine-shaft"
@@ -126,6 +131,21 @@ def check(structure: Mapping[str, Any], values: Mapping[str, float]) -> None:
     from engine.machine_shaft.simulate import check as engine_check
 
     engine_check(spec_of(structure), values)
+
+
+def base_results(structure: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, float]:
+    """Results of the machine with these numbers, by name; NaN for those that it does not have."""
+    from engine.machine_shaft.simulate import simulate
+
+    found = simulate(spec_of(structure), values, cases=1).values[0]
+    return {info.name: float(value) for info, value in zip(result_infos(), found, strict=True)}
+
+
+def reachable_pressure(suction: ArrayLike, clearance: ArrayLike, exponent: ArrayLike) -> NDArray[np.float64]:
+    """Pressure in Pa to which a compressor can bring its gas."""
+    from engine.machine_shaft.operations import reachable_pressure as engine_pressure
+
+    return engine_pressure(*(np.asarray(part, dtype=np.float64) for part in (suction, clearance, exponent)))
 
 
 def run_task(task: ChunkTask) -> ChunkResult:

@@ -1,0 +1,46 @@
+"""Numbers that are each in range and do not go together: what a base machine is refused for before it is solved."""
+
+from engine.machine_shaft.machine import Columns
+from engine.machine_shaft.operations import reachable_pressure
+from engine.machine_shaft.problems import RelationError
+from engine.machine_shaft.spec import MachineSpec
+
+
+def check_relations(spec: MachineSpec, row: Columns) -> None:
+    """Refuse numbers of the first case that do not go together.
+
+    Raises
+    ------
+    RelationError
+        Discharge below suction, or above what the clearance lets the compressor reach; a step over the stroke that
+        ends before it begins.
+    """
+    if spec.operation.quantity == "gas":
+        _check_gas(row)
+    elif spec.operation.form == "steps" and spec.operation.over == "stroke":
+        for k in range(spec.operation.steps):
+            first, last = (float(row.row(f"operation.steps.{k}.{end}")[0]) for end in ("from", "to"))
+            if last < first:
+                raise RelationError(
+                    f"operation.steps.{k}.to", last,
+                    f"a step over the stroke ends where it begins or later: this one begins at {first:.6g} and would "
+                    "never act; `during` tells the stroke",
+                    f">= {first:.6g} and <= 1",
+                )  # fmt: skip
+
+
+def _check_gas(row: Columns) -> None:
+    low, high, clearance, exponent = (
+        row.row(f"operation.gas.{name}") for name in ("suction_pressure", "discharge_pressure", "clearance", "exponent")
+    )
+    most, least, wanted = float(reachable_pressure(low, clearance, exponent)[0]), float(low[0]), float(high[0])
+    if least <= wanted <= most:
+        return
+    message = (
+        "is below the pressure of suction: nothing would be compressed"
+        if wanted < least
+        else f"cannot be reached: at the end of the stroke a clearance of {clearance[0]:.6g} times the displaced "
+        f"volume is left, and the gas comes to {most:.6g} Pa at most"
+    )
+    allowed = f">= {least:.6g} Pa" + (f" and <= {most:.6g} Pa" if most < float("inf") else "")
+    raise RelationError("operation.gas.discharge_pressure", wanted, message, allowed)
