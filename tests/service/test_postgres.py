@@ -324,7 +324,8 @@ def test_a_server_that_crashes_ends_the_worker_with_a_sentence_and_loses_nothing
     with postgres.running() as server:
         url = server.url(server.new_database())
         with Store.open(url, chunking=Chunking(cases=4)) as store:
-            record = store.create_study({}, fakes.study(80))
+            study = fakes.study(1000)  # enough that the first worker is not through before the server crashes
+            record = store.create_study({}, study)
             with worker(url) as process:
                 eventually(lambda: store.get_study(record.id).done > 0)
                 server.stop()
@@ -341,5 +342,5 @@ def test_a_server_that_crashes_ends_the_worker_with_a_sentence_and_loses_nothing
                 process.terminate()
             assert process.returncode == 0
             block = store.case_rows(record.id, limit=1000)
-            assert block.cases.tolist() == list(range(80))
-            np.testing.assert_array_equal(block.values, kernels.run_chunk(fakes.study(80), 0, 80).values)
+            assert block.cases.tolist() == list(range(1000))
+            np.testing.assert_array_equal(block.values, kernels.run_chunk(study, 0, 1000).values)
