@@ -89,6 +89,8 @@ def serving(path: Path) -> Iterator[tuple[str, int]]:
                 break
             except httpx.HTTPError:
                 time.sleep(0.1)
+        else:
+            raise AssertionError("the service does not get ready")
         yield address, process.pid
     finally:
         process.send_signal(signal.SIGTERM)

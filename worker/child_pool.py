@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Generic, TypeVar, TypeVarTuple
 
 from worker.child_process import ChildProcess, ProcessDiedError, ProcessStartError
@@ -123,6 +123,20 @@ class ChildPool:
                 job._leave()
         self._failed_starts = 0
         return value
+
+    def tend(self) -> None:
+        """Put new processes in the place of those that died idle; to be called now and then."""
+        for _ in self._children:
+            try:
+                child = self._idle.get_nowait()
+            except Empty:  # all are at work
+                return
+            try:
+                child.tend()
+            except ProcessStartError:
+                self._failed_starts += 1
+            finally:
+                self._idle.put(child)
 
     def close(self) -> None:
         """Kill what runs, drop what waits and leave no process behind."""

@@ -139,6 +139,25 @@ class ChildProcess:
         pipe.close()
         return exitcode
 
+    def tend(self) -> None:
+        """Put a new process in the place of one that died idle. Only when no thread runs anything in it.
+
+        Raises ProcessStartError when it died before it was ready; the next one is on its way then, too.
+        """
+        process, pipe = self._process, self._pipe
+        if process is None or pipe is None:
+            self.start()
+            return
+        if not wait([process.sentinel], 0.0):
+            return
+        with suppress(EOFError, OSError):
+            self._is_ready = self._is_ready or (pipe.poll() and pipe.recv() is True)
+        was_ready = self._is_ready
+        exitcode = self._bury()
+        self.start()
+        if not was_ready:
+            raise ProcessStartError(f"exit code {exitcode}")
+
     def kill(self) -> None:
         """Kill the process, whatever it does: `run` raises ProcessDiedError."""
         with self._lock:

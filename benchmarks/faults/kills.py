@@ -10,7 +10,6 @@ from __future__ import annotations
 import random
 import time
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -48,8 +47,7 @@ def kills(
                 lambda share=share: harness.done(service.database, study) >= share * cases, "the study goes on"
             )
             time.sleep(draw.uniform(0.0, _JITTER_SECONDS))
-        target = draw.choices(list(TARGETS), list(TARGETS.values()))[0]
-        killed[target] += _kill(service, target, draw, lambda: harness.done(service.database, study) == cases)
+        killed[_kill(service, draw)] += 1
         if number % max(1, count // _ACCEPTED) == 0:
             key = f"small-{number}"
             accepted[key] = _submit(service, small, key)
@@ -86,27 +84,22 @@ def _count_claims(database: Path) -> None:
     connection.close()
 
 
-def _kill(service: harness.Service, target: str, draw: random.Random, ended: Callable[[], bool]) -> bool:
-    """Kill what was drawn; what is not there is waited for. False when there was nothing to kill.
-
-    Processes that died idle are replaced when there is something to run again, so those of a study that has ended are
-    not waited for.
-    """
+def _kill(service: harness.Service, draw: random.Random) -> str:
+    """Kill what is drawn; what is not there is waited for."""
+    target = draw.choices(list(TARGETS), list(TARGETS.values()))[0]
     if target == "service":
         service.kill()
         service.start()
-        return True
-    if target == "dispatcher":
+    elif target == "dispatcher":
         harness.until(service.dispatcher, "there is a dispatcher")
         if (dispatcher := service.dispatcher()) is not None:
             dispatcher.kill()
             dispatcher.wait(60)
-        return True
-    harness.until(lambda: service.pool() or ended(), "there is a pool")
-    pool = service.pool()
-    if pool:
-        draw.choice(pool).kill()
-    return bool(pool)
+    else:
+        harness.until(service.pool, "there is a pool")
+        if pool := service.pool():
+            draw.choice(pool).kill()
+    return target
 
 
 def _submit(service: harness.Service, made: dict[str, Any], key: str) -> str:

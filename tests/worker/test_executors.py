@@ -224,6 +224,22 @@ def test_an_idle_process_that_is_killed_costs_nothing(start: Callable[..., Proce
     assert gather(pool, 1)[0].fate is Fate.DONE
 
 
+def test_processes_that_are_killed_idle_are_replaced_without_a_chunk(start: Callable[..., ProcessPoolExecutor]) -> None:
+    pool = start(2)
+    submit(pool, 4)
+    gather(pool, 4)
+    before = {process.pid for process in pool_processes()}
+    for process in pool_processes():
+        process.kill()
+        process.wait(DEADLINE)
+    assert pool.wait(0.0) == []
+    after = {process.pid for process in pool_processes()}
+    assert len(after) == 2
+    assert not after & before
+    submit(pool, 2)
+    assert {outcome.fate for outcome in gather(pool, 2).values()} == {Fate.DONE}
+
+
 def test_no_process_outlives_its_pool() -> None:
     pool = fakes.pool(2, run=fakes.faulty(hang=frozenset({0, 4})))
     submit(pool, 2)

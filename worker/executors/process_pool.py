@@ -137,6 +137,7 @@ class ProcessPoolExecutor:
 
         It also comes back when a kernel was loaded. Raises ExecutorError when no process can be started.
         """
+        self._pool.tend()
         found: list[Outcome] = []
         try:
             came = self._ready.get(timeout=timeout)
