@@ -12,11 +12,10 @@ import time
 from collections import Counter, deque
 from concurrent.futures import CancelledError
 from contextlib import suppress
-from dataclasses import dataclass, field
 from functools import partial
 from queue import Empty, SimpleQueue
 from threading import RLock
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final
 from uuid import uuid4
 
 import dask
@@ -24,6 +23,7 @@ from distributed import Client, LocalCluster
 from distributed.scheduler import KilledWorker
 
 from worker import kernels
+from worker.executors.dask_jobs import Job, Waiting, Worker
 from worker.executors.dask_tasks import blame_at_once, introduce, load_kernel, run_chunk, scheduler_address
 from worker.executors.process_pool import MAX_LOADS, SPARE_CHUNKS
 from worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
@@ -56,41 +56,6 @@ _CONFIG: Final = {
     "distributed.worker.memory.pause": False,
     "distributed.worker.memory.terminate": False,
 }
-
-
-@dataclass(eq=False, slots=True)
-class _Job:
-    """What a worker is busy with: saying who it is, loading the kernel ``shape``, or the chunk ``ticket``.
-
-    What comes of a ``dropped`` chunk is of no interest any more.
-    """
-
-    kind: Literal["introduce", "load", "chunk"]
-    began: float
-    ticket: int = 0
-    shape: kernels.KernelShape | None = None
-    future: Future[Any] | None = None
-    dropped: bool = False
-
-
-@dataclass(eq=False, slots=True)
-class _Worker:
-    """A worker of the cluster. ``usable`` is False until it has said who it is, and for ever when that was wrong."""
-
-    address: str
-    host: str
-    usable: bool = False
-    shapes: set[kernels.KernelShape] = field(default_factory=set)
-    job: _Job | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class _Waiting:
-    """A chunk that no worker has yet."""
-
-    ticket: int
-    key: str
-    task: kernels.ChunkTask
 
 
 class DaskExecutor:
@@ -130,8 +95,8 @@ class DaskExecutor:
         self._scheduler_seconds = scheduler_seconds
         self._name = uuid4().hex[:12]
         self._lock = RLock()
-        self._workers: dict[str, _Worker] = {}
-        self._waiting: deque[_Waiting] = deque()
+        self._workers: dict[str, Worker] = {}
+        self._waiting: deque[Waiting] = deque()
         self._failed_loads: Counter[kernels.KernelShape] = Counter()
         self._broken: dict[kernels.KernelShape, str] = {}
         self._outcomes: SimpleQueue[Outcome | None] = SimpleQueue()
@@ -176,7 +141,7 @@ class DaskExecutor:
         task = kernels.chunk_task(study, chunk.first, chunk.count)
         key = f"sprag-{chunk.study}-{chunk.first}-{chunk.count}-{chunk.failures}-{self._name}-{ticket}"
         with self._lock:
-            self._waiting.append(_Waiting(ticket, key, task))
+            self._waiting.append(Waiting(ticket, key, task))
             self._fill()
 
     def wait(self, timeout: float) -> list[Outcome]:
@@ -239,9 +204,9 @@ class DaskExecutor:
                 self._worker_is_gone(self._workers.pop(address))
             for address, info in present.items():
                 if address not in self._workers:
-                    self._workers[address] = worker = _Worker(address, str(info.get("host", address)))
+                    self._workers[address] = worker = Worker(address, str(info.get("host", address)))
                     key = f"sprag-introduce-{self._name}-{uuid4().hex}"
-                    self._begin(worker, _Job("introduce", now), key, introduce)
+                    self._begin(worker, Job("introduce", now), key, introduce)
             for worker in list(self._workers.values()):
                 if worker.job and worker.job.kind == "chunk" and now - worker.job.began > self._longest:
                     self._worker_is_frozen(worker)
@@ -288,18 +253,18 @@ class DaskExecutor:
                 f"the scheduler {self._address} was not there for {self._scheduler_seconds:g} s: {error}"
             )
 
-    def _worker_is_gone(self, worker: _Worker) -> None:
+    def _worker_is_gone(self, worker: Worker) -> None:
         if worker.job is not None:
             self._died(worker.job)
             worker.job = None
 
-    def _worker_is_frozen(self, worker: _Worker) -> None:
+    def _worker_is_frozen(self, worker: Worker) -> None:
         _LOG.error("The worker %s does not answer and is not used any more.", worker.address)
         job, worker.job, worker.usable = worker.job, None, False
         if job is not None:
             self._died(job)
 
-    def _died(self, job: _Job) -> None:
+    def _died(self, job: Job) -> None:
         """The worker that was busy with ``job`` is gone."""
         if job.kind == "load" and job.shape is not None:
             self._load_failed(job.shape, "the worker that compiled its kernel died", MAX_LOADS)
@@ -309,7 +274,7 @@ class DaskExecutor:
             else:
                 self._outcomes.put(Outcome(job.ticket, Fate.CRASHED, detail="its worker died"))
 
-    def _loads(self, worker: _Worker, shape: kernels.KernelShape) -> bool:
+    def _loads(self, worker: Worker, shape: kernels.KernelShape) -> bool:
         return worker.job is not None and worker.job.kind == "load" and worker.job.shape == shape
 
     def _fill(self) -> None:
@@ -322,7 +287,7 @@ class DaskExecutor:
             chosen = next((item for item in self._waiting if item.task.shape in worker.shapes), None)
             if chosen is not None:
                 self._waiting.remove(chosen)
-                job = _Job("chunk", time.monotonic(), chosen.ticket)
+                job = Job("chunk", time.monotonic(), chosen.ticket)
                 self._begin(worker, job, chosen.key, run_chunk, self._run, chosen.task, self._timeout)
                 continue
             shape = self._waiting[0].task.shape
@@ -330,11 +295,11 @@ class DaskExecutor:
             if any(shape in other.shapes for other in fellows) or not any(self._loads(o, shape) for o in fellows):
                 self._begin_load(worker, shape)
 
-    def _begin_load(self, worker: _Worker, shape: kernels.KernelShape) -> None:
+    def _begin_load(self, worker: Worker, shape: kernels.KernelShape) -> None:
         key = f"sprag-load-{self._name}-{uuid4().hex}"
-        self._begin(worker, _Job("load", time.monotonic(), shape=shape), key, load_kernel, self._load, shape)
+        self._begin(worker, Job("load", time.monotonic(), shape=shape), key, load_kernel, self._load, shape)
 
-    def _begin(self, worker: _Worker, job: _Job, key: str, function: Callable[..., Any], *given: Any) -> None:
+    def _begin(self, worker: Worker, job: Job, key: str, function: Callable[..., Any], *given: Any) -> None:
         worker.job = job
         if self._client is None:
             return
@@ -345,7 +310,7 @@ class DaskExecutor:
             )
             job.future.add_done_callback(partial(self._done, worker, job))
 
-    def _done(self, worker: _Worker, job: _Job, future: Future[Any]) -> None:
+    def _done(self, worker: Worker, job: Job, future: Future[Any]) -> None:
         """In a thread of Dask's: note what came of a job, and give the worker its next one."""
         value: Any = None
         error: BaseException | None
@@ -373,7 +338,7 @@ class DaskExecutor:
                 self._loaded(worker, job.shape, error)
             self._fill()
 
-    def _introduced(self, worker: _Worker, engine: str | None, error: BaseException | None) -> None:
+    def _introduced(self, worker: Worker, engine: str | None, error: BaseException | None) -> None:
         if error is not None:
             _LOG.error("The worker %s cannot be used: %s: %s", worker.address, type(error).__name__, error)
         elif engine != self._engine:
@@ -384,7 +349,7 @@ class DaskExecutor:
             worker.usable = True
             self._outcomes.put(None)
 
-    def _loaded(self, worker: _Worker, shape: kernels.KernelShape, error: BaseException | None) -> None:
+    def _loaded(self, worker: Worker, shape: kernels.KernelShape, error: BaseException | None) -> None:
         if error is None:
             worker.shapes.add(shape)
             self._failed_loads.pop(shape, None)

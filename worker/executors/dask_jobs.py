@@ -1,0 +1,46 @@
+"""What `worker.executors.dask` knows of its workers and of what they are busy with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from distributed import Future
+
+    from worker import kernels
+
+
+@dataclass(eq=False, slots=True)
+class Job:
+    """What a worker is busy with: saying who it is, loading the kernel ``shape``, or the chunk ``ticket``.
+
+    What comes of a ``dropped`` chunk is of no interest any more.
+    """
+
+    kind: Literal["introduce", "load", "chunk"]
+    began: float
+    ticket: int = 0
+    shape: kernels.KernelShape | None = None
+    future: Future[Any] | None = None
+    dropped: bool = False
+
+
+@dataclass(eq=False, slots=True)
+class Worker:
+    """A worker of the cluster. ``usable`` is False until it has said who it is, and for ever when that was wrong."""
+
+    address: str
+    host: str
+    usable: bool = False
+    shapes: set[kernels.KernelShape] = field(default_factory=set)
+    job: Job | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """A chunk that no worker has yet."""
+
+    ticket: int
+    key: str
+    task: kernels.ChunkTask
