@@ -12,10 +12,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import psutil
 import pytest
+from distributed import Client, Future
 from pydantic import ValidationError
 
 from service.dispatching import WorkerSettings, pool
@@ -217,6 +219,56 @@ def test_chunks_are_stopped_whether_they_run_or_not(start: Callable[..., DaskExe
     outcomes = gather(executor, 3)  # the third one runs when a worker is back
     assert [outcomes[ticket].fate for ticket in range(3)] == [Fate.STOPPED, Fate.STOPPED, Fate.DONE]
     assert executor.wait(0.0) == []
+
+
+@pytest.mark.parametrize("fate", ["finished", "lost"])
+def test_the_connection_stays_until_what_came_of_a_job_is_fetched(
+    start: Callable[..., DaskExecutor], monkeypatch: pytest.MonkeyPatch, fate: str
+) -> None:
+    fetching, closing, seen = Event(), Event(), []
+    name = "result" if fate == "finished" else "exception"
+    fetch, close = getattr(Future, name), Client.close
+
+    def slow(future: Future, *args: object, **options: object) -> object:
+        if not future.key.startswith("sprag-1-"):
+            return fetch(future, *args, **options)
+        fetching.set()
+        seen.append(closing.wait(0.5))  # which only a connection that is closed too soon ends
+        found = fetch(future, *args, **options)
+        seen.append(future.client.status)
+        return found
+
+    def closed(client: Client, *args: object, **options: object) -> object:
+        closing.set()
+        return close(client, *args, **options)
+
+    executor = start(run=fakes.run if fate == "finished" else fakes.raising)
+    study = fakes.study(4)
+    ready(executor, study)
+    monkeypatch.setattr(Future, name, slow)
+    monkeypatch.setattr(Client, "close", closed)
+    executor.submit(0, study, Chunk(1, 0, 4))
+    assert fetching.wait(DEADLINE)
+    executor.close()
+    assert seen == [False, "running"]
+    assert closing.is_set()
+
+
+def test_nothing_is_asked_of_a_connection_that_was_closed(
+    start: Callable[..., DaskExecutor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+    executor = start(run=fakes.faulty(hang=frozenset({0})), chunk_timeout=3.0)
+    study = fakes.study(4)
+    ready(executor, study)
+    executor.submit(0, study, Chunk(1, 0, 4))
+    monkeypatch.setattr(Future, "exception", lambda future, **_: asked.append(future.key))
+    monkeypatch.setattr(Future, "result", lambda future, **_: asked.append(future.key))
+    executor.close()
+    # One thread calls back after the other, so that of the chunk is through when this one is.
+    if Future._cb_executor is not None:
+        Future._cb_executor.submit(int).result(DEADLINE)
+    assert asked == []
 
 
 def test_a_worker_with_another_engine_is_not_used(

@@ -14,7 +14,7 @@ from concurrent.futures import CancelledError
 from contextlib import suppress
 from functools import partial
 from queue import Empty, SimpleQueue
-from threading import RLock
+from threading import Condition, RLock
 from typing import TYPE_CHECKING, Any, Final
 from uuid import uuid4
 
@@ -45,6 +45,8 @@ LOOK_SECONDS: Final = 0.5
 SCHEDULER_SECONDS: Final = 60.0
 #: Seconds beyond a chunk's own after which a worker that should have ended itself counts as frozen.
 FROZEN_SECONDS: Final = 15.0
+#: Seconds for which the connection is kept for results that are just being fetched.
+FETCH_SECONDS: Final = 5.0
 #: What is asked of every Dask process that is started here.
 _CONFIG: Final = {
     "distributed.scheduler.allowed-failures": 0,
@@ -95,6 +97,9 @@ class DaskExecutor:
         self._scheduler_seconds = scheduler_seconds
         self._name = uuid4().hex[:12]
         self._lock = RLock()
+        #: Threads of Dask's that fetch what came of a job, over a connection that must stay till they are through.
+        self._fetching = 0
+        self._fetched = Condition(self._lock)
         self._workers: dict[str, Worker] = {}
         self._waiting: deque[Waiting] = deque()
         self._failed_loads: Counter[kernels.KernelShape] = Counter()
@@ -179,11 +184,7 @@ class DaskExecutor:
         """Leave the cluster, and end it when it is this executor's own."""
         with self._lock:
             self._waiting.clear()
-            self._workers.clear()
-            client, self._client = self._client, None
-        if client is not None:
-            with suppress(Exception):
-                client.close(timeout=5)
+        self._disconnect(timeout=5.0)
         if self._cluster is not None:
             self._cluster.close(timeout=5)
 
@@ -235,16 +236,11 @@ class DaskExecutor:
     def _scheduler_is_gone(self, error: Exception) -> None:
         """Hand back what was on its way; somebody may start the scheduler again."""
         now = time.monotonic()
-        client, self._client = self._client, None
         with self._lock:
             for worker in self._workers.values():
                 if (job := worker.job) and job.kind == "chunk" and not job.dropped:
                     self._outcomes.put(Outcome(job.ticket, Fate.STOPPED, detail="the scheduler was lost"))
-                worker.job = None
-            self._workers.clear()
-        if client is not None:
-            with suppress(Exception):
-                client.close(timeout=1)
+        self._disconnect(timeout=1.0)
         if self._gone_since is None:
             self._gone_since = now
             _LOG.error("The scheduler %s is not there; it is tried again: %s", self._address, error)
@@ -252,6 +248,18 @@ class DaskExecutor:
             raise ExecutorError(
                 f"the scheduler {self._address} was not there for {self._scheduler_seconds:g} s: {error}"
             )
+
+    def _disconnect(self, timeout: float) -> None:
+        """Give up every job, and close the connection when nobody is fetching a result over it any more."""
+        with self._lock:
+            client, self._client = self._client, None
+            for worker in self._workers.values():
+                worker.job = None
+            self._workers.clear()
+            self._fetched.wait_for(lambda: not self._fetching, FETCH_SECONDS)
+        if client is not None:
+            with suppress(Exception):
+                client.close(timeout=timeout)
 
     def _worker_is_gone(self, worker: Worker) -> None:
         if worker.job is not None:
@@ -312,17 +320,14 @@ class DaskExecutor:
 
     def _done(self, worker: Worker, job: Job, future: Future[Any]) -> None:
         """In a thread of Dask's: note what came of a job, and give the worker its next one."""
-        value: Any = None
-        error: BaseException | None
-        try:
-            error = future.exception(timeout=FROZEN_SECONDS) if future.status != "finished" else None
-            if error is None:
-                value = future.result(timeout=FROZEN_SECONDS)
-        except Exception as trouble:  # the value was lost with its worker, or the scheduler
-            error = CancelledError(str(trouble))
-        except CancelledError as trouble:
-            error = trouble
         with self._lock:
+            if worker.job is not job:  # given up, and the connection perhaps as well
+                return
+            self._fetching += 1
+        value, error = _fetched(future)
+        with self._lock:
+            self._fetching -= 1
+            self._fetched.notify_all()
             if worker.job is not job:  # given up meanwhile
                 return
             worker.job = None
@@ -363,6 +368,17 @@ class DaskExecutor:
             del self._failed_loads[shape]
             self._broken[shape] = reason
             self._outcomes.put(None)
+
+
+def _fetched(future: Future[Any]) -> tuple[Any, BaseException | None]:
+    """The value of a future that is through, or why there is none."""
+    try:
+        error = future.exception(timeout=FROZEN_SECONDS) if future.status != "finished" else None
+        return (future.result(timeout=FROZEN_SECONDS) if error is None else None), error
+    except Exception as trouble:  # the value was lost with its worker, or the scheduler
+        return None, CancelledError(str(trouble))
+    except CancelledError as trouble:
+        return None, trouble
 
 
 def _outcome(ticket: int, value: Any, error: BaseException | None) -> Outcome:
