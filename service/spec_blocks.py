@@ -31,12 +31,15 @@ class Block:
     make : callable
         Gives their columns: path -> values (SI), shape (count,). Tied paths share one array. None when something is
         wrong with a value, which is noted.
+    lines : tuple of int
+        Lines of the user's text in which the cases stand one by one; () where they do not stand in one.
     """
 
     pointer: str
     paths: tuple[str, ...]
     count: int
     make: Callable[[], dict[str, Column] | None]
+    lines: tuple[int, ...] = ()
 
 
 def made(blocks: Iterable[Block]) -> list[dict[str, Column]] | None:

@@ -55,10 +55,18 @@ def read_design(report: Report, found: Mapping[str, Any], machine: Machine) -> t
         return None, "zip"
     if conditions:
         columns = chosen(columns, kept(conditions, columns, machine.values, _length(columns)))
-    return (_as_axes(report, columns, excluded=bool(conditions)), "zip")
+        return _as_axes(report, columns, machine, excluded=True), "zip"
+    return _as_axes(report, columns, machine, block.lines), "zip"
 
 
-def _as_axes(report: Report, columns: dict[str, NDArray[np.float64]], excluded: bool) -> tuple[Axis, ...] | None:
+def _as_axes(
+    report: Report,
+    columns: dict[str, NDArray[np.float64]],
+    machine: Machine,
+    lines: tuple[int, ...] = (),
+    *,
+    excluded: bool = False,
+) -> tuple[Axis, ...] | None:
     count = _length(columns)
     if not count:
         message = "every case is excluded" if excluded else "nothing varies"
@@ -68,11 +76,20 @@ def _as_axes(report: Report, columns: dict[str, NDArray[np.float64]], excluded: 
     if first.size < count:
         again = int(np.setdiff1d(np.arange(count), first)[0])
         alike = np.all([column == column[again] for column in columns.values()], axis=0)
-        values = ", ".join(f"{path} = {column[again]:.10g}" for path, column in columns.items())
-        message = f"cases {int(np.flatnonzero(alike)[0])} and {again}, counted from 0, are the same"
-        report.problem("/axes", message, shorten_text(values), allowed="each combination of values once")
+        values = ", ".join(f"{path} = {column[again]:.10g}{_unit(machine, path)}" for path, column in columns.items())
+        before = int(np.flatnonzero(alike)[0])
+        message = f"cases {before} and {again}, counted from 0, are the same"
+        if lines:
+            message = f"lines {lines[before]} and {lines[again]} are the same"
+        where = "/axes/0/points" if lines else "/axes"
+        report.problem(where, message, shorten_text(values), allowed="each combination of values once")
         return None
     return as_axes(columns)
+
+
+def _unit(machine: Machine, path: str) -> str:
+    unit = machine.parameters[path].unit
+    return "" if unit == "1" else f" {unit}"
 
 
 def _length(columns: Mapping[str, NDArray[np.float64]]) -> int:
@@ -118,7 +135,8 @@ def _group(report: Report, pointer: str, items: object, combine: str | None, mac
         return None
     count = {"grid": math.prod(counts), "zip": counts[0], "union": sum(counts)}[combine]
     paths = tuple(dict.fromkeys(path for block in blocks for path in block.paths))
-    return Block(pointer, paths, count, partial(_make, report, where, blocks, combine, machine))
+    lines = blocks[0].lines if top and len(blocks) == 1 else ()
+    return Block(pointer, paths, count, partial(_make, report, where, blocks, combine, machine), lines)
 
 
 def _make(

@@ -23,20 +23,23 @@ def placed(parameter: Parameter, path: str) -> Parameter:
     return replace(parameter, path=path, unit=unit)
 
 
+def exact(value: object, parameter: Parameter) -> Fraction:
+    """The exact SI number that ``value`` means; QuantityError when it is none, or out of ``parameter``'s range."""
+    number = parse_exact(value, parameter.unit)
+    if not parameter.accepts(to_float(number)):
+        raise QuantityError("is out of range")
+    return number
+
+
 def read_exact(report: Report, pointer: str, value: object, parameter: Parameter) -> Fraction | None:
     """The exact SI number of one field, in ``parameter``'s range; None, and a problem noted, when it is not one."""
     if report.full:
         return None
     try:
-        number = parse_exact(value, parameter.unit)
-        rounded = to_float(number)
+        return exact(value, parameter)
     except QuantityError as error:
         report.problem(pointer, str(error), value, allowed=parameter.range_text(), unit=parameter.unit)
         return None
-    if not parameter.accepts(rounded):
-        report.problem(pointer, "is out of range", value, allowed=parameter.range_text(), unit=parameter.unit)
-        return None
-    return number
 
 
 def read_number(report: Report, pointer: str, value: object, parameter: Parameter) -> float | None:

@@ -6,14 +6,15 @@ import csv
 import io
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from service.spec_axes import read_paths
 from service.spec_blocks import Block
-from service.spec_fields import read_number, read_object
+from service.spec_fields import exact, read_object
 from service.spec_messages import Report, join, shorten_text
+from service.units import QuantityError, to_float
 from worker.limits import MAX_AXES, MAX_AXIS_VALUES
 
 if TYPE_CHECKING:
@@ -40,66 +41,97 @@ def read_points(report: Report, pointer: str, data: Mapping[str, Any], machine: 
     except csv.Error as error:
         report.problem(where, f"is no CSV text: {error}")
         return None
-    if len(rows) < 2 or not 1 <= len(rows[0]) <= MAX_AXES or len(rows) - 1 > MAX_AXIS_VALUES:
+    columns = len(rows[0].cells) if rows else 0
+    if len(rows) < 2 or not 1 <= columns <= MAX_AXES or len(rows) - 1 > MAX_AXIS_VALUES:
         report.problem(
-            where, f"has {max(len(rows) - 1, 0)} lines of {len(rows[0]) if rows else 0} columns under its header",
+            where, f"has {max(len(rows) - 1, 0)} lines of {columns} columns under its header",
             allowed=f"1 line or more of 1 to {MAX_AXES} columns",
         )  # fmt: skip
         return None
-    headings = [_read_heading(report, where, cell, machine) for cell in rows[0]]
+    headings = [_read_heading(report, where, cell, machine) for cell in rows[0].cells]
     known = [heading for heading in headings if heading is not None]
     if len(known) < len(headings):
         return None
-    columns = _read_cells(report, where, rows[1:], known)
-    if columns is None:
+    values = _read_cells(report, where, rows[1:], known)
+    if values is None:
         return None
-    paths = tuple(parameter.path for parameter, _ in known)
+    paths = tuple(heading.parameter.path for heading in known)
     if len(set(paths)) < len(paths):
         report.problem(where, "names the same path twice", [shorten_text(path) for path in paths])
         return None
-    return Block(pointer, paths, len(rows) - 1, lambda: dict(zip(paths, columns, strict=True)))
+    lines = tuple(row.line for row in rows[1:])
+    return Block(pointer, paths, len(lines), lambda: dict(zip(paths, values, strict=True)), lines)
 
 
-def _rows(text: str) -> list[list[str]]:
+class _Row(NamedTuple):
+    """The cells of a row and the line of the text that it ends in, from 1."""
+
+    line: int
+    cells: list[str]
+
+
+class _Heading(NamedTuple):
+    """What a column holds; ``unit`` is "" where its header gives none."""
+
+    parameter: Parameter
+    unit: str
+
+    def __str__(self) -> str:
+        return self.parameter.path + (f" [{self.unit}]" if self.unit else "")
+
+
+def _rows(text: str) -> list[_Row]:
     """Rows that are not empty. What the header is parted by, parts all of it: commas, or semicolons, or tabs."""
     header = text.lstrip().partition("\n")[0]
     delimiter = next((sign for sign in ",;\t" if sign in header), ",")
-    return [row for row in csv.reader(io.StringIO(text), delimiter=delimiter, strict=True) if any(row)]
+    reader = csv.reader(io.StringIO(text), delimiter=delimiter, strict=True)
+    return [_Row(reader.line_num, cells) for cells in reader if any(cells)]
 
 
-def _read_heading(report: Report, where: str, cell: str, machine: Machine) -> tuple[Parameter, str] | None:
+def _read_heading(report: Report, where: str, cell: str, machine: Machine) -> _Heading | None:
     match = _HEADING.fullmatch(cell)
     if match is None:
         report.problem(where, "has a heading that names no parameter", cell, allowed="a path, its unit in brackets")
         return None
     paths = read_paths(report, where, match[1], machine)
-    return None if paths is None else (machine.parameters[paths[0]], match[2] or "")
+    return None if paths is None else _Heading(machine.parameters[paths[0]], match[2] or "")
 
 
 def _read_cells(
-    report: Report, where: str, rows: list[list[str]], headings: list[tuple[Parameter, str]]
+    report: Report, where: str, rows: list[_Row], headings: list[_Heading]
 ) -> list[NDArray[np.float64]] | None:
     columns = [np.empty(len(rows)) for _ in headings]
     before = report.found
-    for number, row in enumerate(rows):
+    for number, (line, row) in enumerate(rows):
         if len(row) != len(headings):
-            report.problem(where, f"line {number + 2} has {len(row)} cells", allowed=f"{len(headings)} cells")
+            report.problem(where, f"line {line} has {len(row)} cells", allowed=f"{len(headings)} cells")
             continue
-        for column, cell, (parameter, unit) in zip(columns, row, headings, strict=True):
-            value = _read_cell(report, f"{where} line {number + 2}", cell.strip(), parameter, unit)
-            if value is not None:
-                column[number] = value
+        for column, cell, heading in zip(columns, row, headings, strict=True):
+            try:
+                column[number] = _read_cell(cell.strip(), heading)
+            except QuantityError as error:
+                written = f"{cell.strip()} {heading.unit}" if heading.unit and _is_number(cell) else cell.strip()
+                report.problem(
+                    where, f"line {line}, column {shorten_text(str(heading))}: {error}", written,
+                    allowed=heading.parameter.range_text(), unit=heading.parameter.unit,
+                )  # fmt: skip
         if report.full:
             break
     return None if report.found > before else [column + 0.0 for column in columns]
 
 
-def _read_cell(report: Report, where: str, cell: str, parameter: Parameter, unit: str) -> float | None:
+def _read_cell(cell: str, heading: _Heading) -> float:
     """A cell: a number in the unit of its column (SI where there is none), or a text with a unit of its own."""
+    if not cell:
+        raise QuantityError("is empty")
+    if not _is_number(cell):
+        return to_float(exact(cell, heading.parameter))
+    return to_float(exact(f"{cell} {heading.unit}" if heading.unit else float(cell), heading.parameter))
+
+
+def _is_number(cell: str) -> bool:
     try:
-        number: object = float(cell)
+        float(cell)
     except ValueError:
-        number = cell
-    if isinstance(number, float) and unit:
-        number = f"{cell} {unit}"
-    return read_number(report, where, number, parameter)
+        return False
+    return "_" not in cell  # which Python takes for a thousands separator

@@ -7,14 +7,15 @@ import glob
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Literal
 
 from service.cli.console import CommandFailureError, TroubleError, WrongInputError
 from service.leftovers import mark, sweep
-from service.spec_messages import SpecError
+from service.spec_messages import Problem, SpecError
 from worker.limits import MAX_BODY_BYTES
 
 if TYPE_CHECKING:
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
 #: Largest measured-data file that is read: far more rows than any clutch test has.
 MAX_DATA_BYTES = 16 * 1024 * 1024
+#: Fields of a spec that say what varies in it.
+DESIGN_FIELDS = ("axes", "combine", "exclude")
 #: Errors of the storage rather than of the name that was given.
 _STORAGE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS}
 
@@ -71,32 +74,57 @@ def _format(path: str, data: bytes) -> Literal["json", "toml"]:
     return "json" if data.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] in (b"{", b"[", b"") else "toml"
 
 
-def read_spec(path: str) -> object:
+def read_spec(path: str, points: str | None = None, limit: int = MAX_DATA_BYTES) -> object:
     """The plain data of the spec in a JSON or TOML file, or standard input for "-".
 
+    The cases of the CSV file ``points``, where one is named, take the place of the spec's axes; it may have ``limit``
+    bytes.
     Raises WrongInputError with every problem found.
     """
     from service.spec_text import load_spec
 
+    if path == points == "-":
+        problem = Problem("--points", "standard input is the spec already", allowed="a file")
+        raise WrongInputError("an option is wrong", problems=[problem])
     data = read_bytes(path, MAX_BODY_BYTES)
     try:
-        return load_spec(data, _format(path, data))
+        spec = load_spec(data, _format(path, data))
     except SpecError as error:
         raise spec_failure(path, error) from error
+    if points is None or not isinstance(spec, Mapping):
+        return spec
+    rest = {name: part for name, part in spec.items() if name not in DESIGN_FIELDS}
+    return {**rest, "axes": [{"points": decode(points, read_bytes(points, limit))}]}
 
 
-def read_study(path: str) -> ParsedSpec:
-    """The checked study of a spec file.
+def read_study(path: str, points: str | None = None) -> ParsedSpec:
+    """The checked study of a spec file, of the cases in ``points`` where that is given (see `read_spec`).
 
     Raises WrongInputError with every problem found.
     """
     from service.spec import parse_spec
 
-    data = read_spec(path)
+    data = read_spec(path, points)
+    with naming_points(points):
+        try:
+            return parse_spec(data)
+        except SpecError as error:
+            raise spec_failure(path, error) from error
+
+
+@contextmanager
+def naming_points(points: str | None) -> Iterator[None]:
+    """Problems of axes become problems of the file that the axes are from, where they are from one."""
     try:
-        return parse_spec(data)
-    except SpecError as error:
-        raise spec_failure(path, error) from error
+        yield
+    except WrongInputError as failure:
+        if points is None:
+            raise
+        told = [
+            replace(problem, pointer=points) if problem.pointer.startswith("/axes") else problem
+            for problem in failure.problems
+        ]
+        raise WrongInputError(failure.message, problems=told) from failure
 
 
 def spec_failure(path: str, error: SpecError) -> WrongInputError:

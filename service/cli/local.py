@@ -21,7 +21,7 @@ from service.cli.console import (
     write_text,
 )
 from service.cli.files import output, read_study
-from service.cli.options import ChunkCases, Fresh, JsonFlag, OutputFile, Processes, SpecFile
+from service.cli.options import ChunkCases, Fresh, JsonFlag, OutputFile, PointsFile, Processes, SpecFile
 from service.cli.remote import TableFormat, table_format
 from service.cli.settings import read_settings
 from service.spec_messages import Problem
@@ -50,10 +50,10 @@ class ValueFormat(StrEnum):
 _NO_POOL_SECONDS = 1.0
 
 
-def validate(spec: SpecFile, as_json: JsonFlag = False) -> None:
+def validate(spec: SpecFile, points: PointsFile = None, as_json: JsonFlag = False) -> None:
     """Check a spec: everything that is wrong, and what is allowed but odd."""
     try:
-        parsed = read_study(spec)
+        parsed = read_study(spec, points)
     except WrongInputError as failure:
         if not as_json or not failure.problems:
             raise
@@ -80,6 +80,7 @@ def _say_warnings(parsed: ParsedSpec) -> None:
 
 def preview(
     spec: SpecFile,
+    points: PointsFile = None,
     db: Annotated[
         str | None, typer.Option("--db", metavar="URL", help="Database to look through for cases it has already.")
     ] = None,
@@ -91,7 +92,7 @@ def preview(
     from worker.chunking import Chunking
 
     settings = read_settings(database=db, processes=processes)
-    parsed = read_study(spec)
+    parsed = read_study(spec, points)
     reusable = 0 if db is None else _reusable(settings, parsed)
     made = preview_json(parsed, Chunking(0, settings.pool_processes, settings.chunk_timeout), reusable)
     if as_json:
@@ -215,6 +216,7 @@ def presets(
 
 def run(
     spec: SpecFile,
+    points: PointsFile = None,
     file: OutputFile = None,
     form: Annotated[TableFormat | None, typer.Option("--format", help="Default: as FILE ends, else csv.")] = None,
     db: Annotated[
@@ -229,7 +231,7 @@ def run(
     from service.local import run_here
     from service.unaffected import Unaffected
 
-    parsed = read_study(spec)
+    parsed = read_study(spec, points)
     settings = read_settings(database=db, processes=processes, chunk_cases=chunk)
     _say_warnings(parsed)
     start = time.monotonic()

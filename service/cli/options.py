@@ -13,6 +13,14 @@ JsonFlag = Annotated[
     bool, typer.Option("--json", help="Data as JSON on standard output, failures as JSON on standard error.")
 ]
 SpecFile = Annotated[str, typer.Argument(metavar="SPEC", help="Study spec, JSON or TOML; - reads standard input.")]
+PointsFile = Annotated[
+    str | None,
+    typer.Option(
+        "--points",
+        metavar="FILE",
+        help="CSV file of cases, its header the paths of parameters, in the place of the spec's axes.",
+    ),
+]
 OutputFile = Annotated[
     str | None, typer.Option("-o", "--output", metavar="FILE", help="File to write; default: standard output.")
 ]
@@ -49,6 +57,7 @@ __all__ = [
     "Fresh",
     "JsonFlag",
     "OutputFile",
+    "PointsFile",
     "Processes",
     "Server",
     "SpecFile",

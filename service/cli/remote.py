@@ -22,10 +22,20 @@ from service.cli.console import (
     show_table,
     write_json,
 )
-from service.cli.files import read_spec, write_pieces
-from service.cli.options import DEFAULT_SERVER, Fresh, JsonFlag, OutputFile, Server, SpecFile, StudyId, Token
+from service.cli.files import naming_points, read_spec, write_pieces
+from service.cli.options import (
+    DEFAULT_SERVER,
+    Fresh,
+    JsonFlag,
+    OutputFile,
+    PointsFile,
+    Server,
+    SpecFile,
+    StudyId,
+    Token,
+)
 from service.spec_messages import Problem
-from worker.limits import MAX_PRIORITY
+from worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
 from worker.states import TERMINAL, StudyState
 
 if TYPE_CHECKING:
@@ -109,6 +119,7 @@ def _option(parameter: object) -> str:
 
 def submit(
     spec: SpecFile,
+    points: PointsFile = None,
     wait: Annotated[bool, typer.Option("--wait", help="Wait until the study has ended.")] = False,
     key: Annotated[
         str | None, typer.Option("--key", metavar="KEY", help="Idempotency key: the same key submits the study once.")
@@ -120,8 +131,8 @@ def submit(
     as_json: JsonFlag = False,
 ) -> None:
     """Submit a study to the service and print its id."""
-    data = read_spec(spec)
-    with connection(server, token) as client:
+    data = read_spec(spec, points, MAX_BODY_BYTES)
+    with naming_points(points), connection(server, token) as client:
         study = client.create_study(data, key, priority, fresh)
         say(*(f"warning: {warning}" for warning in study.get("warnings", ())))
         if wait:

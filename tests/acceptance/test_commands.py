@@ -8,13 +8,14 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import httpx
 import pytest
 
 from tests.acceptance.processes import COMMAND, EXAMPLES, SECONDS, Service, environment, service, sprag
+from tests.conftest import Finished
 
 SPEC = EXAMPLES / "one_pendulum.json"
 SMALL = EXAMPLES / "measured_clutch.json"
@@ -61,6 +62,25 @@ def test_a_study_from_submission_to_picture(running: Service, tmp_path: Path) ->
         assert sprag("export", study, "-o", file, *at).code == 0
         assert sprag("export", study, "--format", name[5:], *at).out == file.read_bytes()
     assert json.loads((tmp_path / "rows.json").read_text())["rows"][3]["case"] == 3
+
+
+def test_points_of_a_file_are_run_here_and_by_the_service(
+    running: Service, tmp_path: Path, sprag: Callable[..., Finished]
+) -> None:
+    at = ("--server", running.address)
+    points = tmp_path / "points.csv"
+    points.write_text("shaft.load;excitation.frequency [rpm]\n250 N*mm;1500\n0;1560\n")
+    here = sprag("run", SPEC, "--points", points, "--json")
+    assert here.code == 0
+    rows = here.data["rows"]
+    assert [tuple(row["parameters"].values()) for row in rows] == [(0.25, 25.0), (0.0, 26.0)]
+    submitted = sprag("submit", SPEC, "--points", points, "--wait", "--json", *at)
+    assert submitted.code == 0
+    assert sprag("export", submitted.data["id"], "--json", *at).data["rows"] == rows
+    points.write_text("shaft.load;excitation.frequency [rpm]\n250 N*mm;1500\n-1;1560\n")
+    refused = sprag("submit", SPEC, "--points", points, *at)
+    assert refused.code == 2
+    assert f"{points}: line 3, column shaft.load: is out of range (got '-1'; allowed: >= 0 N*m" in refused.err
 
 
 def test_the_same_key_submits_once(running: Service) -> None:

@@ -114,6 +114,37 @@ def test_toml_json_and_a_name_without_ending_are_told_apart(sprag: Sprag, exampl
     assert "TOML" in sprag("validate", path).err
 
 
+@pytest.mark.parametrize("command", ["validate", "preview", "run"])
+def test_what_is_wrong_with_points_is_told_of_their_file(
+    sprag: Sprag, examples: Path, tmp_path: Path, command: str
+) -> None:
+    points = tmp_path / "points.csv"
+    points.write_text("excitation.frequency [rpm];shaft.load\n1500;0.1\n\n1800;-250 N*mm\n-3;\n")
+    done = sprag(command, examples / "one_pendulum.json", "--points", points)
+    assert (done.code, done.out) == (2, "")
+    _, load, speed, empty = done.err.splitlines()
+    assert load.startswith(f"  {points}: line 4, column shaft.load: is out of range (got '-250 N*mm'; allowed: >= 0 ")
+    assert "line 5, column excitation.frequency [rpm]: is out of range (got '-3 rpm'; allowed: > 0 Hz" in speed
+    assert "line 5, column shaft.load: is empty" in empty
+    gone = sprag(command, examples / "one_pendulum.json", "--points", tmp_path / "none.csv")
+    assert (gone.code, gone.err) == (2, f"sprag: {tmp_path / 'none.csv'}: no such file or directory\n")
+    both = sprag(command, "-", "--points", "-")
+    assert both.code == 2
+    assert "--points: standard input is the spec already" in both.err
+
+
+def test_points_take_the_place_of_what_varies(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    points = tmp_path / "points.csv"
+    points.write_text("excitation.frequency [rpm],shaft.load\n1500,0.1\n1800,250 N*mm\n960,0\n")
+    spec = json.loads((examples / "one_pendulum.json").read_text())
+    assert spec["axes"]
+    path = tmp_path / "spec.json"
+    path.write_text(json.dumps({**spec, "combine": "grid", "exclude": [{"shaft.load": {"below": 1}}]}))
+    made = sprag("preview", path, "--points", points, "--json").data
+    assert made["cases"] == 3
+    assert [(axis["first"], axis["last"]) for axis in made["axes"]] == [(25.0, 16.0), (0.1, 0.0)]
+
+
 @pytest.mark.parametrize("target", ["", "/nowhere/rows.csv", "rows.csv/below"])
 def test_a_file_that_cannot_be_written(sprag: Sprag, examples: Path, tmp_path: Path, target: str) -> None:
     (tmp_path / "rows.csv").write_text("")

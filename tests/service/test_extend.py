@@ -85,7 +85,7 @@ def test_further_cases_come_after_those_there_are() -> None:
             "/axes/0/path",
             "different units",
         ),
-        ({"cases": [{"points": "shaft.load\n-1\n"}]}, "/cases/0/points line 2", ">= 0 N*m"),
+        ({"cases": [{"points": "shaft.load\n-1\n"}]}, "/cases/0/points", "line 2, column shaft.load"),
         ({"extra": 1}, "/extra", "unknown field"),
         ([], "", "must be an object"),
     ],
