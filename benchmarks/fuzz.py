@@ -1,50 +1,73 @@
-"""Made-up requests to every operation of the interface: ``python -m benchmarks.fuzz --examples 100``; takes minutes.
+"""Made-up requests to every operation of the interface, in all phases of schemathesis; takes minutes.
 
-The service runs in this process, on an empty database with one study of made-up rows. The suite sends a few of the same
-requests (tests/service/test_fuzzing.py).
+``python -m benchmarks.fuzz --examples 100``: a service of its own behind a real server on this machine, with a token,
+on a database with studies of made-up rows; motions are computed for real. The suite sends a few of the same requests
+(tests/service/test_fuzzing.py).
 """
 
 from __future__ import annotations
 
 import argparse
 import tempfile
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from anyio.from_thread import start_blocking_portal
+import httpx
+import uvicorn
+from pydantic import SecretStr
 
-from service.api.schedules import EXAMPLE
 from service.app import chunking, create_app
+from service.patience import PatientProtocol
 from service.settings import Settings
 from service.storage.store import Store
-from tests.service.conftest import InThread, PortalTransport, Service
-from tests.service.fuzzing import fuzz
-from tests.service.test_fuzzing import not_here
+from tests.service.conftest import InThread, Service
+from tests.service.fuzzing import fuzz, with_ids
+from tests.service.test_fuzzing import TOKEN, things
+
+
+@contextmanager
+def served(app: object) -> Iterator[str]:
+    """The address of a server of ``app`` in a thread."""
+    config = uvicorn.Config(app, port=0, http=PatientProtocol, log_level="error", server_header=False)  # type: ignore[arg-type]
+    server = uvicorn.Server(config)
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    while not server.started:
+        time.sleep(0.01)
+    try:
+        yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+    finally:
+        server.should_exit = True
+        thread.join()
 
 
 def main() -> None:
     """Send them and tell what came of it."""
-    import httpx
-
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--examples", type=int, default=100, help="requests of each kind to each operation")
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder, start_blocking_portal() as portal:
-        settings = Settings(database=str(Path(folder) / "sprag.sqlite3"), chunk_cases=2, processes=2)
+    with tempfile.TemporaryDirectory() as folder:
+        settings = Settings(
+            database=str(Path(folder) / "sprag.sqlite3"), chunk_cases=2, processes=2, token=SecretStr(TOKEN)
+        )
         with Store.open(settings.database_url, chunking=chunking(settings)) as store:
-            computer = InThread()
-            computer.answer = not_here
-            app = create_app(settings, store=store, computer=computer)
-            app.state.context.ending.set()
-            client = httpx.Client(transport=PortalTransport(app, portal), base_url="http://localhost")
-            service = Service(app, client, store, computer)
-            study_id = service.submit()
-            service.fill(study_id)
-            kept = client.post("/api/v1/schedules", json=EXAMPLE).json()["id"]
-            began = time.monotonic()
-            summary = fuzz(client, {"study_id": study_id, "case": "0", "schedule_id": kept}, options.examples)
-    print(f"{summary} in {time.monotonic() - began:.0f} s")
-    print("\n".join(summary.findings))
+            app = create_app(settings, store=store)
+            app.state.context.ending.set()  # streams of events end at once
+            with (
+                served(app) as address,
+                httpx.Client(base_url=address, headers={"Authorization": f"Bearer {TOKEN}"}) as client,
+            ):
+                ids = things(Service(app, client, store, InThread()))
+                document = client.get("/openapi.json").json()
+                began = time.monotonic()
+                summary = fuzz(with_ids(document, ids), TOKEN, options.examples, address=address)
+                print(f"{summary}\nin {time.monotonic() - began:.0f} s")
+            app.state.context.computer.close()
+    for finding, more in summary.findings.items():
+        print(f"{finding}\n{more}\n")
 
 
 if __name__ == "__main__":

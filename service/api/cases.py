@@ -11,7 +11,7 @@ from starlette.responses import Response
 from service import trajectories
 from service.api import models as m
 from service.api.context import Context, Ctx, StudyId
-from service.api.document import files, problems
+from service.api.document import files, format_query, one_of, problems
 from service.api.requests import strict_query
 from service.api.respond import choose_format, json_response
 from service.api.views import study_address
@@ -20,14 +20,22 @@ from service.errors import ApiError, parameter_error, shown
 from service.exports import MEDIA_TYPES, Format, row_json, rows_json
 from service.storage.records import CaseRow
 from worker import kernels
-from worker.limits import MAX_PAGE_SIZE, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
+from worker.limits import MAX_CASES, MAX_PAGE_SIZE, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 
 if TYPE_CHECKING:
     from worker.study import Study
 
 router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
 
-CaseNumber = Annotated[int, Path(ge=0, description="number of the case, from 0", examples=[0])]
+CaseNumber = Annotated[
+    int,
+    Path(
+        ge=0,
+        description="number of the case, from 0",
+        examples=[0],
+        json_schema_extra={"maximum": MAX_CASES - 1},
+    ),
+]
 _CASE_PROBLEMS = ("invalid-parameter", "study-not-found", "case-not-found")
 
 
@@ -36,8 +44,18 @@ def list_cases(
     context: Ctx,
     study_id: StudyId,
     page_size: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="most cases on the page")] = 100,
-    page_token: Annotated[str | None, Query(description="`next_page_token` of the page before")] = None,
-    ending: Annotated[str | None, Query(description="only cases with this ending", examples=["ok"])] = None,
+    page_token: Annotated[
+        str | None,
+        Query(description="`next_page_token` of the page before", json_schema_extra={"pattern": "^[0-9]{1,18}$"}),
+    ] = None,
+    ending: Annotated[
+        str | None,
+        Query(
+            description="only cases with this ending",
+            examples=["ok"],
+            json_schema_extra=one_of(map(str, kernels.ENDING_SENTENCES)),
+        ),
+    ] = None,
 ) -> Response:
     """Finished cases, in order of their numbers; of a cancelled study also those that were never run."""
     if ending is not None and ending not in kernels.ENDING_SENTENCES:
@@ -118,7 +136,7 @@ async def get_trajectory(
             examples=[50],
         ),
     ] = 1000,
-    form: Annotated[str | None, Query(alias="format", description="json or csv", examples=["json"])] = None,
+    form: Annotated[str | None, format_query(("json", "csv"))] = None,
 ) -> Response:
     """Every variable, torque, power and state of one case over time (or the angle). The case is run again for it."""
     chosen = choose_format(request, form, {"json": MEDIA_TYPES["json"], "csv": MEDIA_TYPES["csv"]})

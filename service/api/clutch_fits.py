@@ -24,7 +24,7 @@ from worker.kernels import ClutchFit
 router = APIRouter(tags=["clutch"], dependencies=[Depends(strict_query)])
 
 _FIELDS: Final = ("data", "accuracy", "max_degree", "through_origin", "angles_include_backlash", "backlash")
-_QUANTITY: Final = {"anyOf": [{"type": "number"}, {"type": "string"}]}
+_QUANTITY: Final = {"anyOf": [{"type": "number"}, {"type": "string", "minLength": 1}]}
 SCHEMA: Final[dict[str, Any]] = {
     "type": "object",
     "description": "Measured data of a clutch and how well it is to be fitted; numbers in SI or texts with a unit.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from threading import Event
-from typing import Annotated, cast
+from typing import Annotated, Final, cast
 
 from fastapi import Depends, Path, Request
 from starlette.convertors import Convertor, register_url_convertor
@@ -50,10 +50,14 @@ class Context:
     unaffected: Unaffected = field(default_factory=Unaffected)
 
 
+#: What an id can be; without a colon, which begins a verb.
+ID_PATTERN: Final = "^[A-Za-z0-9_-]{1,64}$"
+
+
 class StudyIdConvertor(Convertor[str]):
     """Part of an address that can be the id of a study; without a colon, which begins a verb."""
 
-    regex = "[A-Za-z0-9_-]{1,64}"
+    regex = ID_PATTERN.strip("^$")
 
     def convert(self, value: str) -> str:
         """The id as it stands in the address."""
@@ -79,4 +83,4 @@ async def _context(request: Request) -> Context:
 
 
 Ctx = Annotated[Context, Depends(_context)]
-StudyId = Annotated[str, Path(description="id of the study", examples=["st_0123456789abcdef"])]
+StudyId = Annotated[str, Path(description="id of the study", pattern=ID_PATTERN, examples=["st_0123456789abcdef"])]

@@ -12,7 +12,7 @@ from starlette.responses import Response
 from service import exports, plots, report
 from service.api import models as m
 from service.api.context import Ctx, StudyId
-from service.api.document import files, problems
+from service.api.document import files, format_query, problems
 from service.api.document import not_modified as documented_304
 from service.api.requests import strict_query
 from service.api.respond import choose_format, entity_tag, json_response, not_modified, streamed, tagged
@@ -44,7 +44,6 @@ Fixed = Annotated[
         examples=[["excitation.frequency=16 Hz"]],
     ),
 ]
-Form = Annotated[str | None, Query(alias="format", description="format of the answer", examples=["json"])]
 
 
 @router.get(
@@ -72,7 +71,7 @@ def get_curves(
         ),
     ] = None,
     at: Fixed = None,
-    form: Form = None,
+    form: Annotated[str | None, format_query(_CURVE_FORMATS)] = None,
 ) -> Response:
     """Results against one axis. An axis of several values that is neither x nor in `by` needs its value in `at`."""
     chosen = choose_format(request, form, _CURVE_FORMATS)
@@ -109,7 +108,7 @@ def get_map(
     y: Annotated[str, Query(description="path of the other axis", examples=["excitation.frequency"])],
     z: Annotated[str, Query(description="the result", examples=["shaft.speed.mean"])],
     at: Fixed = None,
-    form: Form = None,
+    form: Annotated[str | None, format_query(_MAP_FORMATS)] = None,
 ) -> Response:
     """One result over two axes."""
     chosen = choose_format(request, form, _MAP_FORMATS)
@@ -139,7 +138,7 @@ def get_results(
     context: Ctx,
     request: Request,
     study_id: StudyId,
-    form: Annotated[str | None, Query(alias="format", description=", ".join(exports.FORMATS), examples=["csv"])] = None,
+    form: Annotated[str | None, format_query(exports.FORMATS, "csv")] = None,
 ) -> Response:
     """Every finished case with all its results, in order of the cases: as a table, a labelled grid, or JSON."""
     chosen = choose_format(request, form, _JSON | {str(name): media for name, media in exports.MEDIA_TYPES.items()})
@@ -170,9 +169,7 @@ def get_report(
     context: Ctx,
     request: Request,
     study_id: StudyId,
-    form: Annotated[
-        str | None, Query(alias="format", description=" or ".join(report.REPORT_FORMATS), examples=["pdf"])
-    ] = None,
+    form: Annotated[str | None, format_query(report.REPORT_FORMATS, "pdf")] = None,
 ) -> Response:
     """A study as a printable page or a PDF: inputs, endings, ranges of all results, curves."""
     chosen = choose_format(request, form, {str(name): media for name, media in report.MEDIA_TYPES.items()})

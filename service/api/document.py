@@ -6,16 +6,21 @@ from collections.abc import Iterable
 from http import HTTPStatus
 from typing import Any, Final
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Query
 from fastapi.openapi.utils import get_openapi
 
+from service.api.links import add_links
 from service.errors import PROBLEM_MEDIA_TYPE, PROBLEM_TYPES, ErrorItem, Problem, ProblemType, problem_json
 
 API_PREFIX: Final = "/api/v1"
+_METRICS: Final = "/metrics"
 _SCHEMAS: Final = "#/components/schemas/"
 #: Problems that any operation of the API may answer with.
 _EVERYWHERE: Final = ("unauthorized", "wrong-host", "internal", "unavailable")
 _UNSAFE: Final = ("cross-site", "read-only", "too-slow")
+
+_TEXT: Final = {"type": "string"}
+_TAG: Final = {"ETag": {"description": "entity tag of the version", "required": True, "schema": _TEXT}}
 
 Responses = dict[int | str, dict[str, Any]]
 
@@ -66,7 +71,24 @@ def files(description: str, media_types: Iterable[str]) -> Responses:
 
 def not_modified() -> Responses:
     """Documentation of the answer to a conditional request."""
-    return {304: {"description": "The version named by If-None-Match is still the right one."}}
+    return {304: {"description": "The version named by If-None-Match is still the right one.", "headers": _TAG}}
+
+
+def located(status: int) -> Responses:
+    """Documentation of the answer that tells where the new thing is."""
+    return {status: {"headers": {"Location": {"description": "its address", "required": True, "schema": _TEXT}}}}
+
+
+def one_of(names: Iterable[str]) -> dict[str, Any]:
+    """``json_schema_extra`` of a text that takes these values only, which generated clients go on taking as a text."""
+    return {"pattern": f"^({'|'.join(names)})$"}
+
+
+def format_query(names: Iterable[str], example: str = "json") -> Any:
+    """The query parameter that chooses one of several formats of the answer."""
+    known = list(map(str, names))
+    description = f"format of the answer, else that of `Accept`: {', '.join(known)}"
+    return Query(alias="format", description=description, examples=[example], json_schema_extra=one_of(known))
 
 
 def build_openapi(app: FastAPI, extra_schemas: dict[str, Any]) -> dict[str, Any]:
@@ -90,12 +112,27 @@ def build_openapi(app: FastAPI, extra_schemas: dict[str, Any]) -> dict[str, Any]
     }
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
-            if path.startswith(API_PREFIX):
+            if path.startswith(API_PREFIX) or path == _METRICS:
                 operation["security"] = [{"bearer": []}, {}]
+            if path.startswith(API_PREFIX):
                 everywhere = problems(*_EVERYWHERE, *(_UNSAFE if method in ("post", "patch", "delete") else ()))
                 for status, response in everywhere.items():
                     _merge(operation["responses"], str(status), response)
+    add_links(document)
     return document
+
+
+def with_token_needed(document: dict[str, Any]) -> dict[str, Any]:
+    """The document of a service whose every operation but the open ones needs a token."""
+    needed: list[dict[str, list[str]]] = [{"bearer": []}]
+    paths = {
+        path: {
+            method: {**operation, "security": needed} if "security" in operation else operation
+            for method, operation in operations.items()
+        }
+        for path, operations in document["paths"].items()
+    }
+    return {**document, "paths": paths}
 
 
 def _merge(responses: dict[str, Any], status: str, response: dict[str, Any]) -> None:

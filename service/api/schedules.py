@@ -10,8 +10,8 @@ from starlette.responses import Response
 
 from service.api import examples
 from service.api import models as m
-from service.api.context import Ctx, StudyIdConvertor
-from service.api.document import API_PREFIX, body, problems
+from service.api.context import ID_PATTERN, Ctx, StudyIdConvertor
+from service.api.document import API_PREFIX, body, located, problems
 from service.api.requests import Body, read_body, strict_query
 from service.api.respond import json_response, timestamp
 from service.api.views import study_address
@@ -82,7 +82,9 @@ class ScheduleIdConvertor(StudyIdConvertor):
 
 register_url_convertor("schedule", ScheduleIdConvertor())
 
-ScheduleId = Annotated[str, Path(description="id of the schedule", examples=["sc_0123456789abcdef"])]
+ScheduleId = Annotated[
+    str, Path(description="id of the schedule", pattern=ID_PATTERN, examples=["sc_0123456789abcdef"])
+]
 Fields = Annotated[Body, Depends(read_body)]
 
 
@@ -90,7 +92,7 @@ Fields = Annotated[Body, Depends(read_body)]
     "/schedules",
     status_code=201,
     response_model=m.ScheduleDetail,
-    responses=problems(*_PROBLEMS, "wrong-state"),
+    responses=located(201) | problems(*_PROBLEMS, "wrong-state"),
     openapi_extra=body({"every working night": EXAMPLE}, {"$ref": "#/components/schemas/ScheduleRequest"}),
 )
 def create_schedule(context: Ctx, received: Fields) -> Response:

@@ -12,7 +12,7 @@ from service import exports, plots
 from service.api import models as m
 from service.api.context import Ctx, StudyId
 from service.api.curves import attachment, conditional, picture_of, picture_response
-from service.api.document import files, problems
+from service.api.document import files, format_query, problems
 from service.api.document import not_modified as documented_304
 from service.api.requests import strict_query
 from service.api.respond import choose_format, json_response
@@ -47,7 +47,7 @@ def get_sensitivity(
     y: Annotated[
         list[str], Query(description="result; may be repeated", examples=[["shaft.speed.mean"]], min_length=1)
     ],
-    form: Annotated[str | None, Query(alias="format", description="format of the answer", examples=["json"])] = None,
+    form: Annotated[str | None, format_query(_FORMATS)] = None,
 ) -> Response:
     """Main effects of every axis on results, and shares of their variance (Sobol indices)."""
     chosen = choose_format(request, form, _FORMATS)

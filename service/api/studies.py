@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Query, Request
+from pydantic import Field
 from starlette.responses import Response
 
 from service.api import examples, views
 from service.api import models as m
 from service.api.context import Ctx, StudyId
-from service.api.document import body, problems
+from service.api.document import body, located, one_of, problems
 from service.api.document import not_modified as documented_304
 from service.api.requests import Body, read_body, strict_query
 from service.api.respond import entity_tag, json_response, not_modified, tagged
@@ -26,6 +27,7 @@ from worker.states import StudyState
 router = APIRouter(tags=["studies"], dependencies=[Depends(strict_query)])
 
 _SPEC_BODY = body({"a grid of two axes": examples.SPEC}, {"$ref": "#/components/schemas/Spec"}, toml=examples.SPEC_TOML)
+_FAILED = [str(name) for name in ENDING_SENTENCES if name not in {OK, WorkerEnding.CANCELLED}]
 _BODY_PROBLEMS = ("invalid-parameter", "invalid-spec", "body-too-large", "unsupported-media-type")
 
 SpecBody = Annotated[Body, Depends(read_body)]
@@ -59,7 +61,7 @@ def _parsed(received: Body) -> ParsedSpec:
     "/studies",
     status_code=202,
     response_model=m.StudySummary,
-    responses=problems(*_BODY_PROBLEMS, "idempotency-conflict", "storage-full", "queue-full"),
+    responses=located(202) | problems(*_BODY_PROBLEMS, "idempotency-conflict", "storage-full", "queue-full"),
     openapi_extra=_SPEC_BODY,
 )
 def create_study(
@@ -87,7 +89,9 @@ def preview_study(context: Ctx, received: SpecBody) -> Response:
 def list_studies(
     context: Ctx,
     page_size: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="most studies on the page")] = 50,
-    page_token: Annotated[str | None, Query(max_length=200, description="`next_page_token` of the page before")] = None,
+    page_token: Annotated[
+        str | None, Query(min_length=1, max_length=200, description="`next_page_token` of the page before")
+    ] = None,
     state: Annotated[StudyState | None, Query(description="only studies in this state", examples=["finished"])] = None,
 ) -> Response:
     """Studies, newest first."""
@@ -162,14 +166,14 @@ def retry_study(
     context: Ctx,
     study_id: StudyId,
     ending: Annotated[
-        list[str] | None, Query(description="only cases that ended so; may be given again", examples=[["chatter"]])
+        list[Annotated[str, Field(json_schema_extra=one_of(_FAILED))]] | None,
+        Query(description="only cases that ended so; may be given again", examples=[["chatter"]]),
     ] = None,
 ) -> Response:
     """Run the cases of an ended study that did not end ok again, and no others."""
-    known = [name for name in ENDING_SENTENCES if name not in {OK, WorkerEnding.CANCELLED}]
     for name in ending or ():
-        if name not in known:
-            raise parameter_error("ending", "no ending of a failed case", name, ", ".join(known))
+        if name not in _FAILED:
+            raise parameter_error("ending", "no ending of a failed case", name, ", ".join(_FAILED))
     return json_response(views.summary(context.store.retry_study(study_id, ending)), 202)
 
 
@@ -177,7 +181,7 @@ def retry_study(
     "/studies/{study_id:study}:extend",
     status_code=202,
     response_model=m.StudySummary,
-    responses=problems(*_BODY_PROBLEMS, "study-not-found", "storage-full"),
+    responses=located(202) | problems(*_BODY_PROBLEMS, "study-not-found", "storage-full", "queue-full"),
     openapi_extra=body(
         {"further loads": examples.EXTENSION_AXES, "further cases": examples.EXTENSION_CASES},
         {"$ref": "#/components/schemas/Extension"},

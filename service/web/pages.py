@@ -14,6 +14,7 @@ from starlette.responses import Response
 from service.api import views
 from service.api.catalogues import preset_of
 from service.api.context import Ctx
+from service.api.document import with_token_needed
 from service.api.respond import entity_tag, json_response, not_modified, tagged
 from service.errors import PROBLEM_TYPES, ApiError
 from service.presets import preset_names
@@ -58,7 +59,8 @@ async def docs(request: Request) -> Response:
 @router.get("/openapi.json")
 async def openapi(request: Request) -> Response:
     """The interface for programs (OpenAPI 3.1)."""
-    return json_response(request.app.openapi())
+    document = request.app.openapi()
+    return json_response(with_token_needed(document) if request.app.state.access.needed else document)
 
 
 @router.get("/problems/{slug}")

@@ -1,26 +1,58 @@
-"""Requests made up from the service's own OpenAPI document, right and wrong ones, and what the answers must keep to."""
+"""Requests made up from the service's own OpenAPI document by schemathesis, in all its phases, and what came of them.
+
+The phases: the document's examples; coverage (every bound, type and missing part of every parameter and body, other
+methods, refused credentials); random right and wrong requests; and sequences along the document's links.
+"""
 
 from __future__ import annotations
 
+import copy
+import json
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from datetime import timedelta
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
 
-import httpx
-import hypothesis
 import schemathesis
-from hypothesis import HealthCheck, Phase
-from schemathesis import GenerationMode
-from schemathesis.checks import not_a_server_error
-from schemathesis.specs.openapi.checks import (
-    content_type_conformance,
-    response_schema_conformance,
-    status_code_conformance,
-)
+from schemathesis.config import SchemathesisConfig
+from schemathesis.engine import events, from_schema
 
-CHECKS = (not_a_server_error, status_code_conformance, content_type_conformance, response_schema_conformance)
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from schemathesis.engine.recorder import ScenarioRecorder
+    from schemathesis.specs.openapi.schemas import OpenApiSchema
+
+#: Every check that says something about this service. Left out: `missing_required_header` (there is none), and
+#: `object_level_authorization` (a token of scope write may do everything).
+CHECKS: Final = (
+    "not_a_server_error",
+    "status_code_conformance",
+    "content_type_conformance",
+    "response_headers_conformance",
+    "response_schema_conformance",
+    "negative_data_rejection",
+    "positive_data_acceptance",
+    "unsupported_method",
+    "allow_header_conformance",
+    "use_after_free",
+    "ensure_resource_availability",
+    "ignored_auth",
+)
+#: Operations whose bodies or queries keep to more than JSON Schema can say (units, cron expressions, names of a study's
+#: axes), so that what the document allows may still be refused.
+FURTHER_RULES: Final = (
+    "create_study",
+    "preview_study",
+    "extend_study",
+    "create_schedule",
+    "change_schedule",
+    "fit_clutch",
+    "list_studies",
+    "get_curves",
+    "get_map",
+    "get_sensitivity",
+    "get_trajectory",
+)
 
 
 @dataclass
@@ -28,72 +60,118 @@ class Summary:
     """What was sent and what came of it."""
 
     operations: int = 0
-    cases: int = 0
+    phases: Counter[str] = field(default_factory=Counter)
+    checks: Counter[str] = field(default_factory=Counter)
     statuses: Counter[int] = field(default_factory=Counter)
-    findings: list[str] = field(default_factory=list)
+    served: set[str] = field(default_factory=set)
+    findings: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def requests(self) -> int:
+        """Requests that were answered."""
+        return sum(self.statuses.values())
+
+    def note(self, phase: str, recorder: ScenarioRecorder) -> None:
+        """Count the requests of a scenario and keep what a check found."""
+        for identity, interaction in recorder.interactions.items():
+            if interaction.response is None:
+                self.findings[f"no answer: {interaction.request.method} {interaction.request.uri}"] = ""
+                continue
+            status = interaction.response.status_code
+            self.phases[phase] += 1
+            self.statuses[status] += 1
+            if status < 400 and identity in recorder.cases:
+                self.served.add(recorder.cases[identity].value.operation.label)
+            for check in recorder.checks.get(identity, ()):
+                self.checks[check.name] += 1
+                if check.failure_info is not None:
+                    operation = recorder.cases[identity].value.operation.label
+                    failure = check.failure_info.failure
+                    told = f"{phase}: {operation}: {check.name}: {status}: {failure.title}: {failure.message}"
+                    answer = interaction.response.text[:400]
+                    self.findings.setdefault(" ".join(told.split()), f"{check.failure_info.code_sample}\n{answer}")
 
     def __str__(self) -> str:
         statuses = ", ".join(f"{count} x {status}" for status, count in sorted(self.statuses.items()))
-        return f"{self.operations} operations, {self.cases} requests ({statuses}), {len(self.findings)} findings"
+        phases = ", ".join(f"{phase} {count}" for phase, count in self.phases.items())
+        return (
+            f"{self.operations} operations, {self.requests} requests ({phases}), {sum(self.checks.values())} checks, "
+            f"{len(self.findings)} findings\nanswers: {statuses}\nanswered without an error at least once: "
+            f"{len(self.served)} operations"
+        )
 
 
-def fuzz(client: httpx.Client, ids: dict[str, str], examples: int) -> Summary:
-    """Send up to ``examples`` valid and as many invalid requests to every operation, the same ones every time.
+def fuzz(
+    document: Mapping[str, Any],
+    token: str,
+    examples: int,
+    *,
+    app: Any = None,
+    address: str = "http://localhost",
+    skip: Mapping[str, tuple[str, ...]] | None = None,
+) -> Summary:
+    """Send requests to ``app``, or to the service at ``address``, with the token of scope write ``token``.
 
-    ``ids`` are the ids of things that there are, by the name of the parameter; most requests are about them.
+    ``examples`` are the requests of each kind to each operation in the random phases. The same ones are sent every
+    time. ``skip`` are phases that leave out an operation, by its id.
     """
-    document = client.get("/openapi.json").json()
-    schema = schemathesis.openapi.from_dict(document)
+    schemathesis.serializer("application/toml")(_toml)
+    config = SchemathesisConfig.from_dict(_config(token, examples, skip or {}))
+    schema: OpenApiSchema = schemathesis.openapi.from_dict(copy.deepcopy(dict(document)), config=config)
+    schema.app = app
+    schema.config.update(base_url=address)
     summary = Summary()
-    # What is deleted cannot be asked for any more.
-    for operation in sorted((found.ok() for found in schema.get_all_operations()), key=lambda o: o.method == "delete"):
-        summary.operations += 1
-        for mode in (GenerationMode.POSITIVE, GenerationMode.NEGATIVE):
-            try:
-                strategy = operation.as_strategy(generation_mode=mode)
-                _run(client, strategy, ids, examples, summary)
-            except (hypothesis.errors.Unsatisfiable, NotImplementedError):
-                continue  # nothing can be wrong about a request that has no parts
+    summary.operations = sum(1 for _ in schema.get_all_operations())
+    for event in from_schema(schema).execute():
+        if isinstance(event, events.ScenarioFinished):
+            summary.note(event.phase.value, event.recorder)
+        elif isinstance(event, events.NonFatalError):
+            summary.findings[f"{event.label}: {event.info.title}: {event.info.message}"] = str(event.value)
+        elif isinstance(event, events.FatalError):
+            raise event.exception
+        elif isinstance(event, events.EngineFinished):
+            summary.findings |= {failure.title: failure.message for failure in event.failures}
     return summary
 
 
-def _run(client: httpx.Client, strategy: Any, ids: dict[str, str], examples: int, summary: Summary) -> None:
-    turn: Iterator[int] = iter(range(10**9))
+def _config(token: str, examples: int, skip: Mapping[str, tuple[str, ...]]) -> dict[str, Any]:
+    return {
+        "seed": 1,
+        "continue-on-failure": True,
+        "request-timeout": 120,
+        "headers": {"Authorization": f"Bearer {token}"},
+        "generation": {
+            "max-examples": examples,
+            "deterministic": True,
+            "no-shrink": True,
+            "database": "none",
+        },
+        "checks": {"enabled": False, **{name: {"enabled": True} for name in CHECKS}},
+        "operations": [
+            {
+                "include-operation-id": list(FURTHER_RULES),
+                "checks": {"positive_data_acceptance": {"enabled": False}},
+            },
+            *(
+                {"include-operation-id": name, "phases": {phase: {"enabled": False} for phase in phases}}
+                for name, phases in skip.items()
+            ),
+        ],
+    }
 
-    @hypothesis.settings(
-        max_examples=examples,
-        derandomize=True,
-        database=None,
-        deadline=None,
-        phases=[Phase.generate],
-        suppress_health_check=list(HealthCheck),
-    )
-    @hypothesis.given(strategy)
-    def send(case: Any) -> None:
-        if next(turn) % 3 and case.path_parameters:
-            case.path_parameters |= {name: value for name, value in ids.items() if name in case.path_parameters}
-        kwargs = case.as_transport_kwargs(base_url="http://localhost")
-        body = {name: kwargs[name] for name in ("json", "data", "files") if kwargs.get(name) is not None}
-        if "data" in body and isinstance(body["data"], bytes | str):
-            body["content"] = body.pop("data")
-        try:
-            request = client.build_request(
-                kwargs["method"], kwargs["url"], params=kwargs.get("params"), headers=dict(kwargs["headers"]), **body
-            )
-        except (httpx.InvalidURL, UnicodeEncodeError, ValueError, TypeError):
-            return  # no client can send this
-        answer = client.send(request)
-        answer.elapsed = timedelta()  # nobody measures here
-        summary.cases += 1
-        summary.statuses[answer.status_code] += 1
-        try:
-            case.validate_response(answer, checks=CHECKS)
-        except schemathesis.errors.SchemathesisError:
-            raise
-        except BaseException as failure:
-            text = " ".join(str(failure).split())[:600]
-            summary.findings.append(
-                f"{request.method} {request.url} {request.content[:200]!r}: {answer.status_code} {text}"
-            )
 
-    send()
+def _toml(_context: Any, value: Any) -> Any:
+    """A body as it stands; whatever is no text is written as JSON, which is no TOML."""
+    return value if isinstance(value, bytes) else value.encode() if isinstance(value, str) else json.dumps(value)
+
+
+def with_ids(document: Mapping[str, Any], ids: Mapping[str, list[Any]]) -> dict[str, Any]:
+    """The document with ids of things that there are as examples of its parameters, by their names."""
+    changed = copy.deepcopy(dict(document))
+    for item in changed["paths"].values():
+        for operation in item.values():
+            for parameter in operation.get("parameters", ()):
+                if parameter["name"] in ids and parameter["in"] == "path":
+                    parameter.pop("example", None)
+                    parameter["schema"]["examples"] = ids[parameter["name"]]
+    return changed

@@ -10,14 +10,22 @@ import jsonschema
 import pytest
 from fastapi.routing import iter_route_contexts
 from openapi_spec_validator import OpenAPIV31SpecValidator
+from pydantic import SecretStr
 
 from service.api.schedules import EXAMPLE
+from service.app import create_app
 from service.errors import PROBLEM_TYPES
+from service.guard import OPEN_PATHS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import httpx
 
+    from service.settings import Settings
     from tests.service.conftest import Service
+
+    Connect = Callable[..., httpx.Client]
 
 METHODS = ("get", "post", "patch", "delete")
 
@@ -39,6 +47,38 @@ def operations(document: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]
 def test_the_document_is_openapi_3_1(document: dict[str, Any]) -> None:
     assert document["openapi"].startswith("3.1")
     OpenAPIV31SpecValidator(document).validate()
+
+
+def test_links_give_what_their_targets_take(document: dict[str, Any]) -> None:
+    by_id = {operation["operationId"]: operation for _, _, operation in operations(document)}
+    links = [
+        (link, answer)
+        for operation in by_id.values()
+        for answer in operation["responses"].values()
+        for link in answer.get("links", {}).values()
+    ]
+    targets = {link["operationId"] for link, _ in links}
+    assert {"get_study", "delete_study", "get_curves", "get_case", "change_schedule", "create_study"} <= targets
+    for link, answer in links:
+        target = by_id[link["operationId"]]
+        taken = {parameter["name"]: parameter for parameter in target.get("parameters", ())}
+        needed = {name for name, parameter in taken.items() if parameter["in"] == "path"}
+        assert needed == set(link.get("parameters", {})), link
+        assert ("requestBody" in link) <= ("requestBody" in target), link
+        assert "application/json" in answer["content"], link
+
+
+def test_the_document_says_whether_a_token_is_needed(service: Service, settings: Settings, connect: Connect) -> None:
+    with_token = settings.model_copy(update={"token": SecretStr("correct-horse-battery-staple")})
+    app = create_app(with_token, store=service.store, computer=service.computer)
+    header = {"Authorization": "Bearer correct-horse-battery-staple"}
+    guarded = connect(app).get("/openapi.json", headers=header).json()
+    OpenAPIV31SpecValidator(guarded).validate()
+    opened = service.http.get("/openapi.json").json()
+    for path, method, operation in operations(guarded):
+        wanted = None if path in OPEN_PATHS else [{"bearer": []}]
+        assert operation.get("security") == wanted, (path, method)
+        assert opened["paths"][path][method].get("security") == (wanted and [*wanted, {}])
 
 
 def test_every_operation_is_documented(service: Service, document: dict[str, Any]) -> None:
