@@ -22,8 +22,9 @@ demo: $(RUNTIME)
 serve: $(RUNTIME)
 	@$(BIN)/sprag serve
 
+# The tests of one file share processes and servers, so they stay together.
 test: check
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses logical --maxprocesses 4 --dist loadfile
 
 check: $(DEV)
 	$(BIN)/ruff check .

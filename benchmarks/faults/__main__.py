@@ -34,7 +34,7 @@ def main() -> None:
     drill("stopped", stopped, "dispatchers are stopped, replaced and woken", cases=4_000, rounds=10, seed=1)
     drill(
         "badcases", badcases, "cases that crash or never return",
-        cases=20_000, crashing=5, hanging=0, seed=1, periods=8000.0, timeout=600.0,
+        cases=20_000, crashing=5, hanging=0, seed=1, periods=3000.0, timeout=600.0,
     )  # fmt: skip
     drill("cache", cache, "the cache of compiled kernels is damaged", cases=512)
     drill("disk", disk, "the disk is full (as root: it mounts a small one)", cases=20_000, megabytes=40)
