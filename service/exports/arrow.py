@@ -11,7 +11,8 @@ import numpy as np
 import pyarrow as pa
 
 from service.catalogue import unit_of
-from service.exports.source import description_of, given
+from service.exports.inputs import description_of
+from service.exports.source import machine
 
 if TYPE_CHECKING:
     from service.exports.source import Source
@@ -48,7 +49,7 @@ class _Pieces(io.RawIOBase):
 def schema(source: Source) -> pa.Schema:
     """Columns ``case``, axis paths, ``ending``, ``flags``, results; unit and meaning as metadata of each field.
 
-    The study itself is metadata of the whole, JSON under ``sprag``: its base, run, and ``given`` as the user wrote it.
+    The study itself is metadata of the whole, JSON under ``sprag``, as `machine` tells it.
     """
     study = source.study
     fields = [pa.field("case", pa.int64(), nullable=False)]
@@ -73,14 +74,7 @@ def schema(source: Source) -> pa.Schema:
         )
         for info in source.infos
     ]
-    about = {
-        **source.about,
-        "base": study.base,
-        "run": study.run,
-        "combine": study.combine,
-        "given": given(source.spec),
-    }
-    return pa.schema(fields, metadata={"sprag": json.dumps(about)})
+    return pa.schema(fields, metadata={"sprag": json.dumps({**source.about, **machine(source)})})
 
 
 def batch(source: Source, block: RowBlock, made: pa.Schema) -> pa.RecordBatch:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from service.catalogue import unit_of
-from service.exports.source import description_of, given
+from service.exports.inputs import description_of
+from service.exports.source import machine
 from service.exports.spool import spooled
 
 if TYPE_CHECKING:
@@ -73,10 +74,7 @@ def _about(source: Source) -> dict[str, Any]:
     return {
         "title": study.name,
         **{name: str(value) for name, value in source.about.items()},
-        "base": json.dumps(study.base),
-        "run": json.dumps(study.run),
-        "combine": study.combine,
-        "given": json.dumps(given(source.spec)),
+        **{name: part if isinstance(part, str) else json.dumps(part) for name, part in machine(source).items()},
     }
 
 

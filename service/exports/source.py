@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
-from service.catalogue import parameter_of, unit_of
+from service.exports.inputs import choices, defaults
 
 if TYPE_CHECKING:
     from service.storage.records import RowBlock
@@ -33,37 +33,21 @@ class Source:
     spec: Mapping[str, Any] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
-class Input:
-    """One number of the machine, as a table of inputs shows it; ``varies`` tells that the axes change it."""
+def machine(source: Source) -> dict[str, Any]:
+    """The machine and its run for programs, plain JSON data.
 
-    path: str
-    value: float | None
-    unit: str
-    description: str
-    varies: bool
-
-
-def description_of(study: Study, path: str) -> str:
-    """What a flat SPEC path means, as a few words; "" where the catalogue does not have it."""
-    entry = parameter_of(study, path)
-    return "" if entry is None else entry.help
-
-
-def inputs(study: Study) -> tuple[Input, ...]:
-    """Every number of the study: the base's, and what varies, which has no single value."""
-    varying = study.axis_paths
-    paths = dict.fromkeys((*varying, *study.base))
-    return tuple(
-        Input(
-            path,
-            None if path in varying else study.base[path],
-            unit_of(study, path),
-            description_of(study, path),
-            path in varying,
-        )
-        for path in paths
-    )
+    ``base`` and ``run`` in SI numbers, ``choices`` (what is no number), ``defaults`` (paths of what nobody gave), and
+    ``given``, both as the user wrote them.
+    """
+    study, spec = source.study, source.spec
+    return {
+        "base": study.base,
+        "choices": choices(study, spec),
+        "run": study.run,
+        "combine": study.combine,
+        "given": given(spec),
+        "defaults": defaults(study, spec),
+    }
 
 
 def given(spec: Mapping[str, Any]) -> dict[str, Any]:
@@ -86,16 +70,3 @@ def _flat(path: str, value: object) -> Iterator[tuple[str, str]]:
     else:
         text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
         yield path, text.encode("utf-8", "backslashreplace").decode()
-
-
-def run_texts(study: Study) -> dict[str, str]:
-    """The settings of the run as people read them."""
-    return {name: _text(value) for name, value in study.run.items() if value is not None}
-
-
-def _text(value: object) -> str:
-    if isinstance(value, list | tuple):
-        if len(value) == 2 and isinstance(value[1], str):
-            return f"{value[0]:g} {value[1]}"
-        return " to ".join(map(_text, value))
-    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from service.catalogue import unit_of
 from service.errors import to_bytes
-from service.exports.source import given
+from service.exports.source import machine
 
 if TYPE_CHECKING:
     from service.exports.source import Source
@@ -48,7 +48,7 @@ def json_pieces(source: Source) -> Iterator[bytes]:
             for axis in study.axes
         ],
         "results": [{"name": info.name, "unit": info.unit} for info in source.infos],
-        "given": given(source.spec),
+        **machine(source),
     }
     yield to_bytes(head)[:-1] + b',"rows":['
     separator = b"\n"

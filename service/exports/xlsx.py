@@ -12,7 +12,8 @@ import xlsxwriter
 from xlsxwriter.worksheet import Worksheet
 
 from service.catalogue import unit_of
-from service.exports.source import given_texts, inputs, run_texts
+from service.exports.inputs import inputs, run_inputs
+from service.exports.source import given_texts
 from service.exports.spool import spooled
 
 if TYPE_CHECKING:
@@ -103,7 +104,8 @@ def _write_row(sheet: Any, row: int, cells: list[Any]) -> None:
 def _inputs(book: Any, source: Source, title: Any) -> None:
     sheet = book.add_worksheet("inputs", _ExactSheet)
     sheet.set_column(0, 0, 36)
-    sheet.set_column(1, 3, 18)
+    sheet.set_column(1, 2, 18)
+    sheet.set_column(3, 3, 40)
     row = 0
 
     def line(*cells: object, style: Any = None) -> None:
@@ -119,14 +121,14 @@ def _inputs(book: Any, source: Source, title: Any) -> None:
     for name, value in source.about.items():
         line(name, value)
     line()
-    if run := run_texts(source.study):
-        line("run", style=title)
-        for name, text in run.items():
-            line(name, text)
+    if run := run_inputs(source.study, source.spec):
+        line("run", "", "", "", "origin", style=title)
+        for item in run:
+            line(item.path, item.value, "", "", item.origin)
         line()
-    line("parameter", "value", "unit", "meaning", style=title)
-    for item in inputs(source.study):
-        line(item.path, "varies" if item.varies else item.value, item.unit, item.description)
+    line("parameter", "value", "unit", "meaning", "origin", style=title)
+    for item in inputs(source.study, source.spec):
+        line(item.path, "varies" if item.varies else item.value, item.unit, item.description, item.origin)
     line()
     if texts := given_texts(source.spec):
         line("as given", "value", style=title)

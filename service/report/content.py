@@ -11,7 +11,8 @@ import numpy as np
 
 from service.catalogue import unit_of
 from service.curves import Curves, Fetch, draw, select
-from service.exports.source import Input, given_texts, inputs, run_texts
+from service.exports.inputs import Input, inputs, run_inputs
+from service.exports.source import given_texts
 from service.main_curve import main_query
 from service.plots import require_drawable
 from service.selection import SelectionError
@@ -62,7 +63,7 @@ class Report:
     facts: tuple[tuple[str, str], ...]
     warnings: tuple[str, ...]
     axes: tuple[AxisRow, ...]
-    run: dict[str, str]
+    run: tuple[Input, ...]
     endings: tuple[tuple[str, int, str], ...]
     inputs: tuple[Input, ...]
     given: dict[str, str]
@@ -102,9 +103,9 @@ def make_report(
             AxisRow(", ".join(a.paths), unit_of(study, a.paths[0]), len(a), a.values[0], a.values[-1])
             for a in study.axes
         ),
-        run_texts(study),
+        run_inputs(study, spec),
         tuple((name, count, kernels.ENDING_SENTENCES.get(name, "")) for name, count in endings.items()),
-        inputs(study),
+        inputs(study, spec),
         {path: _shortened(text) for path, text in given_texts(spec).items()},
         ranges(infos, blocks),
         pictures,

@@ -25,6 +25,7 @@ def _template() -> Template:
         lstrip_blocks=True,
     )
     environment.filters["number"] = number_text
+    environment.filters["input"] = input_text
     environment.filters["picture"] = _picture
     return environment.get_template("report.html")
 
@@ -32,6 +33,11 @@ def _template() -> Template:
 def number_text(value: float | None) -> str:
     """A number as people read it, a dash for none."""
     return "–" if value is None else f"{value:.6g}"
+
+
+def input_text(value: float | str | None) -> str:
+    """An input: a number as people read it, a choice as it is called."""
+    return value if isinstance(value, str) else number_text(value)
 
 
 def _picture(curves: Curves) -> str:

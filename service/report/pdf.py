@@ -8,12 +8,13 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
 from service.plots import paint_curves, painting, writable
-from service.report.html import number_text
+from service.report.html import input_text, number_text
 
 if TYPE_CHECKING:
     from matplotlib.backends.backend_pdf import PdfPages
     from matplotlib.figure import Figure
 
+    from service.exports.inputs import Input
     from service.report.content import Report
 
 _A4: Final = (8.27, 11.69)
@@ -70,7 +71,7 @@ def _lines(report: Report) -> Iterator[str]:
             for axis in report.axes
         ],
     )
-    yield from _section("Run", [f"{name:20} {text}" for name, text in report.run.items()])
+    yield from _section("Run", [f"{item.path:20} {item.value}{_mark(item)}" for item in report.run])
     head = f"{'':34} {'unit':12} {'least':>12} {'mean':>12} {'largest':>12} {'cases':>9}"
     ranges = [
         f"{row.info.name:34} {row.info.unit:12} {number_text(row.least):>12} {number_text(row.mean):>12} "
@@ -81,14 +82,19 @@ def _lines(report: Report) -> Iterator[str]:
     yield from _section(
         "Inputs",
         [
-            f"{item.path:34} {'varies' if item.varies else number_text(item.value):>12} {item.unit:12} "
-            f"{item.description}"
+            f"{item.path:34} {'varies' if item.varies else input_text(item.value):>12} {item.unit:12} "
+            f"{item.description}{_mark(item)}"
             for item in report.inputs
         ],
     )
     yield from _section("Machine and run as given", [f"{path:40} {text}" for path, text in report.given.items()])
     if report.note:
         yield from _section("Curves", [report.note])
+
+
+def _mark(item: Input) -> str:
+    """What is said of an input that the user did not give."""
+    return f" ({item.origin})" if item.origin in ("default", "fitted") else ""
 
 
 def _section(title: str, lines: Sequence[str]) -> Iterator[str]:

@@ -18,6 +18,8 @@ from service.api.respond import timestamp
 from service.catalogue import parameter_of, unit_of
 from service.curves import select
 from service.errors import ApiError
+from service.exports.inputs import inputs as every_input
+from service.exports.inputs import run_inputs
 from service.fits import fit_json
 from service.main_curve import caption, drawn_numbers
 from service.selection import SelectionError
@@ -30,6 +32,8 @@ from worker import kernels
 from worker.states import TRANSITIONS, StudyEvent, StudyState
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from starlette.datastructures import QueryParams
 
     from service.curves import CurveQuery
@@ -90,8 +94,8 @@ def study_page(context: Ctx, study_id: StudyId) -> Response:
         curves=f"/studies/{study_id}/curves?{urlencode(pairs)}",
         only_row=None if first is None else first.results.items(),
         units={info.name: info.unit for info in kernels.study_results(study)},
-        inputs=inputs(study),
-        run=run_lines(study),
+        inputs=inputs(study, frame["study"]["spec"]),
+        run=run_inputs(study, frame["study"]["spec"]),
         fits=fits_of(frame["study"]["spec"]),
     )
 
@@ -112,43 +116,15 @@ def _with_rows(context: Context, study: Study, study_id: str, query: CurveQuery 
     return replace(query, at=tuple((path, repr(values[path])) for path, _ in query.at))
 
 
-def inputs(study: Study) -> list[tuple[str, list[dict[str, Any]]]]:
-    """Every parameter of the base by its section, with letter, value and unit; those on an axis say so."""
-    varied = study.axis_paths
+def inputs(study: Study, spec: Mapping[str, Any]) -> list[tuple[str, list[dict[str, Any]]]]:
+    """Every parameter of the base by its section, with letter, value, unit and where it is from."""
     sections: dict[str, list[dict[str, Any]]] = {}
-    for path in dict.fromkeys((*study.base, *varied)):
-        entry = parameter_of(study, path)
-        section, _, name = path.rpartition(".")
-        sections.setdefault(section, []).append(
-            {
-                "name": name,
-                "path": path,
-                "symbol": f"c_{int(name) + 1}" if name.isdigit() else "" if entry is None else entry.symbol,
-                "help": "" if entry is None else entry.help,
-                "value": study.base.get(path),
-                "unit": unit_of(study, path),
-                "varied": path in varied,
-            }
-        )
+    for item in every_input(study, spec):
+        entry = parameter_of(study, item.path)
+        section, _, name = item.path.rpartition(".")
+        symbol = f"c_{int(name) + 1}" if name.isdigit() else "" if entry is None else entry.symbol
+        sections.setdefault(section, []).append({"name": name, "symbol": symbol, "item": item})
     return [(section or "in general", rows) for section, rows in sections.items()]
-
-
-def run_lines(study: Study) -> list[tuple[str, str]]:
-    """The run as people read it."""
-
-    def time(value: Any) -> str:
-        return f"{value[0]:g} {value[1]}"
-
-    lines = []
-    for name, value in study.run.items():
-        if name == "duration":
-            lines.append((name, time(value)))
-        elif name == "window":
-            shown = "the last third" if value is None else f"{time(value[0])} to {time(value[1])}"
-            lines.append(("evaluated window", shown))
-        else:
-            lines.append((name, f"{value:g}" if isinstance(value, float) else str(value)))
-    return lines
 
 
 def fits_of(spec: dict[str, Any]) -> dict[str, tuple[dict[str, Any], FitChart]]:
