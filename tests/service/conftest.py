@@ -134,13 +134,19 @@ def empty_database(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.fixture
-def settings(tmp_path: Path, empty_database: bytes, monkeypatch: pytest.MonkeyPatch) -> Settings:
+def chunk_cases() -> int:
+    """Cases to a chunk; few, so that small studies have several."""
+    return 2
+
+
+@pytest.fixture
+def settings(tmp_path: Path, empty_database: bytes, chunk_cases: int, monkeypatch: pytest.MonkeyPatch) -> Settings:
     """Settings of a service of this test, whatever the environment says."""
     for name in Settings.model_fields:
         monkeypatch.delenv(f"SPRAG_{name.upper()}", raising=False)
     database = tmp_path / "sprag.sqlite3"
     database.write_bytes(empty_database)
-    return Settings(database=str(database), chunk_cases=2, processes=2)
+    return Settings(database=str(database), chunk_cases=chunk_cases, processes=2)
 
 
 @pytest.fixture

@@ -62,6 +62,7 @@ def test_figures_have_the_numbers_of_the_interface(service: Service) -> None:
     assert (heat["z"], heat["customdata"]) == (drawn["z"]["values"], drawn["cases"])
 
 
+@pytest.mark.parametrize("chunk_cases", [5_000])
 def test_a_long_curve_is_thinned_and_keeps_its_highest_point(service: Service, spec: dict[str, Any]) -> None:
     spec["axes"] = [{"path": "shaft.load", "linspace": [0, 1, 20_000]}]
     study_id = service.submit(spec)
