@@ -9,39 +9,19 @@ from __future__ import annotations
 
 import argparse
 import tempfile
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
-import uvicorn
 from pydantic import SecretStr
 
 from service.app import chunking, create_app
-from service.patience import PatientProtocol
 from service.settings import Settings
 from service.storage.store import Store
 from tests.service.conftest import InThread, Service
 from tests.service.fuzzing import fuzz, with_ids
 from tests.service.test_fuzzing import TOKEN, things
-
-
-@contextmanager
-def served(app: object) -> Iterator[str]:
-    """The address of a server of ``app`` in a thread."""
-    config = uvicorn.Config(app, port=0, http=PatientProtocol, log_level="error", server_header=False)  # type: ignore[arg-type]
-    server = uvicorn.Server(config)
-    thread = threading.Thread(target=server.run)
-    thread.start()
-    while not server.started:
-        time.sleep(0.01)
-    try:
-        yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
-    finally:
-        server.should_exit = True
-        thread.join()
+from tests.serving import served
 
 
 def main() -> None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, cast
+from typing import Final, cast
 from urllib.parse import urlsplit
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
 
 from service.access import COOKIE, SESSION_SECONDS, Access, Grant
@@ -14,13 +14,15 @@ from service.web.templates import page
 
 router = APIRouter(include_in_schema=False)
 
+_LONGEST: Final = 4000
+
 
 def _access(request: Request) -> Access:
     return cast("Access", request.app.state.access)
 
 
 @router.get("/login")
-async def login(request: Request, next: Annotated[str, Query(max_length=2000)] = "/") -> Response:
+async def login(request: Request, next: str = "/") -> Response:
     """The form for the token, or who is logged in."""
     return _page(request, next)
 
@@ -65,12 +67,21 @@ def _page(request: Request, wanted: str, fault: str = "", status: int = 200) -> 
 
 
 def _within(address: str) -> str:
-    """``address`` if it leads to a page of this service, else the first page: nobody is sent elsewhere after login."""
+    """``address`` if it leads to a page of this service, else the first page: nobody is sent elsewhere after login.
+
+    One too long for the cookie's answer to repeat is the first page too, rather than a way in that is barred.
+    """
     try:
         parts = urlsplit(address)
     except ValueError:
         return "/"
-    plain = address.isascii() and address.isprintable() and "\\" not in address and not address.startswith("//")
+    plain = (
+        len(address) <= _LONGEST
+        and address.isascii()
+        and address.isprintable()
+        and "\\" not in address
+        and not address.startswith("//")
+    )
     return address if plain and address.startswith("/") and not parts.scheme and not parts.netloc else "/"
 
 

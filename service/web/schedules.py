@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Final
 from zoneinfo import ZoneInfo
@@ -26,6 +27,7 @@ from worker.limits import MAX_PRIORITY
 
 router = APIRouter(include_in_schema=False)
 
+_WHOLE: Final = re.compile(r"-?[0-9]{1,8}")
 #: Studies that are offered as what is to be run.
 _OFFERED: Final = 50
 _EMPTY: Final[Values] = {"when": "cron", "cron": "0 22 * * 1-5", "zone": "UTC", "priority": "0"}
@@ -115,7 +117,7 @@ def _data_of(context: Context, values: Mapping[str, str]) -> dict[str, Any]:
         "name": values.get("name", "").strip() or None,
         "zone": values.get("zone", "").strip(),
         "window": [begin, end] if begin or end else None,
-        "priority": int(priority) if priority.lstrip("-").isdecimal() and len(priority) < 9 else priority,
+        "priority": int(priority) if _WHOLE.fullmatch(priority) else priority,
         "fresh": "fresh" in values,
     }
     when = "at" if values.get("when") == "at" else "cron"

@@ -146,6 +146,8 @@ def _config(token: str, examples: int, skip: Mapping[str, tuple[str, ...]]) -> d
             "no-shrink": True,
             "database": "none",
         },
+        # The document's own links only: guessed ones take the address of a verb for that of a study.
+        "phases": {"stateful": {"inference": {"algorithms": []}}},
         "checks": {"enabled": False, **{name: {"enabled": True} for name in CHECKS}},
         "operations": [
             {

@@ -306,6 +306,8 @@ def test_a_browser_is_led_to_the_login_and_back(office: Office) -> None:
     page = browser.get(login)
     assert page.status_code == 200
     assert 'value="/compare?study=st_1&amp;study=st_2"' in page.text
+    far = browser.get(browser.get("/compare?" + "study=st_1&" * 400).headers["location"])
+    assert (far.status_code, 'value="/"' in far.text) == (200, True)
     wrong = browser.post("/login", data={"token": "wrong", "next": "/new"})
     assert wrong.status_code == 401
     assert "no valid token" in wrong.text

@@ -80,6 +80,24 @@ def test_a_hostile_spec_is_no_matter_for_the_form(service: Service, name: str) -
         assert answer.status_code in (200, 413, 422), (field, answer.text[:300])
 
 
+FORM = {"when": "cron", "cron": "0 22 * * *", "zone": "Europe/Berlin", "priority": "0", "at": "2030-01-01T10:00"}
+TEXTS = (
+    *("--5", "-", "1e5", "\u0663", "9" * 400, "\x00", "../../etc/passwd", "0-99999999999999 * * * *", "nan"),
+    *("9999-12-31T23:59-23:59", "0001-01-01T00:00+23:59", "study \x00", "preset ../x", "<script>alert(1)</script>"),
+)
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_a_hostile_field_of_a_schedule_is_told_beside_it(service: Service, text: str) -> None:
+    source = f"study {service.submit()}"
+    for field in ("source", "name", "zone", "cron", "at", "window_begin", "window_end", "priority", "when"):
+        form = {"source": source, **FORM, "when": "at" if field == "at" else "cron", field: text}
+        answer = service.http.post("/schedules/new", data=form)
+        assert answer.status_code in (303, 422), (field, answer.text[:300])
+        assert "<script>alert" not in answer.text
+    assert "<script>alert" not in service.http.get("/schedules").text
+
+
 @pytest.mark.parametrize("kind", ["json", "toml"])
 @pytest.mark.parametrize("name", BODIES)
 def test_a_hostile_file_is_refused_by_the_commands(
