@@ -143,9 +143,9 @@ def _panel_axes(panel: int, info: ResultInfo, row: tuple[int, int], column: tupl
 
 
 def _legend(drawn: Sequence[tuple[str, Curves]], lines: int) -> Figure:
-    """Few lines are named above the panels, which then have the whole width; many beside them."""
+    """Few lines are named above the panels, which then have the whole width; many beside them, as are families."""
     title: Figure = {"text": _legend_title(drawn)}
-    if lines > len(PALETTE):
+    if lines > len(PALETTE) or _named_apart(drawn):
         return {"title": title, "tracegroupgap": 0}
     return {"title": title, "orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom", "tracegroupgap": 0}
 
@@ -154,7 +154,12 @@ def _legend_title(drawn: Sequence[tuple[str, Curves]]) -> str:
     chosen = drawn[0][1].selection
     paths = list(chosen.lines[0].by)
     titles = [axis_title(chosen.names[path], chosen.units[path]) for path in paths]
-    return ", ".join(["Study", *titles] if len(drawn) > 1 else titles)
+    return "Study" if len(drawn) > 1 and not titles else ", ".join(titles)
+
+
+def _named_apart(drawn: Sequence[tuple[str, Curves]]) -> bool:
+    """Whether the name of a study stands over its lines, which are told apart by values."""
+    return len(drawn) > 1 and bool(drawn[0][1].selection.lines[0].by)
 
 
 def _short(label: str) -> str:
@@ -171,21 +176,23 @@ def _panel_traces(lines: Sequence[tuple[str, Curve]], info: ResultInfo, panel: i
         kept = thin(y, most)
         x = np.array(curve.line.x)
         joined = bool(np.all(np.diff(x) > 0.0))
-        name = ", ".join(
-            [*([escaped(_short(label))] if label else []), *(number(value) for value in curve.line.by.values())]
-        )
+        study = escaped(_short(label))
+        values = ", ".join(number(value) for value in curve.line.by.values())
+        first = index == 0 or lines[index - 1][0] != label
         yield {
             "type": "scatter",
             "mode": ("lines+markers" if kept.size <= _MARKED else "lines") if joined else "markers",
-            "name": name or escaped(words(info.name)),
+            "name": values or study or escaped(words(info.name)),
             "legendgroup": str(index),
+            "legendgrouptitle": {"text": study if values and first else ""},
             "showlegend": panel == 0,
             "x": x[kept].tolist(),
             "y": numbers(y[kept]),
             "customdata": curve.line.cases[kept].tolist(),
             "line": {"color": colour, "width": 1.8, "dash": DASHES[labels.index(label) % len(DASHES)]},
             "marker": {"color": colour, "symbol": symbol, "size": 6},
-            "hovertemplate": f"%{{x:.5g}}, %{{y:.5g}} {unit_text(info.unit)}<br>case %{{customdata}}",
+            "hovertemplate": f"%{{x:.5g}}, %{{y:.5g}} {unit_text(info.unit)}<br>case %{{customdata}}"
+            f"<extra>{', '.join(text for text in (study, values) if text) or escaped(words(info.name))}</extra>",
             "xaxis": "x" if panel == 0 else f"x{panel + 1}",
             "yaxis": "y" if panel == 0 else f"y{panel + 1}",
         }

@@ -143,6 +143,20 @@ def fits_of(spec: dict[str, Any]) -> dict[str, tuple[dict[str, Any], FitChart]]:
     return found
 
 
+@router.get("/studies/{study_id:study}/delete")
+def delete_page(context: Ctx, study_id: StudyId) -> Response:
+    """The question whether a study is to be deleted, and what goes with it."""
+    record = context.store.get_study(study_id)
+    return page("delete.html", study=views.summary(record), ended=record.state.terminal)
+
+
+@router.post("/studies/{study_id:study}/delete")
+def delete(context: Ctx, study_id: StudyId) -> Response:
+    """The answer: the study is deleted, and the list of those that are left is shown."""
+    context.store.delete_study(study_id)
+    return RedirectResponse("/", status_code=303)
+
+
 @router.post("/studies/{study_id:study}/{verb}")
 def act(context: Ctx, study_id: StudyId, verb: str) -> Response:
     """A button of the page: the wish is written down, and the page shown again."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -106,6 +107,27 @@ def test_compared_studies_tell_what_is_held_with_its_unit(service: Service, spec
     assert second.endswith("room for: the end")
 
 
+def test_a_compared_family_says_the_name_of_a_study_once(service: Service, spec: dict[str, Any]) -> None:
+    ids = [service.submit({**spec, "name": name, "axes": [LOAD, FREQUENCY]}) for name in ("first & best", "other")]
+    for study_id in ids:
+        service.fill(study_id)
+    query = {"study": ids, "x": "shaft.load", "by": "excitation.frequency"}
+    figure = service.http.get("/compare/figure", params=query).json()
+    values = [f"{value:g}" for value in FREQUENCY["values"]]
+    assert [line["name"] for line in figure["data"]] == values * 2
+    titles = [line["legendgrouptitle"]["text"] for line in figure["data"]]
+    rest = [""] * (len(values) - 1)
+    assert titles == ["first &amp; best", *rest, "other", *rest]
+    assert figure["layout"]["legend"]["title"]["text"] == "Excitation frequency (Hz)"
+    # What the pointer shows has no heading above it and says both.
+    assert "<extra>other, " in figure["data"][-1]["hovertemplate"]
+    picture = service.http.get("/compare/picture.svg", params=query)
+    assert picture.status_code == 200
+    texts = re.findall(r"<!-- (.*?) -->", picture.text)
+    assert texts.count("other") == 1
+    assert [text for text in texts if text in values].count(values[0]) >= 2
+
+
 def test_a_picture_without_rows_is_a_sentence_and_the_first_one_has_rows(
     service: Service, spec: dict[str, Any]
 ) -> None:
@@ -196,3 +218,30 @@ def test_wishes_come_from_buttons(service: Service) -> None:
         assert service.get(f"/studies/{study_id}")["state"] == state
     assert service.http.post(f"/studies/{study_id}/resume").status_code == 409
     assert service.http.post(f"/studies/{study_id}/explode").status_code == 404
+
+
+def test_a_study_is_deleted_after_a_question_and_only_once_it_has_ended(service: Service) -> None:
+    study_id, other = service.submit(), service.submit()
+    address = f"/studies/{study_id}/delete"
+    asked = service.http.get(address)
+    assert asked.status_code == 200
+    assert "has not ended" in asked.text
+    assert "<button" not in asked.text.partition("<main")[2]
+    refused = service.http.post(address, headers={"Accept": "text/html"})
+    assert refused.status_code == 409
+    assert service.get(f"/studies/{study_id}")["state"] == "queued"
+    assert address not in service.http.get(f"/studies/{study_id}").text
+
+    service.fill(study_id)
+    assert f'href="{address}"' in service.http.get(f"/studies/{study_id}").text
+    assert f'<form method="post" action="{address}">' in service.http.get(address).text
+    assert service.get(f"/studies/{study_id}")["state"] == "finished"  # asking deletes nothing
+    strange = service.http.post(address, headers={"Origin": "http://elsewhere.example"})
+    assert strange.status_code == 403
+    assert service.get(f"/studies/{study_id}")["state"] == "finished"
+    done = service.http.post(address)
+    assert (done.status_code, done.headers["location"]) == (303, "/")
+    for gone in (f"/studies/{study_id}", f"/api/v1/studies/{study_id}"):
+        assert service.http.get(gone).status_code == 404
+    assert service.http.post(address).status_code == 404
+    assert other in service.http.get("/").text
