@@ -5,10 +5,12 @@ from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 from numba.core import cgutils
+from numba.core.compiler import CompilerBase
 from numba.core.types import unliteral
 from numba.extending import intrinsic
 
 from engine.cache import cache_folder
+from engine.program import PartCompiler, ProgramCompiler
 
 setattr(numba.config, "CACHE_DIR", str(cache_folder()))  # noqa: B010  (numba does not declare it)
 
@@ -19,18 +21,27 @@ R = TypeVar("R")
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile ``function`` on first call and keep the machine code in numba's on-disk cache.
 
-    Strict arithmetic: division by zero gives infinities as in numpy, nothing is contracted or reordered. A function
-    that several others call exists in several copies, each optimised with its caller, and which copy runs depends on
-    what was compiled or loaded before; only strict arithmetic gives the same bits from all of them.
+    Strict arithmetic: division by zero gives infinities as in numpy, nothing is contracted or reordered. So a function
+    that several others call gives the same bits from each of the copies that are optimised with them.
     """
-    jitted = _for_any_number(numba.njit(cache=True, error_model="numpy")(function))
-    return cast(Callable[P, R], jitted)
+    return _compiled(function, ProgramCompiler)
+
+
+def part(function: Callable[P, R]) -> Callable[P, R]:
+    """The same for a function that only compiled code calls: it is compiled as part of that (``program``)."""
+    return _compiled(function, PartCompiler)
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
-    """The same for a short function: its callers take its code in instead of passing it their many arrays."""
-    jitted = _for_any_number(numba.njit(cache=True, error_model="numpy", forceinline=True)(function))
-    return cast(Callable[P, R], jitted)
+    """A short part: its callers take its code in instead of passing it their many arrays."""
+    return _compiled(function, PartCompiler, forceinline=True)
+
+
+def _compiled(
+    function: Callable[P, R], pipeline_class: type[CompilerBase], forceinline: bool = False
+) -> Callable[P, R]:
+    decorate = numba.njit(cache=True, error_model="numpy", pipeline_class=pipeline_class, forceinline=forceinline)
+    return cast(Callable[P, R], _for_any_number(decorate(function)))
 
 
 def _for_any_number(dispatcher: Any) -> Any:

@@ -12,7 +12,7 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.jit import compiled
+from engine.jit import part
 
 Floats = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ def work_stack() -> Floats:
     return np.zeros((MAX_DEPTH + 3, MAX_DEGREE + 3))
 
 
-@compiled
+@part
 def evaluate(g: Floats, degree: int, x: float) -> float:
     """Value of ``sum g[k] x^k`` for k = 0..degree."""
     # Even and odd part by Horner's scheme in x^2: two short chains of operations instead of a long one.
@@ -53,7 +53,7 @@ def evaluate(g: Floats, degree: int, x: float) -> float:
     return even + x * odd
 
 
-@compiled
+@part
 def _value_and_slope(g: Floats, degree: int, x: float) -> tuple[float, float]:
     y = x * x
     even = d_even = odd = d_odd = 0.0
@@ -66,7 +66,7 @@ def _value_and_slope(g: Floats, degree: int, x: float) -> tuple[float, float]:
     return even + x * odd, odd + 2.0 * (x * d_even + y * d_odd)
 
 
-@compiled
+@part
 def _slope_and_curvature(g: Floats, degree: int, x: float) -> tuple[float, float]:
     y = x * x
     even = d_even = odd = d_odd = 0.0
@@ -83,7 +83,7 @@ def _slope_and_curvature(g: Floats, degree: int, x: float) -> tuple[float, float
     return even + x * odd, odd + 2.0 * (x * d_even + y * d_odd)
 
 
-@compiled
+@part
 def _start(g: Floats, degree: int, stack: Floats) -> None:
     """Put the interval [0, 1] on the stack: the Bernstein coefficients of the monomial coefficients ``g``."""
     b = stack[0]
@@ -97,7 +97,7 @@ def _start(g: Floats, degree: int, stack: Floats) -> None:
     b[_WIDTH] = 1.0
 
 
-@compiled
+@part
 def _halve(stack: Floats, top: int, degree: int) -> None:
     """De Casteljau at 1/2: the right half stays in place, the left half goes on top of the stack."""
     right = stack[top]
@@ -116,7 +116,7 @@ def _halve(stack: Floats, top: int, degree: int) -> None:
     right[_WIDTH] = half
 
 
-@compiled
+@part
 def _refine_root(g: Floats, degree: int, low: float, high: float, guess: float) -> float:
     """The single sign change of ``g`` between ``low`` (positive there) and ``high`` (not positive): Newton kept
     inside.
@@ -142,7 +142,7 @@ def _refine_root(g: Floats, degree: int, low: float, high: float, guess: float) 
     return x
 
 
-@compiled
+@part
 def _refine_peak(g: Floats, degree: int, low: float, high: float, guess: float, rises: bool) -> float:
     """The single zero of the derivative of ``g`` between ``low`` and ``high``: Newton kept inside.
 
@@ -167,7 +167,7 @@ def _refine_peak(g: Floats, degree: int, low: float, high: float, guess: float, 
     return x
 
 
-@compiled
+@part
 def _shape(g: Floats, degree: int) -> tuple[float, float, float, bool, int]:
     """Value at 1, sum of the moduli of all coefficients but the first, slope at 1, monotony, sign of the curvature.
 
@@ -194,7 +194,7 @@ def _shape(g: Floats, degree: int) -> tuple[float, float, float, bool, int]:
     return end, moduli, slope, degree == 0 or 2.0 * abs(g[1]) > slopes, sign
 
 
-@compiled
+@part
 def first_root(g: Floats, degree: int, stack: Floats) -> float:
     """Smallest x in [0, 1] at which ``g``, positive before, stops being positive.
 
@@ -262,7 +262,7 @@ def first_root(g: Floats, degree: int, stack: Floats) -> float:
     return NO_ROOT
 
 
-@compiled
+@part
 def largest(g: Floats, degree: int, known: float, stack: Floats) -> float:
     """Larger of ``known`` and the largest value of ``sum g[k] x^k`` on [0, 1].
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.jit import compiled, inlined
+from engine.jit import inlined, part
 from engine.taylor.batch import HARD, NONE, RESULT, SLOTS, STATUS, put, slot_start, take
 from engine.taylor.roots import RECIPROCAL, first_root
 from engine.vibration_drive.automaton import CLUTCH_TARGET, Band
@@ -119,7 +119,7 @@ def _enter(
     return used + 1
 
 
-@compiled
+@part
 def collect_guards(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks: Floats, meta: Ints, used: int) -> int:
     """List the guards of a lane that its step may violate; the length of the list then.
 
@@ -155,7 +155,7 @@ def collect_guards(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks
     return used
 
 
-@compiled
+@part
 def settle_guards(
     W: Floats, Z: Ints, lay: Layout, g: Floats, stack: Floats, blocks: Floats, meta: Ints, used: int
 ) -> None:
@@ -172,7 +172,7 @@ def settle_guards(
         _offer(W, Z, lay, meta[slot, 0], x, meta[slot, 1], meta[slot, 2])
 
 
-@compiled
+@part
 def _start(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> None:
     """Start of interaction (5): the relative turn counts from here."""
     lanes = lay.lanes
@@ -214,7 +214,7 @@ def _start(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> None:
     set_clutch(W, Z, lay, lane, i, state)
 
 
-@compiled
+@part
 def transit(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
     """Carry out the event that ended a lane's step: exact values at the crossing, then the new state.
 

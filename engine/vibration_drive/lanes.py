@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.endings import ENDING_CODES, Ending
-from engine.jit import compiled
+from engine.jit import part
 from engine.taylor.roots import evaluate
 from engine.vibration_drive import states as ev
 from engine.vibration_drive.advance import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR
@@ -46,7 +46,7 @@ _P_COPIED = PENDULUM_COLUMNS - 2
 OUT_ENDING, OUT_STEPS, OUT_EVENTS, OUT_RUNUP, OUT_SUMS = 0, 1, 2, 3, 4
 
 
-@compiled
+@part
 def load_case(W: Floats, Z: Ints, lay: Layout, lane: int, case: int, cases: Floats, literal: int) -> None:
     """Put a case into a lane at t = 0 (MODEL.md A2, "Start"). ``cases`` has the columns of ``cases.case_matrix``."""
     lanes = lay.lanes
@@ -84,7 +84,7 @@ def load_case(W: Floats, Z: Ints, lay: Layout, lane: int, case: int, cases: Floa
     watch_extrema(W, lay, lane, False)
 
 
-@compiled
+@part
 def _zero_sums(W: Floats, lay: Layout, lane: int) -> None:
     for row in range(lay.sum_held, lay.work_clutch + 1):
         W[row * lay.lanes + lane] = 0.0
@@ -97,7 +97,7 @@ def _zero_sums(W: Floats, lay: Layout, lane: int) -> None:
         W[lay.driving_max * lay.lanes + lane] += W[(base + lay.p_engaged) * lay.lanes + lane]
 
 
-@compiled
+@part
 def _input_work(W: Floats, lay: Layout, lane: int) -> float:
     total = 0.0
     for i in range(lay.n):
@@ -107,7 +107,7 @@ def _input_work(W: Floats, lay: Layout, lane: int) -> float:
     return total
 
 
-@compiled
+@part
 def _pass_stop(W: Floats, Z: Ints, lay: Layout, lane: int, stop: int, sums: Floats) -> None:
     """Do what a stop asks: 0 starts the window, 1 its whole periods, 2 ends it (3, the end of the run, asks
     nothing).
@@ -138,7 +138,7 @@ def _pass_stop(W: Floats, Z: Ints, lay: Layout, lane: int, stop: int, sums: Floa
         watch_extrema(W, lay, lane, False)
 
 
-@compiled
+@part
 def next_stop(W: Floats, Z: Ints, lay: Layout, lane: int, cases: Floats, sums: Floats) -> bool:
     """Pass every stop that is due, set the next one (at the latest the period's end); False when the run is over.
 
@@ -160,7 +160,7 @@ def next_stop(W: Floats, Z: Ints, lay: Layout, lane: int, cases: Floats, sums: F
     return bool(Z[lane, ev.NEXT_STOP] < STOPS)
 
 
-@compiled
+@part
 def runup_periods(turns: Floats, periods: int) -> float:
     """Periods until the period-mean speed first reaches its share of the final one; NaN where the shaft does not turn.
 
@@ -181,7 +181,7 @@ def runup_periods(turns: Floats, periods: int) -> float:
     return math.nan
 
 
-@compiled
+@part
 def _finish(
     W: Floats, Z: Ints, lay: Layout, lane: int, ending: int, cases: Floats, turns: Floats, sums: Floats
 ) -> None:
@@ -197,7 +197,7 @@ def _finish(
         out[OUT_RUNUP] = cases[case, _PERIOD] * runup_periods(turns[lane], Z[lane, ev.PERIOD])
 
 
-@compiled
+@part
 def _take_event(W: Floats, Z: Ints, lay: Layout, lane: int, h: float, most_events: int) -> int:
     """Carry out the event at the step's end and count it; the ending it causes, if any."""
     Z[lane, ev.EVENTS_AT_ONCE] = 0 if h > 0.0 else Z[lane, ev.EVENTS_AT_ONCE] + 1
@@ -214,7 +214,7 @@ def _take_event(W: Floats, Z: Ints, lay: Layout, lane: int, h: float, most_event
     return _RUNNING
 
 
-@compiled
+@part
 def _lost(W: Floats, lay: Layout, lane: int, most_steps: int) -> int:
     """The abnormal ending a lane has reached after a step, or ``_RUNNING``."""
     lanes = lay.lanes
@@ -232,7 +232,7 @@ def _lost(W: Floats, lay: Layout, lane: int, most_steps: int) -> int:
     return _STEP_BUDGET if W[lay.steps * lanes + lane] >= most_steps else _RUNNING
 
 
-@compiled
+@part
 def settle(
     W: Floats,
     Z: Ints,
@@ -271,7 +271,7 @@ def settle(
     return False
 
 
-@compiled
+@part
 def shorten(W: Floats, lay: Layout, lane: int, g: Floats) -> None:
     """Halve the part x of the step that is taken until the series of every clutch's torque meets its law there."""
     lanes = lay.lanes
@@ -293,7 +293,7 @@ def shorten(W: Floats, lay: Layout, lane: int, g: Floats) -> None:
         W[lay.at_stop * lanes + lane] = 0.0
 
 
-@compiled
+@part
 def look_for_events(
     W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks: Floats, meta: Ints, used: int
 ) -> int:
@@ -303,7 +303,7 @@ def look_for_events(
     return collect_guards(W, Z, lay, lane, g, blocks, meta, used)
 
 
-@compiled
+@part
 def record(
     W: Floats, Z: Ints, lay: Layout, lane: int, times: Floats, done: int, g: Floats, samples: Floats, states: Ints
 ) -> int:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.jit import compiled
+from engine.jit import part
 from engine.vibration_drive.layout import Layout
 from engine.vibration_drive.states import ENGAGED, FREE, LOCKED, ROTATING, SHAFT_STATE, law, set_clutch
 
@@ -18,7 +18,7 @@ _TOUCHING = 1e-9
 EDGE = 1e-10
 
 
-@compiled
+@part
 def acceleration(W: Floats, lay: Layout, lane: int, i: int) -> float:
     """Acceleration of pendulum ``i`` without its clutch, at the lane's state (equation (1))."""
     lanes = lay.lanes
@@ -37,7 +37,7 @@ def acceleration(W: Floats, lay: Layout, lane: int, i: int) -> float:
     )
 
 
-@compiled
+@part
 def lock_share(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> float:
     """Torque that would keep w = 0 at clutch ``i``, as a share of its c_1, when interaction starts with delta = 0.
 
@@ -66,7 +66,7 @@ def lock_share(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> float:
     return float(needed / first)
 
 
-@compiled
+@part
 def _touches(W: Floats, Z: Ints, lay: Layout, lane: int, j: int, size: float) -> bool:
     """Whether clutch ``j``, not locked, is at w = 0 and u = 0 to rounding and could lock; ``size``: a typical speed."""
     lanes = lay.lanes
@@ -80,7 +80,7 @@ def _touches(W: Floats, Z: Ints, lay: Layout, lane: int, j: int, size: float) ->
     return bool(abs(w) <= near and (Z[lane, j] == FREE or wound))
 
 
-@compiled
+@part
 def lock_together(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float) -> bool:
     """Lock clutch ``i`` together with all others that touch at the same time, if the torques of all allow it.
 

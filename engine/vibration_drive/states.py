@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.jit import compiled
+from engine.jit import part
 from engine.vibration_drive.automaton import CLUTCH_THRESHOLD, Band, Clutch, Shaft, Threshold
 from engine.vibration_drive.layout import Layout
 
@@ -41,7 +41,7 @@ NO_EVENT = -2
 OF_SHAFT = -1
 
 
-@compiled
+@part
 def law(W: Floats, first: int, count: int, lanes: int, lane: int, u: float) -> float:
     """Clutch torque at windup ``u`` by the polynomial whose coefficients start at workspace row ``first``."""
     value = 0.0
@@ -50,7 +50,7 @@ def law(W: Floats, first: int, count: int, lanes: int, lane: int, u: float) -> f
     return value
 
 
-@compiled
+@part
 def law_slope(W: Floats, first: int, count: int, lanes: int, lane: int, u: float) -> float:
     """Derivative of ``law``."""
     value = 0.0
@@ -59,7 +59,7 @@ def law_slope(W: Floats, first: int, count: int, lanes: int, lane: int, u: float
     return value
 
 
-@compiled
+@part
 def stored_energy(W: Floats, lay: Layout, lane: int, i: int, u: float) -> float:
     """Energy Pi(u) in the clutch of pendulum ``i`` at windup ``u >= 0``, the straight part beyond the data included."""
     base = lay.pendulums + i * lay.stride
@@ -77,7 +77,7 @@ def stored_energy(W: Floats, lay: Layout, lane: int, i: int, u: float) -> float:
     return float(value)
 
 
-@compiled
+@part
 def watch_fall(W: Floats, lay: Layout, lane: int, i: int, fall: bool) -> None:
     """Let an engaged clutch under literal resets wait for w to fall through 0 (``fall``), or after that to rise through
     it.
@@ -87,7 +87,7 @@ def watch_fall(W: Floats, lay: Layout, lane: int, i: int, fall: bool) -> None:
     W[(first + _W_HIGH) * lay.lanes + lane] = NEVER if fall else 0.0
 
 
-@compiled
+@part
 def set_clutch(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, state: int) -> None:
     """Put the clutch of pendulum ``i`` into a state: its guards' bands, the law in force, the flags."""
     lanes = lay.lanes
@@ -128,7 +128,7 @@ def set_clutch(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, state: int) -
     _set_mobility(W, Z, lay, lane)
 
 
-@compiled
+@part
 def set_shaft(W: Floats, Z: Ints, lay: Layout, lane: int, state: int) -> None:
     """Put the shaft into a state: its guard, its flag, its mobility."""
     lanes = lay.lanes
@@ -141,7 +141,7 @@ def set_shaft(W: Floats, Z: Ints, lay: Layout, lane: int, state: int) -> None:
     _set_mobility(W, Z, lay, lane)
 
 
-@compiled
+@part
 def _set_mobility(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
     """1/(inertia of the shaft and of all pendulums locked to it), or 0 while the load holds it."""
     lanes = lay.lanes

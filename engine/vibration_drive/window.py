@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.jit import compiled, inlined
+from engine.jit import inlined, part
 from engine.taylor.batch import HARD, KNOWN, RESULT, SLOTS, STATUS, slot_start, take
 from engine.taylor.roots import RECIPROCAL, evaluate, largest
 from engine.vibration_drive.automaton import Clutch
@@ -90,7 +90,7 @@ def _exceeds(W: Floats, lay: Layout, lane: int, first: int, last: int) -> bool:
     return found
 
 
-@compiled
+@part
 def collect_peaks(W: Floats, lay: Layout, lane: int, g: Floats, blocks: Floats, meta: Ints, used: int) -> int:
     """List every watched quantity of a lane that may exceed its extremum in the part of the step that is taken.
 
@@ -137,7 +137,7 @@ def collect_peaks(W: Floats, lay: Layout, lane: int, g: Floats, blocks: Floats, 
     return used
 
 
-@compiled
+@part
 def settle_peaks(W: Floats, lay: Layout, g: Floats, stack: Floats, blocks: Floats, meta: Ints, used: int) -> None:
     """After the vector loops over the list: keep the new extrema."""
     for slot in range(used):
@@ -149,7 +149,7 @@ def settle_peaks(W: Floats, lay: Layout, g: Floats, stack: Floats, blocks: Float
         W[meta[slot, 0]] = meta[slot, 1] * value
 
 
-@compiled
+@part
 def watch_extrema(W: Floats, lay: Layout, lane: int, active: bool) -> None:
     """Start the extrema of a lane afresh, or switch them off (then no step can exceed them)."""
     low = -NEVER if active else NEVER
@@ -165,7 +165,7 @@ def watch_extrema(W: Floats, lay: Layout, lane: int, active: bool) -> None:
         W[(base + lay.p_u_max) * lay.lanes + lane] = 0.0 if active else NEVER
 
 
-@compiled
+@part
 def energy(W: Floats, Z: Ints, lay: Layout, lane: int) -> float:
     """Mechanical energy of a lane (MODEL.md A4): pendulums, springs, weight, shaft and wound-up clutches."""
     lanes = lay.lanes
@@ -183,7 +183,7 @@ def energy(W: Floats, Z: Ints, lay: Layout, lane: int) -> float:
     return float(total)
 
 
-@compiled
+@part
 def sample(W: Floats, Z: Ints, lay: Layout, lane: int, x: float, g: Floats, out: Floats, states: Ints) -> None:
     """Write every variable at the fraction ``x`` of the step into ``out``.
 

@@ -19,13 +19,11 @@ from engine.taylor.batch import (
     STATUS,
     blocks_for,
     peaks_loop,
-    put,
     roots_loop,
-    slot_start,
-    take,
 )
 from engine.taylor.lowering import lane_loops
-from engine.taylor.roots import MAX_DEGREE, NO_ROOT, first_root, largest, work_stack
+from engine.taylor.roots import MAX_DEGREE, NO_ROOT, work_stack
+from tests.engine.polynomials import first_root, largest, put, slot_start, take
 
 ORDER = 10
 Block = np.ndarray[Any, np.dtype[np.float64]]

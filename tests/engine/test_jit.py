@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from typing import Any, cast
 
-from engine.jit import compiled, inlined
+import numba
+import pytest
+
+from engine.jit import compiled, inlined, part
+from engine.program import ProgramCompiler
 
 
-@compiled
+@part
 def doubled(number: int) -> int:
     """A function that others call with constants."""
     return 2 * number
@@ -33,3 +37,23 @@ def test_constants_make_no_copies() -> None:
     for function in (doubled, tripled):
         # None where the caller was in the cache already, which a change of the engine empties.
         assert len(cast(Any, function).signatures) <= 1
+
+
+@pytest.mark.parametrize("function", [doubled, tripled])
+def test_parts_have_no_entry_from_python(function: Any) -> None:
+    with pytest.raises(TypeError):
+        function(1)
+
+
+def test_a_program_keeps_its_parts_to_itself() -> None:
+    """No copy of a part is left that others could see: each is private to the program, or taken in and gone."""
+
+    @numba.njit(pipeline_class=ProgramCompiler)  # not cached, so that its code can be looked at
+    def program(number: int) -> int:
+        return doubled(number) + 1
+
+    assert program(20) == 41
+    (overload,) = program.overloads.values()
+    seen = {function.name for function in overload.library.get_defined_functions() if not function.is_declaration}
+    assert any("program" in name for name in seen)
+    assert not any("doubled" in name for name in seen)

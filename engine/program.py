@@ -1,0 +1,90 @@
+"""Whole programs instead of many small ones: how functions that only compiled code calls become part of their caller.
+
+numba makes every function a library of its own: optimised, turned into machine code, wrapped for calls from Python, and
+then linked into every caller, where all that is done again. For the event code of a kernel, sixty functions deep, that
+was most of the first start. A ``Part`` goes no further than LLVM's intermediate code. The ``Program`` that Python calls
+takes all its parts in, makes them private to itself and optimises once: what is called from one place is taken in
+there, what is the same at every call becomes a constant, and nothing is compiled that is not called.
+"""
+
+# mypy: allow-untyped-calls
+# (numba declares none of its own)
+import ctypes
+import gc
+from typing import Any
+
+from llvmlite.binding import Linkage
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
+from numba.core.compiler_lock import require_global_compiler_lock
+
+#: Where a call of a part from Python leads: it raises TypeError instead of jumping to code that is not there.
+_NO_ENTRY = ctypes.cast(ctypes.pythonapi.PyErr_BadArgument, ctypes.c_void_p).value
+
+
+class Part(JITCodeLibrary):
+    """The code of a function without entry from Python, and of all that it calls, not yet optimised."""
+
+    def finalize(self) -> None:
+        require_global_compiler_lock()
+        self._raise_if_finalized()
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    @property
+    def codegen(self) -> Any:
+        """What numba tells the address of the function's environment, which only entries from Python use."""
+        return self
+
+    def set_env(self, name: str, environment: Any) -> None:
+        """Nothing to set."""
+
+    def get_pointer_to_function(self, name: str) -> int | None:  # noqa: ARG002
+        self._ensure_finalized()
+        return _NO_ENTRY
+
+    def serialize_using_object_code(self) -> Any:
+        """The form numba's cache keeps: there is no object code."""
+        return self.serialize_using_bitcode()
+
+
+class Program(JITCodeLibrary):
+    """The code of a function that Python calls, with all its parts private to it."""
+
+    def _optimize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == Linkage.linkonce_odr:
+                function.linkage = Linkage.internal
+        super()._optimize_final_module()
+
+
+class PartCompiler(Compiler):
+    """numba's compiler, for parts."""
+
+    library: type[JITCodeLibrary] = Part
+
+    def define_pipelines(self) -> Any:
+        state = self.state
+        state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        state.flags.no_cfunc_wrapper = True
+        state.flags.no_cpython_wrapper = self.library is Part
+        return super().define_pipelines()
+
+
+class ProgramCompiler(PartCompiler):
+    """numba's compiler, for programs. Python's garbage collector, a tenth of the time, finds next to nothing here."""
+
+    library = Program
+
+    def _compile_core(self) -> Any:
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            return super()._compile_core()
+        finally:
+            if collects:
+                gc.enable()
