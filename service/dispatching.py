@@ -100,17 +100,19 @@ def pool(settings: WorkerSettings) -> Executor:
     return ProcessPoolExecutor(settings.processes, chunk_timeout=settings.chunk_timeout)
 
 
-def _cluster(settings: WorkerSettings) -> Executor:
+def _cluster(settings: WorkerSettings, *, renew: bool = False) -> Executor:
     try:
         from worker.executors.dask import DaskExecutor
     except ImportError:
         raise ExecutorError("Dask is not installed: pip install 'sprag[cluster]'") from None
     url = settings.executor if "://" in settings.executor else ""
-    return DaskExecutor(url, settings.processes, chunk_timeout=settings.chunk_timeout)
+    return DaskExecutor(url, settings.processes, chunk_timeout=settings.chunk_timeout, renew=renew)
 
 
 def renewed_pool(settings: WorkerSettings) -> Executor:
-    """A new pool whose processes compile every kernel anew: what lay in the cache is thrown away."""
+    """A new pool whose processes compile every kernel anew: what lay in the cache is thrown away, on every host."""
+    if "://" in settings.executor:
+        return _cluster(settings, renew=True)
     kernels.discard_compiled()
     return pool(settings)
 
@@ -147,8 +149,7 @@ def run_dispatcher(
                 executor(settings),
                 SystemClock(),
                 owner=owner_name(),
-                # The kernels of a cluster are not ours to throw away.
-                renew=None if "://" in settings.executor else lambda: renewed(settings),
+                renew=lambda: renewed(settings),
                 news=store.session.news(),
             )
             scheduler.start()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from contextlib import suppress
 from itertools import groupby
-from math import inf
 from typing import TYPE_CHECKING, assert_never
 
 from worker import dispatch
@@ -66,8 +65,11 @@ class Dispatcher:
         self._machine = Dispatch(executor.capacity)
         self._studies: dict[int, Study] = {}
         self._ids: dict[int, str] = {}
-        #: Studies that wait for their kernels, and when they began to; infinity once they say so.
+        #: Studies that wait for their kernels, and those that nobody can run at present; and when they began to.
         self._compiling: dict[int, float] = {}
+        self._short: dict[int, float] = {}
+        #: What was noted on studies.
+        self._notes: dict[int, str | None] = {}
         self._priorities: dict[int, int] = {}
         #: By ticket: what of a chunk in flight the store has already; and outcomes of chunks of which it has all.
         self._known: dict[int, Known] = {}
@@ -165,11 +167,13 @@ class Dispatcher:
             if self._only not in {None, study.number}:
                 continue
             if study.state in {StudyState.PAUSED, StudyState.CANCELLING}:
+                self._notes.pop(study.number, None)
                 if self._compiling.pop(study.number, None) is not None:
                     self._forget(study.number)
                 wish = dispatch.Paused if study.state is StudyState.PAUSED else dispatch.Cancelled
                 self._handle(wish(study.number))
             elif study.number in self._machine.studies:
+                self._tell_shortage(study.number)
                 self._handle(dispatch.Offered(study.number, priority=study.priority))
             elif self._may_open(study) and self._has_kernel(study):
                 chunks = self._store.open_chunks(study.number)
@@ -199,13 +203,27 @@ class Dispatcher:
             return False
         if ready:
             self._compiling.pop(number, None)
+            self._notes.pop(number, None)
             self._store.note(self._epoch, number, None)  # it may be that of a dispatcher before this one
             return True
         now = self._clock.monotonic()
         if now - self._compiling.setdefault(number, now) >= NOTE_SECONDS:
-            self._store.note(self._epoch, number, COMPILING)
-            self._compiling[number] = inf
+            self._note(number, self._executor.shortage or COMPILING)
         return False
+
+    def _tell_shortage(self, number: int) -> None:
+        """Note on a study that is being worked on that nothing can be run, when that lasts."""
+        shortage, now = self._executor.shortage, self._clock.monotonic()
+        if shortage is None:
+            self._short.pop(number, None)
+            self._note(number, None)
+        elif now - self._short.setdefault(number, now) >= NOTE_SECONDS:
+            self._note(number, shortage)
+
+    def _note(self, number: int, note: str | None) -> None:
+        if self._notes.get(number) != note:
+            self._store.note(self._epoch, number, note)
+            self._notes[number] = note
 
     def _hold(self, number: int, reason: str) -> None:
         """Hold a study for a fault that is not its cases', and let the log know."""
@@ -217,7 +235,8 @@ class Dispatcher:
     def _forget(self, number: int) -> None:
         self._studies.pop(number, None)
         self._ids.pop(number, None)
-        self._compiling.pop(number, None)
+        for known in (self._compiling, self._short, self._notes):
+            known.pop(number, None)
 
     def _begin_again(self, number: int, reason: str) -> None:
         """New processes and new kernels: those in the cache may be damaged."""

@@ -187,6 +187,10 @@ class Executor(Protocol):
     def capacity(self) -> int:
         """Number of chunks worth having in flight at once."""
 
+    @property
+    def shortage(self) -> str | None:
+        """Why nothing can be run at present, as a sentence; None where chunks can be, or where it will not last."""
+
     def ready(self, study: Study) -> bool:
         """Whether the kernel of ``study`` is loaded; begins to load it where it is not, and returns at once.
 

@@ -100,9 +100,10 @@ class Cluster:
     def start_scheduler(self) -> None:
         self.scheduler = _dask("scheduler", "--host", "127.0.0.1", "--port", self.port, "--no-dashboard", *_QUIET)
 
-    def start_worker(self) -> None:
-        options = ("--nthreads", 1, "--no-dashboard", "--memory-limit", 0, "--host", "127.0.0.1")
-        self.workers.append(_dask("worker", f"tcp://127.0.0.1:{self.port}", *options, "--death-timeout", DEADLINE))
+    def start_worker(self, count: int = 1, **environment: str) -> None:
+        options = ("--nthreads", 1, "--nworkers", count, "--no-dashboard", "--memory-limit", 0, "--host", "127.0.0.1")
+        arguments = ("worker", f"tcp://127.0.0.1:{self.port}", *options, "--death-timeout", DEADLINE)
+        self.workers.append(_dask(*arguments, **environment))
 
     def computing(self) -> list[psutil.Process]:
         """The processes that run chunks: children of the workers' nannies."""
@@ -113,11 +114,11 @@ class Cluster:
         return found
 
 
-def _dask(*arguments: object) -> subprocess.Popen[bytes]:
+def _dask(*arguments: object, **environment: str) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-W", "ignore", "-m", "distributed.cli.dask_" + str(arguments[0])]
     return subprocess.Popen(
         [*command, *map(str, arguments[1:])], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
     )  # fmt: skip
 
 
@@ -206,8 +207,11 @@ def test_a_fault_of_the_program_is_told_by_its_name(start: Callable[..., DaskExe
     assert (outcomes[0].fate, outcomes[0].detail) == (Fate.CRASHED, "ZeroDivisionError: no such thing")
 
 
-def test_chunks_are_stopped_whether_they_run_or_not(start: Callable[..., DaskExecutor]) -> None:
-    executor = start(run=fakes.faulty(hang=frozenset(range(8))), chunk_timeout=3.0)
+def test_chunks_are_stopped_whether_they_run_or_not(
+    start: Callable[..., DaskExecutor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("worker.executors.dask.STOP_SECONDS", 0.2)
+    executor = start(run=fakes.faulty(hang=frozenset(range(8))), chunk_timeout=10 * DEADLINE)
     study = fakes.study(12)
     ready(executor, study)
     for ticket in range(3):
@@ -216,7 +220,7 @@ def test_chunks_are_stopped_whether_they_run_or_not(start: Callable[..., DaskExe
         executor.stop(ticket)
         executor.stop(ticket)
     executor.stop(99)
-    outcomes = gather(executor, 3)  # the third one runs when a worker is back
+    outcomes = gather(executor, 3)  # the third one runs when a worker was ended, and is back
     assert [outcomes[ticket].fate for ticket in range(3)] == [Fate.STOPPED, Fate.STOPPED, Fate.DONE]
     assert executor.wait(0.0) == []
 
@@ -279,12 +283,44 @@ def test_a_worker_with_another_engine_is_not_used(
     assert f"has engine {kernels.ENGINE_VERSION} and is not used; this is engine another" in caplog.text
     assert executor.capacity == SPARE_CHUNKS
     assert not executor.ready(fakes.study(1))
+    assert (executor.shortage or "").startswith("No usable worker has joined the scheduler tcp://127.0.0.1:")
 
 
 def test_a_kernel_that_cannot_be_had_is_told(start: Callable[..., DaskExecutor]) -> None:
     executor = start(load=fakes.raising)
     with pytest.raises(KernelError, match=r"cannot be compiled \(ZeroDivisionError: no such thing\)"):
         ready(executor, fakes.study(1))
+
+
+def test_damaged_kernels_are_compiled_anew(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    study = fakes.study(80)
+    with clusters() as made, Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}", chunking=Chunking(cases=4)) as store:
+        made.start_scheduler()
+        made.start_worker(3, SPRAG_KERNEL_CACHE=str(tmp_path))
+        # One after the other dies while it loads; the last one finds the damaged file gone.
+        executor = DaskExecutor(made.url, 0, chunk_timeout=60.0, run=fakes.run, load=fakes.load_or_die)
+        eventually(lambda: executor.wait(0.05) or executor.capacity == 3 + SPARE_CHUNKS)
+        damaged = tmp_path / "kernels" / kernels.cache_folder().name / fakes.DAMAGED
+        damaged.parent.mkdir(parents=True, exist_ok=True)
+        damaged.touch()
+        assert {outcome.fate for outcome in run_all(executor, study, 20).values()} == {Fate.DONE}
+        assert caplog.text.count("died of a kernel; their host compiles its kernels anew") == 1
+        assert not damaged.exists()
+        executor.close()
+        # Every chunk crashes, of workers that have the damaged kernel in hand; nobody is quarantined.
+        damaged.touch()
+        given = {"chunk_timeout": 60.0, "run": fakes.run_or_die, "load": fakes.load_damaged}
+        first = DaskExecutor(made.url, 0, **given)  # type: ignore[arg-type]
+        record = store.create_study({}, study)
+        dispatcher = Dispatcher(
+            store, first, SystemClock(),
+            renew=lambda: DaskExecutor(made.url, 0, renew=True, **given),  # type: ignore[arg-type]
+        )  # fmt: skip
+        dispatcher.run(lambda: not store.active_studies())
+        ended = store.get_study(record.id)
+        assert (ended.state, ended.ok) == (StudyState.FINISHED, 80)
+        assert caplog.text.count("The kernels are compiled anew, and its cases run again.") == 1
+        assert not damaged.exists()
 
 
 def test_other_machines_need_certificates(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -297,6 +333,7 @@ def test_other_machines_need_certificates(monkeypatch: pytest.MonkeyPatch) -> No
 def test_a_scheduler_that_stays_away_ends_the_executor_with_a_sentence() -> None:
     with clusters() as made:
         executor = DaskExecutor(made.url, 0, chunk_timeout=1.0, scheduler_seconds=0.0)
+        assert executor.shortage == f"The scheduler tcp://127.0.0.1:{made.port} is not there; it is tried again."
         with pytest.raises(ExecutorError, match=rf"127.0.0.1:{made.port} was not there for 0 s"):
             eventually(lambda: executor.wait(0.05))
         executor.close()

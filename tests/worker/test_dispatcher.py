@@ -416,6 +416,33 @@ def test_a_running_study_whose_kernel_must_be_compiled_anew_says_so_too(store: S
     assert seen[-1] == (StudyState.FINISHED, None)
 
 
+def test_studies_say_when_nobody_is_there_to_run_them(store: Store) -> None:
+    class Lonely(Cold):
+        shortage: str | None = None  # type: ignore[assignment]
+
+        def wait(self, timeout: float) -> list[Outcome]:
+            return super().wait(0.0) if self.shortage is None else []
+
+    queued = store.create_study({}, fakes.study(20, "queued", tolerance=1e-6))
+    running = submit(store, 20)
+    clock, executor = fakes.HandClock(), Lonely(fakes.run)
+    seen: list[tuple[str | None, str | None, int]] = []
+
+    def turn() -> bool:
+        records = store.get_study(queued.id), store.get_study(running.id)
+        seen.append((records[0].reason, records[1].reason, records[1].done))
+        told = ("nobody has joined", "nobody has joined", 8) in seen
+        executor.shortage = "nobody has joined" if records[1].done >= 8 and not told else None
+        executor.warm = COMPILING in {reason for reason, *_ in seen}
+        clock.seconds += NOTE_SECONDS / 5
+        assert len(seen) < 1000
+        return not store.active_studies()
+
+    Dispatcher(store, executor, clock).run(turn)
+    assert seen[-1] == (None, None, 20)
+    assert {done for _, reason, done in seen if reason is not None} == {8}
+
+
 def test_a_kernel_that_cannot_be_had_holds_the_study_and_is_logged(
     store: Store, caplog: pytest.LogCaptureFixture
 ) -> None:

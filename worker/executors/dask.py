@@ -13,18 +13,20 @@ from collections import Counter, deque
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from functools import partial
+from math import inf
 from queue import Empty, SimpleQueue
-from threading import Condition, RLock
+from threading import RLock
 from typing import TYPE_CHECKING, Any, Final
 from uuid import uuid4
 
 import dask
-from distributed import Client, LocalCluster
+from distributed import LocalCluster
 from distributed.scheduler import KilledWorker
 
 from worker import kernels
 from worker.executors.dask_jobs import Job, Waiting, Worker
-from worker.executors.dask_tasks import blame_at_once, introduce, load_kernel, run_chunk, scheduler_address
+from worker.executors.dask_link import Link, value_of
+from worker.executors.dask_tasks import introduce, load_kernel, run_chunk, scheduler_address
 from worker.executors.process_pool import MAX_LOADS, SPARE_CHUNKS
 from worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
 
@@ -45,8 +47,8 @@ LOOK_SECONDS: Final = 0.5
 SCHEDULER_SECONDS: Final = 60.0
 #: Seconds beyond a chunk's own after which a worker that should have ended itself counts as frozen.
 FROZEN_SECONDS: Final = 15.0
-#: Seconds for which the connection is kept for results that are just being fetched.
-FETCH_SECONDS: Final = 5.0
+#: Seconds that a stopped chunk gets to come to its end before its worker is ended; most are through sooner.
+STOP_SECONDS: Final = 5.0
 #: What is asked of every Dask process that is started here.
 _CONFIG: Final = {
     "distributed.scheduler.allowed-failures": 0,
@@ -77,6 +79,8 @@ class DaskExecutor:
         The engine's version; workers with another one are not used.
     scheduler_seconds : float
         Seconds for which a scheduler may be away.
+    renew : bool
+        Whether every host throws its compiled kernels away first, since they may be damaged.
     """
 
     def __init__(
@@ -89,6 +93,7 @@ class DaskExecutor:
         load: Callable[[kernels.KernelShape], None] = kernels.load,
         engine: str = kernels.ENGINE_VERSION,
         scheduler_seconds: float = SCHEDULER_SECONDS,
+        renew: bool = False,
     ) -> None:
         self._timeout = chunk_timeout
         self._run = run
@@ -97,20 +102,22 @@ class DaskExecutor:
         self._scheduler_seconds = scheduler_seconds
         self._name = uuid4().hex[:12]
         self._lock = RLock()
-        #: Threads of Dask's that fetch what came of a job, over a connection that must stay till they are through.
-        self._fetching = 0
-        self._fetched = Condition(self._lock)
         self._workers: dict[str, Worker] = {}
         self._waiting: deque[Waiting] = deque()
-        self._failed_loads: Counter[kernels.KernelShape] = Counter()
+        #: For each such text a host throws its compiled kernels away once: every host, and those where workers died.
+        self._renew = uuid4().hex if renew else ""
+        self._discards: dict[str, str] = {}
+        self._failed_loads: Counter[tuple[str, kernels.KernelShape]] = Counter()
+        #: Hosts that cannot have a kernel, and kernels that none can have, with the reason.
+        self._unable: set[tuple[str, kernels.KernelShape]] = set()
         self._broken: dict[kernels.KernelShape, str] = {}
         self._outcomes: SimpleQueue[Outcome | None] = SimpleQueue()
         self._next_look = 0.0
         self._gone_since: float | None = None
         self._cluster: LocalCluster | None = None
-        self._client: Client | None = None
         with dask.config.set(_CONFIG):
-            self._address, self._security = scheduler_address(url) if url else self._start_cluster(processes)
+            address, security = scheduler_address(url) if url else self._start_cluster(processes)
+        self._link = Link(address, security, f"sprag-{self._name}", self._lock)
         self._look()
 
     def _start_cluster(self, processes: int) -> tuple[str, None]:
@@ -126,19 +133,31 @@ class DaskExecutor:
         with self._lock:
             return sum(worker.usable for worker in self._workers.values()) + SPARE_CHUNKS
 
+    @property
+    def shortage(self) -> str | None:
+        """Why nothing can be run at present, as a sentence; None where chunks can be."""
+        if self._gone_since is not None:
+            return f"The scheduler {self._link.address} is not there; it is tried again."
+        with self._lock:
+            if any(worker.usable for worker in self._workers.values()):
+                return None
+        return f"No usable worker has joined the scheduler {self._link.address}; the study goes on when one does."
+
     def ready(self, study: Study) -> bool:
         """Whether some worker has loaded the kernel of ``study``; lets one begin to where none has."""
         shape = kernels.shape_of(study)
         self._look()
         with self._lock:
             if reason := self._broken.pop(shape, None):
+                self._unable = {(host, kernel) for host, kernel in self._unable if kernel != shape}
                 raise KernelError(reason)
             if any(shape in worker.shapes for worker in self._workers.values()):
                 return True
             if not any(self._loads(worker, shape) for worker in self._workers.values()):
-                idle = next((w for w in self._workers.values() if w.usable and w.job is None), None)
-                if idle is not None:
-                    self._begin_load(idle, shape)
+                idle = (worker for worker in self._workers.values() if worker.usable and worker.job is None)
+                able = next((worker for worker in idle if (worker.host, shape) not in self._unable), None)
+                if able is not None:
+                    self._begin_load(able, shape)
         return False
 
     def submit(self, ticket: int, study: Study, chunk: Chunk) -> None:
@@ -165,19 +184,19 @@ class DaskExecutor:
         return found
 
     def stop(self, ticket: int) -> None:
-        """Stop a chunk. One that runs goes on to its end, its worker is busy until then, and its result is dropped."""
+        """Stop a chunk. One that runs gets `STOP_SECONDS` to come to its end, then its worker is ended."""
         with self._lock:
             kept = deque(waiting for waiting in self._waiting if waiting.ticket != ticket)
             running = [
                 job
                 for worker in self._workers.values()
-                if (job := worker.job) and job.kind == "chunk" and job.ticket == ticket and not job.dropped
+                if (job := worker.job) and job.kind == "chunk" and job.ticket == ticket and job.dropped is None
             ]
             if len(kept) == len(self._waiting) and not running:
                 return
             self._waiting = kept
             for job in running:
-                job.dropped = True
+                job.dropped = time.monotonic()
             self._outcomes.put(Outcome(ticket, Fate.STOPPED, detail="stopped"))
 
     def close(self) -> None:
@@ -195,7 +214,7 @@ class DaskExecutor:
             return
         self._next_look = now + LOOK_SECONDS
         try:
-            present = self._present()
+            present = self._link.present()
         except (OSError, TimeoutError, ValueError) as error:
             self._scheduler_is_gone(error)
             return
@@ -207,80 +226,76 @@ class DaskExecutor:
                 if address not in self._workers:
                     self._workers[address] = worker = Worker(address, str(info.get("host", address)))
                     key = f"sprag-introduce-{self._name}-{uuid4().hex}"
-                    self._begin(worker, Job("introduce", now), key, introduce)
-            for worker in list(self._workers.values()):
-                if worker.job and worker.job.kind == "chunk" and now - worker.job.began > self._longest:
-                    self._worker_is_frozen(worker)
+                    self._begin(worker, Job("introduce", now), key, introduce, self._renew)
+            ended = []
+            for worker in self._workers.values():
+                if (job := worker.job) and job.kind == "chunk":
+                    if now - job.began > self._longest:
+                        self._worker_is_frozen(worker)
+                        ended.append(worker.address)
+                    elif job.dropped is not None and now - job.dropped > STOP_SECONDS:
+                        job.dropped = inf
+                        ended.append(worker.address)
             self._fill()
+        for address in ended:
+            self._link.end_worker(address)
 
     @property
     def _longest(self) -> float:
         return self._timeout + FROZEN_SECONDS
-
-    def _present(self) -> dict[str, dict[str, Any]]:
-        """The workers that the scheduler knows, by address. Raises OSError or TimeoutError when it is not there."""
-        if self._client is None:
-            self._client = Client(
-                self._address, security=self._security, timeout=5, set_as_default=False, name=f"sprag-{self._name}"
-            )
-            # A death is counted here, once; the scheduler is not to try the chunk on another worker by itself.
-            self._client.run_on_scheduler(blame_at_once)
-        if self._client.status != "running":
-            raise OSError("the connection to the scheduler is lost")
-        scheduler: Any = self._client.scheduler
-        present: dict[str, dict[str, Any]] = self._client.sync(scheduler.identity, n_workers=-1, callback_timeout=5)[
-            "workers"
-        ]
-        return present
 
     def _scheduler_is_gone(self, error: Exception) -> None:
         """Hand back what was on its way; somebody may start the scheduler again."""
         now = time.monotonic()
         with self._lock:
             for worker in self._workers.values():
-                if (job := worker.job) and job.kind == "chunk" and not job.dropped:
+                if (job := worker.job) and job.kind == "chunk" and job.dropped is None:
                     self._outcomes.put(Outcome(job.ticket, Fate.STOPPED, detail="the scheduler was lost"))
         self._disconnect(timeout=1.0)
         if self._gone_since is None:
             self._gone_since = now
-            _LOG.error("The scheduler %s is not there; it is tried again: %s", self._address, error)
+            _LOG.error("The scheduler %s is not there; it is tried again: %s", self._link.address, error)
         elif now - self._gone_since > self._scheduler_seconds:
             raise ExecutorError(
-                f"the scheduler {self._address} was not there for {self._scheduler_seconds:g} s: {error}"
+                f"the scheduler {self._link.address} was not there for {self._scheduler_seconds:g} s: {error}"
             )
 
     def _disconnect(self, timeout: float) -> None:
-        """Give up every job, and close the connection when nobody is fetching a result over it any more."""
         with self._lock:
-            client, self._client = self._client, None
             for worker in self._workers.values():
                 worker.job = None
             self._workers.clear()
-            self._fetched.wait_for(lambda: not self._fetching, FETCH_SECONDS)
-        if client is not None:
-            with suppress(Exception):
-                client.close(timeout=timeout)
+        self._link.close(timeout)
 
     def _worker_is_gone(self, worker: Worker) -> None:
         if worker.job is not None:
-            self._died(worker.job)
+            self._died(worker, worker.job)
             worker.job = None
 
     def _worker_is_frozen(self, worker: Worker) -> None:
-        _LOG.error("The worker %s does not answer and is not used any more.", worker.address)
+        _LOG.error("The worker %s does not answer; its nanny is asked to start another.", worker.address)
         job, worker.job, worker.usable = worker.job, None, False
         if job is not None:
-            self._died(job)
+            self._died(worker, job)
 
-    def _died(self, job: Job) -> None:
+    def _died(self, worker: Worker, job: Job) -> None:
         """The worker that was busy with ``job`` is gone."""
         if job.kind == "load" and job.shape is not None:
-            self._load_failed(job.shape, "the worker that compiled its kernel died", MAX_LOADS)
-        elif job.kind == "chunk" and not job.dropped:
+            self._died_of(worker.host, job.shape)
+        elif job.kind == "chunk" and job.dropped is None:
             if time.monotonic() - job.began >= self._timeout:
                 self._outcomes.put(Outcome(job.ticket, Fate.TIMED_OUT, detail=f"killed after {self._timeout:g} s"))
             else:
                 self._outcomes.put(Outcome(job.ticket, Fate.CRASHED, detail="its worker died"))
+
+    def _died_of(self, host: str, shape: kernels.KernelShape) -> None:
+        """A worker died while it loaded a kernel: at the second time the one on its host's disk may be damaged."""
+        if any(other.host == host and shape in other.shapes for other in self._workers.values()):
+            return
+        if self._failed_loads[host, shape] == MAX_LOADS - 1:
+            _LOG.error("Workers of %s died of a kernel; their host compiles its kernels anew.", host)
+            self._discards[host] = uuid4().hex
+        self._load_failed(host, shape, "the worker that compiled its kernel died", MAX_LOADS + 1)
 
     def _loads(self, worker: Worker, shape: kernels.KernelShape) -> bool:
         return worker.job is not None and worker.job.kind == "load" and worker.job.shape == shape
@@ -298,44 +313,40 @@ class DaskExecutor:
                 job = Job("chunk", time.monotonic(), chosen.ticket)
                 self._begin(worker, job, chosen.key, run_chunk, self._run, chosen.task, self._timeout)
                 continue
-            shape = self._waiting[0].task.shape
+            shape = next((s for item in self._waiting if (worker.host, s := item.task.shape) not in self._unable), None)
+            if shape is None:
+                continue
             fellows = [other for other in self._workers.values() if other.host == worker.host]
             if any(shape in other.shapes for other in fellows) or not any(self._loads(o, shape) for o in fellows):
                 self._begin_load(worker, shape)
 
     def _begin_load(self, worker: Worker, shape: kernels.KernelShape) -> None:
         key = f"sprag-load-{self._name}-{uuid4().hex}"
-        self._begin(worker, Job("load", time.monotonic(), shape=shape), key, load_kernel, self._load, shape)
+        discard = self._discards.get(worker.host, "")
+        self._begin(worker, Job("load", time.monotonic(), shape=shape), key, load_kernel, self._load, shape, discard)
 
     def _begin(self, worker: Worker, job: Job, key: str, function: Callable[..., Any], *given: Any) -> None:
         worker.job = job
-        if self._client is None:
-            return
         # Where the connection is just being lost, the next look finds that out and takes the job back.
-        with suppress(Exception):
-            job.future = self._client.submit(
-                function, *given, key=key, workers=[worker.address], allow_other_workers=False, pure=False, retries=0
-            )
-            job.future.add_done_callback(partial(self._done, worker, job))
+        job.future = self._link.submit(worker.address, key, partial(self._done, worker, job), function, *given)
 
     def _done(self, worker: Worker, job: Job, future: Future[Any]) -> None:
         """In a thread of Dask's: note what came of a job, and give the worker its next one."""
         with self._lock:
             if worker.job is not job:  # given up, and the connection perhaps as well
                 return
-            self._fetching += 1
-        value, error = _fetched(future)
+            self._link.begin_fetch()
+        value, error = value_of(future)
         with self._lock:
-            self._fetching -= 1
-            self._fetched.notify_all()
+            self._link.end_fetch()
             if worker.job is not job:  # given up meanwhile
                 return
             worker.job = None
             if isinstance(error, KilledWorker):
                 self._workers.pop(worker.address, None)
-                self._died(job)
+                self._died(worker, job)
             elif job.kind == "chunk":
-                if not job.dropped:
+                if job.dropped is None:
                     self._outcomes.put(_outcome(job.ticket, value, error))
             elif job.kind == "introduce":
                 self._introduced(worker, value, error)
@@ -357,28 +368,27 @@ class DaskExecutor:
     def _loaded(self, worker: Worker, shape: kernels.KernelShape, error: BaseException | None) -> None:
         if error is None:
             worker.shapes.add(shape)
-            self._failed_loads.pop(shape, None)
+            self._failed_loads.pop((worker.host, shape), None)
             self._outcomes.put(None)
         elif not isinstance(error, CancelledError):
-            self._load_failed(shape, f"its kernel cannot be compiled ({type(error).__name__}: {error})", 1)
+            self._load_failed(worker.host, shape, f"its kernel cannot be compiled ({type(error).__name__}: {error})", 1)
 
-    def _load_failed(self, shape: kernels.KernelShape, reason: str, allowed: int) -> None:
-        self._failed_loads[shape] += 1
-        if self._failed_loads[shape] >= allowed:
-            del self._failed_loads[shape]
+    def _load_failed(self, host: str, shape: kernels.KernelShape, reason: str, allowed: int) -> None:
+        """A host is asked for a kernel no more when it failed too often; when no other can have it, its chunks fail."""
+        place = (host, shape)
+        self._failed_loads[place] += 1
+        if self._failed_loads[place] < allowed:
+            return
+        del self._failed_loads[place]
+        self._unable.add(place)
+        _LOG.error("The workers of %s cannot run a study: %s.", host, reason)
+        others = [other for other in self._workers.values() if other.usable]
+        if all(shape not in other.shapes and (other.host, shape) in self._unable for other in others):
             self._broken[shape] = reason
+            for item in [item for item in self._waiting if item.task.shape == shape]:
+                self._waiting.remove(item)
+                self._outcomes.put(Outcome(item.ticket, Fate.CRASHED, detail=reason))
             self._outcomes.put(None)
-
-
-def _fetched(future: Future[Any]) -> tuple[Any, BaseException | None]:
-    """The value of a future that is through, or why there is none."""
-    try:
-        error = future.exception(timeout=FROZEN_SECONDS) if future.status != "finished" else None
-        return (future.result(timeout=FROZEN_SECONDS) if error is None else None), error
-    except Exception as trouble:  # the value was lost with its worker, or the scheduler
-        return None, CancelledError(str(trouble))
-    except CancelledError as trouble:
-        return None, trouble
 
 
 def _outcome(ticket: int, value: Any, error: BaseException | None) -> Outcome:

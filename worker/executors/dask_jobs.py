@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 class Job:
     """What a worker is busy with: saying who it is, loading the kernel ``shape``, or the chunk ``ticket``.
 
-    What comes of a ``dropped`` chunk is of no interest any more.
+    What comes of a chunk that was ``dropped`` (then, on the monotonic clock, in s) is of no interest any more.
     """
 
     kind: Literal["introduce", "load", "chunk"]
@@ -23,7 +23,7 @@ class Job:
     ticket: int = 0
     shape: kernels.KernelShape | None = None
     future: Future[Any] | None = None
-    dropped: bool = False
+    dropped: float | None = None
 
 
 @dataclass(eq=False, slots=True)

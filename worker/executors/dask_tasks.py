@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import faulthandler
+import fcntl
 import ipaddress
 import os
+from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from distributed import Security
 
@@ -19,15 +21,42 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 
+#: Seconds in which a nanny has to end a worker.
+END_SECONDS: Final = 20.0
+#: Kernels that this process, which is a worker, has in hand.
+_loaded: set[kernels.KernelShape] = set()
 
-def introduce() -> str:
-    """Run by each worker that joins: which engine it has."""
+
+def introduce(discard: str) -> str:
+    """Run by each worker that joins: which engine it has.
+
+    With ``discard`` the compiled kernels of its host are thrown away first, once for each such text. A process that had
+    some of them in hand ends, and its nanny starts another.
+    """
+    _discard_once(discard)
+    if discard and _loaded:
+        os._exit(0)
     return kernels.ENGINE_VERSION
 
 
-def load_kernel(load: Callable[[kernels.KernelShape], None], shape: kernels.KernelShape) -> None:
-    """Run by each worker before its first chunk of a shape."""
+def load_kernel(load: Callable[[kernels.KernelShape], None], shape: kernels.KernelShape, discard: str) -> None:
+    """Run by each worker before its first chunk of a shape; ``discard`` as in `introduce`."""
+    _discard_once(discard)
+    _loaded.add(shape)
     _within(LOAD_SECONDS, partial(load, shape))
+
+
+def _discard_once(token: str) -> None:
+    if not token:
+        return
+    folder = kernels.cache_folder()
+    with suppress(OSError), folder.with_name(f"{folder.name}.discarded").open("a+", encoding="ascii") as note:
+        fcntl.flock(note, fcntl.LOCK_EX)
+        note.seek(0)
+        if note.read() != token:
+            kernels.discard_compiled()
+            note.truncate(0)
+            note.write(token)
 
 
 def run_chunk(
@@ -79,3 +108,10 @@ def _is_loopback(host: str) -> bool:
 def blame_at_once(dask_scheduler: Any) -> None:
     """Run in the scheduler: a task whose worker dies has failed."""
     dask_scheduler.allowed_failures = 0
+
+
+async def end_worker(address: str, dask_scheduler: Any) -> None:
+    """Run in the scheduler: end the process of a worker, whatever it is busy with, by its nanny."""
+    await dask_scheduler.restart_workers(
+        [address], timeout=END_SECONDS, wait_for_workers=False, on_error="return", stimulus_id=f"sprag-end-{address}"
+    )

@@ -28,6 +28,11 @@ class InlineExecutor:
         """One: more in flight would only wait."""
         return 1
 
+    @property
+    def shortage(self) -> None:
+        """None: nobody has to join."""
+        return None
+
     def ready(self, study: Study) -> bool:  # noqa: ARG002 - the first chunk compiles what it needs
         """Always: nothing else could run meanwhile."""
         return True

@@ -79,6 +79,11 @@ class ProcessPoolExecutor:
         """Number of chunks worth having in flight at once."""
         return self._processes + SPARE_CHUNKS
 
+    @property
+    def shortage(self) -> None:
+        """None: nobody has to join."""
+        return None
+
     def ready(self, study: Study) -> bool:
         """Whether the kernel of ``study`` is loaded; begins to load it where it is not."""
         shape = kernels.shape_of(study)

@@ -1,0 +1,106 @@
+"""The connection of `worker.executors.dask` to a scheduler, which may be lost and found again."""
+
+from __future__ import annotations
+
+from concurrent.futures import CancelledError
+from contextlib import suppress
+from threading import Condition
+from typing import TYPE_CHECKING, Any, Final
+
+from distributed import Client
+
+from worker.executors.dask_tasks import blame_at_once, end_worker
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from threading import RLock
+
+    from distributed import Future, Security
+
+#: Seconds in which the scheduler has to answer.
+ANSWER_SECONDS: Final = 5
+#: Seconds in which the value of a task that is through has to come.
+VALUE_SECONDS: Final = 15.0
+#: Seconds for which the connection is kept for values that are just being fetched.
+FETCH_SECONDS: Final = 5.0
+
+
+class Link:
+    """A connection to the scheduler at ``address``; ``lock`` is the one under which `begin_fetch` is called."""
+
+    def __init__(self, address: str, security: Security | None, name: str, lock: RLock) -> None:
+        self.address = address
+        self._security = security
+        self._name = name
+        self._client: Client | None = None
+        #: Threads of Dask's that fetch a value, over a connection that must stay till they are through.
+        self._fetching = 0
+        self._fetched = Condition(lock)
+
+    def present(self) -> dict[str, dict[str, Any]]:
+        """The workers that the scheduler knows, by address. Raises OSError, TimeoutError or ValueError without it."""
+        if self._client is None:
+            self._client = Client(
+                self.address, security=self._security, timeout=ANSWER_SECONDS, set_as_default=False, name=self._name
+            )
+            # A death is counted here, once; the scheduler is not to try the chunk on another worker by itself.
+            self._tell(blame_at_once)
+        if self._client.status != "running":
+            raise OSError("the connection to the scheduler is lost")
+        scheduler: Any = self._client.scheduler
+        found: dict[str, Any] = self._client.sync(scheduler.identity, n_workers=-1, callback_timeout=ANSWER_SECONDS)
+        present: dict[str, dict[str, Any]] = found["workers"]
+        return present
+
+    def submit(
+        self, address: str, key: str, done: Callable[[Future[Any]], None], function: Callable[..., Any], *given: Any
+    ) -> Future[Any] | None:
+        """Have the worker at ``address`` call a function; None where the connection is being lost."""
+        if self._client is not None:
+            with suppress(Exception):
+                future: Future[Any] = self._client.submit(
+                    function, *given, key=key, workers=[address], allow_other_workers=False, pure=False, retries=0
+                )
+                future.add_done_callback(done)
+                return future
+        return None
+
+    def begin_fetch(self) -> None:
+        """Keep the connection until `end_fetch`; under the lock."""
+        self._fetching += 1
+
+    def end_fetch(self) -> None:
+        """See `begin_fetch`."""
+        self._fetching -= 1
+        self._fetched.notify_all()
+
+    def end_worker(self, address: str) -> None:
+        """Have the process of a worker ended; its nanny, where it has one, starts another."""
+        with suppress(Exception):
+            self._tell(end_worker, address, wait=False)
+
+    def _tell(self, function: Callable[..., Any], *given: Any, wait: bool = True) -> None:
+        """Have the scheduler call a function. What the client offers for that has no limit of time."""
+        if self._client is not None:
+            tell: Any = self._client._run_on_scheduler
+            self._client.sync(tell, function, *given, wait=wait, callback_timeout=ANSWER_SECONDS)
+
+    def close(self, timeout: float) -> None:
+        """Close the connection when nobody fetches a value over it any more; every job was given up before."""
+        with self._fetched:
+            client, self._client = self._client, None
+            self._fetched.wait_for(lambda: not self._fetching, FETCH_SECONDS)
+        if client is not None:
+            with suppress(Exception):
+                client.close(timeout=timeout)
+
+
+def value_of(future: Future[Any]) -> tuple[Any, BaseException | None]:
+    """The value of a future that is through, or why there is none."""
+    try:
+        error = future.exception(timeout=VALUE_SECONDS) if future.status != "finished" else None
+        return (future.result(timeout=VALUE_SECONDS) if error is None else None), error
+    except Exception as trouble:  # the value was lost with its worker, or the scheduler
+        return None, CancelledError(str(trouble))
+    except CancelledError as trouble:
+        return None, trouble
