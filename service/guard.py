@@ -1,5 +1,6 @@
 """The outermost layer of the service: who may send what. Nothing behind it runs for a request that it refuses."""
 
+import re
 from typing import Final
 from urllib.parse import quote
 
@@ -81,7 +82,8 @@ class Guard:
         headers = Headers(scope=scope)
         hosts = headers.getlist("host")
         if len(hosts) != 1 or _host_name(hosts[0]) not in self._hosts:
-            raise ApiError("wrong-host", "This service does not answer under the name the request is addressed to.")
+            detail = "This service does not answer under the name the request is addressed to"
+            raise ApiError("wrong-host", f"{detail}; SPRAG_ALLOWED_HOSTS adds names.")
         if scope["method"] not in SAFE_METHODS and _is_cross_site(headers):
             raise ApiError("cross-site", "A page of another site may not change anything here.")
         scope["sprag.grant"] = await self._grant(scope, headers)
@@ -149,12 +151,13 @@ def _names_its_site(headers: Headers) -> bool:
     return "sec-fetch-site" in headers or "origin" in headers
 
 
+_HOST: Final = re.compile(r"(\[[0-9a-f:.%]+\]|[^:@/\[\]]+)(:[0-9]{0,5})?")
+
+
 def _host_name(host: str) -> str:
-    """The name in a Host header, lower case, without its port."""
-    host = host.strip().lower()
-    if host.startswith("["):
-        return host.partition("]")[0] + "]"
-    return host.rpartition(":")[0] if ":" in host else host
+    """The name in a Host header, lower case, without its port; "" when it is no host and port."""
+    found = _HOST.fullmatch(host.strip().lower())
+    return "" if found is None else found[1]
 
 
 def _is_cross_site(headers: Headers) -> bool:

@@ -61,9 +61,10 @@ class JsonFormatter(logging.Formatter):
             line |= fields
         if request := REQUEST_ID.get():
             line["request"] = request
-        text = f"{message} {line.get('path', '')}"
-        if studies := list(dict.fromkeys(_STUDY_ID.findall(text))):
-            line["studies"] = studies
+        noted = line.pop("studies", [])
+        found = [*_STUDY_ID.findall(f"{message} {line.get('path', '')}"), *(noted if isinstance(noted, list) else [])]
+        if found:
+            line["studies"] = list(dict.fromkeys(found))
         if record.exc_info:
             line["exception"] = self.formatException(record.exc_info)
         return json.dumps(line, ensure_ascii=True, default=str)
@@ -94,7 +95,9 @@ class RequestLog:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
-                MutableHeaders(scope=message)[REQUEST_HEADER] = request_id
+                headers = MutableHeaders(scope=message)
+                headers[REQUEST_HEADER] = request_id
+                seen["made"] = headers.get("location", "")
             await send(message)
 
         token = REQUEST_ID.set(request_id)
@@ -112,6 +115,8 @@ class RequestLog:
                         "path": _plain(scope["path"]),
                         "status": status,
                         "milliseconds": round(1e3 * seconds, 3),
+                        # A study that was submitted stands in no address but that of the answer.
+                        "studies": _STUDY_ID.findall(seen.get("made", "")),
                     }
                 },
             )  # fmt: skip

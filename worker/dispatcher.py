@@ -177,6 +177,8 @@ class Dispatcher:
                 self._handle(dispatch.Offered(study.number, priority=study.priority))
             elif self._may_open(study) and self._has_kernel(study):
                 chunks = self._store.open_chunks(study.number)
+                self._note("The study %s is taken up: %d cases in %d chunks to be run.", study.number,
+                    sum(chunk.count for chunk in chunks), len(chunks))  # fmt: skip
                 self._handle(dispatch.Offered(study.number, chunks, study.priority))
 
     def _may_open(self, study: ActiveStudy) -> bool:
@@ -231,6 +233,11 @@ class Dispatcher:
         if self._only is None:  # who runs a single study is told by its state
             _LOG.error("The study %s is held: %s", self._ids.get(number, number), reason)
         self._forget(number)
+
+    def _note(self, text: str, number: int, *values: object) -> None:
+        """Let the log know what becomes of a study; who runs a single one sees it."""
+        if self._only is None:
+            _LOG.info(text, self._ids.get(number, number), *values)
 
     def _forget(self, number: int) -> None:
         self._studies.pop(number, None)
@@ -309,7 +316,8 @@ class Dispatcher:
             case dispatch.Renew(study=number, reason=reason):
                 self._begin_again(number, reason)
             case dispatch.Settle(study=number):
-                self._store.settle(self._epoch, number)
+                ended = self._store.settle(self._epoch, number)
+                self._note("The study %s is %s.", number, ended.value)
                 self._forget(number)
             case dispatch.Run():
                 self._start([instruction])

@@ -125,6 +125,9 @@ def test_the_password_of_pages_opens_what_they_show_and_no_more(guarded: httpx.C
         ("127.0.0.1.nip.example:8000", 421),
         ("", 421),
         ("a:b:c", 421),
+        ("localhost:80@evil.example", 421),
+        ("evil.example@localhost", 421),
+        ("localhost:99999999", 421),
     ],
 )
 def test_only_known_host_names_are_answered(service: Service, host: str, status: int) -> None:

@@ -50,6 +50,14 @@ def test_a_request_has_a_line_with_its_id_and_study(service: Service, log: io.St
     assert line["time"].endswith("+00:00")
 
 
+def test_a_study_that_is_submitted_stands_in_the_line_of_its_request(service: Service, log: io.StringIO) -> None:
+    study_id = service.submit()
+    line = lines(log)[-1]
+    assert (line["method"], line["path"], line["studies"]) == ("POST", "/api/v1/studies", [study_id])
+    service.http.get("/livez")
+    assert "studies" not in lines(log)[-1]
+
+
 @pytest.mark.parametrize("given", ["", "x" * 65, "a b", "é", '"}', "a\tb"])
 def test_an_id_that_is_none_is_replaced(service: Service, log: io.StringIO, given: str) -> None:
     answer = service.http.get("/livez", headers={REQUEST_HEADER: given.encode("utf-8")})

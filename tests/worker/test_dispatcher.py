@@ -106,6 +106,16 @@ def test_a_crash_and_a_hang_are_found_among_their_neighbours(store: Store) -> No
     assert (ended.state, ended.done, ended.ok) == (StudyState.FINISHED, 24, 22)
 
 
+def test_the_log_tells_when_a_study_is_taken_up_and_how_it_ends(store: Store, caplog: pytest.LogCaptureFixture) -> None:
+    record = submit(store, 10)
+    with caplog.at_level("INFO", logger="worker"):
+        work(store, InlineExecutor(fakes.run))
+    assert caplog.messages == [
+        f"The study {record.id} is taken up: 10 cases in 3 chunks to be run.",
+        f"The study {record.id} is finished.",
+    ]
+
+
 def test_an_engine_fault_holds_the_study_until_it_is_resumed(store: Store, caplog: pytest.LogCaptureFixture) -> None:
     record = submit(store)
     work(store, InlineExecutor(fakes.raising))
