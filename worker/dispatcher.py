@@ -177,7 +177,7 @@ class Dispatcher:
                 self._handle(dispatch.Offered(study.number, priority=study.priority))
             elif self._may_open(study) and self._has_kernel(study):
                 chunks = self._store.open_chunks(study.number)
-                self._note("The study %s is taken up: %d cases in %d chunks to be run.", study.number,
+                self._say("The study %s is taken up: %d cases in %d chunks to be run.", study.number,
                     sum(chunk.count for chunk in chunks), len(chunks))  # fmt: skip
                 self._handle(dispatch.Offered(study.number, chunks, study.priority))
 
@@ -234,7 +234,7 @@ class Dispatcher:
             _LOG.error("The study %s is held: %s", self._ids.get(number, number), reason)
         self._forget(number)
 
-    def _note(self, text: str, number: int, *values: object) -> None:
+    def _say(self, text: str, number: int, *values: object) -> None:
         """Let the log know what becomes of a study; who runs a single one sees it."""
         if self._only is None:
             _LOG.info(text, self._ids.get(number, number), *values)
@@ -317,7 +317,7 @@ class Dispatcher:
                 self._begin_again(number, reason)
             case dispatch.Settle(study=number):
                 ended = self._store.settle(self._epoch, number)
-                self._note("The study %s is %s.", number, ended.value)
+                self._say("The study %s is %s.", number, ended.value)
                 self._forget(number)
             case dispatch.Run():
                 self._start([instruction])
