@@ -13,7 +13,7 @@ from service.spec import ParsedSpec, parse_spec
 from service.spec_axes import axis_values
 from service.spec_base import read_base
 from service.spec_fields import read_object
-from service.spec_messages import Problem, Report, SpecError, join
+from service.spec_messages import Problem, Report, SpecError, join, quantity_text
 
 if TYPE_CHECKING:
     from service.spec_base import Machine
@@ -56,7 +56,7 @@ def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> di
     SpecError
         With everything that is wrong with ``addition``; pointers are into it.
     """
-    report = Report()
+    report = Report(addition)
     found = dict(read_object(report, "", addition, FIELDS) or {})
     report.raise_if_any()
     given = [name for name in ("axes", "cases") if name in found]
@@ -100,5 +100,6 @@ def _add(
     else:
         bases = list(dict.fromkeys(study.base[path] for path in paths))
         if len(bases) > 1:
-            report.problem(join(pointer, "path"), "ties parameters whose values in the base differ", bases)
+            told = [quantity_text(base, machine.parameters[paths[0]].unit) for base in bases]
+            report.problem(join(pointer, "path"), "ties parameters whose values in the base differ", told)
         axes.append({"path": list(paths), "values": list(dict.fromkeys([*bases, *values]))})

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from service.catalogue import unit_of
 from service.errors import ErrorItem, shown
-from service.spec_messages import did_you_mean
+from service.spec_messages import did_you_mean, quantity_text
 from service.units import QuantityError, parse_quantity, split_quantity, to_float
 from worker.study import SAME_VALUE
 
@@ -44,7 +44,9 @@ def require_axis(study: Study, parameter: str, path: str) -> int:
         return position
     fixed = path in study.base
     message = (
-        f"not an axis: it is {study.base[path]!r} in every case" if fixed else "not an axis of this study"
+        f"not an axis: it is {quantity_text(study.base[path], unit_of(study, path))} in every case"
+        if fixed
+        else "not an axis of this study"
     ) + did_you_mean(path, study.axis_paths)
     raise SelectionError(
         [

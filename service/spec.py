@@ -79,7 +79,7 @@ def parse_spec(data: object) -> ParsedSpec:
     SpecError
         With everything that is wrong with it: each problem has its JSON Pointer, the value, and what is allowed.
     """
-    report = Report()
+    report = Report(data)
     found = read_object(report, "", data, FIELDS)
     if found is None:
         raise report.error()

@@ -9,7 +9,7 @@ from typing import Any
 
 from service.spec_base import Machine
 from service.spec_fields import read_object
-from service.spec_messages import Report, join
+from service.spec_messages import Report, join, quantity_text
 from service.spec_values import PLANS, Plan, count_text
 from worker.kernels import Parameter
 from worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_TIED_PATHS
@@ -40,7 +40,7 @@ def read_axes(report: Report, data: object, combine: Combine, machine: Machine) 
         if values is None:
             return None
         axes.append(Axis(paths, values))
-    if combine == "zip" and not _rows_differ(report, axes):
+    if combine == "zip" and not _rows_differ(report, axes, machine):
         return None
     return tuple(axes)
 
@@ -158,13 +158,13 @@ def expand(report: Report, plan: Plan, parameters: list[Parameter], combine: Com
         refusing = next((entry for entry in parameters if not entry.accepts(value)), None)
         if refusing is not None:
             report.problem(
-                where, f"value {index} is out of range for {refusing.path}", value,
+                where, f"value {index} is out of range for {refusing.path}", _shown(plan, value, refusing),
                 allowed=refusing.range_text(), unit=refusing.unit,
             )  # fmt: skip
             return None
         if combine == "grid" and value in seen:
             report.problem(
-                where, f"value {index} repeats value {seen[value]}", value,
+                where, f"value {index} repeats value {seen[value]}", _shown(plan, value, parameters[0]),
                 allowed="each value once", unit=parameters[0].unit,
             )  # fmt: skip
             return None
@@ -172,12 +172,19 @@ def expand(report: Report, plan: Plan, parameters: list[Parameter], combine: Com
     return tuple(value + 0.0 for value in values)  # no negative zero
 
 
-def _rows_differ(report: Report, axes: list[Axis]) -> bool:
+def _shown(plan: Plan, value: float, parameter: Parameter) -> float | str:
+    """A value for a message: where the user wrote it, it is shown as written; else it needs its unit."""
+    return value if plan.listed else quantity_text(value, parameter.unit)
+
+
+def _rows_differ(report: Report, axes: list[Axis], machine: Machine) -> bool:
     seen: dict[tuple[float, ...], int] = {}
     for case, row in enumerate(zip(*(axis.values for axis in axes), strict=True)):
         if seen.setdefault(row, case) != case:
+            pairs = [(axis.paths[0], value) for axis, value in zip(axes, row, strict=True)]
+            values = [f"{path} = {quantity_text(value, machine.parameters[path].unit)}" for path, value in pairs]
             report.problem(
-                "/axes", f"cases {seen[row]} and {case} are the same: every zipped axis repeats its value", list(row),
+                "/axes", f"cases {seen[row]} and {case} are the same: every zipped axis repeats its value", values,
                 allowed="each combination of values once",
             )  # fmt: skip
             return False

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from service.spec_fields import missing, placed, read_flag, read_number, read_object, read_whole
-from service.spec_messages import Report, join
+from service.spec_messages import Report, join, quantity_text
 from worker import kernels
 from worker.kernels import CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, Parameter
 from worker.limits import MAX_CLUTCH_LAWS, MAX_CLUTCH_ROWS
@@ -137,7 +137,7 @@ def _measured(
                 join(pointer, "angles_include_backlash"),
                 "one clutch for all pendulums needs one backlash for all of them to be taken off the angles; give the "
                 "clutch in each pendulum instead",
-                list(backlashes),
+                [quantity_text(backlash, "rad") for backlash in backlashes],
             )
         elif backlashes:
             options["backlash"] = backlashes[0]

@@ -18,7 +18,7 @@ from service.spec_axes import check_paths, expand, read_axes, read_axis
 from service.spec_blocks import Block, as_axes, chosen, first_rows, made, one_after_another, product, side_by_side
 from service.spec_exclude import kept, read_exclude
 from service.spec_fields import read_object
-from service.spec_messages import Report, did_you_mean, join, shorten_text
+from service.spec_messages import Report, did_you_mean, join, quantity_text
 from service.spec_points import read_points
 from service.spec_sample import read_sample
 from service.spec_values import count_text
@@ -76,20 +76,16 @@ def _as_axes(
     if first.size < count:
         again = int(np.setdiff1d(np.arange(count), first)[0])
         alike = np.all([column == column[again] for column in columns.values()], axis=0)
-        values = ", ".join(f"{path} = {column[again]:.10g}{_unit(machine, path)}" for path, column in columns.items())
+        units = {path: machine.parameters[path].unit for path in columns}
+        values = [f"{path} = {quantity_text(column[again], units[path])}" for path, column in columns.items()]
         before = int(np.flatnonzero(alike)[0])
         message = f"cases {before} and {again}, counted from 0, are the same"
         if lines:
             message = f"lines {lines[before]} and {lines[again]} are the same"
         where = "/axes/0/points" if lines else "/axes"
-        report.problem(where, message, shorten_text(values), allowed="each combination of values once")
+        report.problem(where, message, values, allowed="each combination of values once")
         return None
     return as_axes(columns)
-
-
-def _unit(machine: Machine, path: str) -> str:
-    unit = machine.parameters[path].unit
-    return "" if unit == "1" else f" {unit}"
 
 
 def _length(columns: Mapping[str, NDArray[np.float64]]) -> int:

@@ -64,9 +64,10 @@ class SpecError(Exception):
 
 
 class Report:
-    """Collects problems and warnings while a spec is read."""
+    """Collects problems and warnings while ``source``, plain data that the user wrote, is read."""
 
-    def __init__(self) -> None:
+    def __init__(self, source: object = None) -> None:
+        self._source = source
         self.problems: list[Problem] = []
         #: Problems that were found, those included that are not noted any more.
         self.found = 0
@@ -75,10 +76,11 @@ class Report:
     def problem(
         self, pointer: str, message: str, value: object = None, *, allowed: str | None = None, unit: str | None = None
     ) -> None:
-        """Notes a problem, unless there are `MAX_PROBLEMS` already."""
+        """Notes a problem, unless there are `MAX_PROBLEMS` already; numbers that the user wrote stand as written."""
         self.found += 1
         if not self.full:
-            self.problems.append(Problem(pointer, message, shorten(value), allowed, unit))
+            shown = _as_written(value, _at(self._source, pointer))
+            self.problems.append(Problem(pointer, message, shorten(shown), allowed, unit))
 
     @property
     def full(self) -> bool:
@@ -111,6 +113,33 @@ class Report:
         """The error with everything noted so far."""
         more = [Problem("", f"only the first {MAX_PROBLEMS} problems are listed")] if self.full else []
         return SpecError([*self.problems, *more])
+
+
+def _at(source: object, pointer: str) -> object:
+    """What stands at a JSON Pointer; None where nothing does."""
+    for part in pointer.split("/")[1:]:
+        key = part.replace("~1", "/").replace("~0", "~")
+        if isinstance(source, Mapping):
+            source = source.get(key)
+        elif isinstance(source, list) and key.isdecimal() and int(key) < len(source):
+            source = source[int(key)]
+        else:
+            return None
+    return source
+
+
+def _as_written(value: object, written: object) -> object:
+    """``written`` in the place of the SI number, or numbers, that were made of it."""
+    if isinstance(value, list | tuple) and isinstance(written, list) and 0 < len(value) == len(written):
+        pairs = list(zip(value, written, strict=True))
+        return [_as_written(*pair) for pair in pairs]
+    numeric = isinstance(value, float | int) and not isinstance(value, bool)
+    return written if numeric and isinstance(written, str | float | int) and not isinstance(written, bool) else value
+
+
+def quantity_text(number: float, unit: str) -> str:
+    """A computed number for a message, with its unit."""
+    return f"{number:.10g}" + ("" if unit == "1" else f" {unit}")
 
 
 def join(pointer: str, *keys: str | int) -> str:

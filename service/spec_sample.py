@@ -93,7 +93,8 @@ def _read_range(report: Report, pointer: str, data: object, machine: Machine) ->
         report.problem(join(pointer, "to"), "is the same as `from`", high, allowed="another value", unit=unit)
         return None
     if scale == "log" and low * high <= 0.0:
-        report.problem(pointer, "a log scale needs two ends of one sign, neither of them 0", [low, high], unit=unit)
+        report.problem(pointer, "a log scale needs two ends of one sign, neither of them 0",
+                       [found.get("from"), found.get("to")], unit=unit)  # fmt: skip
         return None
     return None if scale is None else SampleRange(paths, low, high, "log" if scale == "log" else "linear")
 

@@ -62,7 +62,7 @@ def fit_clutch(received: Annotated[Body, Depends(read_body)]) -> Response:
 
 
 def _fit(data: object) -> ClutchFit:
-    report = Report()
+    report = Report(data)
     found = dict(read_object(report, "", data, _FIELDS) or {})
     backlash = read_number(report, "/backlash", found.pop("backlash", 0.0), _backlash())
     if backlash and found.get("angles_include_backlash") is not True:

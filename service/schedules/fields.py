@@ -64,7 +64,7 @@ def read_fields(data: object, now: datetime) -> ScheduleFields:
 
 def change_fields(fields: ScheduleFields, data: object, now: datetime) -> ScheduleFields:
     """The fields with those of ``data`` in their place; raises SpecError."""
-    report = Report()
+    report = Report(data)
     given = read_object(report, "", data, FIELDS)
     report.raise_if_any()
     assert given is not None
@@ -77,7 +77,7 @@ def change_fields(fields: ScheduleFields, data: object, now: datetime) -> Schedu
 
 
 def _read(data: object, now: datetime, old: ScheduleFields | None = None) -> ScheduleFields:
-    report = Report()
+    report = Report(data)
     found = read_object(report, "", data, FIELDS) or {}
     zone = _read_zone(report, found.get("zone", "UTC"))
     timing = _read_timing(report, found, zone, now, old)

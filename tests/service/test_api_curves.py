@@ -107,7 +107,7 @@ def test_a_study_without_choice_needs_no_at(service: Service, spec: dict[str, An
             "0.001, 0.002",
         ),
         ("x=shaft.lod&y=torque.max", "x", "did you mean 'shaft.load'", "shaft.load"),
-        ("x=shaft.inertia&y=torque.max", "x", "it is 0.002 in every case", "shaft.load"),
+        ("x=shaft.inertia&y=torque.max", "x", "it is 0.002 kg*m^2 in every case", "shaft.load"),
         ("x=shaft.load&y=torque.maxx", "y", "did you mean 'torque.max'", "torque.mean"),
         ("x=shaft.load&y=torque.max&by=shaft.load", "by", "already taken", None),
         ("x=shaft.load&y=torque.max&at=shaft.load=0.1", "at", "already taken", None),

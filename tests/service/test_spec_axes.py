@@ -292,3 +292,35 @@ def test_a_law_negative_somewhere_in_a_zip() -> None:
     assert found["/axes/0"].value == [0.0, 100.0, 0.0, -20000.0]
     many = [{"path": f"clutch.coefficients.{k}", "linspace": [-1, k, 20_000]} for k in (1, 3)]
     assert "20,000 different clutch laws" in problems({"/axes": many, "/combine": "zip"})["/axes/0"].message
+
+
+@pytest.mark.parametrize(
+    ("changes", "pointer", "value"),
+    [
+        ({"/axes": [{"path": "excitation.frequency", "values": [25, 25]}]}, "/axes/0/values/1", 25),
+        ({"/axes": [{"path": "excitation.frequency", "values": ["25 Hz", "1500 rpm"]}]}, "/axes/0/values/1",
+         "1500 rpm"),
+        ({"/axes": [{"path": ["pendulums.0.arm", "excitation.amplitude_y"], "values": ["2 mm", "-3 mm"]}]},
+         "/axes/0/values/1", "-3 mm"),
+        ({"/axes": [{"path": ["pendulums.0.arm", "excitation.amplitude_y"], "linspace": ["-4 mm", "4 mm", 3]}]},
+         "/axes/0/linspace", "-0.004 m"),
+        ({"/axes": [{"path": "shaft.load", "values": ["1 N*m", "1000 N*mm"]},
+                    {"path": "excitation.frequency", "values": ["25 Hz", "1500 rpm"]}], "/combine": "zip"},
+         "/axes", ["shaft.load = 1 N*m", "excitation.frequency = 25 Hz"]),
+        ({"/axes": [{"sample": "sobol", "count": 4,
+                     "ranges": [{"path": "shaft.load", "from": "1 N*m", "to": "1000 N*mm"}]}]},
+         "/axes/0/ranges/0/to", "1000 N*mm"),
+        ({"/axes": [{"sample": "sobol", "count": 4,
+                     "ranges": [{"path": "pendulums.0.arm", "from": "-30 mm", "to": 0.03, "scale": "log"}]}]},
+         "/axes/0/ranges/0", ["-30 mm", 0.03]),
+        ({"/base/clutch": {"coefficients": ["0 N*m", "-200 N*m/rad"]}}, "/base/clutch/coefficients",
+         ["0 N*m", "-200 N*m/rad"]),
+        ({"/base/clutch": {"data": [["0.1 deg", "0 N*m"], ["1 deg", "2000 N*mm"]], "accuracy": "1 N*m",
+                           "angles_include_backlash": True}, "/base/pendulums/0/backlash": "3 deg"},
+         "/base/clutch/data/1/1", "2000 N*mm"),
+    ],
+)  # fmt: skip
+def test_values_stand_in_messages_as_they_were_written(changes: dict[str, Any], pointer: str, value: object) -> None:
+    (problem,) = problems(changes).values()
+    assert (problem.pointer, problem.value) == (pointer, value)
+    assert type(problem.value) is type(value)

@@ -163,7 +163,7 @@ def test_cases_are_left_out(exclude: list[Any], left: set[tuple[float, float]] |
         ({"/axes": [{"points": 7}]}, "/axes/0/points", "the text of a CSV file"),
         ({"/axes": [{"points": "shaft.load\n1\n1\n"}]}, "/axes/0/points", "lines 2 and 3 are the same"),
         ({"/axes": [{"points": "shaft.load\n3\n1\n\n2\n1\n"}]}, "/axes/0/points",
-         "lines 3 and 6 are the same (got 'shaft.load = 1 N*m'"),
+         "lines 3 and 6 are the same (got ['shaft.load = 1 N*m']"),
         ({"/axes": [{"points": "shaft.load\n1\n1\n"}], "/exclude": []}, "/axes/0/points", "lines 2 and 3"),
         ({"/axes": [{"points": "shaft.load\n1\n1\n"}, FREQUENCY]}, "/axes",
          "cases 0 and 2, counted from 0, are the same"),

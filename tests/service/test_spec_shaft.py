@@ -128,7 +128,7 @@ def test_mechanisms(mechanism: dict[str, Any], expected: dict[str, Any]) -> None
 
 WRONG: list[tuple[dict[str, Any], str, str]] = [
     ({"/base/mean_speed": "40 rpm"}, "/base/mean_speed", "least feasible mean speed is 4.7"),
-    ({"/base/mean_speed": "40 rpm"}, "/base/mean_speed", "got 4.18879"),
+    ({"/base/mean_speed": "40 rpm"}, "/base/mean_speed", "got '40 rpm'"),
     ({"/base/mechanism/slider_crank/rod": "90 mm"}, "/base/mechanism/slider_crank", "shaft angle of 64.1581 deg"),
     ({"/base/drive/inertia": -1}, "/base/drive/inertia", "got -1; allowed: >= 0 kg*m^2"),
     (
@@ -198,7 +198,7 @@ WRONG: list[tuple[dict[str, Any], str, str]] = [
     (
         {"/base/operation": {"gas": GAS | {"clearance": 0.5}}, "/axes": []},
         "/base/operation/gas/discharge_pressure",
-        "got 700000.0; allowed: >= 100000 Pa and <= 417117 Pa",
+        "got '0.7 MPa'; allowed: >= 100000 Pa and <= 417117 Pa",
     ),
     (
         {"/base/operation": {"gas": GAS | {"discharge_pressure": "0.5 bar"}}, "/axes": []},
