@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from service.catalogue import result_of, unit_of, unknown_result
 from service.errors import ErrorItem
 from service.selection import Fixed, SelectionError, axis_name, held_text, listed, locate_axes, require_axis
+from worker.kernels import WorkerEnding
 from worker.limits import MAX_CURVE_VALUES
 
 if TYPE_CHECKING:
@@ -82,6 +83,10 @@ class Curve:
     line: Line
     y: dict[str, NDArray[np.float64]]
     endings: list[str]
+
+    def run(self) -> NDArray[np.intp]:
+        """Places of the cases that were run, ascending: what a picture joins. Of a coarser study, its own points."""
+        return np.flatnonzero(~_not_run(np.array(self.endings, dtype=object)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +155,44 @@ class Map:
             "cases": self.cases.tolist(),
             "endings": self.endings,
         }
+
+    def run(self) -> Map:
+        """The part of the map all of whose cases were run; the map itself where none was.
+
+        Of a study that stopped on its way from coarse to fine it is a coarser grid without holes.
+        """
+        missing = _not_run(np.array(self.endings, dtype=object)).reshape(self.values.shape)
+        rows, columns = _complete(missing)
+        if not missing.any() or not (rows.size and columns.size):
+            return self
+        return replace(
+            self,
+            x_values=tuple(self.x_values[index] for index in columns),
+            y_values=tuple(self.y_values[index] for index in rows),
+            cases=self.cases[np.ix_(rows, columns)],
+            values=self.values[np.ix_(rows, columns)],
+            endings=[[self.endings[row][column] for column in columns] for row in rows],
+        )
+
+
+def _complete(missing: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows and columns that are left when the emptiest is taken away, again and again, until nothing is missing."""
+    rows, columns = np.ones(missing.shape[0], dtype=np.bool_), np.ones(missing.shape[1], dtype=np.bool_)
+    in_rows, in_columns = missing.sum(axis=1), missing.sum(axis=0)
+    while in_rows.any():
+        row, column = int(in_rows.argmax()), int(in_columns.argmax())
+        if in_rows[row] * rows.sum() >= in_columns[column] * columns.sum():
+            rows[row], in_rows[row] = False, 0
+            in_columns -= missing[row] & columns
+        else:
+            columns[column], in_columns[column] = False, 0
+            in_rows -= missing[:, column] & rows
+    return np.flatnonzero(rows), np.flatnonzero(columns)
+
+
+def _not_run(endings: NDArray[np.object_]) -> NDArray[np.bool_]:
+    """Which cases have no ending of their own, yet or for good; shape as ``endings``."""
+    return np.asarray((endings == PENDING) | (endings == WorkerEnding.CANCELLED.value), dtype=np.bool_)
 
 
 def numbers(values: NDArray[np.float64], count: bool = False) -> list[float | int | None]:

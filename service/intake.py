@@ -7,18 +7,26 @@ import json
 from typing import TYPE_CHECKING
 
 from service.errors import ApiError
-from service.preview import estimated_bytes
+from service.finish import finish_warnings
+from service.preview import estimated_bytes, estimated_seconds
 from service.storage.room import RESERVE_BYTES
 from worker.limits import MAX_WAITING_STUDIES
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from service.spec import ParsedSpec
     from service.storage.records import StudyRecord
     from service.storage.store import Store
 
 
 def accept(
-    store: Store, parsed: ParsedSpec, idempotency_key: str | None = None, priority: int = 0, fresh: bool = False
+    store: Store,
+    parsed: ParsedSpec,
+    idempotency_key: str | None = None,
+    priority: int = 0,
+    fresh: bool = False,
+    finish_by: datetime | None = None,
 ) -> StudyRecord:
     """Take a study in, warnings and all; ApiError when its results would not fit on the disk."""
     body_hash = hashlib.sha256(json.dumps(parsed.spec, sort_keys=True).encode("ascii")).hexdigest()
@@ -28,14 +36,21 @@ def accept(
     if store.waiting_studies() >= MAX_WAITING_STUDIES:
         raise ApiError("queue-full", f"{MAX_WAITING_STUDIES:,} studies have not ended yet.")
     _require_room(store, parsed)
+    warnings = (*parsed.warnings, *store.chunking.warnings(parsed.study))
+    if finish_by is not None:
+        to_run = parsed.study.cases - (0 if fresh else store.reusable(parsed.study))
+        seconds = estimated_seconds(parsed.study, store.chunking, to_run)
+        left = (finish_by - store.clock.now()).total_seconds()
+        warnings += finish_warnings(parsed.study, seconds, left)
     return store.create_study(
         parsed.spec,
         parsed.study,
-        warnings=(*parsed.warnings, *store.chunking.warnings(parsed.study)),
+        warnings=warnings,
         idempotency_key=idempotency_key,
         body_hash=body_hash,
         priority=priority,
         fresh=fresh,
+        finish_by=finish_by,
     )
 
 

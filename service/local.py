@@ -23,6 +23,7 @@ from worker.states import StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
+    from datetime import datetime
 
     from service.storage.records import Progress, StudyRecord
     from worker.ports import Executor
@@ -56,6 +57,7 @@ def run_here(
     chunk_timeout: float = 600.0,
     warnings: Sequence[str] = (),
     fresh: bool = False,
+    finish_by: datetime | None = None,
     on_progress: Callable[[Progress], None] | None = None,
     executor: Executor | None = None,
 ) -> Iterator[LocalRun]:
@@ -63,13 +65,14 @@ def run_here(
 
     Without ``database_url`` the database is a temporary one and gone with the context. When another dispatcher is at
     work on the database given, that one runs the study and this process waits. ``processes`` 0 runs the cases in this
-    process, which suits a few; 1 and more start a pool. Raises StoreError and ExecutorError, each with one sentence.
+    process, which suits a few; 1 and more start a pool. At ``finish_by`` it ends with what is done. Raises StoreError
+    and ExecutorError, each with one sentence.
     """
     sweep(Path(tempfile.gettempdir()).glob(f"{_FOLDER_PREFIX}*"))
     with tempfile.TemporaryDirectory(prefix=_FOLDER_PREFIX) as folder, marked(Path(folder)):
         url = database_url or f"sqlite:///{Path(folder) / 'run.sqlite3'}"
         with Store.open(url, chunking=Chunking(chunk_cases, max(processes, 1), chunk_timeout)) as store:
-            record = store.create_study(spec, study, warnings=warnings, fresh=fresh)
+            record = store.create_study(spec, study, warnings=warnings, fresh=fresh, finish_by=finish_by)
             settings = WorkerSettings(url, processes, chunk_timeout)
             watch = _Watch(store, record.id, on_progress)
             lock = lock_of(store.session, owner_name())
@@ -111,6 +114,6 @@ class _Watch:
         record = self._store.get_study(self._id)
         if self._report is not None:
             self._report(self._store.progress(self._id))
-        if not record.state.terminal:
+        if not record.over:
             raise StudyHeldError(f"the study was held: {record.reason or 'somebody paused it'}")
         return record

@@ -105,6 +105,7 @@ def paint_curves(figure: Figure, curves: Curves, title: str) -> None:
 def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
     """A map as a picture: colours over two axes, cases without a result left blank; SelectionError when too large."""
     check_size("points", drawn.values.size, MAX_PICTURE_POINTS)
+    drawn = drawn.run()
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
@@ -163,11 +164,13 @@ def _paint_curves(axes: Axes, curves: Curves, infos: list[ResultInfo], unit: str
     colours = _colours(len(curves.curves))
     for curve, colour in zip(curves.curves, colours, strict=True):
         # A line tells how x leads to y; points of a zip that go to and fro are not on one.
-        joined = bool(np.all(np.diff(curve.line.x) > 0.0))
+        run = curve.run()
+        x = np.asarray(curve.line.x)[run]
+        joined = bool(np.all(np.diff(x) > 0.0))
         for info, (style, marker) in zip(infos, itertools.cycle(_STYLES), strict=False):
             axes.plot(
-                curve.line.x,
-                curve.y[info.name],
+                x,
+                curve.y[info.name][run],
                 color=colour,
                 linestyle=style if joined else "none",
                 marker=marker,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from service.catalogue import axes_json
+from service.finish import finish_warnings
 from service.fits import fit_json
 from worker import kernels
 from worker.chunking import work_of
@@ -25,16 +26,25 @@ def estimated_bytes(study: Study) -> int:
     return study.cases * (_ROW_BYTES + _NUMBER_BYTES * len(kernels.study_results(study)))
 
 
-def preview_json(parsed: ParsedSpec, chunking: Chunking, reusable: int = 0) -> dict[str, Any]:
+def estimated_seconds(study: Study, chunking: Chunking, to_run: int) -> float:
+    """Rough time (s) of running that many cases of ``study`` on the processes of ``chunking``."""
+    # A study of fewer cases than processes still takes the time of one case.
+    rounds = max(to_run / chunking.processes, 1.0)
+    return work_of(rounds) * kernels.estimate_seconds_per_case(study) if to_run else 0.0
+
+
+def preview_json(
+    parsed: ParsedSpec, chunking: Chunking, reusable: int = 0, seconds_left: float | None = None
+) -> dict[str, Any]:
     """What ``parsed`` would be as a study that is cut and run so, as JSON data.
 
     ``reusable`` of its cases need not be run, because studies of the database have them. ``estimated_seconds`` (wall
-    time) and ``estimated_bytes`` (in the database) are rough.
+    time) and ``estimated_bytes`` (in the database) are rough. When ``seconds_left`` until a deadline will hardly do, it
+    is told.
     """
     study = parsed.study
-    # A study of fewer cases than processes still takes the time of one case.
-    to_run = study.cases - reusable
-    rounds = max(to_run / chunking.processes, 1.0)
+    seconds = estimated_seconds(study, chunking, study.cases - reusable)
+    late = () if seconds_left is None else finish_warnings(study, seconds, seconds_left)
     first = range(min(_FIRST_CASES, study.cases))
     return {
         "model": study.model,
@@ -45,9 +55,9 @@ def preview_json(parsed: ParsedSpec, chunking: Chunking, reusable: int = 0) -> d
         "axes": axes_json(study),
         "results": len(kernels.study_results(study)),
         "reusable": reusable,
-        "estimated_seconds": work_of(rounds) * kernels.estimate_seconds_per_case(study) if to_run else 0.0,
+        "estimated_seconds": seconds,
         "estimated_bytes": estimated_bytes(study),
-        "warnings": [*parsed.warnings, *chunking.warnings(study)],
+        "warnings": [*parsed.warnings, *chunking.warnings(study), *late],
         "fits": {pointer: fit_json(fit) for pointer, fit in parsed.fits.items()},
         "first_cases": [
             {"case": case, "parameters": values} for case, values in zip(first, study.values_with(first), strict=True)

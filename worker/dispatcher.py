@@ -172,6 +172,8 @@ class Dispatcher:
                     self._forget(study.number)
                 wish = dispatch.Paused if study.state is StudyState.PAUSED else dispatch.Cancelled
                 self._handle(wish(study.number))
+            elif study.finish_by is not None and study.finish_by <= self._clock.now():
+                self._time_is_over(study.number)
             elif study.number in self._machine.studies:
                 self._tell_shortage(study.number)
                 self._handle(dispatch.Offered(study.number, priority=study.priority))
@@ -180,6 +182,15 @@ class Dispatcher:
                 self._say("The study %s is taken up: %d cases in %d chunks to be run.", study.number,
                     sum(chunk.count for chunk in chunks), len(chunks))  # fmt: skip
                 self._handle(dispatch.Offered(study.number, chunks, study.priority))
+
+    def _time_is_over(self, number: int) -> None:
+        """The deadline of the study has come: what is in flight goes on to its end, then the study is held."""
+        self._compiling.pop(number, None)
+        self._handle(dispatch.Paused(number))
+        if number not in self._machine.studies:
+            self._store.time_is_over(self._epoch, number)
+            self._say("The time of the study %s is over.", number)
+            self._forget(number)
 
     def _may_open(self, study: ActiveStudy) -> bool:
         """Studies that wait for kernels, or have a lower priority, leave room for as many others."""

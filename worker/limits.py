@@ -46,6 +46,8 @@ MAX_TRAJECTORY_POINTS: Final = 20_000
 #: Priorities of studies lie between this and its negative.
 MAX_PRIORITY: Final = 100
 
+#: Days that the deadline of a study may lie ahead.
+MAX_FINISH_DAYS: Final = 366
 #: Studies that have not ended; a further one is refused.
 MAX_WAITING_STUDIES: Final = 1_000
 #: Streams of events that are open at once.

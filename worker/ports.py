@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 class Chunk:
     """Consecutive cases of one study, the unit of claim and commit.
 
+    They are consecutive in the order in which the study is run: by their numbers, or coarse to fine (`worker.order`).
     ``study`` is the study's number in order of submission. ``failures`` counts how often these cases, as one chunk,
     took their process down or ran out of time.
     """
@@ -39,7 +40,7 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """Cases of a chunk whose rows other studies have already.
+    """What is known of the cases of a chunk: which have to be run, and whose rows other studies have already.
 
     Attributes
     ----------
@@ -59,7 +60,8 @@ class Known:
 class ActiveStudy:
     """A study that has not come to its end, as the dispatcher's poll sees it.
 
-    Higher ``priority`` goes first. ``waits_for_room`` tells a paused study that goes on by itself.
+    Higher ``priority`` goes first. ``waits_for_room`` tells a paused study that goes on by itself. No chunk is to be
+    started after ``finish_by``.
     """
 
     number: int
@@ -67,6 +69,7 @@ class ActiveStudy:
     state: StudyState
     priority: int = 0
     waits_for_room: bool = False
+    finish_by: datetime | None = None
 
 
 class StoreError(Exception):
@@ -103,19 +106,25 @@ class Store(Protocol):
         """Note that the dispatcher is alive. Raises alarms when missing, never decides ownership."""
 
     def active_studies(self) -> list[ActiveStudy]:
-        """Studies that have not ended, those of the highest priority first, then in order of submission."""
+        """Studies that have not ended, those of the highest priority first, then in order of submission.
+
+        Without those that `time_is_over` held.
+        """
 
     def study_of(self, number: int) -> Study:
         """The study to compute."""
 
     def open_chunks(self, number: int) -> list[Chunk]:
-        """Chunks of a study that are not done, in order of their cases."""
+        """Chunks of a study that are not done, in the order in which they are to be run."""
 
     def claim(self, epoch: int, chunks: Sequence[Chunk]) -> list[Chunk]:
-        """Claim waiting chunks of studies that are queued or running; gives those that were got."""
+        """Claim waiting chunks of studies that are queued or running and in time; gives those that were got."""
 
     def known(self, study: Study, chunk: Chunk) -> Known | None:
-        """Which cases of a chunk of ``study`` other studies have already; None where none is."""
+        """Which cases of a chunk of ``study`` have to be run, and which others have.
+
+        None where all have to be and they are those numbered ``chunk.first`` to ``chunk.last``.
+        """
 
     def commit(self, epoch: int, chunk: Chunk, result: ChunkResult, known: Known | None = None) -> bool:
         """Insert the rows of a claimed chunk and mark it done. False, and no change, when it is not claimed by us.
@@ -141,6 +150,9 @@ class Store(Protocol):
 
     def fault(self, epoch: int, number: int, reason: str) -> None:
         """Hold the study with a reason and return its claims to waiting."""
+
+    def time_is_over(self, epoch: int, number: int) -> None:
+        """Hold a queued or running study, nothing of which is in flight: its deadline has come."""
 
     def begin_again(self, epoch: int, number: int) -> None:
         """Return every claim of this epoch to waiting, and take all blame from the study's chunks."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -31,12 +31,26 @@ class Progress(Body):
     ok: int = Field(description="cases that ended ok")
 
 
+class Passes(Body):
+    """What of a study is complete that is run coarse to fine."""
+
+    complete: int = Field(description="passes that are complete")
+    total: int = Field(description="passes of the study; the last is the whole study")
+    cases: int = Field(description="cases of the complete passes")
+    values: list[int] = Field(description="values of each axis in the complete grid; empty where cases are written out")
+
+
 class FullProgress(Progress):
     """How far a study is, how fast, and how long it will take."""
 
     endings: dict[str, int] = Field(description="number of cases for each ending")
     rate: float | None = Field(description="cases per second over the recent chunks; null when nothing runs")
     seconds_left: Interval | None = Field(description="estimated time left in s; null when nothing runs")
+    in_time: Literal["yes", "no", "unsure"] | None = Field(
+        description="whether it will be finished by `finish_by`, from `seconds_left`; null when nothing is known"
+    )
+    done_by_then: int | None = Field(description="cases that will be done at `finish_by`, about")
+    passes: Passes | None = Field(description="of a study that is run coarse to fine: what is complete")
 
 
 class StudySummary(Body):
@@ -56,6 +70,8 @@ class StudySummary(Body):
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None
+    finish_by: datetime | None = Field(description="when the study is held, whatever is done then")
+    time_over: bool = Field(description="it is held because `finish_by` came before its end")
     engine_version: str
     links: dict[str, str] = Field(description="addresses of what belongs to the study")
 
@@ -347,49 +363,6 @@ class PresetList(Body):
     """All studies that come with the program."""
 
     presets: list[Preset]
-
-
-class ScheduleRun(Body):
-    """A due time of a schedule and what became of it."""
-
-    due: datetime
-    state: str = Field(description="taken: about to be submitted; submitted; refused, see `problem`")
-    missed: int = Field(description="earlier due times that nobody was there for; they are not run")
-    begun_at: datetime
-    study: str | None = Field(description="id of its study; null where there is none, or none any more")
-    address: str | None = Field(description="address of the study")
-    problem: str | None = Field(description="why no study came of it")
-
-
-class ScheduleSummary(Body):
-    """A study that is submitted by itself."""
-
-    id: str
-    name: str
-    cron: str | None = Field(description="when it is due again and again, on the wall clock of `zone`")
-    at: datetime | None = Field(description="when it is due once")
-    zone: str
-    window: list[str] | None = Field(description="its studies run between these times of day only")
-    priority: int
-    fresh: bool
-    enabled: bool
-    created_at: datetime
-    next_due: datetime | None = Field(description="null when it is disabled or over")
-    last_run: ScheduleRun | None
-    links: dict[str, str]
-
-
-class ScheduleDetail(ScheduleSummary):
-    """A schedule with its spec and its latest runs."""
-
-    runs: list[ScheduleRun] = Field(description="latest first")
-    spec: dict[str, Any]
-
-
-class ScheduleList(Body):
-    """All schedules, newest first."""
-
-    schedules: list[ScheduleSummary]
 
 
 class Health(Body):

@@ -9,13 +9,14 @@ from starlette.convertors import register_url_convertor
 from starlette.responses import Response
 
 from service.api import examples
-from service.api import models as m
+from service.api import schedule_models as m
 from service.api.context import ID_PATTERN, Ctx, StudyIdConvertor
 from service.api.document import API_PREFIX, body, located, problems
 from service.api.requests import Body, read_body, strict_query
 from service.api.respond import json_response, timestamp
 from service.api.views import study_address
 from service.errors import ApiError, spec_items
+from service.finish import ALLOWED_OF_RUNS
 from service.schedules.fields import change_fields, read_fields
 from service.spec import load_spec
 from service.spec_messages import SpecError
@@ -52,6 +53,11 @@ _FIELDS: Final[dict[str, Any]] = {
     },
     "priority": {"type": "integer", "minimum": -MAX_PRIORITY, "maximum": MAX_PRIORITY, "default": 0},
     "fresh": {"type": "boolean", "default": False, "description": "run every case, also those that studies have"},
+    "finish_by": {
+        "type": ["string", "null"],
+        "maxLength": 80,
+        "description": f"each run goes coarse to fine and is held then: {ALLOWED_OF_RUNS}",
+    },
     "enabled": {"type": "boolean", "default": True},
 }
 SCHEMA: Final[dict[str, Any]] = {
@@ -72,6 +78,7 @@ EXAMPLE: Final[dict[str, Any]] = {
     "cron": "0 22 * * 1-5",
     "zone": "Europe/Berlin",
     "window": ["22:00", "06:00"],
+    "finish_by": "06:00",
     "spec": examples.SPEC,
 }
 
@@ -165,7 +172,9 @@ def summary(record: ScheduleRecord) -> dict[str, Any]:
     fields = record.fields.to_json()
     return {
         "id": record.id,
-        **{name: fields.get(name) for name in ("name", "cron", "at", "zone", "window", "priority", "fresh", "enabled")},
+        **{name: fields.get(name) for name in ("name", "cron", "at", "zone", "window", "priority", "fresh")},
+        "finish_by": record.fields.finish_by,
+        "enabled": record.fields.enabled,
         "created_at": timestamp(record.created_at),
         "next_due": timestamp(record.next_due),
         "last_run": None if record.last is None else run_json(record.last),

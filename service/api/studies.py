@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Query, Request
@@ -10,13 +11,14 @@ from starlette.responses import Response
 
 from service.api import examples, views
 from service.api import models as m
-from service.api.context import Ctx, StudyId
+from service.api.context import Context, Ctx, StudyId
 from service.api.document import body, located, one_of, problems
 from service.api.document import not_modified as documented_304
 from service.api.requests import Body, read_body, strict_query
 from service.api.respond import entity_tag, json_response, not_modified, tagged
 from service.errors import parameter_error
 from service.extend import parse_extended
+from service.finish import ALLOWED, FinishError, finish_at
 from service.intake import accept
 from service.preview import preview_json
 from service.spec import ParsedSpec, load_spec, parse_spec
@@ -51,6 +53,24 @@ Priority = Annotated[
         examples=[10],
     ),
 ]
+FinishBy = Annotated[
+    str | None,
+    Query(
+        max_length=80,
+        description=f"the study is run coarse to fine and held at this time, whatever is done then: {ALLOWED}",
+        examples=["8 h"],
+    ),
+]
+
+
+def _finish(context: Context, text: str | None) -> datetime | None:
+    """The deadline that the parameter `finish_by` names; ApiError when it cannot be kept."""
+    if text is None:
+        return None
+    try:
+        return finish_at(text, context.store.clock.now())
+    except FinishError as error:
+        raise parameter_error("finish_by", str(error), text, ALLOWED) from None
 
 
 def _parsed(received: Body) -> ParsedSpec:
@@ -70,19 +90,27 @@ def create_study(
     idempotency_key: IdempotencyKey = None,
     priority: Priority = 0,
     fresh: Annotated[bool, Query(description="run every case, also those that other studies have already")] = False,
+    finish_by: FinishBy = None,
 ) -> Response:
-    """Submit a study. Its cases are run in the order of their numbers; rows that other studies have are taken."""
-    record = accept(context.store, _parsed(received), idempotency_key, priority, fresh)
+    """Submit a study. Rows that other studies have are taken.
+
+    Its cases are run in the order of their numbers; with `finish_by` coarse to fine, each pass a complete coarser grid,
+    so that whatever is done then makes whole curves.
+    """
+    finish = _finish(context, finish_by)
+    record = accept(context.store, _parsed(received), idempotency_key, priority, fresh, finish)
     return json_response(views.summary(record), 202, {"Location": views.study_address(record.id)})
 
 
 @router.post(
     "/studies:preview", response_model=m.Preview, responses=problems(*_BODY_PROBLEMS), openapi_extra=_SPEC_BODY
 )
-def preview_study(context: Ctx, received: SpecBody) -> Response:
+def preview_study(context: Ctx, received: SpecBody, finish_by: FinishBy = None) -> Response:
     """What a study would be: cases, time, size, warnings and fitted clutch laws. Nothing is submitted."""
-    parsed = _parsed(received)
-    return json_response(preview_json(parsed, context.store.chunking, context.store.reusable(parsed.study)))
+    finish = _finish(context, finish_by)
+    parsed, store = _parsed(received), context.store
+    left = None if finish is None else (finish - store.clock.now()).total_seconds()
+    return json_response(preview_json(parsed, store.chunking, store.reusable(parsed.study), left))
 
 
 @router.get("/studies", response_model=m.StudyPage, responses=problems("invalid-parameter"))
@@ -127,7 +155,7 @@ def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
     responses=problems("invalid-parameter", "study-not-found", "wrong-state"),
 )
 def delete_study(context: Ctx, study_id: StudyId) -> Response:
-    """Delete a study that has ended, with all its results."""
+    """Delete a study that has ended, or whose time was over, with all its results."""
     context.store.delete_study(study_id)
     return Response(status_code=204)
 
@@ -153,7 +181,7 @@ def _verb(name: str, sentence: str) -> None:
 
 _verb("cancel", "Stop a study for good: the cases that are done are kept, the others are not run.")
 _verb("pause", "Hold a study: no new cases are started until it is resumed.")
-_verb("resume", "Go on with a study that is held.")
+_verb("resume", "Go on with a study that is held; a deadline that has passed does not count any more.")
 
 
 @router.post(
@@ -192,11 +220,13 @@ def extend_study(
     study_id: StudyId,
     received: SpecBody,
     priority: Priority = 0,
+    finish_by: FinishBy = None,
 ) -> Response:
     """Submit a study with more values on the axes of an old one, or more cases; only what is new is run."""
+    finish = _finish(context, finish_by)
     spec, study = context.store.spec(study_id), context.store.study(study_id)
     parsed = parse_extended(spec, study, load_spec(received.content, received.format))
-    record = accept(context.store, parsed, priority=priority)
+    record = accept(context.store, parsed, priority=priority, finish_by=finish)
     return json_response(views.summary(record), 202, {"Location": views.study_address(record.id)})
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from service.api.document import API_PREFIX
@@ -42,6 +43,8 @@ def summary(record: StudyRecord) -> dict[str, Any]:
         "created_at": timestamp(record.created_at),
         "started_at": timestamp(record.started_at),
         "finished_at": timestamp(record.finished_at),
+        "finish_by": timestamp(record.finish_by),
+        "time_over": record.time_over,
         "engine_version": record.engine_version,
         "links": study_links(record.id),
     }
@@ -49,7 +52,7 @@ def summary(record: StudyRecord) -> dict[str, Any]:
 
 def progress_json(progress: Progress) -> dict[str, Any]:
     """How far a study is, how fast, and how long it will take."""
-    left = progress.seconds_left
+    left, covered = progress.seconds_left, progress.covered
     return {
         "total": progress.total,
         "done": progress.done,
@@ -57,6 +60,9 @@ def progress_json(progress: Progress) -> dict[str, Any]:
         "endings": progress.endings,
         "rate": progress.rate,
         "seconds_left": None if left is None else {"low": left[0], "high": left[1]},
+        "in_time": None if progress.in_time is None else progress.in_time.value,
+        "done_by_then": progress.done_by_then,
+        "passes": None if covered is None else asdict(covered),
     }
 
 

@@ -148,14 +148,23 @@ def duration_text(seconds: float) -> str:
     return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
 
 
-def progress_text(state: str, rate: float | None, seconds_left: tuple[float, float] | None) -> str:
-    """How a study is going, beside its bar: state, cases per second, time left."""
+def progress_text(
+    state: str,
+    rate: float | None,
+    seconds_left: tuple[float, float] | None,
+    finish_by: str | None = None,
+    in_time: str | None = None,
+) -> str:
+    """How a study is going, beside its bar: state, cases per second, time left, and whether it will be in time."""
     parts = [str(state)]
     if rate:
         parts.append(f"{rate:.3g} cases/s")
     if seconds_left is not None:
         low, high = map(duration_text, seconds_left)
         parts.append(f"{low} left" if low == high else f"{low} to {high} left")
+    if finish_by is not None and in_time is not None:
+        word = {"yes": "in time", "no": "not in time", "unsure": "perhaps in time"}[in_time]
+        parts.append(f"{word} ({finish_by})")
     return ", ".join(parts)
 
 

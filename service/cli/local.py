@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import asdict
+from datetime import UTC, datetime
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,7 +22,7 @@ from service.cli.console import (
     write_text,
 )
 from service.cli.files import output, read_study
-from service.cli.options import ChunkCases, Fresh, JsonFlag, OutputFile, PointsFile, Processes, SpecFile
+from service.cli.options import ChunkCases, FinishBy, Fresh, JsonFlag, OutputFile, PointsFile, Processes, SpecFile
 from service.cli.remote import TableFormat, table_format
 from service.cli.settings import read_settings
 from service.spec_messages import Problem
@@ -85,16 +86,19 @@ def preview(
         str | None, typer.Option("--db", metavar="URL", help="Database to look through for cases it has already.")
     ] = None,
     processes: Processes = None,
+    finish_by: FinishBy = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Tell what a study would be: number of cases, time, size, first cases. Nothing is run."""
     from service.preview import preview_json
     from worker.chunking import Chunking
 
+    finish = _finish(finish_by)
+    left = None if finish is None else (finish - datetime.now(UTC)).total_seconds()
     settings = read_settings(database=db, processes=processes)
     parsed = read_study(spec, points)
     reusable = 0 if db is None else _reusable(settings, parsed)
-    made = preview_json(parsed, Chunking(0, settings.pool_processes, settings.chunk_timeout), reusable)
+    made = preview_json(parsed, Chunking(0, settings.pool_processes, settings.chunk_timeout), reusable, left)
     if as_json:
         write_json(made)
         return
@@ -225,12 +229,14 @@ def run(
     processes: Processes = None,
     chunk: ChunkCases = None,
     fresh: Fresh = False,
+    finish_by: FinishBy = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Run a study here, without a service: rows or a report to standard output or FILE, progress on standard error."""
     from service.local import run_here
     from service.unaffected import Unaffected
 
+    finish = _finish(finish_by)
     parsed = read_study(spec, points)
     settings = read_settings(database=db, processes=processes, chunk_cases=chunk)
     _say_warnings(parsed)
@@ -247,7 +253,10 @@ def run(
             chunk_timeout=settings.chunk_timeout,
             warnings=parsed.warnings,
             fresh=fresh,
-            on_progress=lambda now: update(now.done, now.total, progress_text(now.state, now.rate, now.seconds_left)),
+            finish_by=finish,
+            on_progress=lambda now: update(
+                now.done, now.total, progress_text(now.state, now.rate, now.seconds_left, finish_by, now.in_time)
+            ),
         ) as done,
     ):
         for piece in _rows(done, parsed.study, table_format(form, file, as_json)):
@@ -258,8 +267,21 @@ def run(
     say(*(f"warning: {text}" for text in unaffecting))
     seconds = time.monotonic() - start
     say(f"{record.done} of {record.cases} cases done{known}, {record.ok} ok, {seconds:.1f} s{kept}")
+    if record.time_over:
+        say(str(record.reason))
     if record.ok != record.cases:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
+
+
+def _finish(text: str | None) -> datetime | None:
+    """The deadline that an option names; WrongInputError when it cannot be kept."""
+    from service.finish import ALLOWED, FinishError, finish_at
+
+    try:
+        return None if text is None else finish_at(text, datetime.now(UTC))
+    except FinishError as error:
+        problem = Problem("--finish-by", str(error), text, allowed=ALLOWED)
+        raise WrongInputError("an option is wrong", problems=[problem]) from None
 
 
 def _pool_size(study: Study, settings: Settings, asked: int | None) -> int:

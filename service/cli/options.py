@@ -50,10 +50,20 @@ ChunkCases = Annotated[
 
 Fresh = Annotated[bool, typer.Option("--fresh", help="Run every case, also those that other studies have already.")]
 
+FinishBy = Annotated[
+    str | None,
+    typer.Option(
+        "--finish-by",
+        metavar="TIME",
+        help='Run coarse to fine, and stop then: as 2027-01-31T06:00+01:00, or after a while, as "8 h".',
+    ),
+]
+
 __all__ = [
     "DEFAULT_SERVER",
     "ChunkCases",
     "Database",
+    "FinishBy",
     "Fresh",
     "JsonFlag",
     "OutputFile",

@@ -25,6 +25,7 @@ from service.cli.console import (
 from service.cli.files import naming_points, read_spec, write_pieces
 from service.cli.options import (
     DEFAULT_SERVER,
+    FinishBy,
     Fresh,
     JsonFlag,
     OutputFile,
@@ -126,6 +127,7 @@ def submit(
     ] = None,
     priority: PriorityOption = 0,
     fresh: Fresh = False,
+    finish_by: FinishBy = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -133,7 +135,7 @@ def submit(
     """Submit a study to the service and print its id."""
     data = read_spec(spec, points, MAX_BODY_BYTES)
     with naming_points(points), connection(server, token) as client:
-        study = client.create_study(data, key, priority, fresh)
+        study = client.create_study(data, key, priority, fresh, finish_by)
         say(*(f"warning: {warning}" for warning in study.get("warnings", ())))
         if wait:
             study = follow(client, study["id"])
@@ -151,7 +153,7 @@ def watch(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = Non
 
 
 def follow(client: ServiceClient, study_id: str) -> dict[str, Any]:
-    """Look at a study until it has ended, with a bar on standard error; the study as it is then.
+    """Look at a study until it has ended or its time is over, with a bar on standard error; the study as it is then.
 
     A held study is not left by itself: its reason is said, and the watching goes on until it is resumed or cancelled.
     """
@@ -161,7 +163,7 @@ def follow(client: ServiceClient, study_id: str) -> dict[str, Any]:
             study = client.study(study_id)
             progress = study["progress"]
             update(progress["done"], progress["total"], _remark(study))
-            if study["state"] in _ENDED:
+            if study["state"] in _ENDED or study["time_over"]:
                 return study
             if study["state"] == StudyState.PAUSED and study.get("reason") != told:
                 told = study.get("reason")
@@ -172,7 +174,8 @@ def follow(client: ServiceClient, study_id: str) -> dict[str, Any]:
 def _remark(study: dict[str, Any]) -> str:
     progress = study["progress"]
     left = progress["seconds_left"]
-    return progress_text(study["state"], progress["rate"], None if left is None else (left["low"], left["high"]))
+    interval = None if left is None else (left["low"], left["high"])
+    return progress_text(study["state"], progress["rate"], interval, study["finish_by"], progress["in_time"])
 
 
 def exit_as(study: dict[str, Any]) -> None:
@@ -197,7 +200,10 @@ def show_study(study: dict[str, Any], as_json: bool) -> None:
         f"{progress['ok']} ok"
         + (f" ({endings})" if endings else "")
         + (f"; {study['reused']} taken from other studies" if study.get("reused") else "")
+        + (f"; to be finished by {study['finish_by']}" if study.get("finish_by") and not study["time_over"] else "")
     )
+    if study["time_over"]:
+        say(f"{study['id']}: {study['reason']}")
 
 
 def list_studies(
@@ -213,9 +219,10 @@ def list_studies(
     if as_json:
         write_json({"studies": studies})
         return
-    columns = (("id", False), ("state", False), ("done", True), ("cases", True), ("created", False), ("name", False))
+    columns = (("id", False), ("state", False), ("done", True), ("cases", True), ("created", False),
+               ("finish by", False), ("name", False))  # fmt: skip
     rows = [
-        (s["id"], s["state"], s["progress"]["done"], s["progress"]["total"], s["created_at"], s["name"])
+        (s["id"], s["state"], s["progress"]["done"], s["progress"]["total"], s["created_at"], s["finish_by"], s["name"])
         for s in studies
     ]
     show_table("", columns, rows)
@@ -254,7 +261,7 @@ def pause(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = Non
 
 
 def resume(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
-    """Go on with a study that is held."""
+    """Go on with a study that is held; a deadline that has passed does not count any more."""
     _act(study_id, "resume", server, token, as_json)
 
 

@@ -39,6 +39,14 @@ WindowOption = Annotated[
     str | None,
     typer.Option("--window", metavar="FROM-TO", help='Run between these times only, as 22:00-06:00; "" for any time.'),
 ]
+RunFinish = Annotated[
+    str | None,
+    typer.Option(
+        "--finish-by",
+        metavar="TIME",
+        help='Run coarse to fine, and stop then: a time of day, as 06:00, or after a while, as "8 h"; "" for none.',
+    ),
+]
 Name = Annotated[str | None, typer.Option("--name", help="Name of its studies; default: that of the spec.")]
 
 
@@ -52,6 +60,7 @@ def add(
     name: Name = None,
     priority: PriorityOption = 0,
     fresh: Fresh = False,
+    finish_by: RunFinish = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -59,7 +68,7 @@ def add(
     """Keep a schedule for a study and print its id: with --cron again and again, with --at once."""
     fields: dict[str, Any] = {
         "spec": read_spec(spec),
-        **_given(cron=cron, at=at, zone=zone, name=name, **_window(window)),
+        **_given(cron=cron, at=at, zone=zone, name=name, finish_by=finish_by, **_window(window)),
         "priority": priority,
         "fresh": fresh,
     }
@@ -75,9 +84,17 @@ def list_schedules(server: Server = DEFAULT_SERVER, token: Token = None, as_json
     if as_json:
         write_json(found)
         return
-    columns = [(heading, False) for heading in ("id", "when", "window", "last run", "next run", "name")]
+    columns = [(heading, False) for heading in ("id", "when", "window", "finish by", "last run", "next run", "name")]
     rows = [
-        (s["id"], _when(s), "-".join(s["window"] or ()) or None, _run(s["last_run"]), _next(s), s["name"])
+        (
+            s["id"],
+            _when(s),
+            "-".join(s["window"] or ()) or None,
+            s["finish_by"],
+            _run(s["last_run"]),
+            _next(s),
+            s["name"],
+        )
         for s in found["schedules"]
     ]
     show_table("", columns, rows)
@@ -115,12 +132,15 @@ def change(
     fresh: Annotated[
         bool | None, typer.Option("--fresh/--no-fresh", help="Run every case, also those that studies have.")
     ] = None,
+    finish_by: RunFinish = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Change what is given of a schedule; the rest stays."""
-    fields = _given(cron=cron, at=at, zone=zone, name=name, priority=priority, fresh=fresh, **_window(window))
+    fields = _given(
+        cron=cron, at=at, zone=zone, name=name, priority=priority, fresh=fresh, finish_by=finish_by, **_window(window)
+    )
     if spec is not None:
         fields["spec"] = read_spec(spec)
     if not fields:
@@ -158,10 +178,12 @@ def _change(schedule_id: str, fields: Mapping[str, Any], server: str, token: str
 
 
 def _given(**fields: Any) -> dict[str, Any]:
-    """The fields that were given; an empty window takes the window away."""
+    """The fields that were given; an empty window or deadline takes it away."""
     given = {name: value for name, value in fields.items() if value is not None}
     if given.get("window") == []:
         given["window"] = None
+    if given.get("finish_by") == "":
+        given["finish_by"] = None
     return given
 
 
@@ -183,7 +205,8 @@ def _show(schedule: dict[str, Any], as_json: bool) -> None:
         return
     print(schedule["id"])
     window = f", between {' and '.join(schedule['window'])} only" if schedule["window"] else ""
-    say(f"{schedule['name']}: {_when(schedule)}{window}; next run: {_next(schedule)}")
+    finish = f", finished by {schedule['finish_by']}" if schedule["finish_by"] else ""
+    say(f"{schedule['name']}: {_when(schedule)}{window}{finish}; next run: {_next(schedule)}")
 
 
 def _when(schedule: dict[str, Any]) -> str:

@@ -20,6 +20,7 @@ from service.client.queries import (
     Value,
     curve_query,
     extension,
+    finish_text,
     reporting,
     result_query,
     spec_of,
@@ -28,6 +29,7 @@ from service.client.study import DEFAULT_SERVER
 from service.client.wire import API, FILE_TIMEOUT, Query, connection_options, document, reason, refusal, study_path
 
 if TYPE_CHECKING:
+    from datetime import datetime
     from os import PathLike
 
     import pandas as pd
@@ -79,11 +81,19 @@ class AsyncClient:
         return cast("Preview", await self.request("POST", "/studies:preview", json=spec_of(spec)))
 
     async def submit(
-        self, spec: Spec | str | PathLike[str], *, key: str | None = None, priority: int = 0, fresh: bool = False
+        self,
+        spec: Spec | str | PathLike[str],
+        *,
+        key: str | None = None,
+        priority: int = 0,
+        fresh: bool = False,
+        finish_by: str | datetime | None = None,
     ) -> AsyncStudy:
         """Submit a study, as `Client.submit` does."""
         headers = {"Idempotency-Key": key or uuid.uuid4().hex}
         query = {"priority": str(priority), "fresh": str(fresh).lower()}
+        if finish_by is not None:
+            query["finish_by"] = finish_text(finish_by)
         made = await self.request("POST", "/studies", json=spec_of(spec), headers=headers, params=query)
         return AsyncStudy(self, made["id"])
 
@@ -129,7 +139,7 @@ class AsyncStudy:
             while True:
                 study = await self.detail()
                 tell(study)
-                if study["state"] in ENDED:
+                if study["state"] in ENDED or study["time_over"]:
                     return self
                 if end is not None and timeout is not None and time.monotonic() >= end:
                     raise StudyTimeoutError(study, timeout)

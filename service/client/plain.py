@@ -51,15 +51,22 @@ class ServiceClient:
         self._http.close()
 
     def create_study(
-        self, spec: object, key: str | None = None, priority: int = 0, fresh: bool = False
+        self,
+        spec: object,
+        key: str | None = None,
+        priority: int = 0,
+        fresh: bool = False,
+        finish_by: str | None = None,
     ) -> dict[str, Any]:
         """Submit a study; the same ``key`` submits it once, however often it is sent.
 
-        Of a ``fresh`` study every case is run, also those that other studies have already.
+        Of a ``fresh`` study every case is run, also those that other studies have already. With ``finish_by``, a time
+        with its offset or a duration such as "8 h", it is run coarse to fine and held then.
         """
         headers = {"Idempotency-Key": key or uuid.uuid4().hex}
         query = [("priority", str(priority))] if priority else []
         query += [("fresh", "true")] if fresh else []
+        query += [("finish_by", finish_by)] if finish_by is not None else []
         return self._json("POST", "/studies", json=spec, headers=headers, params=query)
 
     def extend(self, study_id: str, addition: object) -> dict[str, Any]:

@@ -13,6 +13,8 @@ from service.client.errors import SpecFileError
 from worker.states import TERMINAL
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from service.client.types import Spec, StudyDetail
 
 ENDED: Final = frozenset(state.value for state in TERMINAL)
@@ -69,6 +71,11 @@ def extension(
     """What is added to a study."""
     parts = {"axes": axes, "cases": cases, "name": name}
     return {key: value for key, value in parts.items() if value is not None}
+
+
+def finish_text(when: str | datetime) -> str:
+    """A deadline as the service reads it: a text as it is, an aware time in RFC 3339."""
+    return when if isinstance(when, str) else when.isoformat()
 
 
 def _listed(names: str | Sequence[str]) -> list[str]:

@@ -18,12 +18,14 @@ from service.client.queries import (
     Value,
     curve_query,
     extension,
+    finish_text,
     reporting,
     result_query,
     spec_of,
 )
 
 if TYPE_CHECKING:
+    from datetime import datetime
     from os import PathLike
 
     import httpx
@@ -72,14 +74,22 @@ class Client:
         return cast("Preview", self.plain.preview(spec_of(spec)))
 
     def submit(
-        self, spec: Spec | str | PathLike[str], *, key: str | None = None, priority: int = 0, fresh: bool = False
+        self,
+        spec: Spec | str | PathLike[str],
+        *,
+        key: str | None = None,
+        priority: int = 0,
+        fresh: bool = False,
+        finish_by: str | datetime | None = None,
     ) -> Study:
         """Submit a study: a spec, or the name of a JSON or TOML file with one.
 
         The same ``key`` submits it once, however often it is sent. Of a ``fresh`` study every case is run, also those
-        that other studies have.
+        that other studies have. With ``finish_by``, an aware time or a duration such as "8 h", it is run coarse to fine
+        and held then.
         """
-        return Study(self, self.plain.create_study(spec_of(spec), key, priority, fresh)["id"])
+        finish = None if finish_by is None else finish_text(finish_by)
+        return Study(self, self.plain.create_study(spec_of(spec), key, priority, fresh, finish)["id"])
 
     def study(self, study_id: str) -> Study:
         """A study by its id; RefusedError when there is none."""
@@ -112,7 +122,7 @@ class Study:
         return cast("StudyDetail", self._client.plain.study(self.id))
 
     def wait(self, *, progress: bool | Progressing = False, timeout: float | None = None) -> Study:
-        """Wait until the study has ended; gives the study itself.
+        """Wait until the study has ended, or its time is over; gives the study itself.
 
         Parameters
         ----------
@@ -127,7 +137,7 @@ class Study:
             while True:
                 study = self.detail()
                 tell(study)
-                if study["state"] in ENDED:
+                if study["state"] in ENDED or study["time_over"]:
                     return self
                 if end is not None and timeout is not None and time.monotonic() >= end:
                     raise StudyTimeoutError(study, timeout)

@@ -27,6 +27,9 @@ class FullProgress(Progress):
     endings: dict[str, int]
     rate: float | None
     seconds_left: SecondsLeft | None
+    in_time: str | None
+    done_by_then: int | None
+    passes: dict[str, Any] | None
 
 
 class StudySummary(TypedDict):
@@ -45,6 +48,8 @@ class StudySummary(TypedDict):
     created_at: str
     started_at: str | None
     finished_at: str | None
+    finish_by: str | None
+    time_over: bool
 
 
 class StudyDetail(StudySummary):

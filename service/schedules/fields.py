@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 from zoneinfo import ZoneInfo
 
+from service.finish import ALLOWED_OF_RUNS, FinishError, check_run_finish
 from service.schedules.times import Timing, TimingError, Window, check_cron, read_moment, read_time_of_day, zones
 from service.spec import parse_spec
 from service.spec_fields import read_flag, read_object, read_whole
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from datetime import datetime
 
-FIELDS: Final = ("name", "spec", "cron", "at", "zone", "window", "priority", "fresh", "enabled")
+FIELDS: Final = ("name", "spec", "cron", "at", "zone", "window", "priority", "fresh", "finish_by", "enabled")
 _CRON_ALLOWED: Final = 'five fields, such as "0 22 * * 1-5": at 22:00 from Monday to Friday'
 _AT_ALLOWED: Final = 'a time to come, such as "2027-01-31T22:00"'
 _WINDOW_ALLOWED: Final = 'two different times of day, such as ["22:00", "06:00"]'
@@ -25,7 +26,10 @@ _LONGEST_CRON: Final = 200
 
 @dataclass(frozen=True, slots=True)
 class ScheduleFields:
-    """A whole schedule: what is run (``spec``, the user's own), when, and how."""
+    """A whole schedule: what is run (``spec``, the user's own), when, and how.
+
+    ``finish_by`` is when each run is held, whatever is done: a time of day in the zone, or a duration.
+    """
 
     name: str
     spec: dict[str, Any]
@@ -34,6 +38,7 @@ class ScheduleFields:
     priority: int
     fresh: bool
     enabled: bool
+    finish_by: str | None = None
 
     def next_due(self, now: datetime) -> datetime | None:
         """The next due time; None for a schedule that is disabled or over."""
@@ -53,6 +58,7 @@ class ScheduleFields:
             "window": None if window is None else [f"{window.begin:%H:%M}", f"{window.end:%H:%M}"],
             "priority": self.priority,
             "fresh": self.fresh,
+            "finish_by": self.finish_by,
             "enabled": self.enabled,
         }
 
@@ -84,12 +90,13 @@ def _read(data: object, now: datetime, old: ScheduleFields | None = None) -> Sch
     window = _read_window(report, found.get("window"), zone)
     priority = read_whole(report, "/priority", found.get("priority", 0), -MAX_PRIORITY, MAX_PRIORITY)
     fresh = read_flag(report, "/fresh", found.get("fresh", False))
+    finish_by = _read_finish(report, found.get("finish_by"))
     enabled = read_flag(report, "/enabled", found.get("enabled", True))
     title, spec = _read_spec(report, found, old)
     name = _read_name(report, found.get("name"), title)
     report.raise_if_any()
     assert timing is not None
-    return ScheduleFields(name, spec, timing, window, priority or 0, bool(fresh), bool(enabled))
+    return ScheduleFields(name, spec, timing, window, priority or 0, bool(fresh), bool(enabled), finish_by)
 
 
 def _read_spec(report: Report, found: Mapping[str, Any], old: ScheduleFields | None) -> tuple[str, dict[str, Any]]:
@@ -155,6 +162,18 @@ def _read_timing(
         report.problem("/at", str(error), at, allowed=_AT_ALLOWED)
         return None
     return Timing(None, moment, zone)
+
+
+def _read_finish(report: Report, value: object) -> str | None:
+    if value is None:
+        return None
+    try:
+        if not isinstance(value, str):
+            raise FinishError("is no text")
+        return check_run_finish(value)
+    except FinishError as error:
+        report.problem("/finish_by", str(error), value, allowed=ALLOWED_OF_RUNS)
+        return None
 
 
 def _read_window(report: Report, value: object, zone: str) -> Window | None:

@@ -79,6 +79,7 @@ class Scheduler(threading.Thread):
         from dataclasses import replace
 
         from service.errors import ApiError
+        from service.finish import run_finish_at
         from service.intake import accept
         from service.spec import parse_spec
         from service.spec_messages import SpecError
@@ -89,7 +90,9 @@ class Scheduler(threading.Thread):
                 parsed = replace(parsed, study=replace(parsed.study, name=run.fields.name))
             # No client can send a key with a blank in it.
             key = f"schedule {run.id} {run.due}"
-            study = accept(self._store, parsed, key, run.fields.priority, run.fields.fresh)
+            fields, now = run.fields, self._store.clock.now()
+            finish = None if fields.finish_by is None else run_finish_at(fields.finish_by, fields.timing.zone, now)
+            study = accept(self._store, parsed, key, fields.priority, fields.fresh, finish)
         except (SpecError, ApiError) as error:
             _LOG.error("The schedule %s was due, and no study came of it: %s", run.id, error)
             self._store.close_run(run, problem=str(error))

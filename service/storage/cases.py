@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sqlalchemy as sa
 
-from service.storage.part import MAX_INTEGER, Part
+from service.storage.order import Orders
+from service.storage.part import MAX_INTEGER
 from service.storage.records import CaseColumns, CaseRow, RowBlock
 from service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
 from worker import kernels
@@ -38,7 +39,7 @@ class _Rows:
     cancelled: bool
 
 
-class Cases(Part):
+class Cases(Orders):
     """Rows of finished cases; and the cases that a cancelled study never ran, which have no rows in the database."""
 
     def _rows(self, connection: sa.Connection, study_id: str) -> _Rows:
@@ -71,7 +72,7 @@ class Cases(Part):
             found = [] if ending == cancelled else _read(connection, rows, after_case, limit, ending)
             if rows.cancelled and ending in {None, cancelled}:
                 nothing = [None] * len(rows.infos)
-                left = itertools.islice(_never_run(connection, rows, after_case), limit)
+                left = itertools.islice(self._never_run(connection, rows, after_case), limit)
                 found = [*found, *((case, cancelled, "", *nothing) for case in left)]
                 found = sorted(found, key=lambda row: int(row[0]))[:limit]
         return _block(rows.infos, found)
@@ -104,7 +105,7 @@ class Cases(Part):
             query = sa.select(c.case_number, c.ending, *(c[columns[name]] for name in names)).where(
                 c.study == rows.number
             )
-            for condition in _conditions(c.case_number, unique):
+            for condition in conditions(c.case_number, unique):
                 found = connection.execute(query.where(condition)).all()
                 if found:
                     numbers, ended, *results = zip(*found, strict=True)
@@ -119,6 +120,24 @@ class Cases(Part):
             endings[position].tolist(),
             {name: values[position, index] for index, name in enumerate(names)},
         )
+
+    def _never_run(self, connection: sa.Connection, rows: _Rows, after_case: int) -> Iterator[int]:
+        """Cases above ``after_case`` that are in no chunk that is done, in order."""
+        c = CHUNKS.c
+        done = sa.select(c["first"], c["count"]).where(c.study == rows.number, c.state == "done").order_by(c["first"])
+        order = self._order(rows.number, connection)
+        if order is not None:
+            never = np.ones(rows.cases, dtype=np.bool_)
+            for first, count in connection.execute(done):
+                never[first : first + count] = False
+            left = np.sort(order.cases(np.flatnonzero(never)))
+            yield from left[np.searchsorted(left, after_case, side="right") :].tolist()
+            return
+        reached = after_case + 1
+        for first, count in connection.execute(done.where(c["first"] + c["count"] > min(reached, MAX_INTEGER))):
+            yield from range(reached, first)
+            reached = max(reached, first + count)
+        yield from range(reached, rows.cases)
 
 
 def _read(
@@ -140,22 +159,7 @@ def _read(
     return connection.execute(query.order_by(c.case_number).limit(limit)).all()
 
 
-def _never_run(connection: sa.Connection, rows: _Rows, after_case: int) -> Iterator[int]:
-    """Cases above ``after_case`` that are in no chunk that is done, in order."""
-    c = CHUNKS.c
-    done = connection.execute(
-        sa.select(c["first"], c["count"])
-        .where(c.study == rows.number, c.state == "done", c["first"] + c["count"] > min(after_case + 1, MAX_INTEGER))
-        .order_by(c["first"])
-    )
-    reached = after_case + 1
-    for first, count in done:
-        yield from range(reached, first)
-        reached = max(reached, first + count)
-    yield from range(reached, rows.cases)
-
-
-def _conditions(column: sa.ColumnElement[Any], cases: NDArray[np.int64]) -> Iterator[sa.ColumnElement[bool]]:
+def conditions(column: sa.ColumnElement[Any], cases: NDArray[np.int64]) -> Iterator[sa.ColumnElement[bool]]:
     """Conditions that together select exactly ``cases`` (ascending, each once)."""
     if not cases.size:
         return

@@ -37,6 +37,11 @@ def moment(micros: int) -> datetime:
     return EPOCH + timedelta(microseconds=micros)
 
 
+def micros_of(when: datetime) -> int:
+    """An aware time as microseconds since 1970, UTC."""
+    return (when - EPOCH) // timedelta(microseconds=1)
+
+
 def optional_moment(micros: int | None) -> datetime | None:
     """The same, None for None."""
     return None if micros is None else moment(micros)
@@ -61,7 +66,7 @@ class Part:
 
     def _now(self) -> int:
         """The present moment in microseconds since 1970."""
-        return (self.clock.now() - EPOCH) // timedelta(microseconds=1)
+        return micros_of(self.clock.now())
 
     def _row(self, connection: sa.Connection, study_id: str, *columns: sa.ColumnElement[Any]) -> sa.Row[Any]:
         """Columns of the study of that id; raises StudyNotFound."""
@@ -77,6 +82,14 @@ class Part:
         latest = connection.execute(sa.select(DISPATCHER.c.epoch).with_for_update()).scalar_one_or_none()
         if latest != epoch:
             raise EpochLostError(f"another dispatcher has taken over (epoch {latest}, this one has {epoch})")
+
+    def _lift_deadline(self, connection: sa.Connection, number: int) -> None:
+        """Somebody lets the study go on: a deadline that has passed does not hold it any more."""
+        connection.execute(
+            sa.update(STUDIES)
+            .where(STUDIES.c.number == number, STUDIES.c.finish_by <= self._now())
+            .values(finish_by=None, revision=STUDIES.c.revision + 1)
+        )
 
     def _move(self, connection: sa.Connection, number: int, event: StudyEvent, reason: str | None = None) -> StudyState:
         """Take the study through ``event``; raises TransitionError where the table of states has no such step.

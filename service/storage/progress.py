@@ -1,19 +1,42 @@
-"""Rate and time left of a study, from its recently finished chunks."""
+"""Rate and time left of a study, from its recently finished chunks and those that are being run.
+
+The cases of a chunk count as done evenly from its claim to its end, so that the rate is right however many chunks run
+side by side. The interval is made to hold nine times out of ten for studies whose cost changes as studies' costs do
+(`benchmarks.time_left` measures it): it has the spread of the pace over the recent chunks, the trend in it carried on,
+and a share for what cannot be seen yet, which shrinks as the study goes on.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
+    Times = NDArray[np.float64]
+
 #: Finished chunks that count as recent.
-RECENT_CHUNKS = 64
-#: Half width of the interval of time left, in standard errors of the rate, and never less than this share of it.
-STANDARD_ERRORS = 2.0
-LEAST_SHARE = 0.05
+RECENT_CHUNKS = 256
+#: Stretches that the recent past is parted into, to see how the pace varies and where it tends.
+STRETCHES = 8
+#: Half width of the interval in standard errors of the pace.
+STANDARD_ERRORS = 2.2
+#: Share of the time left that is unknown while all is left, and the least.
+UNSEEN_SHARE = 0.45
+LEAST_SHARE = 0.04
+#: The same where the cases are run coarse to fine: those that are done tell of the others.
+SAMPLED_SHARE = 0.15
+#: Relative spread of the pace that is assumed while there is too little to tell it from.
+FIRST_SPREAD = 0.6
+#: Bounds of what a trend may do to the time left: at most this many times as long, at least this part.
+LONGER, SHORTER = 3.0, 0.4
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,25 +48,130 @@ class FinishedChunk:
     cases: int
 
 
-def busy_seconds(chunks: Sequence[FinishedChunk]) -> float:
-    """Time in which at least one of the chunks was being run: pauses between them do not count."""
-    busy, reached = 0.0, -math.inf
-    for chunk in sorted(chunks, key=lambda chunk: chunk.begin):
-        busy += max(0.0, chunk.end - max(chunk.begin, reached))
-        reached = max(reached, chunk.end)
-    return busy
+@dataclass(frozen=True, slots=True)
+class RunningChunk:
+    """When a chunk that is not done was claimed (s on the same clock), and its cases."""
+
+    begin: float
+    cases: int
 
 
-def estimate(cases_left: int, recent: Sequence[FinishedChunk]) -> tuple[float | None, tuple[float, float] | None]:
-    """Rate in cases/s and the (low, high) seconds left; None where there is nothing to tell it from."""
-    busy = busy_seconds(recent)
-    if busy <= 0.0:
+@dataclass(frozen=True, slots=True)
+class _Past:
+    """Chunks as arrays, ``work`` (cases) done evenly from ``begin`` to ``end``; after ``since`` none is lacking."""
+
+    begin: Times
+    end: Times
+    work: Times
+    since: float
+    until: float
+
+    def busy(self, begin: float, end: float) -> float:
+        """Seconds between two times in which at least one chunk was being run: pauses do not count."""
+        order = np.argsort(self.begin)
+        starts, ends = np.clip(self.begin[order], begin, end), np.clip(self.end[order], begin, end)
+        reached = np.concatenate([[begin], np.maximum.accumulate(ends)[:-1]])
+        return float(np.maximum(ends - np.maximum(starts, reached), 0.0).sum())
+
+    def done(self, begin: float, end: float) -> float:
+        """Cases that were done between two times."""
+        inside = np.clip(self.end, begin, end) - np.clip(self.begin, begin, end)
+        return float((self.work * inside / np.maximum(self.end - self.begin, 1e-9)).sum())
+
+
+def estimate(
+    cases_left: int,
+    recent: Sequence[FinishedChunk],
+    running: Sequence[RunningChunk] = (),
+    now: float | None = None,
+    cases_done: int | None = None,
+    sampled: bool = False,
+) -> tuple[float | None, tuple[float, float] | None]:
+    """Rate in cases/s and the (low, high) seconds left; None where there is nothing to tell it from.
+
+    Parameters
+    ----------
+    cases_left : int
+        Cases without an ending, those being run among them.
+    recent : finished chunks, the latest `RECENT_CHUNKS` or all of them
+    running : chunks being run ``now`` (s); without it, the end of the latest finished one
+    cases_done : int, optional
+        Cases with an ending; those of ``recent`` unless given.
+    sampled : bool
+        Whether the cases that are done lie among those that are left (`worker.order`).
+    """
+    if not recent:
         return None, None
-    rate = sum(chunk.cases for chunk in recent) / busy
-    each = [max(0.0, chunk.end - chunk.begin) / chunk.cases for chunk in recent]
-    mean = math.fsum(each) / len(each)
-    spread = math.sqrt(math.fsum((value - mean) ** 2 for value in each) / max(1, len(each) - 1))
-    share = min(0.9, max(LEAST_SHARE, STANDARD_ERRORS * spread / (mean * math.sqrt(len(each)))))
-    left = cases_left / rate
-    last_chunk = min(left, max(chunk.end - chunk.begin for chunk in recent))
-    return rate, (left * (1.0 - share), left * (1.0 + share) + last_chunk)
+    latest = max(chunk.end for chunk in recent)
+    past, credit = _past(recent, running, latest if now is None else max(now, latest))
+    busy, work = past.busy(past.since, past.until), past.done(past.since, past.until)
+    if busy <= 0.0 or work <= 0.0:
+        return None, None
+    rate = work / busy
+    typical = float(np.mean([chunk.end - chunk.begin for chunk in recent]))
+    # At the end some processes have nothing more to do while the others finish their last chunks.
+    beside = max(1.0, rate * typical / float(np.mean([chunk.cases for chunk in recent])))
+    left = max(cases_left - credit, 0.0) / rate
+    left += 0.5 * typical * (1.0 - 1.0 / beside) if cases_left else 0.0
+    done = sum(chunk.cases for chunk in recent) if cases_done is None else cases_done
+    unseen = (SAMPLED_SHARE if sampled else UNSEEN_SHARE) * cases_left / max(1, cases_left + done)
+    low, high = _factors(past, len(recent), left / busy, max(LEAST_SHARE, unseen))
+    grain = min(left, typical)
+    return rate, (max(0.0, left * low - 0.6 * grain), left * high + 0.8 * grain)
+
+
+def _past(recent: Sequence[FinishedChunk], running: Sequence[RunningChunk], now: float) -> tuple[_Past, float]:
+    """The recent past, and how many cases of the running chunks count as done."""
+    typical = max(float(np.mean([chunk.end - chunk.begin for chunk in recent])), 1e-9)
+    since = min(chunk.begin for chunk in recent)
+    if len(recent) >= RECENT_CHUNKS:  # others, of which nothing is known here, may have run until the first of these
+        since = min(chunk.end for chunk in recent)
+    shares = [min(0.95, max(0.0, now - chunk.begin) / typical) for chunk in running]
+    credits = [share * chunk.cases for share, chunk in zip(shares, running, strict=True)]
+    past = _Past(
+        np.array([*(chunk.begin for chunk in recent), *(min(chunk.begin, now) for chunk in running)]),
+        np.array([*(chunk.end for chunk in recent), *(now for _ in running)]),
+        np.array([*(float(chunk.cases) for chunk in recent), *credits]),
+        since,
+        now,
+    )
+    return past, sum(credits)
+
+
+def _factors(past: _Past, chunks: int, ahead: float, unseen: float) -> tuple[float, float]:
+    """What the time left may be at least and at most, in parts of the estimate.
+
+    ``ahead`` is the estimate in parts of the recent past, ``unseen`` the share of it that is unknown in any case.
+    """
+    paces = _paces(past, min(STRETCHES, chunks // 2))
+    if paces.size < 3:
+        spread = math.hypot(STANDARD_ERRORS * FIRST_SPREAD / math.sqrt(max(chunks, 1)), unseen)
+        return 1.0 / (1.0 + 1.5 * spread), 1.0 + 1.5 * spread
+    count = paces.size
+    at = np.arange(count) - 0.5 * (count - 1)
+    slope = float((at * paces).sum() / (at**2).sum())
+    rest = paces - paces.mean() - slope * at
+    variance = float((rest**2).sum()) / (count - 2)
+    slope_variance = variance / float((at**2).sum())
+    # The mean of the recent past is uncertain, and so is that of the time to come, the shorter it is.
+    error = math.sqrt(variance * (1.0 / count + 1.0 / max(1.0, ahead * count)))
+    trend = slope * slope**2 / max(slope**2 + slope_variance, 1e-300) * 0.5 * count * (1.0 + ahead)
+    trend = min(max(trend, SHORTER - 1.0), LONGER - 1.0)
+    around = math.hypot(STANDARD_ERRORS * error, unseen)
+    low, high = min(0.0, trend), max(0.0, trend)
+    return (1.0 + low) / (1.0 + around), (1.0 + high) * (1.0 + around)
+
+
+def _paces(past: _Past, stretches: int) -> Times:
+    """Seconds for each case in stretches of the recent past, in parts of their mean; as many chunks ended in each."""
+    if stretches < 3:
+        return np.ones(1)
+    ends = np.sort(past.end[past.end > past.since])
+    edges = np.concatenate([[past.since], np.quantile(ends, np.arange(1, stretches) / stretches), [past.until]])
+    found = []
+    for begin, end in pairwise(edges.tolist()):
+        work = past.done(begin, end)
+        if work > 0.0:
+            found.append(past.busy(begin, end) / work)
+    paces: Times = np.array(found) / np.mean(found)
+    return paces

@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from service.storage.part import moment, optional_moment
+from service.storage.tables import HELD_AT_DEADLINE
 from worker.states import StudyState
 
 if TYPE_CHECKING:
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from worker.kernels import ResultInfo
+    from worker.order import Coverage
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +31,8 @@ class StudyRecord:
     ``number`` counts studies in order of submission; ``id`` is the public name. ``done`` counts cases with an ending,
     ``ok`` those that ended ok. ``reason`` says why the study is held or failed. ``revision`` rises with every change of
     the record or its rows: together with ``id`` it makes an ETag. Studies of higher ``priority`` go first.
-    ``reused`` counts the cases whose rows were taken from earlier studies.
+    ``reused`` counts the cases whose rows were taken from earlier studies. A study is held at ``finish_by``; it is
+    ``coarse`` when its cases are run coarse to fine. ``time_over`` tells that this is what holds it.
     """
 
     number: int
@@ -51,6 +55,14 @@ class StudyRecord:
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None
+    finish_by: datetime | None
+    coarse: bool
+    time_over: bool
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing more of it is run unless somebody asks for it."""
+        return self.state.terminal or self.time_over
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,12 +73,21 @@ class StudyPage:
     next_token: str | None
 
 
+class InTime(StrEnum):
+    """Whether a study will be finished by its deadline, from the interval of the time it will take."""
+
+    YES = "yes"
+    NO = "no"
+    UNSURE = "unsure"
+
+
 @dataclass(frozen=True, slots=True)
 class Progress:
     """How far a study is, computed when asked.
 
     ``rate`` is in cases/s over the recent chunks, None before the first; ``seconds_left`` is a (low, high) interval,
-    None where the rate is or when the study is held or ended.
+    None where the rate is or when the study is held or ended. ``covered`` tells what is complete of a study that is run
+    coarse to fine, None for others. The study is held at ``finish_by``; ``asked_at`` is the present.
     """
 
     state: StudyState
@@ -76,6 +97,33 @@ class Progress:
     endings: dict[str, int]
     rate: float | None
     seconds_left: tuple[float, float] | None
+    covered: Coverage | None = None
+    finish_by: datetime | None = None
+    asked_at: datetime | None = None
+
+    @property
+    def _until(self) -> float | None:
+        """Seconds until the deadline; None where there is none."""
+        if self.finish_by is None or self.asked_at is None:
+            return None
+        return (self.finish_by - self.asked_at).total_seconds()
+
+    @property
+    def in_time(self) -> InTime | None:
+        """Whether the study will be finished by its deadline; None where it has none or nothing is known."""
+        until = self._until
+        if until is None or self.seconds_left is None:
+            return None
+        low, high = self.seconds_left
+        return InTime.YES if high <= until else InTime.NO if low > until else InTime.UNSURE
+
+    @property
+    def done_by_then(self) -> int | None:
+        """About how many cases will be done at the deadline; None where it has none or nothing is known."""
+        until = self._until
+        if until is None or self.seconds_left is None or self.rate is None:
+            return None
+        return int(min(self.done + self.rate * max(0.0, until), self.total))
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,4 +242,7 @@ def record_of(row: sa.Row[Any]) -> StudyRecord:
         created_at=moment(row.created_at),
         started_at=optional_moment(row.started_at),
         finished_at=optional_moment(row.finished_at),
+        finish_by=optional_moment(row.finish_by),
+        coarse=bool(row.coarse),
+        time_over=row.waits_for == HELD_AT_DEADLINE,
     )

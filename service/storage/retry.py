@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from itertools import pairwise, starmap
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import sqlalchemy as sa
 
 from service.storage.errors import NothingToRetry
-from service.storage.part import Part
+from service.storage.order import Orders
 from service.storage.records import StudyRecord, record_of
 from service.storage.tables import CHUNKS, ENDINGS, RECORD_COLUMNS, STUDIES, results_table
 from worker import kernels
@@ -19,7 +20,9 @@ from worker.states import StudyEvent, StudyState, follow
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-#: First case and number of cases that follow one another.
+    from worker.order import Order
+
+#: First and number of chunk places that follow one another: case numbers, or positions in the study's order.
 Run = tuple[int, int]
 
 
@@ -34,7 +37,7 @@ class _Done:
     detail: str | None
 
 
-class Retries(Part):
+class Retries(Orders):
     """Failed cases back to waiting."""
 
     def retry_study(self, study_id: str, endings: Collection[str] | None = None) -> StudyRecord:
@@ -51,13 +54,16 @@ class Retries(Part):
                 counts = _failed(connection, row.number, endings)
                 if not counts:
                     raise NothingToRetry(_nothing(endings))
-                runs = _runs(connection, row, tuple(counts))
+                order = self._order(row.number, connection)
+                ended = tuple(counts)
+                runs = _runs(connection, row, ended) if order is None else _places(connection, row, ended, order)
             with self.session.write() as connection:
                 now = self._row(connection, study_id, c.revision)
                 if now.revision != row.revision:  # it was run again, or deleted and not yet gone, in between
                     continue
                 _give_back(connection, row, runs, counts)
                 self._move(connection, row.number, StudyEvent.RETRY)
+                self._lift_deadline(connection, row.number)
                 # To be run again means run, not taken from a study in which they failed in the same way.
                 connection.execute(sa.update(STUDIES).where(c.number == row.number).values(fresh=1))
                 return record_of(self._row(connection, study_id, *RECORD_COLUMNS))
@@ -88,7 +94,19 @@ def _runs(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...])
     )
     first = sa.func.min(found.c.case_number).label("first")
     query = sa.select(first, sa.func.count()).group_by(found.c.same).order_by(first).limit(MAX_CHUNKS + 1)
-    runs = [(int(number), int(count)) for number, count in connection.execute(query)]
+    return _few([(int(number), int(count)) for number, count in connection.execute(query)])
+
+
+def _places(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...], order: Order) -> list[Run]:
+    """The same of a study that is run coarse to fine: runs of positions in its order."""
+    c = results_table(row.model, row.pendulums).c
+    query = sa.select(c.case_number).where(c.study == row.number, c.ending.in_(endings))
+    places = np.sort(order.positions(np.fromiter(connection.execute(query).scalars(), dtype=np.int64)))
+    edges = np.flatnonzero(np.diff(places) > 1) + 1
+    return _few([(int(run[0]), run.size) for run in np.split(places, edges)])
+
+
+def _few(runs: list[Run]) -> list[Run]:
     if len(runs) > MAX_CHUNKS:
         raise NothingToRetry(
             f"the failed cases lie in more than {MAX_CHUNKS} places: choose fewer by their ending, or submit them as "
@@ -98,14 +116,9 @@ def _runs(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...])
 
 
 def _give_back(connection: sa.Connection, row: sa.Row[Any], runs: Sequence[Run], counts: dict[str, int]) -> None:
-    """Take the rows away and cut the chunks so that exactly these cases are waiting."""
+    """Take the rows of those endings away and cut the chunks so that exactly their cases are waiting."""
     table = results_table(row.model, row.pendulums)
-    for first, count in runs:
-        connection.execute(
-            sa.delete(table).where(
-                table.c.study == row.number, table.c.case_number >= first, table.c.case_number < first + count
-            )
-        )
+    connection.execute(sa.delete(table).where(table.c.study == row.number, table.c.ending.in_(tuple(counts))))
     _cut(connection, row.number, runs)
     connection.execute(sa.delete(ENDINGS).where(ENDINGS.c.study == row.number, ENDINGS.c.ending.in_(tuple(counts))))
     connection.execute(

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections import OrderedDict
+from collections import Counter, OrderedDict
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import sqlalchemy as sa
 
-from service.storage.part import Part
+from service.storage.cases import conditions
+from service.storage.order import Orders
 from service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, results_table
 from worker import kernels
 from worker.kernels import WorkerEnding
+from worker.order import order_of
 from worker.ports import Known
 from worker.reuse import kin_hash, shared_cases
 from worker.states import StudyState
@@ -36,6 +38,7 @@ _SOURCE: Final[tuple[sa.ColumnElement[Any], ...]] = (
     STUDIES.c.state,
     STUDIES.c.model,
     STUDIES.c.pendulums,
+    STUDIES.c.coarse,
 )
 #: Endings that say nothing of the case itself: it deserves a run of its own.
 _NO_RESULT: Final = tuple(ending.value for ending in WorkerEnding)
@@ -50,7 +53,7 @@ class _Found:
     there: Cases
 
 
-class Reuse(Part):
+class Reuse(Orders):
     """Equal cases of other studies."""
 
     def __init__(self, session: Session, clock: Clock) -> None:
@@ -64,18 +67,22 @@ class Reuse(Part):
         return 0 if found is None else found.cases.size
 
     def known(self, study: Study, chunk: Chunk) -> Known | None:
-        """Which cases of a chunk of ``study`` other studies have; None where none is.
+        """Which cases of a chunk of ``study`` have to be run and which others have; None where all of a range have to.
 
         What is found at the first chunk of a study holds for all of them.
         """
         found = self._of_study(study, chunk.study)
+        plain, cases = self._order(chunk.study) is None, self._cases(chunk)
         if found is None:
+            nothing = np.empty(0, dtype=np.int64)
+            return None if plain else Known(cases, nothing, nothing, nothing)
+        at = np.searchsorted(found.cases, cases)
+        at[at == found.cases.size] = 0
+        there = found.cases[at] == cases
+        if plain and not there.any():
             return None
-        begin, end = np.searchsorted(found.cases, [chunk.first, chunk.first + chunk.count])
-        if begin == end:
-            return None
-        missing = np.setdiff1d(np.arange(chunk.first, chunk.first + chunk.count), found.cases[begin:end])
-        return Known(missing, found.cases[begin:end], found.studies[begin:end], found.there[begin:end])
+        at = at[there]
+        return Known(cases[~there], found.cases[at], found.studies[at], found.there[at])
 
     def _of_study(self, study: Study, number: int) -> _Found | None:
         if number not in self._found:
@@ -108,10 +115,11 @@ def _find(connection: sa.Connection, study: Study, kin: str, number: int) -> _Fo
     taken = np.zeros(study.cases, dtype=np.bool_) if sources else np.empty(0, dtype=np.bool_)
     for source in sources:
         text = connection.execute(sa.select(c.study).where(c.number == source.number)).scalar_one()
-        ours, theirs = shared_cases(study, Study.from_json(json.loads(text)))
+        other = Study.from_json(json.loads(text))
+        ours, theirs = shared_cases(study, other)
         new = ~taken[ours]
         ours, theirs = ours[new], theirs[new]
-        stored = _has_rows(connection, source, theirs)
+        stored = _has_rows(connection, source, other, theirs)
         ours, theirs = ours[stored], theirs[stored]
         if ours.size:
             taken[ours] = True
@@ -127,7 +135,7 @@ def _find(connection: sa.Connection, study: Study, kin: str, number: int) -> _Fo
     return _Found(cases[order], studies[order], np.concatenate([theirs for _, _, theirs in found])[order])
 
 
-def _has_rows(connection: sa.Connection, source: sa.Row[Any], cases: Cases) -> NDArray[np.bool_]:
+def _has_rows(connection: sa.Connection, source: sa.Row[Any], study: Study, cases: Cases) -> NDArray[np.bool_]:
     """Which of the cases of a study have rows that are results."""
     stored = np.ones(cases.size, dtype=np.bool_)
     if not cases.size:
@@ -140,8 +148,9 @@ def _has_rows(connection: sa.Connection, source: sa.Row[Any], cases: Cases) -> N
         if not done:
             return ~stored
         first, count = np.array(done, dtype=np.int64).T
-        at = np.searchsorted(first, cases, side="right") - 1
-        stored = (at >= 0) & (cases < (first + count)[at])
+        places = order_of(study).positions(cases) if source.coarse else cases
+        at = np.searchsorted(first, places, side="right") - 1
+        stored = (at >= 0) & (places < (first + count)[at])
     e = ENDINGS.c
     odd = connection.execute(
         sa.select(sa.func.sum(e.cases)).where(e.study == source.number, e.ending.in_(_NO_RESULT))
@@ -169,12 +178,12 @@ def copy_rows(connection: sa.Connection, model: str, pendulums: int, chunk: Chun
     return done.rowcount == known.cases.size
 
 
-def endings_of(connection: sa.Connection, model: str, pendulums: int, chunk: Chunk) -> dict[str, int]:
-    """How many rows of a chunk ended how."""
+def endings_of(connection: sa.Connection, model: str, pendulums: int, study: int, cases: Cases) -> Counter[str]:
+    """How many of the cases (ascending) of a study ended how."""
     c = results_table(model, pendulums).c
-    found = connection.execute(
-        sa.select(c.ending, sa.func.count())
-        .where(c.study == chunk.study, c.case_number >= chunk.first, c.case_number <= chunk.last)
-        .group_by(c.ending)
-    )
-    return {ending: count for ending, count in found}  # noqa: C416 - rows are no pairs for the type checker
+    found: Counter[str] = Counter()
+    for condition in conditions(c.case_number, cases):
+        query = sa.select(c.ending, sa.func.count()).where(c.study == study, condition).group_by(c.ending)
+        for ending, count in connection.execute(query):
+            found[ending] += count
+    return found

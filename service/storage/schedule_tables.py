@@ -26,6 +26,8 @@ SCHEDULES = sa.Table(
     sa.Column("created_at", sa.BigInteger, nullable=False),
     # A deleted schedule stays as long as the windows of its studies.
     sa.Column("deleted_at", sa.BigInteger),
+    # "06:00" on the wall clock of the zone, or a duration such as "8 h"; NULL where a run has no deadline.
+    sa.Column("finish_by", sa.String(80)),
     sqlite_autoincrement=True,
 )
 

@@ -231,6 +231,7 @@ class Schedules(Part):
             "window_end": None if window is None else f"{window.end:%H:%M}",
             "priority": fields.priority,
             "fresh": int(fields.fresh),
+            "finish_by": fields.finish_by,
             "enabled": int(fields.enabled),
             "next_due": None if due is None else _micros(due),
         }
@@ -287,5 +288,12 @@ def _window(row: Any) -> Window | None:
 def _fields(row: Any) -> ScheduleFields:
     timing = Timing(row.cron, optional_moment(row.due_at), row.zone)
     return ScheduleFields(
-        row.name, json.loads(row.spec), timing, _window(row), row.priority, bool(row.fresh), bool(row.enabled)
+        row.name,
+        json.loads(row.spec),
+        timing,
+        _window(row),
+        row.priority,
+        bool(row.fresh),
+        bool(row.enabled),
+        row.finish_by,
     )

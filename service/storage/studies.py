@@ -6,20 +6,21 @@ import json
 import secrets
 from collections import OrderedDict
 from contextlib import suppress
-from datetime import timedelta
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
 
 from service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyNotFound
-from service.storage.part import EPOCH, MAX_INTEGER, Part, announce
-from service.storage.progress import RECENT_CHUNKS, FinishedChunk, estimate
+from service.storage.order import Orders
+from service.storage.part import MAX_INTEGER, announce, micros_of, optional_moment
+from service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
 from service.storage.records import Progress, StudyPage, StudyRecord, record_of
 from service.storage.schedules import unbind
 from service.storage.tables import (
     CHUNKS,
     ENDINGS,
+    HELD_AT_DEADLINE,
     IDEMPOTENCY_KEYS,
     RECORD_COLUMNS,
     STUDIES,
@@ -46,7 +47,7 @@ DELETE_ROWS = 20_000
 KEPT_STUDIES = 32
 
 
-class Studies(Part):
+class Studies(Orders):
     """Studies as the service sees them."""
 
     def __init__(self, session: Session, clock: Clock, chunking: Chunking) -> None:
@@ -65,11 +66,13 @@ class Studies(Part):
         warnings: Sequence[str] = (),
         priority: int = 0,
         fresh: bool = False,
+        finish_by: datetime | None = None,
     ) -> StudyRecord:
         """Accept a study: the study and its chunks in one transaction.
 
         ``spec`` is the user's own, kept verbatim. A key that was used before with the same ``body_hash`` gives the
         study of that time; with another one raises IdempotencyConflict. A ``fresh`` study takes no rows from others.
+        One with a moment to ``finish_by`` is run coarse to fine, and held then.
         """
         size = self.chunking.cases_of(study)
         values = {
@@ -90,6 +93,8 @@ class Studies(Part):
             "priority": priority,
             "kin_hash": kin_hash(study, kernels.ENGINE_VERSION),
             "fresh": int(fresh),
+            "finish_by": None if finish_by is None else micros_of(finish_by),
+            "coarse": int(finish_by is not None),
             "revision": 1,
             "created_at": self._now(),
         }
@@ -157,9 +162,11 @@ class Studies(Part):
         return StudyPage(records, str(records[-1].number) if len(rows) > size else None)
 
     def waiting_studies(self) -> int:
-        """Number of studies that have not ended."""
+        """Number of studies that have not ended, without those whose time was over."""
         c = STUDIES.c
-        query = sa.select(sa.func.count()).where(c.state.not_in([state.value for state in TERMINAL]))
+        query = sa.select(sa.func.count()).where(
+            c.state.not_in([state.value for state in TERMINAL]), c.waits_for.is_distinct_from(HELD_AT_DEADLINE)
+        )
         with self.session.read() as connection:
             return connection.execute(query).scalar_one()
 
@@ -167,7 +174,7 @@ class Studies(Part):
         """How far the study is; raises StudyNotFound."""
         c = STUDIES.c
         with self.session.read() as connection:
-            row = self._row(connection, study_id, c.number, c.state, c.cases, c.done, c.ok)
+            row = self._row(connection, study_id, c.number, c.state, c.cases, c.done, c.ok, c.finish_by, c.coarse)
             endings = connection.execute(
                 sa.select(ENDINGS.c.ending, ENDINGS.c.cases)
                 .where(ENDINGS.c.study == row.number)
@@ -179,12 +186,35 @@ class Studies(Part):
                 .order_by(CHUNKS.c.finished_at.desc())
                 .limit(RECENT_CHUNKS)
             ).all()
+            claimed = connection.execute(
+                sa.select(CHUNKS.c.claimed_at, CHUNKS.c["count"]).where(
+                    CHUNKS.c.study == row.number, CHUNKS.c.state == "claimed"
+                )
+            ).all()
+            covered = self._coverage(connection, row.number, row.cases)
+        now = self.clock.now()
         state = StudyState(row.state)
         rate, left = estimate(
-            row.cases - row.done, [FinishedChunk(begin / 1e6, end / 1e6, count) for begin, end, count in recent]
+            row.cases - row.done,
+            [FinishedChunk(begin / 1e6, end / 1e6, count) for begin, end, count in recent],
+            [RunningChunk(begin / 1e6, count) for begin, count in claimed],
+            micros_of(now) / 1e6,
+            row.done,
+            bool(row.coarse),
         )
         going = state in {StudyState.QUEUED, StudyState.RUNNING}
-        return Progress(state, row.cases, row.done, row.ok, dict(endings), rate, left if going else None)
+        return Progress(
+            state,
+            row.cases,
+            row.done,
+            row.ok,
+            dict(endings),
+            rate,
+            left if going else None,
+            covered,
+            optional_moment(row.finish_by),
+            now,
+        )
 
     def pause_study(self, study_id: str) -> StudyRecord:
         """Hold the study until it is resumed; raises StudyNotFound, TransitionError when it has ended."""
@@ -202,9 +232,14 @@ class Studies(Part):
         with self.session.write() as connection:
             row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.waits_for)
             self._move(connection, row.number, event)
+            if event is StudyEvent.RESUME:
+                self._lift_deadline(connection, row.number)
             if event is StudyEvent.RESUME and row.waits_for == WAITS_FOR_WINDOW:
                 unbind(connection, row.number)
-            if event is StudyEvent.PAUSE and row.waits_for is not None:  # it was paused, but not by the user
+            if event is StudyEvent.PAUSE and row.waits_for not in {
+                None,
+                HELD_AT_DEADLINE,
+            }:  # it was paused, but not by the user
                 connection.execute(
                     sa.update(STUDIES)
                     .where(STUDIES.c.number == row.number)
@@ -230,11 +265,11 @@ class Studies(Part):
             return _study_of_key(connection, idempotency_key, body_hash)
 
     def delete_study(self, study_id: str) -> None:
-        """Delete an ended study with its rows; raises StudyNotFound, StudyBusy when it has not ended."""
+        """Delete a study with its rows that has ended, or whose time was over; raises StudyNotFound, else StudyBusy."""
         with self.session.write() as connection:
-            row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.state)
+            row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.state, STUDIES.c.waits_for)
             state = StudyState(row.state)
-            if not state.terminal:
+            if not state.terminal and row.waits_for != HELD_AT_DEADLINE:
                 raise StudyBusy(f"the study {study_id} is {state.value}: cancel it before it is deleted")
             for table in (ENDINGS, IDEMPOTENCY_KEYS):
                 connection.execute(sa.delete(table).where(table.c.study == row.number))
@@ -242,10 +277,14 @@ class Studies(Part):
         self.purge()
 
     def prune(self, ended_before: datetime, *, dry: bool = False) -> list[str]:
-        """Delete every study that ended earlier than ``ended_before``; their ids. ``dry``: only tell."""
+        """Delete every study that ended, or whose time was over, before ``ended_before``; their ids.
+
+        ``dry``: only tell.
+        """
         c = STUDIES.c
-        micros = (ended_before - EPOCH) // timedelta(microseconds=1)
-        old = (c.finished_at < micros) & c.state.in_([state.value for state in TERMINAL]) & c.deleted_at.is_(None)
+        ended = c.state.in_([state.value for state in TERMINAL]) & (c.finished_at < micros_of(ended_before))
+        over = (c.waits_for == HELD_AT_DEADLINE) & (c.finish_by < micros_of(ended_before))
+        old = (ended | over) & c.deleted_at.is_(None)
         with self.session.read() as connection:
             found = list(connection.execute(sa.select(c.id).where(old).order_by(c.number)).scalars())
         for study_id in () if dry else found:

@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from worker import kernels
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0007"
+HEAD_REVISION = "0008"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -45,7 +45,7 @@ STUDIES = sa.Table(
     sa.Column("deleted_at", sa.BigInteger),
     # Of two studies the one with the higher number goes first.
     sa.Column("priority", sa.Integer, nullable=False, server_default="0"),
-    # What a paused study waits for by itself (`WAITS_FOR_ROOM`); NULL where it waits for somebody to resume it.
+    # What a paused study waits for (`WAITS_FOR_ROOM` and below); NULL where somebody paused it, or a fault.
     sa.Column("waits_for", sa.String(12)),
     # Equal for studies that may have cases in common (`worker.reuse`).
     sa.Column("kin_hash", sa.String(64), nullable=False, server_default="", index=True),
@@ -53,6 +53,10 @@ STUDIES = sa.Table(
     sa.Column("fresh", sa.Integer, nullable=False, server_default="0"),
     # Cases whose rows were taken from other studies.
     sa.Column("reused", sa.Integer, nullable=False, server_default="0"),
+    # When the study is held, whatever is done then; NULL where it takes as long as it takes.
+    sa.Column("finish_by", sa.BigInteger),
+    # 1: it is run coarse to fine, and its chunks are ranges of positions in that order (`worker.order`).
+    sa.Column("coarse", sa.Integer, nullable=False, server_default="0"),
     sqlite_autoincrement=True,
 )
 
@@ -61,17 +65,19 @@ WAITS_FOR_ROOM = "room"
 #: What a study waits for that is held outside its window.
 WAITS_FOR_WINDOW = "window"
 
+#: What holds a study whose deadline came; it does not go on by itself.
+HELD_AT_DEADLINE = "deadline"
+
 #: The columns of a `StudyRecord`: without the texts that can be long.
 RECORD_COLUMNS = tuple(
-    column
-    for column in STUDIES.c
-    if column.name not in {"spec", "study", "deleted_at", "waits_for", "kin_hash", "fresh"}
+    column for column in STUDIES.c if column.name not in {"spec", "study", "deleted_at", "kin_hash", "fresh"}
 )
 
 CHUNKS = sa.Table(
     "chunks",
     METADATA,
     sa.Column("study", sa.Integer, sa.ForeignKey("studies.number"), primary_key=True),
+    # Of case numbers, or of positions in the study's order where it is coarse to fine.
     sa.Column("first", sa.Integer, primary_key=True),
     sa.Column("count", sa.Integer, nullable=False),
     sa.Column("state", sa.String(8), nullable=False),

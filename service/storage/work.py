@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sqlalchemy as sa
 
-from service.storage.part import moment
+from service.storage.part import moment, optional_moment
 from service.storage.records import DispatcherRecord
 from service.storage.reuse import Reuse, copy_rows, endings_of
 from service.storage.tables import (
     CHUNKS,
     DISPATCHER,
     ENDINGS,
+    HELD_AT_DEADLINE,
     KEY_COLUMNS,
     STUDIES,
     WAITS_FOR_ROOM,
@@ -88,16 +89,26 @@ class Work(Reuse):
             return_claims(connection)
 
     def active_studies(self) -> list[ActiveStudy]:
-        """Studies that have not ended, those of the highest priority first, then in order of submission."""
+        """Studies that have not ended, those of the highest priority first, then in order of submission.
+
+        Those that are held because their time was over are left out.
+        """
         c = STUDIES.c
         with self.session.read() as connection:
             rows = connection.execute(
-                sa.select(c.number, c.id, c.state, c.priority, c.waits_for)
-                .where(c.state.not_in(_TERMINAL))
+                sa.select(c.number, c.id, c.state, c.priority, c.waits_for, c.finish_by)
+                .where(c.state.not_in(_TERMINAL), c.waits_for.is_distinct_from(HELD_AT_DEADLINE))
                 .order_by(c.priority.desc(), c.number)
             ).all()
         return [
-            ActiveStudy(row.number, row.id, StudyState(row.state), row.priority, row.waits_for == WAITS_FOR_ROOM)
+            ActiveStudy(
+                row.number,
+                row.id,
+                StudyState(row.state),
+                row.priority,
+                row.waits_for == WAITS_FOR_ROOM,
+                optional_moment(row.finish_by),
+            )
             for row in rows
         ]
 
@@ -108,7 +119,7 @@ class Work(Reuse):
         return Study.from_json(json.loads(text))
 
     def open_chunks(self, number: int) -> list[Chunk]:
-        """Chunks of a study that are not done, in order of their cases."""
+        """Chunks of a study that are not done, in the order in which they are to be run."""
         c = CHUNKS.c
         with self.session.read() as connection:
             rows = connection.execute(
@@ -119,7 +130,7 @@ class Work(Reuse):
         return [Chunk(number, first, count, failures) for first, count, failures in rows]
 
     def claim(self, epoch: int, chunks: Sequence[Chunk]) -> list[Chunk]:
-        """Claim waiting chunks of studies that are queued or running; gives those that were got."""
+        """Claim waiting chunks of studies that are queued or running and in time; gives those that were got."""
         got: list[Chunk] = []
         with self.session.write() as connection:
             self._own(connection, epoch)
@@ -127,7 +138,8 @@ class Work(Reuse):
                 number: StudyState(state)
                 for number, state in connection.execute(
                     sa.select(STUDIES.c.number, STUDIES.c.state).where(
-                        STUDIES.c.number.in_({chunk.study for chunk in chunks})
+                        STUDIES.c.number.in_({chunk.study for chunk in chunks}),
+                        sa.func.coalesce(STUDIES.c.finish_by > self._now(), sa.true()),
                     )
                 ).all()
             }
@@ -185,18 +197,20 @@ class Work(Reuse):
         model, pendulums = connection.execute(
             sa.select(STUDIES.c.model, STUDIES.c.pendulums).where(STUDIES.c.number == chunk.study)
         ).one()
-        numbers = range(chunk.first, chunk.last + 1) if known is None else known.missing.tolist()
+        numbers = (self._cases(chunk, connection) if known is None else known.missing).tolist()
         if result.count:
             rows = _tuples(chunk.study, numbers, result, kernels.result_infos(model, pendulums))
             self.session.insert_rows(connection, *_target(model, pendulums), rows)
-        if known is not None and not copy_rows(connection, model, pendulums, chunk, known):
-            raise _SourceGoneError
+        endings = Counter(result.endings)
+        if known is not None and known.cases.size:
+            if not copy_rows(connection, model, pendulums, chunk, known):
+                raise _SourceGoneError
+            endings += endings_of(connection, model, pendulums, chunk.study, known.cases)
         connection.execute(
             sa.update(CHUNKS)
             .where(_is(chunk))
             .values(state="done", finished_at=self._now(), detail=detail, failures=chunk.failures)
         )
-        endings = Counter(result.endings if known is None else endings_of(connection, model, pendulums, chunk))
         for ending, cases in endings.items():
             this = (ENDINGS.c.study == chunk.study) & (ENDINGS.c.ending == ending)
             more = connection.execute(sa.update(ENDINGS).where(this).values(cases=ENDINGS.c.cases + cases))
@@ -278,6 +292,33 @@ class Work(Reuse):
             state = connection.execute(sa.select(STUDIES.c.state).where(STUDIES.c.number == number)).scalar_one()
             if StudyState(state) in {StudyState.QUEUED, StudyState.RUNNING}:
                 self._move(connection, number, StudyEvent.FAULT, reason)
+
+    def time_is_over(self, epoch: int, number: int) -> None:
+        """Hold a queued or running study, nothing of which is in flight: its deadline has come.
+
+        A study without open chunks comes to its end instead.
+        """
+        c = STUDIES.c
+        with self.session.write() as connection:
+            self._own(connection, epoch)
+            state, cases, done, finish_by = connection.execute(
+                sa.select(c.state, c.cases, c.done, c.finish_by).where(c.number == number)
+            ).one()
+            if StudyState(state) not in {StudyState.QUEUED, StudyState.RUNNING}:
+                return
+            if done < cases:
+                covered = self._coverage(connection, number, cases)
+                complete = f"; {covered}" if covered else ""
+                self._move(
+                    connection,
+                    number,
+                    StudyEvent.FAULT,
+                    f"its time was over at {moment(finish_by).isoformat(timespec='seconds')}: {done:,} of {cases:,} "
+                    f"cases are done{complete}. Resume it to have the others run, too.",
+                )
+                connection.execute(sa.update(STUDIES).where(c.number == number).values(waits_for=HELD_AT_DEADLINE))
+                return
+        self.settle(epoch, number)
 
     def begin_again(self, epoch: int, number: int) -> None:
         """Return every claim of this epoch to waiting, and take all blame from the study's chunks."""

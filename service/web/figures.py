@@ -172,9 +172,10 @@ def _panel_traces(lines: Sequence[tuple[str, Curve]], info: ResultInfo, panel: i
     styles = zip(colours, itertools.cycle(SYMBOLS), strict=False)
     labels = list(dict.fromkeys(label for label, _ in lines))
     for index, ((label, curve), (colour, symbol)) in enumerate(zip(lines, styles, strict=False)):
-        y = curve.y[info.name]
+        run = curve.run()
+        y = curve.y[info.name][run]
         kept = thin(y, most)
-        x = np.array(curve.line.x)
+        x = np.array(curve.line.x)[run]
         joined = bool(np.all(np.diff(x) > 0.0))
         study = escaped(_short(label))
         values = ", ".join(number(value) for value in curve.line.by.values())
@@ -188,7 +189,7 @@ def _panel_traces(lines: Sequence[tuple[str, Curve]], info: ResultInfo, panel: i
             "showlegend": panel == 0,
             "x": x[kept].tolist(),
             "y": numbers(y[kept]),
-            "customdata": curve.line.cases[kept].tolist(),
+            "customdata": curve.line.cases[run][kept].tolist(),
             "line": {"color": colour, "width": 1.8, "dash": DASHES[labels.index(label) % len(DASHES)]},
             "marker": {"color": colour, "symbol": symbol, "size": 6},
             "hovertemplate": f"%{{x:.5g}}, %{{y:.5g}} {unit_text(info.unit)}<br>case %{{customdata}}"
@@ -210,6 +211,7 @@ def line_colours(count: int) -> list[str]:
 
 def map_figure(drawn: Map, contour: bool) -> Figure:
     """A map as a figure: colours, or lines of equal value with their numbers; gaps where there is no result."""
+    drawn = drawn.run()
     trace: Figure = {
         "type": "contour" if contour else "heatmap",
         "x": list(drawn.x_values),

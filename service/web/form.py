@@ -19,7 +19,8 @@ from service.api.respond import json_response
 from service.errors import ApiError
 from service.intake import accept
 from service.presets import preset_names
-from service.web.form_check import Checked, check_form, check_text
+from service.web import form_check
+from service.web.form_check import Checked
 from service.web.form_fields import FORM_MODEL, path_choices, pendulum, sections
 from service.web.form_spec import (
     Values,
@@ -119,11 +120,11 @@ def _submit(context: Context, request: Request, values: Values) -> Response:
     if checked.parsed is None:
         return form_page(request, values, checked, status=422)
     # Sent twice, by a second click, the same form is one study; changed and sent again it is another.
-    text = json.dumps(checked.spec, sort_keys=True)
+    text = json.dumps([checked.spec, values.get("finish_by", "")], sort_keys=True)
     key = f"form-{values.get('key', '')[:64]}-{hashlib.sha256(text.encode()).hexdigest()[:32]}"
     key = "".join(character for character in key if "!" <= character <= "~")
     try:
-        record = accept(context.store, checked.parsed, key)
+        record = accept(context.store, checked.parsed, key, finish_by=checked.finish)
     except ApiError as error:
         checked.faults.setdefault("", []).append(error.detail)
         return form_page(request, values, checked, status=error.type.status)
@@ -150,9 +151,8 @@ async def check(context: Ctx, request: Request, values: Form) -> Response:
 
 def look_over(context: Context, values: Mapping[str, str]) -> Checked:
     """A form, field by field or as text, looked over."""
-    if "/text" in values:
-        return check_text(values["/text"], values.get("format", "json"), context.store.chunking, context.store.reusable)
-    return check_form(values, context.store.chunking, context.store.reusable)
+    store = context.store
+    return form_check.look_over(values, store.chunking, store.reusable, store.clock.now())
 
 
 def reshape(values: Values, wanted: str) -> None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
+from urllib.parse import urlencode
 
 from service.errors import ErrorItem, spec_items
+from service.finish import ALLOWED, FinishError, finish_at
 from service.fits import fit_json
 from service.measured import MeasuredDataError, parse_measured
 from service.preview import preview_json
@@ -19,6 +21,8 @@ from service.web.form_spec import Faults, clutch_pointers, field_of, pendulums_o
 from service.web.templates import unit_text
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from worker.chunking import Chunking
     from worker.study import Study
 
@@ -31,7 +35,7 @@ class Checked:
 
     ``faults`` has the messages by field ("" for those of no field); ``preview`` is None while there are any. ``fits``
     has the report and the picture of each clutch that could be fitted, whatever else is wrong; ``notes`` what was taken
-    for granted in measured data.
+    for granted in measured data. ``finish`` is the deadline, which is no part of the spec.
     """
 
     spec: dict[str, Any]
@@ -39,8 +43,15 @@ class Checked:
     faults: Faults = field(default_factory=dict)
     preview: dict[str, Any] | None = None
     fits: dict[str, tuple[dict[str, Any], FitChart]] = field(default_factory=dict)
+    finish: datetime | None = None
+    finish_text: str = ""
     notes: list[str] = field(default_factory=list)
     empty: frozenset[str] = frozenset()
+
+    @property
+    def query(self) -> str:
+        """What an address carries beside the spec."""
+        return "" if self.finish is None else "?" + urlencode({"finish_by": self.finish_text})
 
     @property
     def missing(self) -> int:
@@ -57,8 +68,31 @@ def _none_known(_study: Study) -> int:
     return 0
 
 
-def check_form(values: Mapping[str, str], chunking: Chunking, known: Known = _none_known) -> Checked:
-    """Look a filled form over; ``known`` tells how many cases of a study need not be run."""
+def look_over(values: Mapping[str, str], chunking: Chunking, known: Known, now: datetime) -> Checked:
+    """Look a form over, field by field or as text, with its deadline; ``known`` as for `check_form`."""
+    text, finish, fault = values.get("finish_by", "").strip(), None, ""
+    try:
+        finish = finish_at(text, now) if text else None
+    except FinishError as error:
+        fault = f"{error}; allowed: {ALLOWED}"
+    left = None if finish is None else (finish - now).total_seconds()
+    if "/text" in values:
+        checked = check_text(values["/text"], values.get("format", "json"), chunking, known, left)
+    else:
+        checked = check_form(values, chunking, known, left)
+    checked.finish, checked.finish_text = finish, text
+    if fault:
+        checked.faults["finish_by"], checked.parsed, checked.preview = [fault], None, None
+    return checked
+
+
+def check_form(
+    values: Mapping[str, str], chunking: Chunking, known: Known = _none_known, left: float | None = None
+) -> Checked:
+    """Look a filled form over.
+
+    ``known`` tells how many cases of a study need not be run; ``left`` are the seconds until its deadline.
+    """
     spec, faults = spec_of(values)
     found = Checked(spec, faults=faults, empty=frozenset(name for name, text in values.items() if not text.strip()))
     try:
@@ -72,7 +106,7 @@ def check_form(values: Mapping[str, str], chunking: Chunking, known: Known = _no
     if found.faults:
         found.parsed = None
     if found.parsed is not None:
-        found.preview = preview_json(found.parsed, chunking, known(found.parsed.study))
+        found.preview = preview_json(found.parsed, chunking, known(found.parsed.study), left)
     for pointer in clutch_pointers(values):
         if values.get(f"{pointer}/kind") == "data":
             found.notes += _assumed(values.get(f"{pointer}/data", ""))
@@ -88,8 +122,10 @@ def _assumed(text: str) -> list[str]:
         return []
 
 
-def check_text(text: str, form: str, chunking: Chunking, known: Known = _none_known) -> Checked:
-    """Look a spec over that is given as text, JSON or TOML."""
+def check_text(
+    text: str, form: str, chunking: Chunking, known: Known = _none_known, left: float | None = None
+) -> Checked:
+    """Look a spec over that is given as text, JSON or TOML; ``known`` and ``left`` as for `check_form`."""
     found = Checked({})
     try:
         loaded = load_spec(text, "toml" if form == "toml" else "json")
@@ -99,7 +135,7 @@ def check_text(text: str, form: str, chunking: Chunking, known: Known = _none_kn
         found.faults["/text"] = [f"{pointer}: {message(item)}" for pointer, item in places]
         return found
     found.spec = found.parsed.spec
-    found.preview = preview_json(found.parsed, chunking, known(found.parsed.study))
+    found.preview = preview_json(found.parsed, chunking, known(found.parsed.study), left)
     return found
 
 

@@ -119,6 +119,7 @@ def _data_of(context: Context, values: Mapping[str, str]) -> dict[str, Any]:
         "window": [begin, end] if begin or end else None,
         "priority": int(priority) if _WHOLE.fullmatch(priority) else priority,
         "fresh": "fresh" in values,
+        "finish_by": values.get("finish_by", "").strip() or None,
     }
     when = "at" if values.get("when") == "at" else "cron"
     data[when] = values.get(when, "").strip() or None
@@ -142,6 +143,7 @@ def _values_of(fields: ScheduleFields) -> Values:
         "window_begin": "" if window is None else f"{window.begin:%H:%M}",
         "window_end": "" if window is None else f"{window.end:%H:%M}",
         "priority": str(fields.priority),
+        "finish_by": fields.finish_by or "",
         **({"fresh": "on"} if fields.fresh else {}),
     }
 

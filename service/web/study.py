@@ -147,7 +147,7 @@ def fits_of(spec: dict[str, Any]) -> dict[str, tuple[dict[str, Any], FitChart]]:
 def delete_page(context: Ctx, study_id: StudyId) -> Response:
     """The question whether a study is to be deleted, and what goes with it."""
     record = context.store.get_study(study_id)
-    return page("delete.html", study=views.summary(record), ended=record.state.terminal)
+    return page("delete.html", study=views.summary(record), ended=record.over)
 
 
 @router.post("/studies/{study_id:study}/delete")

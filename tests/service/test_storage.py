@@ -5,13 +5,14 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import numpy as np
 import pytest
 import sqlalchemy as sa
 
 from service.storage import session as session_module
 from service.storage.errors import DatabaseBusyError, DatabaseError
 from service.storage.lock import DispatcherLock
-from service.storage.progress import FinishedChunk, busy_seconds, estimate
+from service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
 from service.storage.session import Session, file_system_of, sqlite_warning
 from service.storage.store import Store
 from service.storage.tables import STUDIES
@@ -181,10 +182,26 @@ def test_one_dispatcher_at_a_time(tmp_path: Path) -> None:
 
 def test_pauses_do_not_count_as_work() -> None:
     chunks = [FinishedChunk(0.0, 2.0, 10), FinishedChunk(1.0, 3.0, 10), FinishedChunk(100.0, 101.0, 10)]
-    assert busy_seconds(chunks) == 4.0
     rate, left = estimate(0, chunks)
-    assert rate == 7.5
+    assert rate == pytest.approx(30 / 4.0)
     assert left == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("processes", [1, 4, 32])
+@pytest.mark.parametrize("done", [1, 7, 40, 100, 400])
+def test_the_rate_is_right_however_many_chunks_run_side_by_side(processes: int, done: int) -> None:
+    # Ten cases in 8 s on each process, which began one after the other: the next chunk begins when the last ends.
+    begins = sorted(8.0 * (n // processes) + 8.0 * (n % processes) / processes for n in range(done + processes))
+    ended = [FinishedChunk(begin, begin + 8.0, 10) for begin in begins[:done]]
+    now = ended[-1].end
+    running = [RunningChunk(begin, 10) for begin in begins[done:] if begin < now]
+    rate, left = estimate(5000, ended[-RECENT_CHUNKS:], running, now, 10 * done)
+    assert rate is not None
+    assert left is not None
+    # While processes are only just beginning, fewer run side by side.
+    assert rate == pytest.approx(10.0 * processes / 8.0, rel=0.15 if done > 3 * processes else 0.6)
+    if done > 3 * processes:
+        assert left[0] < 5000 / (10.0 * processes / 8.0) < left[1]
 
 
 def test_time_left_is_unknown_before_the_first_chunk() -> None:
@@ -195,9 +212,32 @@ def test_time_left_is_unknown_before_the_first_chunk() -> None:
 def test_the_interval_is_narrow_for_even_chunks_and_wide_for_uneven_ones() -> None:
     even = [FinishedChunk(float(i), float(i + 1), 10) for i in range(20)]
     uneven = [FinishedChunk(float(i * i), float((i + 1) ** 2), 10) for i in range(20)]
-    for chunks, widest in ((even, 0.2), (uneven, 2.0)):
-        rate, left = estimate(1000, chunks)
+    widths = []
+    for chunks in (even, uneven):
+        rate, left = estimate(100, chunks)
         assert rate is not None
         assert left is not None
-        assert left[0] < 1000 / rate < left[1]
-        assert (left[1] - left[0]) * rate / 1000 < widest
+        assert left[0] < 100 / rate < left[1]
+        widths.append((left[1] - left[0]) * rate / 100)
+    assert widths[0] < 0.6
+    assert widths[1] > 2.0 * widths[0]
+
+
+def test_a_trend_is_carried_on() -> None:
+    # From 1 s each chunk takes 40 ms longer than the one before; fifty are done and fifty are left.
+    ends = np.cumsum(1.0 + 0.04 * np.arange(100))
+    chunks = [
+        FinishedChunk(float(end - cost), float(end), 10)
+        for end, cost in zip(ends, np.diff(ends, prepend=0.0), strict=True)
+    ]
+    _, left = estimate(500, chunks[:50])
+    assert left is not None
+    assert left[0] < ends[99] - ends[49] < left[1]
+
+
+def test_an_interval_is_narrower_where_the_cases_done_lie_among_those_left() -> None:
+    chunks = [FinishedChunk(float(i), float(i + 1), 10) for i in range(20)]
+    (_, plain), (_, sampled) = (estimate(1000, chunks, sampled=sampled) for sampled in (False, True))
+    assert plain is not None
+    assert sampled is not None
+    assert plain[0] < sampled[0] < 100.0 < sampled[1] < plain[1]

@@ -1,0 +1,192 @@
+"""How often the truth lay inside the interval of the time left, for studies of different structure of cost.
+
+The estimator is the service's own (`service.storage.progress`). Chunks of made-up cost are run on simulated processes,
+in the order of the service; at every so many commits the interval is taken and held against what was left in truth.
+With ``--real`` studies of the engine are run here as well, and the intervals that ``sprag run`` tells are taken.
+
+    python -m benchmarks.time_left [--studies 60] [--seed 1] [--real]
+"""
+
+from __future__ import annotations
+
+import argparse
+import heapq
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.local import run_here
+from service.presets import preset_text
+from service.spec import load_spec, parse_spec
+from service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
+from service.storage.records import Progress
+from worker.order import order_of
+from worker.study import Axis, Study
+
+Costs = NDArray[np.float64]
+
+#: Looks at each study, and where a look counts as early, in the middle, or late (share of the time that is over).
+_LOOKS = 40
+_PARTS = (("early", 0.0, 1 / 3), ("middle", 1 / 3, 2 / 3), ("late", 2 / 3, 1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """One interval and the truth, s; ``at`` is the share of the whole time that was over."""
+
+    at: float
+    low: float
+    high: float
+    truth: float
+
+    @property
+    def inside(self) -> bool:
+        """Whether the interval held."""
+        return self.low <= self.truth <= self.high
+
+
+def even(rng: np.random.Generator, count: int) -> Costs:
+    """The same for all, up to the machine's noise."""
+    return rng.lognormal(0.0, 0.05, count)
+
+
+def noisy(rng: np.random.Generator, count: int) -> Costs:
+    """Cases that differ much, in no order: a sampled design, or a machine that others work on."""
+    return rng.lognormal(0.0, 0.5, count)
+
+
+def rising(rng: np.random.Generator, count: int) -> Costs:
+    """The first axis makes a case up to four times as dear, or cheap, from its begin to its end."""
+    slope = np.linspace(0.0, rng.uniform(-np.log(4.0), np.log(4.0)), count)
+    return np.exp(slope) * rng.lognormal(0.0, 0.1, count)
+
+
+def stepped(rng: np.random.Generator, count: int) -> Costs:
+    """From some case on the motion is another, and the cost with it."""
+    cost = np.ones(count)
+    cost[int(rng.uniform(0.2, 0.8) * count) :] = rng.uniform(0.4, 2.5)
+    return cost * rng.lognormal(0.0, 0.1, count)
+
+
+def waves(rng: np.random.Generator, count: int) -> Costs:
+    """The cost goes up and down with an inner axis."""
+    phase = np.arange(count) / count * rng.uniform(3.0, 30.0) * 2.0 * np.pi
+    return (1.0 + rng.uniform(0.2, 0.7) * np.sin(phase)) * rng.lognormal(0.0, 0.1, count)
+
+
+def rare(rng: np.random.Generator, count: int) -> Costs:
+    """One chunk in thirty takes many times as long."""
+    return np.where(rng.random(count) < 1 / 30, rng.uniform(3.0, 15.0, count), 1.0) * rng.lognormal(0.0, 0.05, count)
+
+
+def interrupted(rng: np.random.Generator, count: int) -> Costs:
+    """Somebody else takes the machine for some time: everything is slower by half."""
+    cost = even(rng, count)
+    begin = int(rng.uniform(0.0, 0.9) * count)
+    cost[begin : begin + int(rng.uniform(0.1, 0.4) * count)] *= 1.5
+    return cost
+
+
+def refined(rng: np.random.Generator, count: int) -> Costs:
+    """The costs of `rising`, `stepped` or `waves` in the order of a study with a deadline, coarse to fine."""
+    axis = Axis(("shaft.load",), tuple(map(float, range(count))))
+    study = Study("vibration-drive", "", {"shaft.load": 0.0}, {}, (axis,))
+    cost = (rising, stepped, waves)[int(rng.integers(3))]
+    return cost(rng, count)[order_of(study).cases(np.arange(count))]
+
+
+STRUCTURES: dict[str, Callable[[np.random.Generator, int], Costs]] = {
+    f.__name__: f for f in (even, noisy, rising, stepped, waves, rare, interrupted, refined)
+}
+
+
+def simulate(costs: Costs, processes: int, sampled: bool, cases: int = 16) -> Iterator[Look]:
+    """Run chunks of ``cases`` cases with those costs (s) and look at the time left now and then."""
+    free = [0.0] * processes
+    done: list[FinishedChunk] = []
+    for cost in costs.tolist():
+        begin = heapq.heappop(free)
+        heapq.heappush(free, begin + cost)
+        done.append(FinishedChunk(begin, begin + cost, cases))
+    done.sort(key=lambda chunk: chunk.end)
+    end = done[-1].end
+    for look in sorted(set(np.linspace(1, len(done) - 1, _LOOKS, dtype=int).tolist())):
+        now = done[look - 1].end
+        recent = done[max(0, look - RECENT_CHUNKS) : look][::-1]
+        # What is claimed and not done: a chunk for each process, and those that wait for one.
+        running = [RunningChunk(chunk.begin, cases) for chunk in done[look:] if chunk.begin <= now]
+        _, left = estimate((len(done) - look) * cases, recent, running, now, look * cases, sampled)
+        if left is not None and now < end:
+            yield Look(now / end, *left, end - now)
+
+
+def real_looks(study: Study) -> Iterator[Look]:
+    """Run a study of the engine here and take the intervals it tells."""
+    taken: list[tuple[float, tuple[float, float]]] = []
+
+    def note(progress: Progress) -> None:
+        if progress.seconds_left is not None and progress.done < progress.total:
+            taken.append((time.monotonic(), progress.seconds_left))
+
+    start = time.monotonic()
+    with run_here({}, study, processes=0, chunk_cases=32, on_progress=note):
+        end = time.monotonic()
+    for at, (low, high) in taken:
+        yield Look((at - start) / (end - start), low, high, end - at)
+
+
+def real_studies() -> Iterator[tuple[str, Study]]:
+    """Studies whose cost has a structure: longer and shorter periods, more and fewer engagements."""
+    example = parse_spec(load_spec(preset_text("one_pendulum")[1], "json")).study
+    loads = tuple(np.linspace(0.0, 0.5, 150).tolist())
+    frequencies = tuple(np.linspace(12.0, 40.0, 150).tolist())
+    by_load = (Axis(("shaft.load",), loads), Axis(("excitation.frequency",), frequencies))
+    yield "loads outside", replace(example, axes=by_load)
+    yield "frequencies outside", replace(example, axes=by_load[::-1])
+    fixed = {**example.run, "duration": [2.0, "s"], "window": None}
+    yield "fixed time, frequencies outside", replace(example, axes=by_load[::-1], run=fixed)
+
+
+def told(name: str, looks: list[Look]) -> None:
+    """One line: shares that held and how wide the interval was, for each part."""
+    cells = []
+    for _, begin, end in _PARTS:
+        part = [look for look in looks if begin <= look.at < end]
+        if not part:
+            cells.append(f"{'-':>14}")
+            continue
+        held = sum(look.inside for look in part) / len(part)
+        width = float(np.median([(look.high - look.low) / look.truth for look in part]))
+        cells.append(f"{held:7.0%} ({width:4.2f})")
+    held = sum(look.inside for look in looks) / len(looks)
+    print(f"{name:32}{'  '.join(cells)}  {held:7.0%}  {len(looks):6d}")
+
+
+def main() -> None:
+    """Measure and tell."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--studies", type=int, default=60, help="studies of each structure")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--real", action="store_true", help="run studies of the engine, too")
+    options = parser.parse_args()
+    rng = np.random.default_rng(options.seed)
+    print("share of intervals that held the truth (median width in parts of the truth)")
+    print(f"{'structure of cost':32}{'  '.join(f'{name:>14}' for name, _, _ in _PARTS)}      all   looks")
+    every: dict[str, list[Look]] = defaultdict(list)
+    for name, cost in STRUCTURES.items():
+        for _ in range(options.studies):
+            count, processes = int(np.exp(rng.uniform(np.log(20), np.log(2000)))), int(rng.choice([1, 2, 8, 32]))
+            every[name] += simulate(cost(rng, count), processes, name.startswith("refined"))
+        told(name, every[name])
+    told("all made-up ones", [look for looks in every.values() for look in looks])
+    if options.real:
+        for name, study in real_studies():
+            told(name, list(real_looks(study)))
+
+
+if __name__ == "__main__":
+    main()

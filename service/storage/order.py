@@ -1,0 +1,76 @@
+"""Which cases a chunk of a study is: consecutive ones, or those at its positions in the order coarse to fine."""
+
+from __future__ import annotations
+
+import json
+from collections import OrderedDict
+from threading import Lock
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import sqlalchemy as sa
+
+from service.storage.part import Part
+from service.storage.tables import CHUNKS, STUDIES
+from worker.order import coverage, order_of
+from worker.study import Study
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from service.storage.session import Session
+    from worker.order import Coverage, Order
+    from worker.ports import Chunk, Clock
+
+#: Studies whose orders are kept in memory; each is a few numbers for every value of an axis, or of the list.
+_KEPT: Final = 16
+
+
+class Orders(Part):
+    """The orders of studies, which never change."""
+
+    def __init__(self, session: Session, clock: Clock) -> None:
+        super().__init__(session, clock)
+        self._orders: OrderedDict[int, Order | None] = OrderedDict()
+        self._orders_lock = Lock()
+
+    def _order(self, number: int, connection: sa.Connection | None = None) -> Order | None:
+        """The order of a study; None where its cases are run by their numbers.
+
+        Without a connection it is asked of the database in a transaction of its own, once.
+        """
+        with self._orders_lock:
+            if number in self._orders:
+                self._orders.move_to_end(number)
+                return self._orders[number]
+        if connection is None:
+            with self.session.read() as own:
+                return self._order(number, own)
+        coarse, text = connection.execute(
+            sa.select(STUDIES.c.coarse, sa.case((STUDIES.c.coarse != 0, STUDIES.c.study), else_="")).where(
+                STUDIES.c.number == number
+            )
+        ).one()
+        found = order_of(Study.from_json(json.loads(text))) if coarse else None
+        with self._orders_lock:
+            self._orders[number] = found
+            while len(self._orders) > _KEPT:
+                self._orders.popitem(last=False)
+        return found
+
+    def _cases(self, chunk: Chunk, connection: sa.Connection | None = None) -> NDArray[np.int64]:
+        """Numbers of the cases of a chunk, int64 array of shape (chunk.count,), ascending."""
+        positions = np.arange(chunk.first, chunk.first + chunk.count, dtype=np.int64)
+        order = self._order(chunk.study, connection)
+        return positions if order is None else np.sort(order.cases(positions))
+
+    def _coverage(self, connection: sa.Connection, number: int, cases: int) -> Coverage | None:
+        """What of a study is complete, of its ``cases``; None where it is not run coarse to fine."""
+        order = self._order(number, connection)
+        if order is None:
+            return None
+        c = CHUNKS.c
+        first_open = connection.execute(
+            sa.select(sa.func.min(c["first"])).where(c.study == number, c.state != "done")
+        ).scalar_one()
+        return coverage(order, cases if first_open is None else first_open)

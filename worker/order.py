@@ -1,0 +1,196 @@
+"""Coarse to fine: the order in which the cases of a study with a deadline are run.
+
+The first pass takes the two ends of every axis, the next their middles too, and so on: pass ``p`` takes the values
+whose rank (place among the values of the axis by size) is ``floor(j (n - 1) / 2^p)`` for some ``j = 0 .. 2^p``. Those
+of one pass are among those of the next, they lie evenly, and the ends are always with them. A pass is the complete grid
+of the values it takes, so that whatever is done when the time is over is a usable, coarser study. (The one-dimensional
+order is that of bisection; the radical inverse of van der Corput, 1935, without its permutation within a pass.)
+
+Chunks of such a study are ranges of *positions* in this order. For a grid nothing is tabulated but the axes: the cases
+that a pass adds are boxes, one for each axis that comes to its new values first, and a position in a box is a number in
+mixed radix, as a case number is in the whole. Cases that are written out one by one (a zip) are sorted by the pass
+that takes all their values; of one pass they stay in the order they were given in, which for samples covers the ranges.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from worker.study import Study
+
+    Numbers = NDArray[np.int64]
+
+
+class Order(Protocol):
+    """A one-to-one relation between positions (when a case is run) and case numbers, both 0 .. cases - 1.
+
+    Attributes
+    ----------
+    passes : tuple of int
+        Positions before each entry are one complete, coarser study; ascending, the last is the number of cases.
+    """
+
+    @property
+    def passes(self) -> tuple[int, ...]: ...
+
+    def cases(self, positions: Numbers) -> Numbers:
+        """Numbers of the cases at those positions, shape (m,)."""
+
+    def positions(self, cases: Numbers) -> Numbers:
+        """Positions of the cases of those numbers, shape (m,)."""
+
+    def values(self, passes: int) -> tuple[int, ...]:
+        """Values of each axis that the first ``passes`` passes take; () where cases are written out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """What of a study is complete: ``complete`` of ``total`` passes, ``cases`` cases, a grid of so many ``values``.
+
+    ``values`` has a number for each axis, none where the cases are written out.
+    """
+
+    complete: int
+    total: int
+    cases: int
+    values: tuple[int, ...]
+
+    def __str__(self) -> str:
+        if not self.complete:
+            return f"no pass of {self.total} is complete"
+        grid = f"a grid of {' x '.join(map(str, self.values))} values" if self.values else f"{self.cases:,} cases"
+        return f"pass {self.complete} of {self.total} is complete, {grid}"
+
+
+def coverage(order: Order, reached: int) -> Coverage:
+    """What is complete when every position before ``reached`` is done."""
+    complete = sum(size <= reached for size in order.passes)
+    cases = order.passes[complete - 1] if complete else 0
+    return Coverage(complete, len(order.passes), cases, order.values(complete) if complete else ())
+
+
+def levels(count: int) -> Numbers:
+    """First pass that takes each of ``count`` ranks, int64 array of shape (count,)."""
+    found = np.full(count, -1, dtype=np.int64)
+    level = 0
+    while count and (found < 0).any():
+        ranks = np.arange(2**level + 1, dtype=np.int64) * (count - 1) >> level
+        new = ranks[found[ranks] < 0]
+        found[new] = level
+        level += 1
+    return found
+
+
+def levels_of(values: NDArray[np.float64]) -> Numbers:
+    """First pass that takes each of the values (shape (m,), repetitions allowed), by their rank among all of them."""
+    different, rank = np.unique(values, return_inverse=True)
+    return levels(different.size)[rank.reshape(-1)]
+
+
+def order_of(study: Study) -> Order:
+    """The order of ``study``, coarse to fine."""
+    if study.combine == "grid" and study.axes:
+        return GridOrder([levels_of(axis.array) for axis in study.axes])
+    own = [levels_of(axis.array) for axis in study.axes]
+    return ListOrder(np.max(own, axis=0) if own else np.zeros(study.cases, dtype=np.int64))
+
+
+class ListOrder:
+    """Cases that are written out: sorted by their level (shape (cases,)), the given order kept within one."""
+
+    def __init__(self, level: Numbers) -> None:
+        self._case = np.argsort(level, kind="stable").astype(np.int64)
+        self._position = np.empty_like(self._case)
+        self._position[self._case] = np.arange(level.size)
+        self.passes = tuple(np.cumsum(np.unique(level, return_counts=True)[1]).tolist())
+
+    def values(self, passes: int) -> tuple[int, ...]:  # noqa: ARG002 - as of every order
+        """Nothing: there are no axes."""
+        return ()
+
+    def cases(self, positions: Numbers) -> Numbers:
+        """Numbers of the cases at those positions."""
+        return self._case[positions]
+
+    def positions(self, cases: Numbers) -> Numbers:
+        """Positions of the cases of those numbers."""
+        return self._position[cases]
+
+
+@dataclass(frozen=True, slots=True)
+class _Box:
+    """Cases whose places on every axis (sorted by level) lie in ``low`` .. ``low + size - 1``; the last is fastest."""
+
+    start: int
+    low: tuple[int, ...]
+    size: tuple[int, ...]
+
+
+class GridOrder:
+    """Every combination of the values of axes, whose levels are given: one array of shape (values,) for each axis."""
+
+    def __init__(self, level: list[Numbers]) -> None:
+        self._shape = tuple(one.size for one in level)
+        #: Place of an axis' values when they are sorted by level, and what stands at each place.
+        self._value = [np.argsort(one, kind="stable").astype(np.int64) for one in level]
+        self._place = [np.argsort(value, kind="stable").astype(np.int64) for value in self._value]
+        self._level = level
+        self._boxes: list[_Box] = []
+        #: Which box is that of a pass and the first axis with a new value in it.
+        self._box_of: dict[tuple[int, int], int] = {}
+        ends = [self._cut(one) for one in range(1 + max(int(one.max()) for one in level))]
+        self._starts = np.array([box.start for box in self._boxes], dtype=np.int64)
+        self.passes = tuple(ends)
+
+    def _cut(self, level: int) -> int:
+        """Append the boxes of a pass; gives the number of cases up to its end."""
+        before = tuple(int((one < level).sum()) for one in self._level)
+        until = tuple(int((one <= level).sum()) for one in self._level)
+        start = math.prod(before)
+        for axis in range(len(self._level)):
+            size = (*before[:axis], until[axis] - before[axis], *until[axis + 1 :])
+            if not math.prod(size):
+                continue
+            low = (*(0 for _ in before[:axis]), before[axis], *(0 for _ in before[axis + 1 :]))
+            self._box_of[level, axis] = len(self._boxes)
+            self._boxes.append(_Box(start, low, size))
+            start += math.prod(size)
+        return start
+
+    def values(self, passes: int) -> tuple[int, ...]:
+        """Values of each axis that the first ``passes`` passes take."""
+        return tuple(int((one < passes).sum()) for one in self._level)
+
+    def cases(self, positions: Numbers) -> Numbers:
+        """Numbers of the cases at those positions."""
+        positions = np.asarray(positions, dtype=np.int64)
+        found = np.empty_like(positions)
+        which = np.searchsorted(self._starts, positions, side="right") - 1
+        for index in np.unique(which).tolist():
+            box, here = self._boxes[index], which == index
+            places = np.unravel_index(positions[here] - box.start, box.size)
+            own = [value[low + place] for value, low, place in zip(self._value, box.low, places, strict=True)]
+            found[here] = np.ravel_multi_index(own, self._shape)
+        return found
+
+    def positions(self, cases: Numbers) -> Numbers:
+        """Positions of the cases of those numbers."""
+        cases = np.asarray(cases, dtype=np.int64)
+        own = np.unravel_index(cases, self._shape)
+        level = np.array([one[index] for one, index in zip(self._level, own, strict=True)])
+        last = level.max(axis=0)
+        axis = (level == last).argmax(axis=0)
+        found = np.empty_like(cases)
+        code = last * len(self._level) + axis
+        for one in np.unique(code).tolist():
+            box, here = self._boxes[self._box_of[divmod(one, len(self._level))]], code == one
+            places = [place[index[here]] - low for place, index, low in zip(self._place, own, box.low, strict=True)]
+            found[here] = box.start + np.ravel_multi_index(places, box.size)
+        return found
