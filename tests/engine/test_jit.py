@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from typing import Any, cast
 
 import numba
@@ -52,7 +53,9 @@ def test_a_program_keeps_its_parts_to_itself() -> None:
     def program(number: int) -> int:
         return doubled(number) + 1
 
+    assert gc.isenabled()
     assert program(20) == 41
+    assert gc.isenabled(), "the collector pauses for the compilation only"
     (overload,) = program.overloads.values()
     seen = {function.name for function in overload.library.get_defined_functions() if not function.is_declaration}
     assert any("program" in name for name in seen)
