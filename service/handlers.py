@@ -10,7 +10,7 @@ from fastapi import FastAPI
 from fastapi.exceptions import RequestValidationError
 from fastapi.routing import iter_route_contexts
 from starlette.exceptions import HTTPException
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 
 from service.errors import ApiError, ErrorItem, parameter_error, problem_response, shown, spec_items
@@ -92,6 +92,11 @@ def _http(request: Request, error: Exception) -> Response:
     return _unknown(request, error)
 
 
+def _left(request: Request, _: Exception) -> Response:
+    """For the log and the metrics only: nobody is there any more to read it."""
+    return _answer(request, ApiError("bad-request", "The connection ended before the request was whole."))
+
+
 def _methods_at(app: FastAPI, path: str) -> set[str]:
     """Every method that some route takes at ``path``; the framework itself names those of one route only."""
     found: set[str] = set()
@@ -136,6 +141,7 @@ def install(app: FastAPI) -> None:
     """Give ``app`` its error handlers."""
     handled: Iterable[tuple[type[Exception], Callable[[Request, Exception], Response]]] = (
         *((kind, _known) for kind in (ApiError, SpecError, SelectionError, TransitionError, storage.StoreError)),
+        (ClientDisconnect, _left),
         (HTTPException, _http),
         (RequestValidationError, _invalid),
         (Exception, _unknown),

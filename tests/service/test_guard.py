@@ -397,3 +397,27 @@ def test_an_open_address_needs_a_token(settings: Settings, host: str) -> None:
     with pytest.raises(UnsafeSettingsError, match="SPRAG_TOKEN"):
         create_app(settings.model_copy(update={"host": host}))
     settings.model_copy(update={"host": host, "token": SecretStr(TOKEN)}).require_safe()
+
+
+@pytest.mark.parametrize(
+    ("path", "kind"), [("/api/v1/studies", b"application/json"), ("/new", b"application/x-www-form-urlencoded")]
+)
+def test_who_leaves_amid_a_body_is_no_fault_of_the_service(
+    service: Service, portal: BlockingPortal, caplog: pytest.LogCaptureFixture, path: str, kind: bytes
+) -> None:
+    sent: list[dict[str, Any]] = []
+    received = iter([{"type": "http.request", "body": b'{"sprag"', "more_body": True}, {"type": "http.disconnect"}])
+
+    async def receive() -> dict[str, Any]:
+        return next(received)
+
+    async def send(message: dict[str, Any]) -> None:
+        sent.append(message)
+
+    headers = [(b"host", b"localhost"), (b"content-type", kind), (b"content-length", b"1000")]
+    scope = {"type": "http", "method": "POST", "path": path, "raw_path": path.encode(), "query_string": b"",
+        "headers": headers, "http_version": "1.1", "scheme": "http", "client": ("127.0.0.1", 1),
+        "server": ("localhost", 80), "root_path": ""}  # fmt: skip
+    portal.call(service.app, scope, receive, send)
+    assert sent[0]["status"] == 400
+    assert caplog.records == []
