@@ -25,20 +25,23 @@ SLOW, STREAMS, CLIENTS = 200, 50, 16
 CURVE = "curves?x=shaft.load&y=shaft.speed.mean&by=excitation.frequency"
 
 
-async def slow_client(host: str, port: int) -> None:
+async def slow_client(host: str, port: int, begun: asyncio.Event) -> None:
     """Send the head of a request a byte a second, for ever: whenever the service hangs up, begin anew."""
     while True:
         with contextlib.suppress(OSError):
             _, writer = await asyncio.open_connection(host, port)
-            for byte in b"GET /livez HTTP/1.1\r\nHost: localhost\r\nX: " + b"y" * 10_000:
-                writer.write(bytes([byte]))
-                await writer.drain()
-                await asyncio.sleep(1.0)
+            with contextlib.closing(writer):
+                for byte in b"GET /livez HTTP/1.1\r\nHost: localhost\r\nX: " + b"y" * 10_000:
+                    writer.write(bytes([byte]))
+                    await writer.drain()
+                    begun.set()
+                    await asyncio.sleep(1.0)
 
 
 async def stream(address: str, path: str, opened: asyncio.Event) -> None:
-    """Hold a stream of events open."""
+    """Hold a stream of events open; returns when the service ends it."""
     async with httpx.AsyncClient(timeout=None) as client, client.stream("GET", address + path) as answer:
+        assert answer.status_code == 200, answer.status_code
         async for _ in answer.aiter_bytes():
             opened.set()
 
@@ -68,14 +71,15 @@ async def measured(host: str, port: int, path: str, seconds: float, tag: str = "
 
 @contextlib.asynccontextmanager
 async def crowd(address: str, study: str) -> AsyncIterator[None]:
-    """The slow clients and the streams."""
+    """The slow clients and the streams, all of them there; none has left when the block ends."""
     host, port = str(urlsplit(address).hostname), int(urlsplit(address).port or 0)
-    opened = [asyncio.Event() for _ in range(STREAMS)]
-    tasks = [asyncio.create_task(slow_client(host, port)) for _ in range(SLOW)]
+    begun, opened = [[asyncio.Event() for _ in range(count)] for count in (SLOW, STREAMS)]
+    tasks = [asyncio.create_task(slow_client(host, port, event)) for event in begun]
     tasks += [asyncio.create_task(stream(address, f"/api/v1/studies/{study}/events", event)) for event in opened]
-    await asyncio.gather(*(asyncio.wait_for(event.wait(), 60) for event in opened))
+    await asyncio.gather(*(asyncio.wait_for(event.wait(), 60) for event in [*begun, *opened]))
     try:
         yield
+        assert not any(task.done() for task in tasks), "a slow client or a stream of events has ended"
     finally:
         for task in tasks:
             task.cancel()
@@ -116,8 +120,11 @@ def main() -> None:
             with client.stream("GET", f"/studies/{done}/events") as events:
                 states = [json.loads(line[5:])["state"] for line in events.iter_lines() if line.startswith("data:")]
             assert states[-1] == "finished", states
-            held = client.post("/studies?fresh=true", json=SPEC | {"name": "held"}).json()["id"]
-            client.post(f"/studies/{held}:pause")
+            # So many cases that it cannot end before it is held: streams of an ended study end too.
+            many = {"name": "held", "axes": [{"path": "shaft.load", "linspace": [0.0, 0.5, 100_000]}]}
+            held = client.post("/studies?fresh=true", json=SPEC | many).json()["id"]
+            paused = client.post(f"/studies/{held}:pause").json()
+            assert paused["state"] == "paused", paused
         asyncio.run(run(running.address, done, held, seconds))
 
 
