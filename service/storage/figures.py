@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import sqlalchemy as sa
 
 from service.storage.part import EPOCH, Part, moment
-from service.storage.tables import CHUNKS, DISPATCHER, ENDINGS, STUDIES
+from service.storage.tables import CHUNKS, DISPATCHER, ENDINGS, HELD_AT_DEADLINE, STUDIES
 from worker.states import TERMINAL
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Totals(Part):
         """The figures of this moment."""
         c = STUDIES.c
         alive = c.deleted_at.is_(None)
-        going = alive & c.state.not_in(_TERMINAL)
+        going = alive & c.state.not_in(_TERMINAL) & c.waits_for.is_distinct_from(HELD_AT_DEADLINE)
         with self.session.read() as connection:
             states = connection.execute(sa.select(c.state, sa.func.count()).where(alive).group_by(c.state)).all()
             waiting, reused = connection.execute(

@@ -37,6 +37,12 @@ def test_run_gives_the_same_rows(reference: list[dict[str, Any]], processes: int
     assert done.data["rows"] == reference
 
 
+def test_coarse_to_fine_gives_the_same_rows(reference: list[dict[str, Any]]) -> None:
+    done = sprag("run", SPEC, "--json", "--processes", 2, "--chunk", 7, "--finish-by", "1 h")
+    assert done.code == 0, done.err
+    assert done.data["rows"] == reference
+
+
 @pytest.fixture(scope="module", params=CUTS, ids=lambda cut: f"{cut[0]} processes, chunks of {cut[1]}")
 def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
     """A client at the address of the study, which a service with this cut has run."""
