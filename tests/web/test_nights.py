@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from playwright.sync_api import BrowserContext
 
+expect.set_options(timeout=90_000)
 PLAIN = {"java_script_enabled": False}
 
 
@@ -81,7 +82,8 @@ def finished_study(store: Store) -> str:
 def tab(house: House, browser: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
     """A tab at the service, with JavaScript and without."""
     context = browser.new_context(base_url=house.address, viewport={"width": 1280, "height": 900}, **request.param)
-    context.set_default_timeout(20_000)
+    # The first page reads all presets, which takes a machine that is busy with other tests many seconds.
+    context.set_default_timeout(90_000)
     yield context.new_page()
     context.close()
 
