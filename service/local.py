@@ -14,6 +14,7 @@ from service.dispatching import STANDBY_SECONDS, WorkerSettings, owner_name, poo
 from service.leftovers import marked, sweep
 from service.storage.lock import lock_of
 from service.storage.part import SystemClock
+from service.storage.room import GOES_ON
 from service.storage.store import Store
 from worker.chunking import Chunking
 from worker.dispatcher import Dispatcher
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     from worker.study import Study
 
 _FOLDER_PREFIX = "sprag-run-"
+#: What the reason of a study that is held for want of room ends with; true of services, and not here.
+_LATER = (f"; {GOES_ON}", "; it is tried again from time to time")
 #: Seconds between two reports of progress.
 REPORT_SECONDS = 0.25
 
@@ -88,7 +91,7 @@ def run_here(
                         time.sleep(STANDBY_SECONDS)
             finally:
                 lock.release()
-            yield LocalRun(store, watch.final())
+            yield LocalRun(store, watch.final(passing=database_url is None))
 
 
 class _Watch:
@@ -109,11 +112,28 @@ class _Watch:
         state = self._store.get_study(self._id).state
         return state.terminal or state is StudyState.PAUSED
 
-    def final(self) -> StudyRecord:
-        """The study at its end; raises StudyHeldError when it was held instead."""
+    def final(self, *, passing: bool) -> StudyRecord:
+        """The study at its end; raises StudyHeldError when it was held instead, its rows lost with a passing database.
+
+        Nothing goes on by itself here, whatever the reason says of services.
+        """
         record = self._store.get_study(self._id)
         if self._report is not None:
             self._report(self._store.progress(self._id))
         if not record.over:
-            raise StudyHeldError(f"the study was held: {record.reason or 'somebody paused it'}")
+            raise StudyHeldError(f"the study was held: {_told(record, passing=passing)}")
         return record
+
+
+def _told(record: StudyRecord, *, passing: bool) -> str:
+    """Why the study was held, and what can be done where it was for want of room."""
+    reason = record.reason or "somebody paused it"
+    cause = next((reason.removesuffix(later) for later in _LATER if reason.endswith(later)), None)
+    if cause is None:
+        return reason
+    if passing:
+        return f"{cause}; nothing of it is kept: make room, or name another place with TMPDIR or --db"
+    return (
+        f"{cause}; {record.done} of {record.cases} cases are kept as {record.id}, and `sprag worker` or `sprag serve` "
+        "with this database goes on with it when there is room"
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -16,9 +17,11 @@ import pytest
 from service import dispatching
 from service.dispatching import StopFlag, WorkerSettings, run_dispatcher, start_dispatcher_process
 from service.local import StudyHeldError, run_here
+from service.storage import room
 from service.storage.lock import DispatcherLock
 from service.storage.records import Progress
 from service.storage.store import Store
+from tests.conftest import Finished
 from tests.worker import fakes
 from worker import kernels
 from worker.chunking import Chunking
@@ -70,6 +73,35 @@ def test_a_held_study_is_no_result() -> None:
         run_here({}, fakes.study(20), processes=0, chunk_cases=4, executor=InlineExecutor(fakes.raising)),
     ):
         raise AssertionError("there is nothing to do with it")
+
+
+@pytest.mark.parametrize(
+    ("database", "advice"),
+    [([], "nothing of it is kept: make room, or name another place with TMPDIR or --db"),
+     (["--db", "runs.sqlite3"], "are kept as st_")],
+)  # fmt: skip
+def test_a_run_without_room_for_its_rows_is_trouble_of_the_storage(
+    sprag: Callable[..., Finished],
+    examples: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    database: list[str],
+    advice: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(room.shutil, "disk_usage", lambda _: usage._replace(free=1_000_000))
+    done = sprag("run", examples / "measured_clutch.json", "-o", "rows.csv", *database)
+    assert (done.code, done.out) == (3, "")
+    assert "sprag: the study was held: no room: the disk that holds" in done.err
+    assert advice in done.err
+    assert "by itself" not in done.err
+    assert not (tmp_path / "rows.csv").exists()
+
+
+def test_rows_that_find_no_room_are_trouble_of_the_storage(sprag: Callable[..., Finished], examples: Path) -> None:
+    done = sprag("trajectory", examples / "press.toml", "--points", "20000", "-o", "/dev/full")
+    assert (done.code, done.err) == (3, "sprag: /dev/full: no space left on device\n")
 
 
 def test_a_failed_study_is_told_with_its_reason() -> None:
