@@ -13,6 +13,13 @@ from service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
 from service.cli.remote import connection
 from service.spec_messages import Problem
 
+HeldAt = Annotated[
+    list[str] | None, typer.Option("--at", metavar="PATH=VALUE", help="Value at which another axis is held.")
+]
+PictureFile = Annotated[
+    str | None, typer.Option("-o", "--output", metavar="FILE", help="Picture to write: .svg, .png or .pdf.")
+]
+
 _PICTURES = ("svg", "png", "pdf")
 
 
@@ -35,12 +42,8 @@ def curve(
     by: Annotated[
         list[str] | None, typer.Option("--by", metavar="PATH", help="Axis with one curve for each value.")
     ] = None,
-    at: Annotated[
-        list[str] | None, typer.Option("--at", metavar="PATH=VALUE", help="Value at which another axis is held.")
-    ] = None,
-    file: Annotated[
-        str | None, typer.Option("-o", "--output", metavar="FILE", help="Picture to write: .svg, .png or .pdf.")
-    ] = None,
+    at: HeldAt = None,
+    file: PictureFile = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -66,12 +69,8 @@ def draw_map(
     x: Annotated[str, typer.Option("--x", metavar="PATH", help="Axis to the right, such as shaft.load.")],
     y: Annotated[str, typer.Option("--y", metavar="PATH", help="Axis upwards, such as excitation.frequency.")],
     z: Annotated[str, typer.Option("--z", metavar="RESULT", help="Result to draw.")],
-    at: Annotated[
-        list[str] | None, typer.Option("--at", metavar="PATH=VALUE", help="Value at which another axis is held.")
-    ] = None,
-    file: Annotated[
-        str | None, typer.Option("-o", "--output", metavar="FILE", help="Picture to write: .svg, .png or .pdf.")
-    ] = None,
+    at: HeldAt = None,
+    file: PictureFile = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -104,9 +103,7 @@ def _show_map(found: dict[str, Any]) -> None:
 def sensitivity(
     study_id: StudyId,
     y: Annotated[list[str], typer.Option("--y", metavar="RESULT", help="Result; may be given again.")],
-    file: Annotated[
-        str | None, typer.Option("-o", "--output", metavar="FILE", help="Picture to write: .svg, .png or .pdf.")
-    ] = None,
+    file: PictureFile = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
