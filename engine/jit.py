@@ -29,12 +29,12 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
 
 def part(function: Callable[P, R]) -> Callable[P, R]:
     """The same for a function that only compiled code calls: it is compiled as part of that (``program``)."""
-    return _compiled(function, PartCompiler)
+    return cast(Callable[P, R], _without_entry(_compiled(function, PartCompiler)))
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
     """A short part: its callers take its code in instead of passing it their many arrays."""
-    return _compiled(function, PartCompiler, forceinline=True)
+    return cast(Callable[P, R], _without_entry(_compiled(function, PartCompiler, forceinline=True)))
 
 
 def _compiled(
@@ -58,6 +58,20 @@ def _for_any_number(dispatcher: Any) -> Any:
         return find(types, named)
 
     dispatcher.get_call_template = without_constants
+    return dispatcher
+
+
+def _without_entry(dispatcher: Any) -> Any:
+    """Have calls from Python raise TypeError: there is no code for them, neither compiled nor loaded from the cache."""
+
+    def refuse(*_arguments: Any, **_named: Any) -> None:
+        raise TypeError(f"{dispatcher.py_func.__name__} is for compiled callers only")
+
+    def add_overload(result: Any) -> None:
+        dispatcher.overloads[tuple(result.signature.args)] = result
+
+    dispatcher._compile_for_args = refuse
+    dispatcher.add_overload = add_overload
     return dispatcher
 
 

@@ -9,7 +9,6 @@ there, what is the same at every call becomes a constant, and nothing is compile
 
 # mypy: allow-untyped-calls
 # (numba declares none of its own)
-import ctypes
 import gc
 from collections.abc import Callable
 from typing import Any
@@ -18,9 +17,6 @@ from llvmlite.binding import Linkage
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_lock import require_global_compiler_lock
-
-#: Where a call of a part from Python leads: it raises TypeError instead of jumping to code that is not there.
-_NO_ENTRY = ctypes.cast(ctypes.pythonapi.PyErr_BadArgument, ctypes.c_void_p).value
 
 
 def _with_room(work: Callable[[], Any]) -> Any:
@@ -56,9 +52,10 @@ class Part(JITCodeLibrary):
     def set_env(self, name: str, environment: Any) -> None:
         """Nothing to set."""
 
-    def get_pointer_to_function(self, name: str) -> int | None:  # noqa: ARG002
+    def get_pointer_to_function(self, name: str) -> int:  # noqa: ARG002
+        """There is no machine code."""
         self._ensure_finalized()
-        return _NO_ENTRY
+        return 0
 
     def serialize_using_object_code(self) -> Any:
         """The form numba's cache keeps: there is no object code."""

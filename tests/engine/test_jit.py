@@ -42,8 +42,10 @@ def test_constants_make_no_copies() -> None:
 
 @pytest.mark.parametrize("function", [doubled, tripled])
 def test_parts_have_no_entry_from_python(function: Any) -> None:
-    with pytest.raises(TypeError):
-        function(1)
+    for _compiled_or_loaded in range(2):
+        with pytest.raises(TypeError, match="for compiled callers only"):
+            function(1)
+        caller(1)
 
 
 def test_a_program_keeps_its_parts_to_itself() -> None:
