@@ -12,8 +12,10 @@ from typing import Any
 from benchmarks.faults.badcases import badcases
 from benchmarks.faults.cache import cache
 from benchmarks.faults.clients import clients
+from benchmarks.faults.cluster import cluster
 from benchmarks.faults.disk import disk, file_limit
 from benchmarks.faults.kills import kills
+from benchmarks.faults.link import link
 from benchmarks.faults.powercut import powercut
 from benchmarks.faults.stopped import stopped
 
@@ -30,6 +32,13 @@ def main() -> None:
         command.set_defaults(run=run)
 
     drill("kills", kills, "kill -9 at random moments", cases=20_000, count=100, seed=1, periods=60.0)
+    drill(
+        "cluster", cluster, "kill -9 of the parts of a Dask cluster at random moments",
+        cases=20_000, count=30, seed=1, periods=60.0,
+    )  # fmt: skip
+    drill(
+        "link", link, "links between hosts are cut (as root: it makes network namespaces)", cases=2_000, periods=200.0
+    )
     drill("powercut", powercut, "the power goes between any two system calls of a commit", studies=12, seed=1)
     drill("stopped", stopped, "dispatchers are stopped, replaced and woken", cases=4_000, rounds=10, seed=1)
     drill(

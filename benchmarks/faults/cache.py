@@ -20,10 +20,7 @@ def cache(folder: Path, *, cases: int, size: int = 64) -> dict[str, Any]:
     Every file of machine code keeps its first ``size`` bytes only.
     """
     made = harness.spec(cases, 4.0)
-    whole = kernels.cache_folder()
-    copy = folder / "cache" / "kernels" / whole.name
-    shutil.copytree(whole, copy)
-    _warm_up(made, folder / "cache")
+    copy = own_cache(folder, made) / "kernels" / kernels.cache_folder().name
     damaged = _code(copy)
     assert damaged, "there is no machine code in the cache"
     for file in damaged:
@@ -40,6 +37,15 @@ def cache(folder: Path, *, cases: int, size: int = 64) -> dict[str, Any]:
     mended = [file for file in _code(copy) if file.stat().st_size > size]
     assert mended, "no machine code was made"
     return {"cases": cases, "files damaged": len(damaged), "times compiled anew": 1, "quarantined": 0}
+
+
+def own_cache(folder: Path, made: dict[str, Any]) -> Path:
+    """A copy of the cache in ``folder`` that has the study's kernel; the path to set as SPRAG_KERNEL_CACHE."""
+    whole = kernels.cache_folder()
+    copy = folder / "cache"
+    shutil.copytree(whole, copy / "kernels" / whole.name)
+    _warm_up(made, copy)
+    return copy
 
 
 def _warm_up(made: dict[str, Any], cache: Path) -> None:

@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from worker.study import Study
 
 _LOG = logging.getLogger(__name__)
-# What it tells of its own doings is for those who look into a cluster, not for the log of a service.
-logging.getLogger("distributed").setLevel(logging.WARNING)
 
 #: Seconds between two looks at who has joined and who has gone; between two tries to reach a scheduler that is gone.
 LOOK_SECONDS: Final = 0.5

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from threading import Condition
 from typing import TYPE_CHECKING, Any, Final
 
 from distributed import Client
+from distributed.client import AllExit
 
 from worker.executors.dask_tasks import blame_at_once, end_worker
 
@@ -23,6 +25,16 @@ ANSWER_SECONDS: Final = 5
 VALUE_SECONDS: Final = 15.0
 #: Seconds for which the connection is kept for values that are just being fetched.
 FETCH_SECONDS: Final = 5.0
+
+
+def _is_news(record: logging.LogRecord) -> bool:
+    return record.exc_info is None or not isinstance(record.exc_info[1], AllExit)
+
+
+# What Dask's client tells of lost connections, with tracebacks, is told here in a sentence; and a fetch of its own that
+# was given up, as the value was lost, is nothing that anybody has to know.
+logging.getLogger("distributed").setLevel(logging.CRITICAL)
+logging.getLogger("asyncio").addFilter(_is_news)
 
 
 class Link:
