@@ -350,7 +350,7 @@ def test_a_cluster_of_its_own_runs_chunks() -> None:
         executor.close()
 
 
-def test_a_study_survives_what_happens_to_a_cluster(tmp_path: Path) -> None:
+def test_a_study_survives_what_happens_to_a_cluster(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """Workers are killed and join, the scheduler is killed with all it knows; no row is lost, doubled or wrong."""
     cases = int(os.environ.get("SPRAG_TEST_CASES", "3000"))
     chosen = random.Random(3)
@@ -388,6 +388,7 @@ def test_a_study_survives_what_happens_to_a_cluster(tmp_path: Path) -> None:
         blocks = list(store.iter_rows(record.id))
         assert np.concatenate([block.cases for block in blocks]).tolist() == list(range(cases))
         np.testing.assert_array_equal(np.concatenate([block.values for block in blocks]), fakes.values(0, cases))
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_the_setting_is_checked() -> None:
