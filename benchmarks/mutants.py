@@ -101,8 +101,11 @@ MUTANTS = (
 )
 
 
-def passes(tree: Path, tests: tuple[str, ...]) -> bool:
-    """Whether the tests pass in that copy; one that takes too long does not."""
+_PASSED, _FAILED, _ENDLESS = "passed", "failed", "came to no end"
+
+
+def outcome(tree: Path, tests: tuple[str, ...]) -> str:
+    """How the tests end in that copy. What a mutant loses is waited for in vain: some tests come to no end."""
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests]
     try:
         done = subprocess.run(
@@ -110,9 +113,9 @@ def passes(tree: Path, tests: tuple[str, ...]) -> bool:
             timeout=180, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        return False
+        return _ENDLESS
     assert done.returncode in (0, 1), done.stdout.decode()[-2000:]
-    return done.returncode == 0
+    return _FAILED if done.returncode else _PASSED
 
 
 def main() -> None:
@@ -129,16 +132,17 @@ def main() -> None:
             if wanted and not any(word in mutant.name for word in wanted):
                 continue
             begin = time.monotonic()
-            sound = passes(tree, mutant.tests)
+            sound = outcome(tree, mutant.tests) == _PASSED
             file = tree / mutant.file
             original = file.read_text()
             assert original.count(mutant.before) == 1, f"{mutant.name}: the place to change is not there"
             file.write_text(original.replace(mutant.before, mutant.after))
-            dead = not passes(tree, mutant.tests)
+            found = outcome(tree, mutant.tests)
             file.write_text(original)
-            if not (sound and dead):
+            dead = sound and found != _PASSED
+            if not dead:
                 alive.append(mutant.name)
-            verdict = "dead" if sound and dead else "ALIVE" if sound else "the test fails without it"
+            verdict = f"dead, its test {found}" if dead else "ALIVE" if sound else "the test fails without it"
             print(f"{mutant.name}: {verdict} ({time.monotonic() - begin:.0f} s)", flush=True)
     if alive:
         raise SystemExit(1)

@@ -42,9 +42,17 @@ async def read_body(request: Request) -> Body:
 
 
 async def strict_query(request: Request) -> None:
-    """Refuse query parameters that the operation does not have, or has once only: a misspelled one is no default."""
-    known = _query_parameters(request.scope["route"].dependant)
+    """Refuse query parameters that the operation does not have, or has once only: a misspelled one is no default.
+
+    A header that the operation reads, such as an Idempotency-Key, is refused when it is there twice.
+    """
+    dependant = request.scope["route"].dependant
+    known = _query_parameters(dependant)
     faults = []
+    for name in (field.alias for field in dependant.header_params):
+        values = request.headers.getlist(name)
+        if len(values) > 1:
+            faults.append(ErrorItem("given more than once", None, name, shown(values[1]), "one value"))
     for name in request.query_params:
         values = request.query_params.getlist(name)
         if name not in known:

@@ -80,6 +80,15 @@ def test_a_useless_idempotency_key_is_refused(service: Service, key: str) -> Non
         assert error["allowed"] == "printable ASCII characters without blanks"
 
 
+def test_two_keys_are_one_too_many(service: Service) -> None:
+    keys = [("Idempotency-Key", "a"), ("Idempotency-Key", "b")]
+    response = service.http.post(STUDIES, json=SPEC, headers=keys)
+    assert response.status_code == 422
+    (error,) = response.json()["errors"]
+    assert (error["parameter"], error["message"]) == ("Idempotency-Key", "given more than once")
+    assert service.get("/studies")["studies"] == []
+
+
 def test_studies_are_listed_in_pages_newest_first(service: Service, spec: dict[str, Any]) -> None:
     made = [service.submit({**spec, "name": f"study {number}"}) for number in range(5)]
     service.fill(made[2])
