@@ -24,7 +24,7 @@ serve: $(RUNTIME)
 
 # The tests of one file share processes and servers, so they stay together.
 test: check
-	$(BIN)/python -m pytest --numprocesses logical --maxprocesses 4 --dist loadfile
+	$(BIN)/python -m pytest --numprocesses logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 check: $(DEV)
 	$(BIN)/ruff check .

@@ -69,7 +69,7 @@ def test_the_service_ends_soon_and_hands_running_chunks_back(tmp_path: Path) -> 
 
 
 def test_a_copy_made_during_a_run_goes_on_where_it_was_made(tmp_path: Path) -> None:
-    made = harness.spec(1_000, 400.0)
+    made = harness.spec(1_000, 2_000.0)
     with harness.running(tmp_path, "--processes", 1, "--chunk", 50) as service:
         study = service.submit(made)
         harness.until(lambda: harness.done(service.database, study) > 100, "the study goes on")
