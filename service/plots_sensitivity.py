@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Final
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from service.sensitivity import Sensitivity
 
 MOST_RESULTS: Final = 8
+#: Characters of a line of notes that surely fit into the width of a picture.
+_NOTE_WIDTH: Final = 110
 
 
 def draw_sensitivity(found: Sequence[Sensitivity], title: str, picture: Picture) -> bytes:
@@ -35,7 +38,8 @@ def _paint(found: Sequence[Sensitivity], title: str, figure: Figure) -> None:
     for (bars, lines), item in zip(plots, found, strict=True):
         _bars(bars, item)
         _lines(lines, item)
-    head(figure, title, tuple(dict.fromkeys(note for item in found for note in item.notes)))
+    notes = dict.fromkeys(note for item in found for note in item.notes)
+    head(figure, title, tuple("\n".join(textwrap.wrap(note, _NOTE_WIDTH)) for note in notes))
 
 
 def _bars(axes: Axes, item: Sensitivity) -> None:
@@ -61,11 +65,15 @@ def _bars(axes: Axes, item: Sensitivity) -> None:
     axes.set_xlabel(f"share of the variance of {item.info.name}")
     if axes.has_data():
         axes.legend(fontsize=8, loc="best")
+    else:
+        _tell(axes, "no shares of the variance" if item.cases else "no case has this result")
 
 
 def _lines(axes: Axes, item: Sensitivity) -> None:
     """Every axis from its least to its largest value, so that axes of different units stand in one plot."""
     for index, effect in enumerate(item.effects):
+        if not np.isfinite(effect.means).any():
+            continue
         low, high = effect.values.min(), effect.values.max()
         place = (effect.values - low) / (high - low) if high > low else np.zeros(effect.values.size)
         unit = "" if effect.unit == "1" else f" {effect.unit}"
@@ -73,4 +81,12 @@ def _lines(axes: Axes, item: Sensitivity) -> None:
         axes.plot(place, effect.means, marker="o", markersize=3.0, color=f"C{index}", label=text)
     axes.set_xlabel("axis, from its least to its largest value")
     axes.set_ylabel(f"mean of {axis_label(item.info.name, item.info.unit)}")
-    axes.legend(fontsize=8, loc="best")
+    if axes.has_data():
+        axes.legend(fontsize=8, loc="best")
+    else:
+        _tell(axes, "no case has this result")
+
+
+def _tell(axes: Axes, sentence: str) -> None:
+    """A sentence in the middle of a panel that has nothing to draw."""
+    axes.text(0.5, 0.5, sentence, ha="center", va="center", transform=axes.transAxes, color="0.35")

@@ -19,7 +19,15 @@ import numpy as np
 from service.catalogue import result_of, unit_of, unknown_result
 from service.curves import Fetch, numbers
 from service.errors import ErrorItem
-from service.selection import SelectionError, listed
+from service.selection import SelectionError, axis_name, listed
+from service.sensitivity_design import (
+    factorial_table,
+    going_together,
+    is_factorial,
+    is_sample,
+    scattered,
+    why_no_shares,
+)
 from worker import kernels
 
 if TYPE_CHECKING:
@@ -30,8 +38,8 @@ if TYPE_CHECKING:
 
     Numbers = NDArray[np.float64]
 
-#: How the indices were found: exactly from a full grid, from the design made for them, or from any sample.
-Method = Literal["grid", "saltelli", "rbd-fast"]
+#: How the indices were found: exactly from a full grid, from the design made for them, from a sample, or not at all.
+Method = Literal["grid", "saltelli", "rbd-fast", "none"]
 #: Cases that are looked at; more take seconds and say nothing new.
 MOST_CASES: Final = 1_000_000
 #: Groups that the values of an axis without a grid are put into, to tell its main effect.
@@ -149,25 +157,36 @@ def _of_result(study: Study, varying: list[Axis], info: ResultInfo, y: Numbers, 
     mean = float(values.mean()) if cases else None
     variance = float(values.var()) if cases else None
     positions = [study.axes.index(axis) for axis in varying]
-    columns = [axis.array[study.indices(range(study.cases))[at]] for axis, at in zip(varying, positions, strict=True)]
+    every = study.indices(range(study.cases))
+    columns = np.stack([axis.array[every[at]] for axis, at in zip(varying, positions, strict=True)], axis=1)
     notes = [f"{missing} cases without this result are left out"] if missing else []
-    method: Method
-    if study.combine == "grid" and not missing:
+    method: Method = "none"
+    indices: list[Indices] = [(None, None, None, None)] * len(varying)
+    if not cases:
+        notes = ["no case has this result"]
+    elif study.combine == "grid" and not missing:
         method = "grid"
-        indices = _grid_indices(study, y, positions)
+        indices = _grid_indices(y.reshape(study.shape), positions)
     elif base is not None:
         method = "saltelli"
         indices = _saltelli_indices(y, base, len(study.axes), notes)
         indices = [indices[at] for at in positions]
-    else:
+    elif study.combine == "zip" and (scarce := _too_few(columns[known])):
+        notes.append(scarce)
+    elif study.combine == "zip" and is_sample(columns[known]):
         method = "rbd-fast"
-        indices = _any_indices(np.stack(columns, axis=1)[known], values, notes)
+        indices = _sample_indices(columns[known], values, notes)
+    elif not missing and is_factorial(columns):
+        method = "grid"
+        indices = _grid_indices(factorial_table(columns, y), list(range(len(varying))))
+    else:
+        notes.append(why_no_shares(columns, known, [axis_name(study, axis.paths[0]) for axis in varying]))
     if mean is not None and variance is not None and variance <= (1e-13 * mean) ** 2:
         notes.append("the result is the same in every case")
         indices = [(None, None, None, None)] * len(varying)
     effects = tuple(
         Effect(axis.paths, unit_of(study, axis.paths[0]), *_main_effect(axis, column[known], values), *numbers_)
-        for axis, column, numbers_ in zip(varying, columns, indices, strict=True)
+        for axis, column, numbers_ in zip(varying, columns.T, indices, strict=True)
     )
     return Sensitivity(info, method, cases, missing, mean, variance, effects, tuple(notes))
 
@@ -176,11 +195,16 @@ Indices = tuple[float | None, float | None, float | None, float | None]
 
 
 def _main_effect(axis: Axis, column: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:
-    """Mean of the result at each value of the axis, or over groups of about equally many cases where it has many."""
+    """Mean of the result at each value of the axis, or over groups of about equally many values where it has many.
+
+    The cases of one value are never parted: a group that had some of them only would tell of other axes too.
+    """
     values = np.unique(axis.array)
     if values.size > 2 * BINS and column.size < 4 * values.size:
-        order = np.argsort(column, kind="stable")
-        parts = [part for part in np.array_split(order, BINS) if part.size]
+        there, count = np.unique(column, return_counts=True)
+        ends = np.cumsum(count)
+        bounds = [int(ends[part[-1]]) for part in np.array_split(np.arange(there.size), BINS) if part.size]
+        parts = np.split(np.argsort(column, kind="stable"), bounds[:-1]) if bounds else []
         return np.array([column[part].mean() for part in parts]), np.array([y[part].mean() for part in parts])
     group = np.searchsorted(values, column)
     count = np.bincount(group, minlength=values.size)
@@ -189,9 +213,8 @@ def _main_effect(axis: Axis, column: Numbers, y: Numbers) -> tuple[Numbers, Numb
         return values, np.asarray(np.where(count > 0, total / np.maximum(count, 1), np.nan), dtype=np.float64)
 
 
-def _grid_indices(study: Study, y: Numbers, positions: list[int]) -> list[Indices]:
+def _grid_indices(table: Numbers, positions: list[int]) -> list[Indices]:
     """Exact shares of the variance over the points of a full grid, every point weighing the same."""
-    table = y.reshape(study.shape)
     variance = float(table.var())
     every = tuple(range(table.ndim))
     found: list[Indices] = []
@@ -222,13 +245,16 @@ def _saltelli_indices(y: Numbers, base: int, dimensions: int, notes: list[str]) 
     ]
 
 
-def _any_indices(x: Numbers, y: Numbers, notes: list[str]) -> list[Indices]:
-    """First-order indices from any cases, by SALib's random balance design."""
+def _too_few(x: Numbers) -> str:
+    """The sentence for too few cases of a sample, shape (cases, axes); "" where they suffice or are no sample."""
+    few = len(x) < LEAST_CASES and going_together(x) is None and all(scattered(column) for column in x.T)
+    return f"too few cases for indices: {len(x)}, and {LEAST_CASES} are needed" if few else ""
+
+
+def _sample_indices(x: Numbers, y: Numbers, notes: list[str]) -> list[Indices]:
+    """First-order indices from a sample (`is_sample`), by SALib's random balance design."""
     from SALib.analyze import rbd_fast
 
-    if len(y) < LEAST_CASES:
-        notes.append(f"too few cases for indices: {len(y)}, and {LEAST_CASES} are needed")
-        return [(None, None, None, None)] * x.shape[1]
     notes.append("total indices need a full grid or a sample by the method saltelli")
     with _quiet():
         found = rbd_fast.analyze(_problem(x.shape[1]), x, y, M=max(2, min(10, (len(y) - 1) // 10)), seed=_SEED)

@@ -287,7 +287,9 @@ class ResultSensitivity(Body):
     result: str
     unit: str
     description: str
-    method: str = Field(description="grid: exact; saltelli: by the design for it; rbd-fast: from any cases")
+    method: str = Field(
+        description="grid: exact; saltelli: by the design for it; rbd-fast: from a sample; none: a note says why"
+    )
     cases: int = Field(description="cases that have the result")
     missing: int = Field(description="cases that have not")
     mean: float | None

@@ -80,9 +80,10 @@ def indices_csv(found: list[Sensitivity]) -> bytes:
             effect.total_error,
             item.method,
             item.cases,
+            "; ".join(item.notes),
         ]
         for item in found
         for effect in item.effects
     ]
-    header = ["result", "paths", "first_order", "first_order_error", "total", "total_error", "method", "cases"]
+    header = ["result", "paths", "first_order", "first_order_error", "total", "total_error", "method", "cases", "notes"]
     return exports.table_csv(header, zip(*rows, strict=True) if rows else [[] for _ in header])

@@ -126,7 +126,8 @@ def sensitivity(
 
 
 def _show_effects(result: dict[str, Any]) -> None:
-    title = f"{_heading(result['result'], result['unit'])}: {result['cases']} cases, method {result['method']}"
+    way = "no shares" if result["method"] == "none" else f"method {result['method']}"
+    title = f"{_heading(result['result'], result['unit'])}: {result['cases']} cases, {way}"
     columns = [("axis", False), ("first order", True), ("+-", True), ("total", True), ("+-", True)]
     columns += [("least mean", True), ("largest mean", True)]
     rows = []

@@ -1,0 +1,104 @@
+"""Which way to shares of the variance the cases of a study allow: a sample, a complete grid, or none."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Numbers = NDArray[np.float64]
+
+#: Least part of the cases that must have a value of their own on an axis whose values were drawn.
+_LEAST_DISTINCT: Final = 0.95
+#: Rank correlation of two columns of a sample that is too large, and its largest share of what chance alone makes of
+#: columns drawn apart (its standard deviation is 1 / sqrt(cases - 1)).
+_MOST_CORRELATED: Final = 0.4
+_CHANCE: Final = 3.5
+#: Rank correlation from which two axes go together.
+_TOGETHER: Final = 0.99
+#: A grid that lacks more than this part of its points is not spoken of as one.
+_LEAST_GRID: Final = 0.1
+
+
+def scattered(column: Numbers) -> bool:
+    """Whether nearly every case has a value of its own in ``column``, shape (cases,)."""
+    return bool(np.unique(column).size >= _LEAST_DISTINCT * column.size)
+
+
+def is_sample(columns: Numbers) -> bool:
+    """Whether ``columns``, shape (cases, axes), are like points drawn at random, every axis for itself.
+
+    Nearly all values of an axis differ, and no axis tells of another, neither where it is high or low nor where it is
+    in its middle or at its ends. The cases are looked at and not how they were meant: those that failed can make a
+    sample lopsided.
+    """
+    cases, axes = columns.shape
+    if not all(scattered(columns[:, axis]) for axis in range(axes)):
+        return False
+    if axes < 2:
+        return True
+    if cases < 3:
+        return False
+    ranks = _ranks(columns)
+    features = np.concatenate([ranks, np.abs(ranks)], axis=1)
+    correlations = np.abs(np.corrcoef(features, rowvar=False))
+    own = np.arange(2 * axes) % axes
+    apart = own[:, None] != own[None, :]
+    return bool(correlations[apart].max() <= min(_MOST_CORRELATED, _CHANCE / math.sqrt(cases - 1)))
+
+
+def is_factorial(columns: Numbers) -> bool:
+    """Whether ``columns``, shape (cases, axes), hold every combination of their values just once."""
+    found = math.prod(np.unique(column).size for column in columns.T)
+    return found == len(columns) == len(np.unique(columns, axis=0))
+
+
+def factorial_table(columns: Numbers, y: Numbers) -> Numbers:
+    """``y`` of the cases of `is_factorial` columns as a table with one direction for each axis, values ascending."""
+    shape = tuple(np.unique(column).size for column in columns.T)
+    return y[np.lexsort(columns.T[::-1])].reshape(shape)
+
+
+def going_together(columns: Numbers) -> tuple[int, int] | None:
+    """Two axes of which the one gives the other away by order, such as those of a zip; None when there are none."""
+    if len(columns) < 2 or columns.shape[1] < 2:
+        return None
+    ranks = _ranks(columns)
+    spread = ranks.std(axis=0)
+    for first in range(columns.shape[1]):
+        for second in range(first + 1, columns.shape[1]):
+            if spread[first] > 0.0 and spread[second] > 0.0:
+                shared = float((ranks[:, first] * ranks[:, second]).mean() / (spread[first] * spread[second]))
+                if abs(shared) >= _TOGETHER:
+                    return first, second
+    return None
+
+
+def why_no_shares(columns: Numbers, known: NDArray[np.bool_], names: list[str]) -> str:
+    """The sentence for cases that are neither a sample nor a complete grid; ``known`` are those that have the result.
+
+    ``columns`` has shape (cases, axes), over all cases; ``names`` are those of the axes.
+    """
+    tied = going_together(columns)
+    if tied is not None:
+        first, second = (names[at] for at in tied)
+        return f"{first} and {second} were varied together: the cases cannot tell what each of them does"
+    points, cases = math.prod(np.unique(column).size for column in columns.T), int(known.sum())
+    reason = "the cases are not a complete grid nor a sample"
+    if cases < points and cases >= _LEAST_GRID * points:
+        reason += f": {points - cases} of {points} are missing"
+    return f"{reason}; main effects are means over those there are"
+
+
+def _ranks(columns: Numbers) -> Numbers:
+    """Ranks of each column from -1 to 1, the same for the same value, shape (cases, axes)."""
+    found = np.empty(columns.shape)
+    for at, column in enumerate(columns.T):
+        _, group, count = np.unique(column, return_inverse=True, return_counts=True)
+        middle = np.cumsum(count) - (count + 1) / 2.0
+        found[:, at] = 2.0 * middle[group.reshape(-1)] / max(len(column) - 1, 1) - 1.0
+    return found
