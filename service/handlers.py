@@ -76,7 +76,9 @@ def _known(request: Request, error: Exception) -> Response:
 
 def _unknown(request: Request, error: Exception) -> Response:
     _log.error("%s %s failed", request.method, request.url.path, exc_info=error)
-    return _answer(request, ApiError("internal", "The service failed to answer; the fault is in its log."))
+    # The framework passes the fault on to the server, which then ends the connection; the client has to know.
+    detail = "The service failed to answer; the fault is in its log."
+    return _answer(request, ApiError("internal", detail, headers={"Connection": "close"}))
 
 
 def _http(request: Request, error: Exception) -> Response:
