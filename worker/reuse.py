@@ -17,11 +17,14 @@ from worker import kernels
 from worker.study import Axis
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from numpy.typing import NDArray
 
     from worker.study import Study
 
     Cases = NDArray[np.int64]
+    Values = NDArray[np.float64]
 
 #: Codes of cases stay below this, so that one more factor does not overflow.
 _LARGEST_CODE: Final = 2**62
@@ -45,61 +48,168 @@ def kin_hash(study: Study, engine_version: str) -> str:
     return hashlib.sha256(text.encode("ascii")).hexdigest()
 
 
-def shared_cases(new: Study, old: Study) -> tuple[Cases, Cases]:
+class Wanted:
+    """The cases of a study, made ready to be looked for in many others."""
+
+    def __init__(self, study: Study) -> None:
+        self.study = study
+        self._sorted: dict[int, tuple[Cases, Values]] = {}
+        self._unique: dict[int, Values] = {}
+
+    def values(self, path: str) -> Values:
+        """The values (SI) that a parameter takes, ascending, each once."""
+        axis = self.study.axis_of(path)
+        if axis is None:
+            return np.array([self.study.base[path]])
+        if axis not in self._unique:
+            self._unique[axis] = np.unique(self.study.axes[axis].array)
+        return self._unique[axis]
+
+    def may_share(self, spans: Values) -> NDArray[np.bool_]:
+        """Which of many studies may have a case in common with this one, from the `span` of each.
+
+        Parameters
+        ----------
+        spans : float64 array, shape (studies, 2, paths)
+
+        Returns
+        -------
+        bool array, shape (studies,); a study that is not among them has none of the cases
+        """
+        left = np.arange(len(spans))
+        for column, path in enumerate(_paths(self.study)):
+            values = self.values(path)
+            low, high = spans[left, 0, column], spans[left, 1, column]
+            at = np.searchsorted(values, low)
+            inside = at < values.size
+            inside[inside] = values[at[inside]] <= high[inside]
+            left = left[inside]
+        found = np.zeros(len(spans), dtype=np.bool_)
+        found[left] = True
+        return found
+
+    def cases_with(self, wanted: Sequence[tuple[int, Values]]) -> Cases:
+        """The cases, ascending, whose value on each of the axes named is among those given with it (ascending)."""
+        study = self.study
+        if study.combine == "zip":
+            return self._rows_with(wanted) if wanted else np.arange(study.cases, dtype=np.int64)
+        cases = np.zeros(1, dtype=np.int64)
+        for index, axis in enumerate(study.axes):
+            kept = np.ones(len(axis), dtype=np.bool_)
+            for position, values in wanted:
+                if position == index:
+                    kept &= _places(values, axis.array) >= 0
+            cases = (cases[:, None] * len(axis) + np.flatnonzero(kept)).reshape(-1)
+        return cases
+
+    def _rows_with(self, wanted: Sequence[tuple[int, Values]]) -> Cases:
+        """The same where the axes go together: only the rows of the axis that leaves the fewest are looked at."""
+        found: list[tuple[int, Cases, Cases, Cases]] = []
+        for position, values in wanted:
+            if position not in self._sorted:
+                array = self.study.axes[position].array
+                order = np.argsort(array, kind="stable")
+                self._sorted[position] = order, array[order]
+            order, ascending = self._sorted[position]
+            first, last = (np.searchsorted(ascending, values, side) for side in ("left", "right"))
+            found.append((int((last - first).sum()), order, first, last))
+        size, order, first, last = min(found, key=lambda item: item[0])
+        starts = np.repeat(first - np.concatenate([[0], np.cumsum(last - first)[:-1]]), last - first)
+        rows = np.sort(order[starts + np.arange(size)])
+        for position, values in wanted:
+            rows = rows[_places(values, self.study.axes[position].array[rows]) >= 0]
+        return rows
+
+
+def shared_cases(new: Study | Wanted, old: Study) -> tuple[Cases, Cases]:
     """Numbers of the cases of ``new`` that ``old`` has too, ascending, and what their numbers are there.
 
     The two must be of one `kin_hash`. Values are the same when they are the same doubles.
     """
+    ours, theirs = new if isinstance(new, Wanted) else Wanted(new), Wanted(old)
     nothing = np.empty(0, dtype=np.int64)
-    pairs = _axis_pairs(new, old)
-    common = [np.intersect1d(_values(new, path), _values(old, path)) for path in pairs]
-    if not all(values.size for values in common):
-        return nothing, nothing
-    ours, ours_code = _all_cases(new)
-    theirs, theirs_code = _all_cases(old)
-    for path, values in zip(pairs, common, strict=True):
-        ours, ours_code = _narrowed(new, path, values, ours, ours_code)
-        theirs, theirs_code = _narrowed(old, path, values, theirs, theirs_code)
-        if max(ours_code.max(initial=0), theirs_code.max(initial=0)) > _LARGEST_CODE // 10**7:
-            both = np.unique(np.concatenate([ours_code, theirs_code]), return_inverse=True)[1].reshape(-1)
-            ours_code, theirs_code = both[: ours.size], both[ours.size :]
-    _, at_ours, at_theirs = np.intersect1d(ours_code, theirs_code, return_indices=True)
+    common: list[tuple[str, Values]] = []
+    for path in _axis_pairs(ours.study, old):
+        if ours.study.axis_of(path) is None and old.axis_of(path) is None:
+            if ours.study.base[path] != old.base[path]:
+                return nothing, nothing
+            continue
+        values = _common(ours.values(path), theirs.values(path))
+        if not values.size:
+            return nothing, nothing
+        common.append((path, values))
+    our_cases, their_cases = (_cases_with(side, common) for side in (ours, theirs))
+    our_codes, their_codes = np.zeros_like(our_cases), np.zeros_like(their_cases)
+    for path, values in common:
+        our_codes = _coded(ours.study, path, values, our_cases, our_codes)
+        their_codes = _coded(old, path, values, their_cases, their_codes)
+        if max(our_codes.max(initial=0), their_codes.max(initial=0)) > _LARGEST_CODE // 10**7:
+            both = np.unique(np.concatenate([our_codes, their_codes]), return_inverse=True)[1].reshape(-1)
+            our_codes, their_codes = both[: our_cases.size], both[our_cases.size :]
+    _, at_ours, at_theirs = np.intersect1d(our_codes, their_codes, return_indices=True)
     order = np.argsort(at_ours)
-    return ours[at_ours[order]], theirs[at_theirs[order]]
+    return our_cases[at_ours[order]], their_cases[at_theirs[order]]
 
 
-def _all_cases(study: Study) -> tuple[Cases, Cases]:
-    return np.arange(study.cases, dtype=np.int64), np.zeros(study.cases, dtype=np.int64)
+def span(study: Mapping[str, Any]) -> Values:
+    """Least and largest value (SI) of every parameter of a study, which is given as plain data (`Study.to_json`).
+
+    Returns
+    -------
+    float64 array, shape (2, paths)
+        The paths in the order of their names, which is one for all studies of a `kin_hash`.
+    """
+    spans = {path: (value, value) for path, value in study["base"].items()}
+    for axis in study["axes"]:
+        ends = min(axis["values"]), max(axis["values"])
+        spans.update(dict.fromkeys(axis["paths"], ends))
+    return np.array([spans[path] for path in sorted(spans)], dtype=np.float64).reshape(-1, 2).T
+
+
+def _paths(study: Study) -> list[str]:
+    return sorted({*study.base, *study.axis_paths})
 
 
 def _axis_pairs(new: Study, old: Study) -> list[str]:
     """A path for each pair of an axis (or the base) of one study and that of the other; tied paths need one look."""
     found: dict[tuple[int | None, int | None, object], str] = {}
+    ours, theirs = _axes_of(new), _axes_of(old)
     for path in dict.fromkeys((*new.base, *new.axis_paths)):
-        axes = (new.axis_of(path), old.axis_of(path))
+        axes = (ours.get(path), theirs.get(path))
         # What varies in neither is looked at one by one, as is what varies in one only and is another number here.
         constant = (axes[0] is None and new.base[path], axes[1] is None and old.base[path])
         found.setdefault((*axes, constant if None in axes else None), path)
     return list(found.values())
 
 
-def _values(study: Study, path: str) -> NDArray[np.float64]:
-    axis = study.axis_of(path)
-    return np.array([study.base[path]]) if axis is None else study.axes[axis].array
+def _axes_of(study: Study) -> dict[str, int]:
+    return {path: index for index, axis in enumerate(study.axes) for path in axis.paths}
 
 
-def _narrowed(study: Study, path: str, common: NDArray[np.float64], cases: Cases, code: Cases) -> tuple[Cases, Cases]:
-    """The cases whose value of ``path`` is in ``common`` (ascending), their codes carried on by its place there."""
+def _common(some: Values, others: Values) -> Values:
+    """What two ascending arrays have in common, ascending; the shorter is looked for in the longer."""
+    short, long = (some, others) if some.size <= others.size else (others, some)
+    return short[_places(long, short) >= 0]
+
+
+def _places(ascending: Values, values: Values) -> Cases:
+    """Place of each value in an ascending array that is not empty; -1 where it is not in it."""
+    place = np.searchsorted(ascending, values)
+    place[place == ascending.size] = 0
+    return np.where(ascending[place] == values, place, -1)
+
+
+def _cases_with(side: Wanted, common: Sequence[tuple[str, Values]]) -> Cases:
+    axes = ((side.study.axis_of(path), values) for path, values in common)
+    return side.cases_with([(axis, values) for axis, values in axes if axis is not None])
+
+
+def _coded(study: Study, path: str, common: Values, cases: Cases, codes: Cases) -> Cases:
+    """The codes of cases, carried on by the place of their value of ``path`` among those in common."""
     position = study.axis_of(path)
     if position is None:
-        return cases, code * common.size  # the one value is the one in common
-    values = study.axes[position].array
-    place = np.searchsorted(common, values)
-    place[place == common.size] = 0
-    place = np.where(common[place] == values, place, -1)
-    at = place[_positions(study, position, cases)]
-    kept = at >= 0
-    return cases[kept], code[kept] * common.size + at[kept]
+        return codes * common.size  # the one value is the one in common
+    return codes * common.size + _places(common, study.axes[position].array[_positions(study, position, cases)])
 
 
 def _positions(study: Study, axis: int, cases: Cases) -> Cases:

@@ -75,7 +75,7 @@ async def _events(context: Context, study_id: str, last: str | None) -> AsyncIte
     spoke = time.monotonic()
     while not context.ending.is_set():
         try:
-            record, progress = await run_in_threadpool(_look, context, study_id)
+            record, progress = await run_in_threadpool(context.store.look, study_id)
         except StoreError:
             return  # deleted, or the database is in trouble: a client that comes again is told which
         if str(record.revision) != last:
@@ -87,11 +87,6 @@ async def _events(context: Context, study_id: str, last: str | None) -> AsyncIte
             spoke = time.monotonic()
             yield b":\n\n"
         await anyio.sleep(LOOK_SECONDS)
-
-
-def _look(context: Context, study_id: str) -> tuple[StudyRecord, Progress]:
-    # In this order, so that the event of an ended study has all its cases.
-    return context.store.get_study(study_id), context.store.progress(study_id)
 
 
 def _event(record: StudyRecord, progress: Progress) -> bytes:

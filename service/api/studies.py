@@ -136,12 +136,12 @@ def list_studies(
 )
 def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
     """A study: its state, how far it is, how long it will take, and its spec."""
-    record = context.store.get_study(study_id)
+    record, progress = context.store.look(study_id)
     tag = entity_tag(record.id, record.revision)
     if record.state.terminal and (unchanged := not_modified(request, tag)):
         return unchanged
     study = context.store.study(study_id)
-    data = views.detail(record, context.store.progress(study_id), study, context.store.spec(study_id))
+    data = views.detail(record, progress, study, context.store.spec(study_id))
     data["warnings"] += context.unaffected.of(context.store, record)
     response = json_response(data)
     # While it runs, the time left changes with no change of the study.

@@ -67,12 +67,9 @@ def progress_json(progress: Progress) -> dict[str, Any]:
 
 
 def detail(record: StudyRecord, progress: Progress, study: Study, spec: dict[str, Any]) -> dict[str, Any]:
-    """A study with everything."""
+    """A study with everything; ``record`` and ``progress`` are of one moment (`Store.look`)."""
     return {
         **summary(record),
-        # State and counts are read together, so that a finished study never shows fewer cases than it has.
-        "state": progress.state.value,
-        "state_meaning": progress.state.sentence,
         "progress": progress_json(progress),
         "combine": study.combine,
         "axes": axes_json(study),

@@ -74,10 +74,11 @@ class Report:
 
 def report_of(store: Store, study_id: str) -> Report:
     """The report of a stored study; raises StudyNotFound."""
+    record, progress = store.look(study_id)
     return make_report(
-        store.get_study(study_id),
+        record,
         store.study(study_id),
-        store.progress(study_id).endings,
+        progress.endings,
         store.iter_rows(study_id),
         partial(store.rows_for_cases, study_id),
         store.spec(study_id),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter, OrderedDict
 from dataclasses import dataclass
+from threading import Lock
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -17,7 +18,7 @@ from worker import kernels
 from worker.kernels import WorkerEnding
 from worker.order import order_of
 from worker.ports import Known
-from worker.reuse import kin_hash, shared_cases
+from worker.reuse import Wanted, kin_hash, shared_cases, span
 from worker.states import StudyState
 from worker.study import Study
 
@@ -29,8 +30,9 @@ if TYPE_CHECKING:
 
     Cases = NDArray[np.int64]
 
-#: Studies that are looked through for equal cases, the newest first.
-MOST_SOURCES: Final = 64
+#: Studies whose spans are kept in memory, about a kilobyte each; and how many are read and compared in one go.
+_KEPT_SPANS: Final = 20_000
+_SPANS_AT_ONCE: Final = 500
 #: Studies whose equal cases are kept in memory.
 _KEPT: Final = 16
 _SOURCE: Final[tuple[sa.ColumnElement[Any], ...]] = (
@@ -39,6 +41,7 @@ _SOURCE: Final[tuple[sa.ColumnElement[Any], ...]] = (
     STUDIES.c.model,
     STUDIES.c.pendulums,
     STUDIES.c.coarse,
+    STUDIES.c.study,
 )
 #: Endings that say nothing of the case itself: it deserves a run of its own.
 _NO_RESULT: Final = tuple(ending.value for ending in WorkerEnding)
@@ -59,11 +62,12 @@ class Reuse(Orders):
     def __init__(self, session: Session, clock: Clock) -> None:
         super().__init__(session, clock)
         self._found: OrderedDict[int, _Found | None] = OrderedDict()
+        self._spans = _Spans()
 
     def reusable(self, study: Study) -> int:
         """How many cases of a study that is not submitted yet would not have to be run."""
         with self.session.read() as connection:
-            found = _find(connection, study, kin_hash(study, kernels.ENGINE_VERSION), 0)
+            found = _find(connection, self._spans, study, kin_hash(study, kernels.ENGINE_VERSION), 0)
         return 0 if found is None else found.cases.size
 
     def known(self, study: Study, chunk: Chunk) -> Known | None:
@@ -90,7 +94,7 @@ class Reuse(Orders):
                 kin, fresh = connection.execute(
                     sa.select(STUDIES.c.kin_hash, STUDIES.c.fresh).where(STUDIES.c.number == number)
                 ).one()
-                self._found[number] = None if fresh else _find(connection, study, kin, number)
+                self._found[number] = None if fresh else _find(connection, self._spans, study, kin, number)
             while len(self._found) > _KEPT:
                 self._found.popitem(last=False)
         self._found.move_to_end(number)
@@ -101,22 +105,64 @@ class Reuse(Orders):
         self._found.pop(number, None)
 
 
-def _find(connection: sa.Connection, study: Study, kin: str, number: int) -> _Found | None:
-    """Equal cases with rows in the studies of the same kin; the newest study that has a case counts."""
-    c = STUDIES.c
-    sources = connection.execute(
-        sa.select(*_SOURCE)
-        .where(c.kin_hash == kin, c.number != number, c.done > 0, c.deleted_at.is_(None))
-        .order_by(c.number.desc())
-        .limit(MOST_SOURCES)
-    ).all()
+class _Spans:
+    """The `span` of every study that was looked at: it never changes, and most studies can be ruled out by it alone."""
+
+    def __init__(self) -> None:
+        self._of: OrderedDict[int, NDArray[np.float64]] = OrderedDict()
+        self._lock = Lock()
+
+    def candidates(self, connection: sa.Connection, wanted: Wanted, kin: str, number: int) -> list[int]:
+        """Numbers of the studies of that kin that may have a case in common with another, the newest first."""
+        c = STUDIES.c
+        numbers = list(
+            connection.execute(
+                # The index of the kin has the numbers: no study is read for this.
+                sa.select(c.number).where(c.kin_hash == kin, c.number != number).order_by(c.number.desc())
+            ).scalars()
+        )
+        found: list[int] = []
+        for first in range(0, len(numbers), _SPANS_AT_ONCE):
+            part = numbers[first : first + _SPANS_AT_ONCE]
+            spans = self._get(connection, part)
+            part = [study for study in part if study in spans]  # one may be gone since its number was read
+            if part:
+                may = wanted.may_share(np.stack([spans[study] for study in part]))
+                found += np.array(part)[may].tolist()
+        return found
+
+    def _get(self, connection: sa.Connection, numbers: list[int]) -> dict[int, NDArray[np.float64]]:
+        with self._lock:
+            spans = {number: self._of[number] for number in numbers if number in self._of}
+        missing = [number for number in numbers if number not in spans]
+        if missing:
+            query = sa.select(STUDIES.c.number, STUDIES.c.study).where(STUDIES.c.number.in_(missing))
+            for number, text in connection.execute(query):
+                spans[number] = span(json.loads(text))
+        with self._lock:
+            self._of.update(spans)
+            while len(self._of) > _KEPT_SPANS:
+                self._of.popitem(last=False)
+        return spans
+
+
+def _find(connection: sa.Connection, spans: _Spans, study: Study, kin: str, number: int) -> _Found | None:
+    """Equal cases with rows in the studies of the same kin, however many; the newest study that has a case counts."""
+    wanted, c = Wanted(study), STUDIES.c
     found: list[tuple[Cases, int, Cases]] = []
-    left = study.cases
-    taken = np.zeros(study.cases, dtype=np.bool_) if sources else np.empty(0, dtype=np.bool_)
-    for source in sources:
-        text = connection.execute(sa.select(c.study).where(c.number == source.number)).scalar_one()
-        other = Study.from_json(json.loads(text))
-        ours, theirs = shared_cases(study, other)
+    left, taken = study.cases, np.empty(0, dtype=np.bool_)
+    for candidate in spans.candidates(connection, wanted, kin, number):
+        source = connection.execute(
+            sa.select(*_SOURCE).where(c.number == candidate, c.done > 0, c.deleted_at.is_(None))
+        ).one_or_none()
+        if source is None:
+            continue
+        other = Study.from_json(json.loads(source.study))
+        ours, theirs = shared_cases(wanted, other)
+        if not ours.size:
+            continue
+        if not taken.size:
+            taken = np.zeros(study.cases, dtype=np.bool_)
         new = ~taken[ours]
         ours, theirs = ours[new], theirs[new]
         stored = _has_rows(connection, source, other, theirs)

@@ -172,9 +172,12 @@ class Studies(Orders):
 
     def progress(self, study_id: str) -> Progress:
         """How far the study is; raises StudyNotFound."""
-        c = STUDIES.c
+        return self.look(study_id)[1]
+
+    def look(self, study_id: str) -> tuple[StudyRecord, Progress]:
+        """The study and how far it is, both of one moment; raises StudyNotFound."""
         with self.session.read() as connection:
-            row = self._row(connection, study_id, c.number, c.state, c.cases, c.done, c.ok, c.finish_by, c.coarse)
+            row = self._row(connection, study_id, *RECORD_COLUMNS)
             endings = connection.execute(
                 sa.select(ENDINGS.c.ending, ENDINGS.c.cases)
                 .where(ENDINGS.c.study == row.number)
@@ -203,17 +206,9 @@ class Studies(Orders):
             bool(row.coarse),
         )
         going = state in {StudyState.QUEUED, StudyState.RUNNING}
-        return Progress(
-            state,
-            row.cases,
-            row.done,
-            row.ok,
-            dict(endings),
-            rate,
-            left if going else None,
-            covered,
-            optional_moment(row.finish_by),
-            now,
+        finish_by = optional_moment(row.finish_by)
+        return record_of(row), Progress(
+            state, row.cases, row.done, row.ok, dict(endings), rate, left if going else None, covered, finish_by, now
         )
 
     def pause_study(self, study_id: str) -> StudyRecord:

@@ -53,8 +53,8 @@ _EVENTS: Final = {
 
 def study_frame(context: Context, study_id: str) -> dict[str, Any]:
     """What every page about a study shows: the study as the interface tells it, its verbs, the pages beside it."""
-    record, study = context.store.get_study(study_id), context.store.study(study_id)
-    shown = views.detail(record, context.store.progress(study_id), study, context.store.spec(study_id))
+    (record, progress), study = context.store.look(study_id), context.store.study(study_id)
+    shown = views.detail(record, progress, study, context.store.spec(study_id))
     varies = any(len(axis) > 1 for axis in study.axes)
     mapped = study.combine == "grid" and sum(len(axis) > 1 for axis in study.axes) > 1
     tabs = [("", "Overview"), *([("/curves", "Curves")] if varies else []), *([("/map", "Map")] if mapped else [])]

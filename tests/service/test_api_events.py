@@ -45,13 +45,13 @@ def test_an_ended_study_is_told_once(service: Service) -> None:
 def test_a_study_is_followed_to_its_end(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
     study_id = service.submit()
     looked = threading.Event()
-    look = events._look
+    look = service.store.look
 
     def noticed(*arguments: Any) -> Any:
         looked.set()
         return look(*arguments)
 
-    monkeypatch.setattr(events, "_look", noticed)
+    monkeypatch.setattr(service.store, "look", noticed)
     monkeypatch.setattr(events, "LOOK_SECONDS", 0.01)
     heard: list[str] = []
     listener = threading.Thread(target=lambda: heard.append(service.http.get(f"{STUDIES}/{study_id}/events").text))
@@ -72,12 +72,12 @@ def test_a_study_is_followed_to_its_end(service: Service, monkeypatch: pytest.Mo
 def test_a_deleted_study_ends_the_stream(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
     study_id = service.submit()
     service.fill(study_id)
-    look = events._look
+    look = service.store.look
 
     def deleted(*arguments: Any) -> Any:
         service.store.delete_study(study_id)
         return look(*arguments)
 
-    monkeypatch.setattr(events, "_look", deleted)
+    monkeypatch.setattr(service.store, "look", deleted)
     assert parse(service.http.get(f"{STUDIES}/{study_id}/events").text) == []
     assert service.http.get(f"{STUDIES}/{study_id}/events").status_code == 404

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.worker.fakes import BASE, RUN
 from worker import kernels
-from worker.reuse import kin_hash, shared_cases, taken
+from worker.reuse import Wanted, kin_hash, shared_cases, span, taken
 from worker.study import Axis, Study
 
 PATHS = ("shaft.load", "excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y")
@@ -51,6 +51,21 @@ def test_the_cases_found_are_those_with_equal_parameters(new: Study, old: Study)
     ours, theirs = shared_cases(new, old)
     assert set(zip(ours.tolist(), theirs.tolist(), strict=True)) == expected
     assert ours.tolist() == sorted(ours.tolist())
+
+
+@given(studies(), st.lists(studies(), min_size=1, max_size=4))
+@settings(max_examples=200, deadline=None)
+def test_no_study_is_ruled_out_that_has_a_case(new: Study, others: list[Study]) -> None:
+    wanted = Wanted(new)
+    may = wanted.may_share(np.stack([span(other.to_json()) for other in others]))
+    for other, possible in zip(others, may.tolist(), strict=True):
+        ours = {tuple(sorted(parameters(new, case).items())) for case in range(new.cases)}
+        shares = any(tuple(sorted(parameters(other, case).items())) in ours for case in range(other.cases))
+        assert possible or not shares
+        if other.cases == 1 and new.combine == "grid" and all(len(axis.paths) == 1 for axis in new.axes):
+            assert possible == shares
+        found, _ = shared_cases(wanted, other)
+        assert bool(found.size) == shares
 
 
 @given(studies(), st.data())

@@ -1,0 +1,142 @@
+"""Cases are found again however many studies there are; and a study is told as it was at one moment."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import sqlalchemy as sa
+
+from service.storage import reuse
+from service.storage.records import StudyRecord
+from service.storage.store import Store
+from service.storage.tables import CHUNKS, STUDIES
+from tests import postgres
+from tests.worker import fakes
+from worker import reuse as physics
+from worker.chunking import Chunking
+from worker.states import StudyState
+from worker.study import Axis, Study
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Store]:
+    if request.param == "postgresql":
+        server: postgres.Server = request.getfixturevalue("postgres_server")
+        url = server.url(server.new_database())
+    else:
+        url = f"sqlite:///{tmp_path / 'store.sqlite3'}"
+    with Store.open(url, chunking=Chunking(cases=10)) as store:
+        yield store
+
+
+def over_loads(*loads: float, frequency: float = 25.0) -> Study:
+    base = {**fakes.BASE, "excitation.frequency": frequency}
+    return Study("vibration-drive", "", base, dict(fakes.RUN), (Axis(("shaft.load",), loads),))
+
+
+def finished(store: Store, study: Study) -> StudyRecord:
+    """A study that has run to its end, with what others have taken from them."""
+    record = store.create_study({}, study)
+    finish(store, record, study)
+    return store.get_study(record.id)
+
+
+def finish(store: Store, record: StudyRecord, study: Study) -> None:
+    epoch = store.take_over("test")
+    for chunk in store.open_chunks(record.number):
+        assert store.claim(epoch, [chunk]) == [chunk]
+        known = store.known(study, chunk)
+        if known is None:
+            assert store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+        else:
+            assert store.commit(epoch, chunk, fakes.result(0, known.missing.size), known)
+    store.settle(epoch, record.number)
+
+
+def many_more(store: Store, like: StudyRecord, studies: list[Study]) -> None:
+    """Ended studies of the same kin, written as they lie in the table, with their one chunk each."""
+    with store.session.write() as connection:
+        row = connection.execute(sa.select(STUDIES).where(STUDIES.c.number == like.number)).mappings().one()
+        first = like.number + 1
+        connection.execute(
+            sa.insert(STUDIES),
+            [
+                {**row, "number": first + index, "id": f"st_more{index}", "study": json.dumps(study.to_json())}
+                for index, study in enumerate(studies)
+            ],
+        )
+        connection.execute(
+            sa.insert(CHUNKS),
+            [
+                {"study": first + index, "first": 0, "count": 1, "state": "done", "failures": 0}
+                for index in range(len(studies))
+            ],
+        )
+        if connection.dialect.name == "postgresql":
+            connection.exec_driver_sql("SELECT setval('studies_number_seq', (SELECT max(number) FROM studies))")
+
+
+def test_an_old_study_is_found_behind_many_newer_ones(store: Store) -> None:
+    old = finished(store, over_loads(0.1, 0.2, 0.3))
+    # Between its loads, beside them, and at its loads with another frequency: more than are compared in one go.
+    others = [over_loads(0.1 + 0.2 * (index + 0.5) / 700) for index in range(700)]
+    others += [over_loads(0.2, frequency=26.0 + index) for index in range(100)]
+    many_more(store, old, others)
+    larger = over_loads(0.1, 0.2, 0.3, 0.4)
+    assert store.reusable(larger) == 3
+    record = finished(store, larger)
+    assert (record.reused, record.done, record.state) == (3, 4, StudyState.FINISHED)
+    assert store.case_rows(record.id).values[:3].tolist() == store.case_rows(old.id).values.tolist()
+
+
+def test_studies_that_cannot_have_a_case_are_not_read_again(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    old = finished(store, over_loads(0.1, 0.2))
+    many_more(store, old, [over_loads(0.15 + 1e-4 * index) for index in range(300)])
+    compared: list[Study] = []
+
+    def counted(wanted: Any, other: Study) -> Any:
+        compared.append(other)
+        return physics.shared_cases(wanted, other)
+
+    read: list[int] = []
+    monkeypatch.setattr(reuse, "shared_cases", counted)
+    monkeypatch.setattr(reuse, "span", lambda study: read.append(1) or physics.span(study))  # type: ignore[func-returns-value]
+    assert store.reusable(over_loads(0.1, 0.9)) == 1
+    assert [study.axes[0].values for study in compared] == [(0.1, 0.2)]
+    assert len(read) == 301
+    assert store.reusable(over_loads(0.2, 0.8)) == 1
+    assert len(read) == 301
+
+
+def test_memory_of_studies_is_bounded(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reuse, "_KEPT_SPANS", 5)
+    monkeypatch.setattr(reuse, "_SPANS_AT_ONCE", 3)
+    old = finished(store, over_loads(0.1, 0.2))
+    many_more(store, old, [over_loads(1.0 + index) for index in range(20)])
+    for _ in range(2):
+        assert store.reusable(over_loads(0.1, 0.2, 0.3)) == 2
+
+
+def test_a_look_is_of_one_moment(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    study = over_loads(0.1, 0.2, 0.3)
+    finished(store, study)
+    again = store.create_study({}, study)
+    row = store._row
+
+    def ended_meanwhile(*arguments: Any) -> Any:
+        found = row(*arguments)
+        monkeypatch.undo()
+        finish(store, again, study)
+        return found
+
+    monkeypatch.setattr(store, "_row", ended_meanwhile)
+    record, progress = store.look(again.id)
+    assert (record, progress.state, progress.done) == (again, StudyState.QUEUED, 0)
+    assert progress.endings == {}
+    record, progress = store.look(again.id)
+    assert (record.reused, record.done, record.state) == (3, 3, StudyState.FINISHED)
+    assert (progress.endings, progress.state) == ({"ok": 3}, StudyState.FINISHED)
