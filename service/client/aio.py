@@ -7,6 +7,8 @@ import os
 import time
 import uuid
 from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import httpx
@@ -21,6 +23,7 @@ from service.client.queries import (
     curve_query,
     extension,
     finish_text,
+    form_of,
     reporting,
     result_query,
     spec_of,
@@ -75,6 +78,18 @@ class AsyncClient:
         if response.is_error:
             raise refusal(response)
         return response.content
+
+    @asynccontextmanager
+    async def pieces(self, path: str, query: Query) -> AsyncIterator[AsyncIterator[bytes]]:
+        """The bytes of a document under the API, piece by piece as they come."""
+        try:
+            async with self._http.stream("GET", API + path, params=list(query), timeout=FILE_TIMEOUT) as response:
+                if response.is_error:
+                    await response.aread()
+                    raise refusal(response)
+                yield response.aiter_bytes()
+        except httpx.HTTPError as error:
+            raise UnreachableError(self.server, reason(error)) from error
 
     async def preview(self, spec: Spec | str | PathLike[str]) -> Preview:
         """What a study would be."""
@@ -157,6 +172,10 @@ class AsyncStudy:
         """Results against one axis, as `Study.curves` gives them."""
         return Curves(cast("Any", await self._get("/curves", curve_query(x, y, by, at))))
 
+    async def map(self, x: str, y: str, z: str, *, at: Mapping[str, Value] | None = None) -> dict[str, Any]:
+        """One result ``z`` over two axes."""
+        return await self._get("/map", [*curve_query(x, y, (), at), ("z", z)])
+
     async def sensitivity(self, y: str | Sequence[str]) -> dict[str, Any]:
         """Main effects of every axis on results, and shares of their variance."""
         return await self._get("/sensitivity", result_query(y))
@@ -171,8 +190,35 @@ class AsyncStudy:
 
     async def download(self, form: str) -> bytes:
         """All rows in a format of `service.exports`, or the report as "html" or "pdf"."""
+        return await self._client.read(*self._rows(form))
+
+    async def export(self, file: str | PathLike[str], form: str | None = None) -> Path:
+        """Write all rows, or a report, to a file; its ending tells the format unless it is given."""
+        path = Path(file)
+        async with self._client.pieces(*self._rows(form or form_of(path))) as pieces:
+            with path.open("wb") as out:
+                async for piece in pieces:
+                    out.write(piece)
+        return path
+
+    def _rows(self, form: str) -> tuple[str, Query]:
         part = "/report" if form in ("html", "pdf") else "/results"
-        return await self._client.read(self._path + part, [("format", form)])
+        return self._path + part, [("format", form)]
+
+    async def picture(
+        self,
+        file: str | PathLike[str],
+        x: str,
+        y: str | Sequence[str],
+        *,
+        by: str | Sequence[str] = (),
+        at: Mapping[str, Value] | None = None,
+    ) -> Path:
+        """Write curves as a picture: .svg, .png or .pdf."""
+        path = Path(file)
+        query = [*curve_query(x, y, by, at), ("format", path.suffix[1:].lower())]
+        path.write_bytes(await self._client.read(f"{self._path}/curves", query))
+        return path
 
     async def extend(
         self,

@@ -78,6 +78,17 @@ def finish_text(when: str | datetime) -> str:
     return when if isinstance(when, str) else when.isoformat()
 
 
+def form_of(path: Path) -> str:
+    """The format that the ending of a file's name tells; ValueError when it tells none."""
+    from service.exports import format_of
+
+    ending = path.suffix[1:].lower()
+    form = ending if ending in ("html", "pdf") else format_of(path.name)
+    if form is None:
+        raise ValueError(f"the ending of {path.name!r} tells no format; name it as `form`")
+    return form
+
+
 def _listed(names: str | Sequence[str]) -> list[str]:
     return [names] if isinstance(names, str) else list(names)
 

@@ -19,6 +19,7 @@ from service.client.queries import (
     curve_query,
     extension,
     finish_text,
+    form_of,
     reporting,
     result_query,
     spec_of,
@@ -179,8 +180,11 @@ class Study:
     def export(self, file: str | PathLike[str], form: str | None = None) -> Path:
         """Write all rows, or a report, to a file; its ending tells the format unless it is given."""
         path = Path(file)
+        pieces = self._pieces(form or form_of(path))
+        first = next(pieces, b"")  # a refusal comes here, and leaves the file of before as it is
         with path.open("wb") as out:
-            for piece in self._pieces(form or _form_of(path)):
+            out.write(first)
+            for piece in pieces:
                 out.write(piece)
         return path
 
@@ -216,13 +220,3 @@ class Study:
     def act(self, verb: str) -> StudySummary:
         """Ask for "pause", "resume", "cancel" or "retry"."""
         return cast("StudySummary", self._client.plain.act(self.id, verb))
-
-
-def _form_of(path: Path) -> str:
-    from service.exports import format_of
-
-    ending = path.suffix[1:].lower()
-    form = ending if ending in ("html", "pdf") else format_of(path.name)
-    if form is None:
-        raise ValueError(f"the ending of {path.name!r} tells no format; name it as `form`")
-    return form

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import io
 from collections.abc import Iterator
 from functools import partial
@@ -17,10 +18,12 @@ from anyio.from_thread import BlockingPortal
 
 from service.client import (
     AsyncClient,
+    AsyncStudy,
     Client,
     Curves,
     RefusedError,
     SpecFileError,
+    Study,
     StudyTimeoutError,
     UnreachableError,
 )
@@ -92,6 +95,9 @@ def test_a_study_from_submission_to_table_grid_and_curves(
     assert study.picture(tmp_path / "curve.svg", "shaft.load", SPEED, by="excitation.frequency").stat().st_size > 1000
     with pytest.raises(ValueError, match="tells no format"):
         study.export(tmp_path / "rows.doc")
+    with pytest.raises(RefusedError, match="no such format"):
+        study.export(tmp_path / "rows.xlsx", "doc")
+    assert openpyxl.load_workbook(tmp_path / "rows.xlsx").sheetnames == ["cases", "inputs"]
 
     larger = study.extend([{"path": "shaft.load", "values": [0.5]}], name="larger")
     assert larger.detail()["cases"] == 12
@@ -164,7 +170,7 @@ def test_cases_side_by_side_with_equal_parameters_are_no_grid(client: Client, se
         Curves(data).to_xarray()
 
 
-async def asynchronous(service: Service, spec: dict[str, Any]) -> None:
+async def asynchronous(service: Service, spec: dict[str, Any], folder: Path) -> None:
     """The same with the other client."""
     filling = Filling(service)
     transport = httpx.ASGITransport(service.app)
@@ -178,6 +184,20 @@ async def asynchronous(service: Service, spec: dict[str, Any]) -> None:
         curves = await study.curves("shaft.load", SPEED, by="excitation.frequency")
         np.testing.assert_array_equal(curves.to_pandas()[SPEED], speeds)
         assert (await study.sensitivity(SPEED))["results"][0]["result"] == SPEED
+        assert (await study.map("shaft.load", "excitation.frequency", SPEED))["z"]["values"][0][0] == speeds[0]
+        held = await study.map("shaft.load", "excitation.frequency", SPEED, at={"excitation.amplitude_x": "2 mm"})
+        assert held["z"]["values"][0][0] == speeds[0]
+        assert len(pd.read_csv(await study.export(folder / "rows.csv"))) == 9
+        assert (await study.export(folder / "rows.bin", "pdf")).read_bytes().startswith(b"%PDF")
+        picture = await study.picture(folder / "curve.png", "shaft.load", SPEED, by="excitation.frequency")
+        assert picture.read_bytes().startswith(b"\x89PNG")
+        with pytest.raises(ValueError, match="tells no format"):
+            await study.export(folder / "rows.doc")
+        with pytest.raises(RefusedError, match="no such format"):
+            await study.picture(folder / "curve.gif", "shaft.load", SPEED)
+        with pytest.raises(RefusedError, match="no such format"):
+            await study.export(folder / "none.csv", "doc")
+        assert not (folder / "none.csv").exists()
         assert (await study.download("pdf")).startswith(b"%PDF")
         larger = await study.extend(cases=[{"points": "shaft.load\n0.9\n"}])
         assert (await larger.detail())["cases"] == 10
@@ -194,10 +214,29 @@ async def asynchronous(service: Service, spec: dict[str, Any]) -> None:
             await nobody.preview(spec)
         with pytest.raises(UnreachableError):
             await nobody.read("/studies", [])
+        with pytest.raises(UnreachableError):
+            await AsyncStudy(nobody, "st_1").export(folder / "none.csv")
+        assert not (folder / "none.csv").exists()
 
 
-def test_the_asynchronous_client_does_the_same(service: Service, portal: BlockingPortal, spec: dict[str, Any]) -> None:
-    portal.call(partial(asynchronous, service, spec))
+def test_the_asynchronous_client_does_the_same(
+    service: Service, portal: BlockingPortal, spec: dict[str, Any], tmp_path: Path
+) -> None:
+    portal.call(partial(asynchronous, service, spec, tmp_path))
+
+
+def public(kind: type) -> dict[str, inspect.Signature]:
+    """Public methods of a class with their parameters, whatever they give."""
+    found = {name: item for name, item in vars(kind).items() if inspect.isfunction(item) and not name.startswith("_")}
+    return {name: inspect.signature(item).replace(return_annotation=None) for name, item in found.items()}
+
+
+def test_both_clients_have_the_same_methods() -> None:
+    assert public(AsyncStudy) == public(Study)
+    both = public(Client)
+    assert {name: signature for name, signature in public(AsyncClient).items() if name in both} == both
+    # What the asynchronous one has in the place of `Client.plain`.
+    assert set(public(AsyncClient)) - set(both) == {"request", "read", "pieces"}
 
 
 def test_server_and_token_come_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
