@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.spec_messages import Problem
+from service.written import written_number
 from worker.limits import MAX_CLUTCH_ROWS
 
 #: Problems told of one file; a file of another kind has one in every line.
@@ -103,16 +104,8 @@ def _unquoted(cell: str) -> str:
     return cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] and cell[0] in "\"'" else cell
 
 
-def _number(cell: str) -> float | None:
-    try:
-        value = float(cell)
-    except ValueError:
-        return None
-    return None if "_" in cell else value
-
-
 def _is_header(cells: list[str]) -> bool:
-    return all(_number(cell) is None for cell in cells)
+    return all(written_number(cell) is None for cell in cells)
 
 
 def _factors(number: int, line: str, convert: Callable[[str, str], float]) -> tuple[float | None, float | None]:
@@ -183,7 +176,7 @@ def _wrong_rows(lines: list[tuple[int, str]]) -> Iterator[Problem]:
             yield Problem(f"line {number}", few, line.replace("\t", " ")[:80], allowed)
             continue
         for cell, (name, _) in zip(cells, _QUANTITIES, strict=True):
-            value = _number(cell)
+            value = written_number(cell)
             if value is None:
                 yield Problem(f"line {number}", f"the {name} is no number", cell[:80], "a number")
             elif not math.isfinite(value):

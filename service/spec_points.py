@@ -15,6 +15,7 @@ from service.spec_blocks import Block
 from service.spec_fields import exact, read_object
 from service.spec_messages import Report, join, shorten_text
 from service.units import QuantityError, to_float
+from service.written import written_number
 from worker.limits import MAX_AXES, MAX_AXIS_VALUES
 
 if TYPE_CHECKING:
@@ -81,11 +82,15 @@ class _Heading(NamedTuple):
 
 
 def _rows(text: str) -> list[_Row]:
-    """Rows that are not empty. What the header is parted by, parts all of it: commas, or semicolons, or tabs."""
+    """Rows that are not empty. What the header is parted by, parts all of it: commas, or semicolons, or tabs.
+
+    Lines may end as any system ends them, old ones with a carriage return alone.
+    """
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
     header = text.lstrip().partition("\n")[0]
     delimiter = next((sign for sign in ",;\t" if sign in header), ",")
     reader = csv.reader(io.StringIO(text), delimiter=delimiter, strict=True)
-    return [_Row(reader.line_num, cells) for cells in reader if any(cells)]
+    return [_Row(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
 
 
 def _read_heading(report: Report, where: str, cell: str, machine: Machine) -> _Heading | None:
@@ -130,8 +135,4 @@ def _read_cell(cell: str, heading: _Heading) -> float:
 
 
 def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return "_" not in cell  # which Python takes for a thousands separator
+    return written_number(cell) is not None

@@ -12,6 +12,7 @@ from service.cli.files import decode, read_bytes
 from service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
 from service.cli.remote import connection, exit_as, follow, show_study
 from service.spec_messages import Problem
+from service.written import written_number
 from worker.limits import MAX_BODY_BYTES
 
 
@@ -70,7 +71,5 @@ def _addition(axes: list[str], points: str | None) -> dict[str, Any]:
 
 
 def _value(text: str) -> float | str:
-    try:
-        return float(text)
-    except ValueError:
-        return text
+    number = written_number(text)
+    return text if number is None else number

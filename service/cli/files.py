@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import errno
 import glob
 import os
@@ -57,6 +58,8 @@ def decode(path: str, data: bytes) -> str:
 
     Raises WrongInputError when it is no text.
     """
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise WrongInputError(f"{path}: UTF-16 text; save it as UTF-8 (spreadsheets call it CSV UTF-8)")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -12,6 +12,7 @@ from service.cli.console import WrongInputError, say, show_table, write_json, wr
 from service.cli.files import MAX_DATA_BYTES, decode, read_bytes
 from service.cli.options import JsonFlag
 from service.spec_messages import Problem, shorten
+from service.written import written_number
 
 if TYPE_CHECKING:
     from service.measured import MeasuredData
@@ -71,12 +72,9 @@ def _quantity(option: str, text: str, unit: str) -> float:
     """The SI number of an option: a plain number in ``unit`` or a text with its own unit."""
     from service.units import QuantityError, parse_quantity
 
+    number = written_number(text)
     try:
-        value: float | str = float(text)
-    except ValueError:
-        value = text
-    try:
-        return parse_quantity(value, unit)
+        return parse_quantity(text if number is None else number, unit)
     except QuantityError as error:
         raise WrongInputError("an option is wrong", problems=[Problem(option, str(error), text, unit=unit)]) from error
 

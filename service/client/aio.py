@@ -29,7 +29,17 @@ from service.client.queries import (
     spec_of,
 )
 from service.client.study import DEFAULT_SERVER
-from service.client.wire import API, FILE_TIMEOUT, Query, connection_options, document, reason, refusal, study_path
+from service.client.wire import (
+    API,
+    FILE_TIMEOUT,
+    Query,
+    connection_options,
+    document,
+    reason,
+    refusal,
+    require_finite,
+    study_path,
+)
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -63,6 +73,7 @@ class AsyncClient:
 
     async def request(self, method: str, path: str, **arguments: Any) -> dict[str, Any]:
         """The JSON object that the service answers under its API."""
+        require_finite(arguments.get("json"))
         try:
             response = await self._http.request(method, API + path, **arguments)
         except httpx.HTTPError as error:

@@ -17,6 +17,7 @@ from service.client.wire import (
     document,
     reason,
     refusal,
+    require_finite,
     schedule_path,
     study_path,
 )
@@ -159,6 +160,7 @@ class ServiceClient:
             raise refusal(response)
 
     def _request(self, method: str, path: str, **arguments: Any) -> httpx.Response:
+        require_finite(arguments.get("json"))
         try:
             return self._http.request(method, API + path, **arguments)
         except httpx.HTTPError as error:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ipaddress
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 from urllib.parse import quote
 
@@ -44,6 +45,25 @@ def document(server: str, response: httpx.Response) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise UnreachableError(server, "what answers there is not Sprag")
     return data
+
+
+def require_finite(data: object, pointer: str = "") -> None:
+    """RefusedError, as the service's own, at the first number in ``data`` that is none; JSON cannot say such."""
+    if isinstance(data, Mapping):
+        for key, item in data.items():
+            require_finite(item, f"{pointer}/{str(key).replace('~', '~0').replace('/', '~1')}")
+    elif isinstance(data, list | tuple):
+        for index, item in enumerate(data):
+            require_finite(item, f"{pointer}/{index}")
+    elif isinstance(data, float) and not math.isfinite(data):
+        fault = {"pointer": pointer, "message": "must be a finite number", "value": str(data)}
+        problem = {
+            "title": "The study spec is not valid",
+            "status": 422,
+            "detail": f"{pointer}: must be a finite number (got {data})",
+            "errors": [fault],
+        }
+        raise RefusedError(422, problem)
 
 
 def study_path(study_id: str) -> str:

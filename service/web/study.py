@@ -28,6 +28,7 @@ from service.web.choice import characteristic, map_query, pairs_of
 from service.web.fit_chart import FitChart, fit_chart
 from service.web.form_check import backlashes, clutch_at
 from service.web.templates import page
+from service.written import written_number
 from worker import kernels
 from worker.states import TRANSITIONS, StudyEvent, StudyState
 
@@ -200,10 +201,7 @@ _MOST_CHOICES: Final = 200
 
 
 def _plain(text: str | None) -> float | None:
-    try:
-        return None if text is None else float(text)
-    except ValueError:
-        return None
+    return None if text is None else written_number(text)
 
 
 def map_address(study: Study, given: QueryParams, study_id: str) -> str | None:

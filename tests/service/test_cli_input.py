@@ -133,6 +133,15 @@ def test_what_is_wrong_with_points_is_told_of_their_file(
     assert "--points: standard input is the spec already" in both.err
 
 
+def test_a_file_of_utf_16_is_told_what_to_do_with(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    points = tmp_path / "points.csv"
+    for encoding in ("utf-16-le", "utf-16-be"):
+        points.write_bytes("\ufeffshaft.load\n0.1\n".encode(encoding))
+        done = sprag("validate", examples / "one_pendulum.json", "--points", points)
+        assert (done.code, done.out) == (2, "")
+        assert done.err == f"sprag: {points}: UTF-16 text; save it as UTF-8 (spreadsheets call it CSV UTF-8)\n"
+
+
 def test_points_take_the_place_of_what_varies(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
     points = tmp_path / "points.csv"
     points.write_text("excitation.frequency [rpm],shaft.load\n1500,0.1\n1800,250 N*mm\n960,0\n")

@@ -239,6 +239,24 @@ def test_both_clients_have_the_same_methods() -> None:
     assert set(public(AsyncClient)) - set(both) == {"request", "read", "pieces"}
 
 
+@pytest.mark.parametrize("value", [float("nan"), np.float64("inf")])
+def test_a_number_that_is_none_is_refused_with_its_path(
+    client: Client, service: Service, portal: BlockingPortal, spec: dict[str, Any], value: float
+) -> None:
+    wrong = {**spec, "axes": ({"path": "shaft.load", "values": (0.1, value)},)}
+    with pytest.raises(RefusedError, match=r"^/axes/0/values/1: must be a finite number") as caught:
+        client.submit(wrong)
+    assert caught.value.status == 422
+    assert [(fault["pointer"], fault["value"]) for fault in caught.value.errors] == [("/axes/0/values/1", str(value))]
+
+    async def asynchronous_one() -> None:
+        async with AsyncClient("http://localhost", transport=httpx.ASGITransport(service.app)) as other:
+            with pytest.raises(RefusedError, match=r"^/axes/0/values/1: must be a finite number"):
+                await other.preview(wrong)
+
+    portal.call(asynchronous_one)
+
+
 def test_server_and_token_come_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SPRAG_SERVER", "http://127.0.0.1:9/")
     monkeypatch.setenv("SPRAG_TOKEN", "secret")

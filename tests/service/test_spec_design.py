@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
+from service.measured import MeasuredDataError, parse_measured
 from service.spec import parse_spec
 from service.spec_sample import unit_sample
 from service.spec_schema import spec_schema
+from service.units import parse_quantity
 from tests.service.spec_sample import SPEC, changed, parsed, problems
 from worker import kernels
 from worker.study import Study
@@ -115,6 +117,23 @@ def test_points_may_be_parted_as_spreadsheets_do(sign: str) -> None:
     text = "\ufeffexcitation.frequency [rpm],shaft.load\r\n1500,0.1\r\n1800, 250 N*mm\r\n".replace(",", sign)
     study = study_of([{"points": text}])
     assert rows(study, "excitation.frequency", "shaft.load") == [(25.0, 0.1), (30.0, 0.25)]
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_lines_of_points_end_as_on_any_system_and_blank_ones_do_not_count(end: str) -> None:
+    text = end.join(["excitation.frequency [rpm],shaft.load", "1500,0.1", " , ", ",", "  ", "1800,0.25", ""])
+    study = study_of([{"points": text}])
+    assert rows(study, "excitation.frequency", "shaft.load") == [(25.0, 0.1), (30.0, 0.25)]
+
+
+@pytest.mark.parametrize("cell", ["\u0661\u0662", "\uff11\uff12"], ids=["arabic", "wide"])
+def test_what_only_python_takes_for_a_number_is_none(cell: str) -> None:
+    (problem,) = problems({"/axes": [{"points": f"excitation.frequency,shaft.load\n20,0.1\n{cell},0.2\n"}]}).values()
+    assert problem.pointer == "/axes/0/points"
+    assert problem.message.startswith("line 3, column excitation.frequency: must begin with a number")
+    assert problem.value == cell
+    with pytest.raises(MeasuredDataError, match="number"):
+        parse_measured(f"angle_rad,torque_Nm\n0.1,2\n{cell},3\n", parse_quantity)
 
 
 @pytest.mark.parametrize(
