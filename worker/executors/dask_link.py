@@ -33,7 +33,8 @@ def _is_news(record: logging.LogRecord) -> bool:
 
 # What Dask's client tells of lost connections, with tracebacks, is told here in a sentence; and a fetch of its own that
 # was given up, as the value was lost, is nothing that anybody has to know.
-logging.getLogger("distributed").setLevel(logging.CRITICAL)
+for _name in ("distributed", "distributed.client"):  # Dask gives the second a level of its own
+    logging.getLogger(_name).setLevel(logging.CRITICAL)
 logging.getLogger("asyncio").addFilter(_is_news)
 
 
