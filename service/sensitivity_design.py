@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 _LEAST_DISTINCT: Final = 0.95
 #: Rank correlation of two columns of a sample that is too large, and its largest share of what chance alone makes of
 #: columns drawn apart (its standard deviation is 1 / sqrt(cases - 1)).
-_MOST_CORRELATED: Final = 0.4
-_CHANCE: Final = 3.5
+_MOST_CORRELATED: Final = 0.45
+_CHANCE: Final = 4.5
 #: Rank correlation from which two axes go together.
 _TOGETHER: Final = 0.99
 #: A grid that lacks more than this part of its points is not spoken of as one.
@@ -89,7 +89,9 @@ def why_no_shares(columns: Numbers, known: NDArray[np.bool_], names: list[str]) 
         return f"{first} and {second} were varied together: the cases cannot tell what each of them does"
     points, cases = math.prod(np.unique(column).size for column in columns.T), int(known.sum())
     reason = "the cases are not a complete grid nor a sample"
-    if cases < points and cases >= _LEAST_GRID * points:
+    if all(scattered(column) for column in columns[known].T):
+        reason += ": their axes are not independent of each other"
+    elif cases < points and cases >= _LEAST_GRID * points:
         reason += f": {points - cases} of {points} are missing"
     return f"{reason}; main effects are means over those there are"
 

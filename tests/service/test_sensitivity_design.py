@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from SALib.analyze import rbd_fast
+from scipy.stats import qmc
 
 from service.cli.pictures import _show_effects
 from service.plots_sensitivity import draw_sensitivity
 from service.sensitivity import Sensitivity
+from service.sensitivity_design import is_sample
 from tests.service.test_sensitivity import API, SPEED, effects, ranges
 
 if TYPE_CHECKING:
@@ -117,7 +119,17 @@ def test_a_sample_that_failed_cases_make_lopsided_is_none() -> None:
     assert [effect.first for effect in fair.effects] == pytest.approx([2.56 / 3.56, 1 / 3.56, 0.0], abs=0.06)
     corner = effects(sample, lambda p: np.where(p[A] + p[B] > 1.2, np.nan, p[A]))
     assert (corner.method, indices(corner)) == ("none", {NONE})
-    assert "not a complete grid nor a sample" in corner.notes[-1]
+    assert "not a complete grid nor a sample: their axes are not independent of each other" in corner.notes[-1]
+
+
+def test_chance_alone_makes_no_sample_lopsided() -> None:
+    for cases, axes in ((100, 3), (200, 10), (1000, 10)):
+        assert all(is_sample(qmc.LatinHypercube(axes, rng=seed).random(cases)) for seed in range(40))
+    assert all(is_sample(qmc.Sobol(3, rng=seed).random(128)) for seed in range(40))
+    drawn = np.random.default_rng(1).normal(size=(1000, 2))
+    assert is_sample(drawn)
+    drawn[:, 1] += 0.3 * drawn[:, 0]
+    assert not is_sample(drawn)
 
 
 @pytest.mark.parametrize(
