@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -36,6 +37,16 @@ class Finished:
     def data(self) -> Any:
         """Standard output as JSON."""
         return json.loads(self.out)
+
+
+@pytest.fixture(autouse=True)
+def _levels_of_before() -> Iterator[None]:
+    """A test that sets up the program's log leaves the others' levels as they were."""
+    loggers = [logging.getLogger(name) for name in ("sprag", "sprag.requests", "service", "worker")]
+    levels = [logger.level for logger in loggers]
+    yield
+    for logger, level in zip(loggers, levels, strict=True):
+        logger.setLevel(level)
 
 
 @pytest.fixture
