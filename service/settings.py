@@ -137,8 +137,9 @@ class Settings(BaseSettings):
     @field_validator("executor")
     @classmethod
     def _known_executor(cls, value: str) -> str:
-        if not re.fullmatch(r"pool|dask|dask://(\[[0-9a-fA-F:]+\]|[^\s:/]+):[0-9]{1,5}", value):
-            raise ValueError("it is pool, dask, or dask://host:port")
+        found = re.fullmatch(r"pool|dask|dask://(\[[0-9a-fA-F:]+\]|[^\s:/@]+):([0-9]{1,5})", value)
+        if not found or (found[2] and not 1 <= int(found[2]) <= 65_535):
+            raise ValueError("it is pool, dask, or dask://host:port, with a port of 1 to 65535")
         return value
 
     @field_validator("token")

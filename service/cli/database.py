@@ -106,7 +106,7 @@ def _opened(db: str | None, *, existing: bool = True) -> Iterator[Session]:
     from service.storage.session import Session
 
     location = read_settings(database=db).database_url
-    with suppress(ArgumentError):  # which the session tells better
+    with suppress(ArgumentError, ValueError):  # which the session tells better
         url = make_url(location)
         path = url.database if url.get_backend_name() == "sqlite" else None
         if existing and path and not Path(path).exists():

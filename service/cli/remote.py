@@ -200,10 +200,15 @@ def show_study(study: dict[str, Any], as_json: bool) -> None:
         f"{progress['ok']} ok"
         + (f" ({endings})" if endings else "")
         + (f"; {study['reused']} taken from other studies" if study.get("reused") else "")
-        + (f"; to be finished by {study['finish_by']}" if study.get("finish_by") and not study["time_over"] else "")
+        + (f"; to be finished by {study['finish_by']}" if _is_due(study) else "")
     )
     if study["time_over"]:
         say(f"{study['id']}: {study['reason']}")
+
+
+def _is_due(study: dict[str, Any]) -> bool:
+    """Whether there is a deadline that is still to come for the study."""
+    return bool(study.get("finish_by")) and not (study["time_over"] or study["state"] in TERMINAL)
 
 
 def list_studies(

@@ -70,7 +70,24 @@ class Orders(Part):
         if order is None:
             return None
         c = CHUNKS.c
-        first_open = connection.execute(
-            sa.select(sa.func.min(c["first"])).where(c.study == number, c.state != "done")
-        ).scalar_one()
-        return coverage(order, cases if first_open is None else first_open)
+        first_open, done = connection.execute(
+            sa.select(
+                sa.func.min(sa.case((c.state != "done", c["first"]))),
+                sa.func.coalesce(sa.func.sum(sa.case((c.state == "done", c["count"]), else_=0)), 0),
+            ).where(c.study == number)
+        ).one()
+        if first_open is not None:
+            return coverage(order, first_open)
+        return coverage(order, cases if done == cases else self._first_gap(connection, number))
+
+    @staticmethod
+    def _first_gap(connection: sa.Connection, number: int) -> int:
+        """First position that no chunk has: a cancelled study has lost its open ones."""
+        ends = (
+            sa.select((CHUNKS.c["first"] + CHUNKS.c["count"]).label("end")).where(CHUNKS.c.study == number).subquery()
+        )
+        begins = sa.select(CHUNKS.c["first"]).where(CHUNKS.c.study == number)
+        if connection.execute(begins.where(CHUNKS.c["first"] == 0)).first() is None:
+            return 0
+        gap: int = connection.execute(sa.select(sa.func.min(ends.c.end)).where(ends.c.end.not_in(begins))).scalar_one()
+        return gap

@@ -6,6 +6,7 @@ What is particular to a PostgreSQL server is in `service.storage.postgres`; here
 from __future__ import annotations
 
 import os
+import re
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
@@ -79,6 +80,11 @@ def file_system_of(path: Path, mounts: str | None = None) -> str:
     return kind
 
 
+def _without_password(url: str) -> str:
+    """A text that should have been a URL, without what stands between its scheme and the last @."""
+    return re.sub(r"(://).*@", r"\1...@", url)
+
+
 class Session:
     """Connections to one database.
 
@@ -89,10 +95,16 @@ class Session:
     def __init__(self, url: str) -> None:
         try:
             self.url: URL = make_url(url)
-        except sa.exc.ArgumentError:
+        except (sa.exc.ArgumentError, ValueError):  # the latter of a port that is no number
             raise DatabaseError(
-                f"{url!r} is no database URL; one looks like sqlite:////path/to/sprag.sqlite3"
+                f"{_without_password(url)!r} is no database URL; one looks like sqlite:////path/to/sprag.sqlite3 or "
+                "postgresql://user@host:5432/database"
             ) from None
+        if "@" in (self.url.host or ""):
+            raise DatabaseError(
+                "the database URL has more than one @ before its host: "
+                "in a name or password write @ as %40 and / as %2F"
+            )
         self._path: Path | None = None
         match self.url.get_backend_name():
             case "sqlite":

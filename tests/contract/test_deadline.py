@@ -186,6 +186,9 @@ def test_cases_that_were_never_run_are_told_of_a_cancelled_study(store: Store) -
         run(store, epoch, record, chunk)
     store.cancel_study(record.id)
     store.settle(epoch, record.number)
+    covered = store.progress(record.id).covered
+    assert covered is not None
+    assert (covered.complete, covered.cases) == (2, 3), "the two ends, the middle, and one of the next pass"
     page = store.case_page(record.id)
     assert page.cases.tolist() == list(range(9))
     assert [case for case, ending in zip(page.cases.tolist(), page.endings, strict=True) if ending == "ok"] == [

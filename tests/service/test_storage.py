@@ -27,6 +27,8 @@ def url(tmp_path: Path) -> str:
 @pytest.mark.parametrize(
     ("url", "message"),
     [
+        ("postgresql://me:pass@host:abc/x", "'postgresql://...@host:abc/x' is no database URL"),
+        ("postgresql://me:a@@pass/1@host/x", "more than one @ before its host"),
         ("no url", "is no database URL"),
         ("mysql://host/db", "kind 'mysql' are not supported; use sqlite or postgresql"),
         ("sqlite://", "must be a file"),

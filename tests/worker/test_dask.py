@@ -394,7 +394,7 @@ def test_a_study_survives_what_happens_to_a_cluster(tmp_path: Path, capfd: pytes
 def test_the_setting_is_checked() -> None:
     for good in ("pool", "dask", "dask://head.example:8786", "dask://[::1]:8786"):
         assert Settings(executor=good).executor == good
-    for wrong in ("dusk", "dask://", "dask://head.example", "tcp://head.example:8786"):
+    for wrong in ("dusk", "dask://", "dask://head.example", "dask://head.example:0", "tcp://head.example:8786"):
         with pytest.raises(ValidationError, match="it is pool, dask, or dask://host:port"):
             Settings(executor=wrong)
 
