@@ -11,7 +11,8 @@ from engine.jit import inlined
 from engine.taylor.straight import LaneCode, larger, smaller
 
 #: Polynomials in a block.
-SLOTS = 16
+SLOTS = 8
+_LINE = 8  # doubles of a cache line
 #: Status of a slot after its loop.
 NONE, FOUND, HARD = 0.0, 1.0, 2.0
 #: Rows behind the highest coefficient's: what is known (peaks), the result, the status; and their number and one.
@@ -42,9 +43,16 @@ def take(blocks: NDArray[np.float64], order: int, slot: int, g: NDArray[np.float
         g[k] = blocks[start + k * SLOTS]
 
 
+def aligned_zeros(size: int) -> NDArray[np.float64]:
+    """A flat array that begins with a cache line, so that no vector of lanes lies across two."""
+    spare = np.zeros(size + _LINE)
+    skipped = -(spare.ctypes.data // spare.itemsize) % _LINE
+    return spare[skipped : skipped + size]
+
+
 def blocks_for(polynomials: int, order: int) -> NDArray[np.float64]:
     """The flat array of as many blocks as that many polynomials need."""
-    return np.zeros(-(-polynomials // SLOTS) * (order + ROWS) * SLOTS)
+    return aligned_zeros(-(-polynomials // SLOTS) * (order + ROWS) * SLOTS)
 
 
 class _Shape:

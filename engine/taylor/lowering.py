@@ -21,6 +21,8 @@ _DOUBLE = ir.DoubleType()
 _INT = ir.IntType(64)
 #: Products and sums may become fused multiply-adds; nothing is reordered.
 _FLAGS = ("contract",)
+#: Bytes: the largest vector, a cache line.
+_STACK_ALIGNMENT = 64
 _ARITHMETIC = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"}
 _COMPARISONS = {ast.Lt: "<", ast.Gt: ">", ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
 
@@ -113,6 +115,9 @@ def lane_loops(text: str, first: str, second: str) -> Callable[[Any, float, floa
     def run(typing_context: Any, W: Any, a: Any, b: Any) -> Any:  # noqa: ARG001
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             array = context.make_array(signature.args[0])(context, builder, arguments[0])
+            # Vectors that find no register go to the stack, which is aligned for the smallest of them only.
+            builder.function.attributes.alignstack = _STACK_ALIGNMENT
+            builder.function.attributes.add("nounwind")  # llvmlite writes no alignment alone
             numbers = {first: arguments[1], second: arguments[2]}
             for loop in tree.body:
                 assert isinstance(loop, ast.For)
@@ -127,3 +132,55 @@ def lane_loops(text: str, first: str, second: str) -> Callable[[Any, float, floa
         return types.void(W, types.float64, types.float64), generate
 
     return cast(Callable[[Any, float, float], None], run)
+
+
+def lane_mask(sign: str, row: int, lanes: int) -> Callable[[Any], int]:
+    """A function ``(W)`` for compiled code that finds the lanes whose element of a workspace row compares with 0 as
+    ``sign`` says, or is not a number: bit k of the answer is lane k.
+    """
+    kind = ir.VectorType(_DOUBLE, lanes)
+
+    @intrinsic
+    def find(typing_context: Any, W: Any) -> Any:  # noqa: ARG001
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            array = context.make_array(signature.args[0])(context, builder, arguments[0])
+            first = builder.gep(array.data, [_INT(row * lanes)], inbounds=True)
+            values = builder.load(builder.bitcast(first, kind.as_pointer()), align=8)
+            holds = builder.fcmp_unordered(sign, values, ir.Constant(kind, [0.0] * lanes))
+            bits = builder.bitcast(holds, ir.IntType(lanes))
+            return bits if lanes == _INT.width else builder.zext(bits, _INT)
+
+        return types.int64(W), generate
+
+    return cast(Callable[[Any], int], find)
+
+
+@intrinsic
+def _lowest(typing_context: Any, mask: Any) -> Any:  # noqa: ARG001
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ARG001
+        return builder.cttz(arguments[0], ir.IntType(1)(1))
+
+    return types.int64(types.int64), generate
+
+
+#: ``lowest(mask)`` is the first lane of a mask that is not 0, for compiled code.
+lowest = cast(Callable[[int], int], _lowest)
+
+
+def constant_record(record: Any) -> Callable[[Any], Any]:
+    """A function for compiled code that gives, for a record of the same type, this one as a constant.
+
+    What is computed from its fields alone is then computed by the compiler: places in arrays, lengths of loops.
+    """
+    data = bytearray(record.tobytes())
+
+    @intrinsic
+    def fixed(typing_context: Any, given: Any) -> Any:  # noqa: ARG001
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ARG001
+            constant = ir.ArrayType(ir.IntType(8), len(data))(data)
+            pointer = cgutils.global_constant(builder, "layout", constant)  # type: ignore[no-untyped-call]
+            return builder.bitcast(pointer, context.get_value_type(given))
+
+        return given(given), generate
+
+    return cast(Callable[[Any], Any], fixed)

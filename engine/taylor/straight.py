@@ -5,7 +5,8 @@ rows; loops over orders, calls or a second array prevent it (docs/adr/0002). So 
 Python, here and in the model's ``equations``, and unrolled into the source text of a kernel.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 Names = Sequence[str]
 
@@ -52,8 +53,19 @@ class LaneCode:
 
 
 def product(a: Names, b: Names, k: int) -> str:
-    """Coefficient k of the product of two series (Cauchy)."""
-    return " + ".join(f"{a[j]}*{b[k - j]}" for j in range(k + 1))
+    """Coefficient k of the product of two series (Cauchy).
+
+    The newest coefficients come last: all that is before them can be added up while they are still being computed.
+    """
+    return " + ".join(f"{a[j]}*{b[k - j]}" for j in [*range(1, k), 0, k][: k + 1])
+
+
+def square(a: Names, k: int) -> str:
+    """Coefficient k of the square of a series: the products that occur twice are formed once."""
+    terms = [f"{a[j]}*{a[k - j]}" for j in reversed(range((k + 1) // 2))]
+    twice = f"2.0*({' + '.join(terms)})" if terms else ""
+    middle = f"{a[k // 2]}*{a[k // 2]}" if k % 2 == 0 else ""
+    return " + ".join(part for part in (middle, twice) if part)
 
 
 def horner(coefficients: Names, x: str) -> str:
@@ -75,19 +87,75 @@ def chord_constant(k: int) -> float:
     return float(k ** (-1.0 / (k - 1)) - k ** (-k / (k - 1)))
 
 
-def range_bounds(code: LaneCode, tag: str, coefficients: Names) -> tuple[str, str]:
-    """Lower and upper bound of a polynomial on [0, 1]: the chord between its end values, less or plus the bulge.
+class Span(NamedTuple):
+    """Names of what bounds a polynomial on [0, 1]: its values at 0 and 1, its slope at 0, and its bulge.
 
-    ``sum c_k x^k`` differs from its chord by at most ``sum |c_k| max(x - x^k)`` over k >= 2. For the short steps of a
-    high order this is nearly sharp, and it takes no branches.
+    ``sum c_k x^k`` differs from the chord between its end values by at most the bulge, ``sum |c_k| max(x - x^k)`` over
+    k >= 2. For the short steps of a high order this is nearly sharp, and it takes no branches.
     """
-    start = coefficients[0]
+
+    start: str
+    end: str
+    slope: str
+    bulge: str
+    order: int
+
+    @property
+    def low(self) -> str:
+        """Lower bound."""
+        return f"({smaller(self.start, self.end)}) - {self.bulge}"
+
+    @property
+    def high(self) -> str:
+        """Upper bound."""
+        return f"({larger(self.start, self.end)}) + {self.bulge}"
+
+    @property
+    def least_slope(self) -> str:
+        """A slope at 0 larger than this, whatever its sign, is kept by the chord from 0 to every other point.
+
+        Those chords' slopes differ from it by ``sum |c_k|`` over k >= 2 at most.
+        """
+        return f"{max(1.0 / chord_constant(k) for k in range(2, self.order + 1))!r}*{self.bulge}"
+
+    @property
+    def monotone(self) -> str:
+        """Condition under which the polynomial certainly has no extremum inside: its slope differs from that at 0 by
+        ``sum k |c_k|`` over k >= 2 at most.
+        """
+        return f"abs({self.slope}) > {max(k / chord_constant(k) for k in range(2, self.order + 1))!r}*{self.bulge}"
+
+
+def span(code: LaneCode, tag: str, coefficients: Names) -> Span:
+    """The span of a polynomial."""
     end = code.let(f"end_{tag}", " + ".join(coefficients))
-    terms = [f"{chord_constant(k)!r}*abs({name})" for k, name in enumerate(coefficients) if k >= 2]
-    bulge = code.let(f"bulge_{tag}", " + ".join(terms))
-    low = code.let(f"low_{tag}", f"({smaller(start, end)}) - {bulge}")
-    high = code.let(f"high_{tag}", f"({larger(start, end)}) + {bulge}")
-    return low, high
+    bulge = _bulge(coefficients[2:], lambda _: 1.0)
+    return Span(coefficients[0], end, coefficients[1], code.let(f"bulge_{tag}", bulge), len(coefficients) - 1)
+
+
+def rate_span(code: LaneCode, tag: str, coefficients: Names, inverse_h: str) -> Span:
+    """The span of the time derivative of a polynomial in fractions of a step whose inverse is ``inverse_h``."""
+    start = code.let(f"start_{tag}", f"{inverse_h}*{coefficients[1]}")
+    slope = code.let(f"slope_{tag}", f"{inverse_h}*2.0*{coefficients[2]}")
+    terms = [name if k == 1 else f"{float(k)!r}*{name}" for k, name in enumerate(coefficients) if k >= 1]
+    end = code.let(f"end_{tag}", f"{inverse_h}*({' + '.join(terms)})")
+    bulge = code.let(f"bulge_{tag}", f"{inverse_h}*({_bulge(coefficients[3:], lambda k: k + 1.0)})")
+    return Span(start, end, slope, bulge, len(coefficients) - 2)
+
+
+def primitive_span(code: LaneCode, tag: str, start: str, coefficients: Names, h: str) -> Span:
+    """The span of the time integral, from the value ``start``, of a polynomial in fractions of the step ``h``."""
+    terms = [name if k == 0 else f"{1.0 / (k + 1)!r}*{name}" for k, name in enumerate(coefficients)]
+    end = code.let(f"end_{tag}", f"{start} + {h}*({' + '.join(terms)})")
+    slope = code.let(f"slope_{tag}", f"{h}*{coefficients[0]}")
+    bulge = code.let(f"bulge_{tag}", f"{h}*({_bulge(coefficients[1:], lambda k: 1.0 / k)})")
+    return Span(start, end, slope, bulge, len(coefficients))
+
+
+def _bulge(coefficients: Names, factor: Callable[[int], float]) -> str:
+    """``coefficients`` begin with that of x^2."""
+    terms = enumerate(coefficients, 2)
+    return " + ".join(f"{factor(k) * chord_constant(k)!r}*abs({name})" for k, name in terms)
 
 
 def smaller(a: str, b: str) -> str:

@@ -1,10 +1,10 @@
 """Bounds of every watched quantity over a step: how far guards keep from their bands, how far extrema may be exceeded.
 
-They are made in the vector loops, from the stored series; only lanes whose bounds cannot exclude an event or a new
+They are made in the vector loop, from the stored series; only lanes whose bounds cannot exclude an event or a new
 extremum get a second look (``lanes.look_for_events``, ``window.collect_peaks``).
 """
 
-from engine.taylor.straight import LaneCode, horner, larger, range_bounds, smaller
+from engine.taylor.straight import LaneCode, Span, horner, larger, primitive_span, rate_span, smaller, span
 from engine.vibration_drive.layout import Layout
 
 #: Margin that says the step itself is too long, not that a guard is near.
@@ -12,106 +12,124 @@ TOO_LONG = -1e308
 
 
 class _Watch:
-    """Code of one lane loop that lowers the lane's ``margin`` and raises its ``excess``."""
+    """Code of the lane loop that finds every lane's ``margin`` and ``excess``."""
 
-    def __init__(self, layout: Layout, tag: str, first: bool) -> None:
+    def __init__(self, layout: Layout) -> None:
         self.layout = layout
-        self.code = LaneCode(layout.lanes, f"_b{tag}")
-        self.margin = self.code.let("margin", "1e300" if first else self.code.row(layout.margin))
-        self.excess = self.code.let("excess", "-1e300" if first else self.code.row(layout.excess))
-        self.h = self.code.load("h", layout.h)
-        self.inverse_h = self.code.let("inverse_h", f"1.0/{self.h}")
+        self.code = code = LaneCode(layout.lanes, "_b")
+        self.margin = code.let("margin", "1e300")
+        self.excess = code.let("excess", "-1e300")
+        self.h = code.load("h", layout.h)
+        self.inverse_h = code.let("inverse_h", f"1.0/{self.h}")
+        self.speed = code.series("W", layout.speed, layout.order + 1)
+        self.torques: list[list[str]] = []
 
-    def guard(self, bounds: tuple[str, str], block: int, low: int | None, high: int | None) -> None:
-        """``low`` and ``high`` are rows of a band's edges; the distances to them go ``block`` rows further."""
-        for text, row in ((f"{bounds[0]} - {{}}", low), (f"{{}} - {bounds[1]}", high)):
-            if row is not None:
-                gap = self.code.let("gap", text.format(self.code.row(row)))
-                self.code.store(row + block, gap)
-                self.margin = self.code.let("margin", smaller(gap, self.margin))
+    def guard(self, bounds: Span, block: int, low: int | None, high: int | None) -> None:
+        """``low`` and ``high`` are rows of a band's edges; the distances to them go ``block`` rows further.
 
-    def peak(self, bounds: tuple[str, str], block: int, high: int, low: int | None = None) -> None:
+        After a crossing the quantity starts on an edge and leaves it at once: that is far enough.
+        """
+        code = self.code
+        if low is not None:
+            edge = code.load("edge", low)
+            gap = code.let("gap", f"{bounds.low} - {edge}")
+            leaving = code.let("leaving", f"{bounds.slope} if {bounds.start} >= {edge} else -1e300")
+            self._keep_off(low + block, gap, leaving, bounds)
+        if high is not None:
+            edge = code.load("edge", high)
+            gap = code.let("gap", f"{edge} - ({bounds.high})")
+            leaving = code.let("leaving", f"-{bounds.slope} if {bounds.start} <= {edge} else -1e300")
+            self._keep_off(high + block, gap, leaving, bounds)
+
+    def _keep_off(self, row: int, gap: str, leaving: str, bounds: Span) -> None:
+        gap = self.code.let("gap", f"1e300 if {leaving} > {bounds.least_slope} else {gap}")
+        self.code.store(row, gap)
+        self.margin = self.code.let("margin", smaller(gap, self.margin))
+
+    def peak(self, bounds: Span, block: int, high: int, low: int | None = None) -> None:
         """``high`` and ``low`` are rows of known extrema; their excess goes ``block`` rows further."""
-        for text, row in ((f"{bounds[1]} - {{}}", high), (f"{{}} - {bounds[0]}", low)):
-            if row is not None:
-                gap = self.code.let("gap", text.format(self.code.row(row)))
-                self.code.store(row + block, gap)
-                self.excess = self.code.let("excess", larger(gap, self.excess))
+        code = self.code
+        bulge = code.let("bulge", f"0.0 if {bounds.monotone} else {bounds.bulge}")
+        self._exceed(high + block, f"(({larger(bounds.start, bounds.end)}) + {bulge}) - {code.row(high)}")
+        if low is not None:
+            self._exceed(low + block, f"{code.row(low)} - (({smaller(bounds.start, bounds.end)}) - {bulge})")
 
-    def rates(self, names: list[str]) -> list[str]:
-        """Time derivative of a series."""
-        order = self.layout.order
-        return [self.code.let(f"R_{k}", f"{names[k + 1]}*{self.inverse_h}*{k + 1.0!r}") for k in range(order)]
+    def _exceed(self, row: int, excess: str) -> None:
+        excess = self.code.let("exceeding", excess)
+        self.code.store(row, excess)
+        self.excess = self.code.let("excess", larger(excess, self.excess))
 
-    def primitive(self, tag: str, start: str, names: list[str]) -> list[str]:
-        """Time integral of a series from the value ``start``."""
-        order = self.layout.order
-        return [
-            start,
-            *(self.code.let(f"{tag}{k + 1}", f"{self.h}*{names[k]}*{1.0 / (k + 1)!r}") for k in range(order)),
-        ]
+    def pendulum(self, index: int) -> None:
+        """Watch one pendulum and its clutch."""
+        layout, code = self.layout, self.code
+        count = layout.order + 1
+        base = layout.pendulums + index * layout.stride
 
-    def loop(self) -> str:
-        """The finished loop."""
-        self.code.store(self.layout.margin, self.margin)
-        self.code.store(self.layout.excess, self.excess)
-        return self.code.loop()
+        def row(name: str) -> int:
+            offset: int = getattr(layout, f"p_{name}")
+            return base + offset
+
+        block = layout.p_x_phi_max - layout.p_phi_max
+        edges = layout.p_m_w_low - layout.p_w_low
+        w = code.series("w", row("speed"), count)
+        relative = [code.let(f"v{k}", f"{w[k]} - {self.speed[k]}") for k in range(count)]
+        self.guard(span(code, "v", relative), edges, row("w_low"), row("w_high"))
+        windup = primitive_span(code, "u", code.load("u", row("u")), relative[:-1], self.h)
+        self.guard(windup, edges, row("u_low"), row("u_high"))
+        self.peak(windup, block, row("u_max"))
+        torque = code.series("T", row("torque"), count)
+        self.torques.append(torque)
+        bounds = span(code, "T", torque)
+        self.guard(bounds, edges, row("t_low"), row("t_high"))
+        self.peak(bounds, block, row("torque_max"))
+        force = code.series("e", row("force"), layout.coefficients)
+        self._check_law(torque, force, windup.end, row("locked"), row("allowed"))
+        angle = primitive_span(code, "phi", code.load("phi", row("phi")), w[:-1], self.h)
+        self.peak(angle, block, row("phi_max"), row("phi_min"))
+        self.peak(span(code, "w", w), block, row("speed_max"), row("speed_min"))
+        self.peak(rate_span(code, "a", w, self.inverse_h), block, row("acc_max"), row("acc_min"))
+
+    def _check_law(self, torque: list[str], force: list[str], u_end: str, locked: int, allowed: int) -> None:
+        """Lower the margin where the step is too long for the clutch's law.
+
+        The step is chosen by two coefficients. A law without a linear term, entered from uniform motion, has a series
+        in which most coefficients vanish, these two perhaps among them: only the defect of the torque's series at the
+        step's end tells.
+        """
+        code = self.code
+        end = code.let("torque_end", " + ".join(torque))
+        defect = code.let("defect", f"abs({horner(force, u_end)} - {end})*(1.0 - {code.row(locked)})")
+        self.margin = code.let("margin", f"{self.margin} if {defect} <= {code.row(allowed)} else {TOO_LONG!r}")
+
+    def shaft(self) -> None:
+        """Watch the shaft and what all clutches do together."""
+        layout, code = self.layout, self.code
+        block = layout.x_speed_max - layout.speed_max
+        edges = layout.m_sum_high - layout.sum_high
+        speeds = span(code, "W", self.speed)
+        self.guard(speeds, edges, layout.speed_low, None)
+        self.peak(speeds, block, layout.speed_max, layout.speed_min)
+        self.peak(rate_span(code, "A", self.speed, self.inverse_h), block, layout.acc_max)
+        total = self.torques[0]
+        if layout.n > 1:
+            total = [code.let("S", " + ".join(parts)) for parts in zip(*self.torques, strict=True)]
+        sums = span(code, "S", total)
+        self.guard(sums, edges, None, layout.sum_high)
+        if layout.n > 1:
+            self.peak(sums, block, layout.sum_max)
+        corners = [code.let("corner", f"({a})*({b})") for a in (sums.low, sums.high) for b in (speeds.low, speeds.high)]
+        highest = corners[0]
+        for corner in corners[1:]:
+            highest = code.let("highest", larger(corner, highest))
+        self._exceed(layout.power_max + block, f"{highest} - {code.row(layout.power_max)}")
 
 
-def shaft_bounds(layout: Layout) -> str:
-    """Source of the loop over the shaft's quantities; it starts ``margin`` and ``excess`` afresh."""
-    watch = _Watch(layout, "s", first=True)
-    code = watch.code
-    count = layout.order + 1
-    block = layout.x_speed_max - layout.speed_max
-    edges = layout.m_sum_high - layout.sum_high
-    shaft = code.series("W", layout.speed, count)
-    bounds = range_bounds(code, "W", shaft)
-    watch.guard(bounds, edges, layout.speed_low, None)
-    watch.peak(bounds, block, layout.speed_max, layout.speed_min)
-    bounds = range_bounds(code, "S", code.series("S", layout.sum, count))
-    watch.guard(bounds, edges, None, layout.sum_high)
-    watch.peak(bounds, block, layout.sum_max)
-    watch.peak(range_bounds(code, "R", watch.rates(shaft)), block, layout.acc_max)
-    watch.peak(range_bounds(code, "P", code.series("P", layout.power, count)), block, layout.power_max)
-    return watch.loop()
-
-
-def pendulum_bounds(layout: Layout, index: int) -> str:
-    """Source of the loop over the quantities of one pendulum and its clutch."""
-    watch = _Watch(layout, str(index), first=False)
-    code = watch.code
-    count = layout.order + 1
-    base = layout.pendulums + index * layout.stride
-
-    def row(name: str) -> int:
-        offset: int = getattr(layout, f"p_{name}")
-        return base + offset
-
-    block = layout.p_x_phi_max - layout.p_phi_max
-    edges = layout.p_m_w_low - layout.p_w_low
-    shaft = code.series("W", layout.speed, count)
-    w = code.series("w", row("speed"), count)
-    relative = [code.let(f"v{k}", f"{w[k]} - {shaft[k]}") for k in range(count)]
-    watch.guard(range_bounds(code, "v", relative), edges, row("w_low"), row("w_high"))
-    u = watch.primitive("u", code.load("u_start", row("u")), relative)
-    bounds = range_bounds(code, "u", u)
-    watch.guard(bounds, edges, row("u_low"), row("u_high"))
-    watch.peak(bounds, block, row("u_max"))
-    torque = code.series("T", row("torque"), count)
-    bounds = range_bounds(code, "T", torque)
-    watch.guard(bounds, edges, row("t_low"), row("t_high"))
-    watch.peak(bounds, block, row("torque_max"))
-    force = code.series("e", row("force"), layout.coefficients)
-    # The step is chosen by two coefficients. A law without a linear term, entered from uniform motion, has a series in
-    # which most coefficients vanish, these two perhaps among them: only the defect of the torque's series at the step's
-    # end tells that the step is too long.
-    torque_end = code.let("torque_end", " + ".join(torque))
-    law = horner(force, code.let("u_end", " + ".join(u)))
-    defect = code.let("defect", f"abs({law} - {torque_end})*(1.0 - {code.row(row('locked'))})")
-    watch.margin = code.let("margin", f"{watch.margin} if {defect} <= {code.row(row('allowed'))} else {TOO_LONG!r}")
-    phi = watch.primitive("p", code.load("phi_start", row("phi")), w)
-    watch.peak(range_bounds(code, "p", phi), block, row("phi_max"), row("phi_min"))
-    watch.peak(range_bounds(code, "w", w), block, row("speed_max"), row("speed_min"))
-    watch.peak(range_bounds(code, "R", watch.rates(w)), block, row("acc_max"), row("acc_min"))
-    return watch.loop()
+def bounds_loop(layout: Layout) -> str:
+    """Source of the loop that bounds everything watched."""
+    watch = _Watch(layout)
+    for index in range(layout.n):
+        watch.pendulum(index)
+    watch.shaft()
+    watch.code.store(layout.margin, watch.margin)
+    watch.code.store(layout.excess, watch.excess)
+    return watch.code.loop()

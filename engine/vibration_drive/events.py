@@ -33,6 +33,7 @@ from engine.vibration_drive.states import (
     set_clutch,
     set_shaft,
     stored_energy,
+    total,
     watch_fall,
 )  # fmt: skip
 
@@ -130,15 +131,17 @@ def collect_guards(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks
     fresh = W[lay.steps * lanes + lane] == Z[lane, SKIP_STEP]
     shaft = Z[lane, SHAFT_STATE]
     if not W[(lay.m_sum_high if shaft == HELD else lay.m_speed_low) * lanes + lane] > 0.0:
-        first = (lay.sum if shaft == HELD else lay.speed) * lanes + lane
-        sign = -1.0 if shaft == HELD else 1.0
-        for k in range(lay.order + 1):
-            g[k] = sign * W[first + k * lanes]
         if shaft == HELD:
+            total(W, lay, lane, g)
+            for k in range(lay.order + 1):
+                g[k] = -g[k]
             g[0] += W[lay.sum_high * lanes + lane]
-        elif fresh:
-            for k in range(Z[lane, SKIP_SHAFT]):
-                g[k] = 0.0
+        else:
+            for k in range(lay.order + 1):
+                g[k] = W[(lay.speed + k) * lanes + lane]
+            if fresh:
+                for k in range(Z[lane, SKIP_SHAFT]):
+                    g[k] = 0.0
         target = ROTATING if shaft == HELD else HELD
         used = _enter(W, Z, lay, lane, OF_SHAFT, target, g, blocks, meta, used)
     literal = Z[lane, LITERAL]

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from engine.cache import cache_folder
 from engine.taylor.batch import ROWS, SLOTS, peaks_loop, roots_loop
-from engine.vibration_drive.advance import pendulum_advance, shaft_advance
-from engine.vibration_drive.bounds import pendulum_bounds, shaft_bounds
+from engine.vibration_drive.advance import advance_loop
+from engine.vibration_drive.bounds import bounds_loop
 from engine.vibration_drive.equations import series_loop
 from engine.vibration_drive.layout import Layout, make_layout
 
@@ -33,7 +33,7 @@ _MODULE = '''"""Generated kernel: {n} pendulum(s), {coefficients} clutch coeffic
 import numpy as np
 
 from engine.jit import compiled, unmanaged
-from engine.taylor.lowering import lane_loops
+from engine.taylor.lowering import constant_record, lane_loops, lane_mask, lowest
 from engine.vibration_drive.events import settle_guards
 from engine.vibration_drive.lanes import load_case, look_for_events, next_stop, record, settle
 from engine.vibration_drive.layout import Layout, as_record
@@ -41,6 +41,7 @@ from engine.vibration_drive.window import collect_peaks, settle_peaks
 
 LAYOUT = {layout!r}
 RECORD = as_record(LAYOUT)
+fixed = constant_record(RECORD)
 
 
 # Series, step size, distances to guards and extrema of every lane.
@@ -61,6 +62,12 @@ find_peaks = lane_loops("""
 {peaks}
 """, "unused", "unused_too")
 
+# Lanes that may have an event, that may exceed an extremum, that move at all, that need more than the next step.
+doubtful = lane_mask("<=", LAYOUT.margin, LAYOUT.lanes)
+exceeding = lane_mask(">", LAYOUT.excess, LAYOUT.lanes)
+moving = lane_mask(">", LAYOUT.x, LAYOUT.lanes)
+noted = lane_mask("!=", LAYOUT.attention, LAYOUT.lanes)
+
 
 @compiled
 def integrate(
@@ -68,48 +75,53 @@ def integrate(
     times, samples, states,
 ):
     """Run every case, filling a lane again the moment its case ends; the number of samples recorded (of case 0)."""
+    lay = fixed(lay)
     cases, turns, sums, times = unmanaged(cases), unmanaged(turns), unmanaged(sums), unmanaged(times)
     W, Z, g, stack, blocks, meta = (
         unmanaged(W), unmanaged(Z), unmanaged(g), unmanaged(stack), unmanaged(blocks), unmanaged(meta)
     )
     samples, states = unmanaged(samples), unmanaged(states)
-    running = 0
+    busy = 0  # bit k: lane k has a case
     queue = 0
     recorded = 0
-    busy = np.zeros({lanes}, dtype=np.bool_)
     while True:
-        for lane in range({lanes}):
-            if not busy[lane] and queue < cases.shape[0]:
-                load_case(W, Z, lay, lane, queue, cases, literal)
-                next_stop(W, Z, lay, lane, cases, sums[queue])
-                busy[lane] = True
-                queue += 1
-                running += 1
-        if running == 0:
+        idle = ~busy & {every}
+        while idle != 0 and queue < cases.shape[0]:
+            lane = lowest(idle)
+            idle &= idle - 1
+            load_case(W, Z, lay, lane, queue, cases, literal)
+            next_stop(W, Z, lay, lane, cases, sums[queue])
+            busy |= 1 << lane
+            queue += 1
+        if busy == 0:
             return recorded
         step(W, tolerance, log2_tolerance)
         used = 0
-        for lane in range({lanes}):
-            if busy[lane] and not W[{margin} + lane] > 0.0:
-                used = look_for_events(W, Z, lay, lane, g, blocks, meta, used)
+        left = busy & doubtful(W)
+        while left != 0:
+            used = look_for_events(W, Z, lay, lowest(left), g, blocks, meta, used)
+            left &= left - 1
         for start in range(0, (used + {slots} - 1) // {slots} * {block}, {block}):
             find_roots(blocks[start : start + {block}], 0.0, 0.0)
         settle_guards(W, Z, lay, g, stack, blocks, meta, used)
         used = 0
-        for lane in range({lanes}):
-            # A state that is left at once lasts no time and has no extrema.
-            if busy[lane] and not W[{excess} + lane] <= 0.0 and W[{x} + lane] > 0.0:
-                used = collect_peaks(W, lay, lane, g, blocks, meta, used)
+        # A state that is left at once lasts no time and has no extrema.
+        left = busy & exceeding(W) & moving(W)
+        while left != 0:
+            used = collect_peaks(W, lay, lowest(left), g, blocks, meta, used)
+            left &= left - 1
         for start in range(0, (used + {slots} - 1) // {slots} * {block}, {block}):
             find_peaks(blocks[start : start + {block}], 0.0, 0.0)
         settle_peaks(W, lay, g, stack, blocks, meta, used)
         if recorded < times.shape[0]:
             recorded = record(W, Z, lay, 0, times, recorded, g, samples, states)
         advance(W, float(most_steps), 0.0)
-        for lane in range({lanes}):
-            if busy[lane] and W[{attention} + lane] != 0.0:
-                busy[lane] = settle(W, Z, lay, lane, cases, turns, sums, most_steps, most_events)
-                running -= not busy[lane]
+        left = busy & noted(W)
+        while left != 0:
+            lane = lowest(left)
+            left &= left - 1
+            if not settle(W, Z, lay, lane, cases, turns, sums, most_steps, most_events):
+                busy &= ~(1 << lane)
 '''
 
 
@@ -127,35 +139,34 @@ class Kernel(Protocol):
 
 
 def order_for(tolerance: float) -> int:
-    """Order of the series for a tolerance: 14 at 1e-9.
+    """Order of the series for a tolerance: 12 at 1e-9.
 
-    Jorba and Zou (2005, eq. 12) find ``1 - ln(tolerance)/2`` optimal for long smooth arcs; a little more pays here
-    because every step also costs a look for events (benchmarks/engine.py).
+    Next to what Jorba and Zou (2005, eq. 12) find optimal, ``1 - ln(tolerance)/2``. Between 11 and 14 the time is the
+    same within a tenth (benchmarks.kernel_shape): higher orders take longer steps, but have more code.
     """
-    return max(6, 1 + math.ceil(-0.6 * math.log(tolerance)))
+    return max(6, 1 + math.ceil(-0.52 * math.log(tolerance)))
 
 
 @cache
 def lane_count() -> int:
-    """Lanes of this machine's kernels: 16 are two vectors of AVX-512 or four of AVX2, 8 are four vectors of NEON.
+    """Lanes of this machine's kernels: 40 are five vectors of AVX-512 or ten of AVX2, 24 are twelve of NEON.
 
-    With AVX2 alone, 8 lanes were a sixth slower than 16 (benchmarks.engine, with ``NUMBA_CPU_NAME=haswell``).
+    A kernel's code does not fit into the first cache of instructions, so that it pays to use what is fetched for many
+    lanes; beyond 40 nothing is gained (benchmarks.kernel_shape; NEON was not measured). A power of two would put all
+    rows of a lane into the same few places of the first cache of numbers.
     """
-    return 16 if llvm.get_host_cpu_features().get("avx2") else 8
+    return 40 if llvm.get_host_cpu_features().get("avx2") else 24
 
 
 def source(layout: Layout) -> str:
     """The text of the kernel module for a layout."""
-    pendulums = range(layout.n)
-    step = [series_loop(layout), shaft_bounds(layout), *(pendulum_bounds(layout, i) for i in pendulums)]
-    advance = [*(pendulum_advance(layout, i) for i in pendulums), shaft_advance(layout)]
+    assert layout.lanes < 64, "masks of lanes are 64-bit integers"
     return _MODULE.format(
         n=layout.n, coefficients=layout.coefficients, order=layout.order, lanes=layout.lanes, layout=layout,
-        margin=layout.margin * layout.lanes, excess=layout.excess * layout.lanes,
-        attention=layout.attention * layout.lanes, x=layout.x * layout.lanes,
+        every=2**layout.lanes - 1,
         slots=SLOTS, block=SLOTS * (layout.order + ROWS),
         roots=roots_loop(layout.order), peaks=peaks_loop(layout.order),
-        step="\n".join(step), advance="\n".join(advance),
+        step=series_loop(layout) + "\n" + bounds_loop(layout), advance=advance_loop(layout),
     )  # fmt: skip
 
 

@@ -58,7 +58,6 @@ class Layout(NamedTuple):
     time_held: int
     time_rotating: int
     time_driven: int
-    work_clutch: int
     # extrema over the window
     speed_max: int
     speed_min: int
@@ -85,11 +84,8 @@ class Layout(NamedTuple):
     # distance of this step to the shaft's guards
     m_sum_high: int
     m_speed_low: int
-    # series of the shaft, order + 1 coefficients each, in fractions of the planned step: speed, sum of the clutch
-    # torques, power of the clutches
+    # series of the shaft's speed, order + 1 coefficients, in fractions of the planned step
     speed: int
-    sum: int
-    power: int
     # one pendulum
     p_ml: int
     p_spring: int
@@ -157,7 +153,7 @@ def make_layout(n: int, coefficients: int, order: int, lanes: int) -> Layout:
     """Lay out the rows for ``n`` pendulums, that many clutch coefficients, series of that order, and that many
     lanes.
     """
-    sizes = dict.fromkeys(("speed", "sum", "power", "p_speed", "p_torque"), order + 1)
+    sizes = dict.fromkeys(("speed", "p_speed", "p_torque"), order + 1)
     sizes |= {"p_drive": order, "p_law": coefficients, "p_force": coefficients}
     names = Layout._fields[Layout._fields.index("stride") + 1 :]
     fields: dict[str, int] = {}

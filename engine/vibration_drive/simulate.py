@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from engine.endings import ENDING_CODES, Ending
 from engine.run import Run
-from engine.taylor.batch import blocks_for
+from engine.taylor.batch import aligned_zeros, blocks_for
 from engine.taylor.roots import MAX_DEGREE, work_stack
 from engine.vibration_drive.automaton import Clutch, Shaft
 from engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count
@@ -86,7 +86,7 @@ def _integrate(
     done = module.integrate(
         module.RECORD, matrix, run.tolerance, math.log2(run.tolerance), int(run.reset == "literal"),
         run.max_steps, run.max_events_per_period,
-        np.zeros(lay.rows * lay.lanes), np.zeros((lay.lanes, LANE_INTEGERS), dtype=np.int64),
+        aligned_zeros(lay.rows * lay.lanes), np.zeros((lay.lanes, LANE_INTEGERS), dtype=np.int64),
         np.zeros(MAX_DEGREE + 1), work_stack(),
         blocks_for(listed, lay.order), np.zeros((listed, 3), dtype=np.int64),
         np.zeros((lay.lanes, periods)), sums, times, samples, states,

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.jit import part
+from engine.jit import inlined, part
 from engine.vibration_drive.automaton import CLUTCH_THRESHOLD, Band, Clutch, Shaft, Threshold
 from engine.vibration_drive.layout import Layout
 
@@ -57,6 +57,17 @@ def law_slope(W: Floats, first: int, count: int, lanes: int, lane: int, u: float
     for k in range(count - 1, 0, -1):
         value = value * u + k * W[(first + k) * lanes + lane]
     return value
+
+
+@inlined
+def total(W: Floats, lay: Layout, lane: int, g: Floats) -> None:
+    """Write the series of the sum of the clutch torques into ``g`` (shape (order + 1,))."""
+    for k in range(lay.order + 1):
+        g[k] = 0.0
+    for i in range(lay.n):
+        first = lay.pendulums + i * lay.stride + lay.p_torque
+        for k in range(lay.order + 1):
+            g[k] += W[(first + k) * lay.lanes + lane]
 
 
 @part

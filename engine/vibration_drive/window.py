@@ -10,7 +10,7 @@ from engine.taylor.batch import HARD, KNOWN, RESULT, SLOTS, STATUS, slot_start, 
 from engine.taylor.roots import RECIPROCAL, evaluate, largest
 from engine.vibration_drive.automaton import Clutch
 from engine.vibration_drive.layout import Layout
-from engine.vibration_drive.states import NEVER, stored_energy
+from engine.vibration_drive.states import NEVER, stored_energy, total
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -46,6 +46,17 @@ def primitive(W: Floats, lay: Layout, lane: int, start: float, row: int, minus: 
         if minus >= 0:
             value -= W[(minus + k) * lay.lanes + lane]
         g[k + 1] = h * value * RECIPROCAL[k + 1]
+
+
+@part
+def _power(W: Floats, lay: Layout, lane: int, g: Floats) -> None:
+    """Like ``series``, but of the power of all clutches, cut off at the order."""
+    total(W, lay, lane, g)
+    for k in range(lay.order, -1, -1):
+        value = 0.0
+        for j in range(k + 1):
+            value += g[j] * W[(lay.speed + k - j) * lay.lanes + lane]
+        g[k] = value
 
 
 @inlined
@@ -105,11 +116,12 @@ def collect_peaks(W: Floats, lay: Layout, lane: int, g: Floats, blocks: Floats, 
     if _exceeds(W, lay, lane, lay.x_acc_max, lay.x_acc_max):
         rate(W, lay, lane, lay.speed, g)
         used = _enter(W, lay, lane, lay.acc_max, block, 1.0, g, blocks, meta, used)
-    if _exceeds(W, lay, lane, lay.x_sum_max, lay.x_sum_max):
-        series(W, lay, lane, lay.sum, g)
+    # The sum of a single torque has that torque's extremum.
+    if lay.n > 1 and _exceeds(W, lay, lane, lay.x_sum_max, lay.x_sum_max):
+        total(W, lay, lane, g)
         used = _enter(W, lay, lane, lay.sum_max, block, 1.0, g, blocks, meta, used)
     if _exceeds(W, lay, lane, lay.x_power_max, lay.x_power_max):
-        series(W, lay, lane, lay.power, g)
+        _power(W, lay, lane, g)
         used = _enter(W, lay, lane, lay.power_max, block, 1.0, g, blocks, meta, used)
     block = lay.p_x_phi_max - lay.p_phi_max
     for i in range(lay.n):
@@ -197,7 +209,7 @@ def sample(W: Floats, Z: Ints, lay: Layout, lane: int, x: float, g: Floats, out:
     out[1] = evaluate(g, lay.order, x)
     rate(W, lay, lane, lay.speed, g)
     out[2] = evaluate(g, lay.order, x)
-    series(W, lay, lane, lay.sum, g)
+    total(W, lay, lane, g)
     out[3] = evaluate(g, lay.order, x)
     states[0] = int(W[lay.rotating * lanes + lane])
     for i in range(lay.n):

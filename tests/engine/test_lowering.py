@@ -10,8 +10,21 @@ import numba
 import numpy as np
 import pytest
 
-from engine.taylor.lowering import lane_loops
-from engine.taylor.straight import LaneCode, exp2, horner, integral, log2, product, range_bounds, sincos
+from engine.taylor.lowering import lane_loops, lane_mask, lowest
+from engine.taylor.straight import (
+    LaneCode,
+    Span,
+    exp2,
+    horner,
+    integral,
+    log2,
+    primitive_span,
+    product,
+    rate_span,
+    sincos,
+    span,
+    square,
+)
 
 LANES = 8
 
@@ -110,16 +123,86 @@ def test_series_products_values_and_integrals() -> None:
         np.testing.assert_allclose(out[13, lane], p.integ()(x[lane]), rtol=1e-13, atol=1e-14)
 
 
-def test_bounds_hold_and_are_near() -> None:
-    rng = np.random.default_rng(5)
-    a = rng.normal(size=(8, LANES)) * 0.3 ** np.arange(8)[:, None]
+@pytest.mark.parametrize("k", range(8))
+def test_coefficients_of_products_and_squares(k: int) -> None:
+    a, b = np.random.default_rng(4).normal(size=(2, 8, LANES))
     code = LaneCode(LANES)
-    low, high = range_bounds(code, "a", code.series("a", 0, 8))
-    code.store(8, low)
-    code.store(9, high)
-    out = run(code, [*a.tolist(), [0.0] * LANES, [0.0] * LANES])
-    values = np.polynomial.polynomial.polyval(np.linspace(0.0, 1.0, 2001), a)
-    assert np.all(out[8] <= values.min(axis=1) + 1e-14)
-    assert np.all(out[9] >= values.max(axis=1) - 1e-14)
-    span = values.max(axis=1) - values.min(axis=1)
-    assert np.all(out[9] - out[8] <= span + np.abs(a[2:]).sum(axis=0))
+    first, second = code.series("a", 0, 8), code.series("b", 8, 8)
+    code.store(16, product(first, second, k))
+    code.store(17, square(first, k))
+    out = run(code, [*a.tolist(), *b.tolist(), [0.0] * LANES, [0.0] * LANES])
+    for lane in range(LANES):
+        np.testing.assert_allclose(out[16, lane], np.convolve(a[:, lane], b[:, lane])[k], rtol=1e-13, atol=1e-13)
+        np.testing.assert_allclose(out[17, lane], np.convolve(a[:, lane], a[:, lane])[k], rtol=1e-13, atol=1e-13)
+
+
+def _spans(code: LaneCode, names: list[str], kind: str) -> Span:
+    if kind == "series":
+        return span(code, "a", names)
+    h = code.load("h", 8)
+    if kind == "rate":
+        return rate_span(code, "a", names, code.let("inverse_h", f"1.0/{h}"))
+    return primitive_span(code, "a", code.load("start", 9), names, h)
+
+
+def _curves(kind: str, a: np.ndarray, h: np.ndarray, start: np.ndarray) -> list[np.polynomial.Polynomial]:
+    """The polynomials a span of that kind is about, one a lane."""
+    curves = [np.polynomial.Polynomial(column) for column in a.T]
+    if kind == "rate":
+        return [curve.deriv() / step for curve, step in zip(curves, h, strict=True)]
+    if kind == "primitive":
+        return [curve.integ() * step + first for curve, step, first in zip(curves, h, start, strict=True)]
+    return curves
+
+
+@pytest.mark.parametrize("kind", ["series", "rate", "primitive"])
+@pytest.mark.parametrize("seed", range(40))
+def test_spans_hold_and_are_near(kind: str, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    a = rng.normal(size=(8, LANES)) * rng.uniform(0.05, 0.6, LANES) ** np.arange(8)[:, None]
+    h, start = rng.uniform(0.1, 2.0, LANES), rng.normal(size=LANES)
+    code = LaneCode(LANES)
+    found = _spans(code, code.series("a", 0, 8), kind)
+    for row, text in enumerate((found.start, found.end, found.slope, found.low, found.high, found.least_slope), 10):
+        code.store(row, text)
+    code.store(16, f"1.0 if {found.monotone} else 0.0")
+    out = run(code, [*a.tolist(), h.tolist(), start.tolist(), *([[0.0] * LANES] * 7)])
+    x = np.linspace(0.0, 1.0, 2001)
+    for lane, curve in enumerate(_curves(kind, a, h, start)):
+        values, slopes = curve(x), curve.deriv()(x)
+        size = 1e-13 * np.abs(curve.coef).sum()
+        np.testing.assert_allclose(out[10:13, lane], [values[0], values[-1], slopes[0]], rtol=1e-12, atol=size)
+        assert out[13, lane] <= values.min() + size
+        assert out[14, lane] >= values.max() - size
+        assert out[14, lane] - out[13, lane] <= np.ptp(values) + np.abs(curve.coef[2:]).sum() + size
+        chords = (values[1:] - values[0]) / x[1:]
+        assert np.all(np.abs(chords - slopes[0]) <= out[15, lane] * (1.0 + 1e-12) + size)
+        if out[16, lane] == 1.0:
+            assert slopes.min() > 0.0 or slopes.max() < 0.0
+
+
+def test_short_steps_are_seen_to_be_monotone() -> None:
+    a = np.array([[2.0] * LANES, [1.0] * LANES, np.linspace(-0.2, 0.2, LANES), [1e-3] * LANES])
+    code = LaneCode(LANES)
+    code.store(4, f"1.0 if {span(code, 'a', code.series('a', 0, 4)).monotone} else 0.0")
+    assert run(code, [*a.tolist(), [0.0] * LANES])[4].tolist() == [1.0] * LANES
+
+
+@pytest.mark.parametrize("lanes", [8, 16, 32, 64])
+def test_masks_of_lanes(lanes: int) -> None:
+    values = np.random.default_rng(lanes).choice([-1.0, -0.0, 0.0, 2.0, math.nan], size=(3, lanes))
+    signs = {"<=": np.less_equal, ">": np.greater, "!=": np.not_equal}
+    for sign, compare in signs.items():
+        find = lane_mask(sign, 1, lanes)
+
+        @numba.njit
+        def lanes_of(W: np.ndarray) -> list[int]:
+            left = find(W)  # noqa: B023
+            found = [-1]
+            while left != 0:
+                found.append(lowest(left))
+                left &= left - 1
+            return found
+
+        expected = np.flatnonzero(compare(values[1], 0.0) | np.isnan(values[1]))
+        assert lanes_of(values.ravel())[1:] == expected.tolist()
