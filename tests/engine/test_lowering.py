@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -10,7 +11,8 @@ import numba
 import numpy as np
 import pytest
 
-from engine.taylor.lowering import lane_loops, lane_mask, lowest
+from engine.taylor.batch import aligned_zeros
+from engine.taylor.lowering import constant_record, lane_loops, lane_mask, lowest
 from engine.taylor.straight import (
     LaneCode,
     Span,
@@ -186,6 +188,42 @@ def test_short_steps_are_seen_to_be_monotone() -> None:
     code = LaneCode(LANES)
     code.store(4, f"1.0 if {span(code, 'a', code.series('a', 0, 4)).monotone} else 0.0")
     assert run(code, [*a.tolist(), [0.0] * LANES])[4].tolist() == [1.0] * LANES
+
+
+def test_the_stack_of_lane_loops_is_aligned_for_every_vector() -> None:
+    """What finds no register would lie across two cache lines in most processes, and in some not."""
+    loops = lane_loops("for lane in range(8):\n    W[0 + lane] = W[8 + lane] + 1.0", "first", "second")
+
+    @numba.njit
+    def call(W: np.ndarray) -> None:
+        loops(W, 0.0, 0.0)
+
+    workspace = np.zeros(16)
+    call(workspace)
+    assert workspace.tolist() == [1.0] * 8 + [0.0] * 8
+    body = next(iter(call.inspect_llvm().values()))
+    number = re.search(r"^define [^\n]*@_ZN8?[^\n]*call[^\n]*\) [^\n]*#(\d+)", body, re.MULTILINE)
+    assert number is not None
+    assert re.search(rf"attributes #{number[1]} = {{[^}}]*alignstack=64", body)
+
+
+def test_a_record_becomes_a_constant() -> None:
+    kind = np.dtype([("a", np.int64), ("b", np.int64)])
+    given, other = np.array([(3, -5)], kind)[0], np.array([(70, 900)], kind)[0]
+    fixed = constant_record(given)
+
+    @numba.njit
+    def fields(record: Any) -> tuple[int, int]:
+        record = fixed(record)
+        return record.a, record.b
+
+    assert fields(other) == (3, -5)
+
+
+@pytest.mark.parametrize("size", [1, 7, 64, 1000, 40_000])
+def test_workspaces_begin_with_a_cache_line(size: int) -> None:
+    kept = [aligned_zeros(size) for _ in range(20)]
+    assert all(array.ctypes.data % 64 == 0 and array.shape == (size,) and not array.any() for array in kept)
 
 
 @pytest.mark.parametrize("lanes", [8, 16, 32, 64])
