@@ -225,7 +225,7 @@ def test_the_source_of_a_kernel_is_shown(sprag: Sprag) -> None:
     compile(done.out, "kernel", "exec")
     other = sprag("doctor", "--kernel", "--pendulums", 2, "--coefficients", 3, "--tolerance", 1e-6, "--json").data
     assert (other["pendulums"], other["coefficients"], other["tolerance"]) == (2, 3, 1e-6)
-    assert other["source"].startswith('"""Generated kernel: 2 pendulum(s), 3 clutch coefficients, order 10')
+    assert other["source"].startswith('"""Generated kernel: 2 pendulum(s), 3 clutch coefficients, order 9')
 
 
 @pytest.mark.parametrize(
