@@ -18,6 +18,7 @@ import numpy as np
 
 from benchmarks.workloads import CASES, PERIODS, Timing, Workload, take_turns
 from engine.run import Run, Span
+from engine.taylor.lowering import GROUP
 from engine.vibration_drive import simulate as module
 
 _LOOPS = 2000
@@ -45,15 +46,15 @@ def _restore(W: Any, saved: Any, times: int) -> None:
         W[:] = saved
 
 
-def _stepper(step: Any, advance: Any) -> Any:
+def _stepper(step: Any, advance: Any, groups: int) -> Any:
     """A compiled loop over the lane loops of one kernel, which can only be called from compiled code."""
 
     @numba.njit
     def step_and_advance(W: Any, saved: Any, times: int, tolerance: float, log2_tolerance: float) -> None:
         for _ in range(times):
             W[:] = saved
-            step(W, tolerance, log2_tolerance)
-            advance(W, 1e9, 0.0)
+            step(W, tolerance, log2_tolerance, groups)
+            advance(W, 1e9, 0.0, groups)
 
     return step_and_advance
 
@@ -79,12 +80,12 @@ def stepping(workload: Workload, tolerance: float) -> tuple[float, int, int]:
         return spies[-1]
 
     with patch.object(module, "kernel", spying):
-        cases = np.arange(0, CASES, CASES // 16)
+        cases = np.arange(0, CASES, CASES // 64)  # more than lanes
         module.simulate(workload.columns(cases), Run(tolerance=tolerance, max_steps=_MID_RUN), cases=len(cases))
     spy = spies[-1]
     W, saved = spy.arguments["W"], spy.arguments["W"].copy()
     limits = (spy.arguments["tolerance"], spy.arguments["log2_tolerance"])
-    stepped = _seconds(_stepper(spy.step, spy.advance), W, saved, _LOOPS, *limits)
+    stepped = _seconds(_stepper(spy.step, spy.advance, spy.LAYOUT.lanes // GROUP), W, saved, _LOOPS, *limits)
     lanes = spy.LAYOUT.lanes
     return (stepped - _seconds(_restore, W, saved, _LOOPS)) / lanes, spy.LAYOUT.order, lanes
 

@@ -21,6 +21,8 @@ _DOUBLE = ir.DoubleType()
 _INT = ir.IntType(64)
 #: Products and sums may become fused multiply-adds; nothing is reordered.
 _FLAGS = ("contract",)
+#: Lanes that are always computed together: the doubles of the largest vector.
+GROUP = 8
 #: Bytes: the largest vector, a cache line.
 _STACK_ALIGNMENT = 64
 _ARITHMETIC = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"}
@@ -103,8 +105,9 @@ class _Lane:
         return self.builder.bitcast(self.builder.fptosi(argument, _INT), _DOUBLE)
 
 
-def lane_loops(text: str, first: str, second: str) -> Callable[[Any, float, float], None]:
-    """A function ``(W, a, b)`` for compiled code that runs the loops in ``text`` over the float64 workspace ``W``.
+def lane_loops(text: str, first: str, second: str) -> Callable[[Any, float, float, int], None]:
+    """A function ``(W, a, b, groups)`` for compiled code that runs the loops in ``text`` over the float64 workspace
+    ``W``, for the first so many groups of `GROUP` lanes.
 
     ``first`` and ``second`` are the names under which the loops know the numbers a and b. The function can only be
     called from a numba function; it is compiled as part of that one.
@@ -112,7 +115,7 @@ def lane_loops(text: str, first: str, second: str) -> Callable[[Any, float, floa
     tree = ast.parse(text)
 
     @intrinsic
-    def run(typing_context: Any, W: Any, a: Any, b: Any) -> Any:  # noqa: ARG001
+    def run(typing_context: Any, W: Any, a: Any, b: Any, groups: Any) -> Any:  # noqa: ARG001
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             array = context.make_array(signature.args[0])(context, builder, arguments[0])
             # Vectors that find no register go to the stack, which is aligned for the smallest of them only.
@@ -121,17 +124,20 @@ def lane_loops(text: str, first: str, second: str) -> Callable[[Any, float, floa
             numbers = {first: arguments[1], second: arguments[2]}
             for loop in tree.body:
                 assert isinstance(loop, ast.For)
-                assert isinstance(loop.iter, ast.Call)
-                assert isinstance(loop.iter.args[0], ast.Constant)
-                with cgutils.for_range(builder, _INT(loop.iter.args[0].value)) as counter:
-                    lane = _Lane(builder, array.data, counter.index, dict(numbers))
+                with (
+                    cgutils.for_range(builder, arguments[3]) as group,
+                    cgutils.for_range(builder, _INT(GROUP)) as member,
+                ):
+                    start = builder.mul(group.index, _INT(GROUP), flags=("nsw", "nuw"))
+                    index = builder.add(start, member.index, flags=("nsw", "nuw"))
+                    lane = _Lane(builder, array.data, index, dict(numbers))
                     for statement in loop.body:
                         lane.statement(statement)
             return context.get_dummy_value()
 
-        return types.void(W, types.float64, types.float64), generate
+        return types.void(W, types.float64, types.float64, types.int64), generate
 
-    return cast(Callable[[Any, float, float], None], run)
+    return cast(Callable[[Any, float, float, int], None], run)
 
 
 def lane_mask(sign: str, row: int, lanes: int) -> Callable[[Any], int]:

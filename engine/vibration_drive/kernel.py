@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from engine.cache import cache_folder
 from engine.taylor.batch import ROWS, SLOTS, peaks_loop, roots_loop
+from engine.taylor.lowering import GROUP
 from engine.vibration_drive.advance import advance_loop
 from engine.vibration_drive.bounds import bounds_loop
 from engine.vibration_drive.equations import series_loop
@@ -81,11 +82,12 @@ def integrate(
         unmanaged(W), unmanaged(Z), unmanaged(g), unmanaged(stack), unmanaged(blocks), unmanaged(meta)
     )
     samples, states = unmanaged(samples), unmanaged(states)
+    groups = min((cases.shape[0] + {group} - 1) // {group}, {groups})  # of lanes that are ever used
     busy = 0  # bit k: lane k has a case
     queue = 0
     recorded = 0
     while True:
-        idle = ~busy & {every}
+        idle = ~busy & ((1 << groups * {group}) - 1)
         while idle != 0 and queue < cases.shape[0]:
             lane = lowest(idle)
             idle &= idle - 1
@@ -95,14 +97,14 @@ def integrate(
             queue += 1
         if busy == 0:
             return recorded
-        step(W, tolerance, log2_tolerance)
+        step(W, tolerance, log2_tolerance, groups)
         used = 0
         left = busy & doubtful(W)
         while left != 0:
             used = look_for_events(W, Z, lay, lowest(left), g, blocks, meta, used)
             left &= left - 1
         for start in range(0, (used + {slots} - 1) // {slots} * {block}, {block}):
-            find_roots(blocks[start : start + {block}], 0.0, 0.0)
+            find_roots(blocks[start : start + {block}], 0.0, 0.0, {slot_groups})
         settle_guards(W, Z, lay, g, stack, blocks, meta, used)
         used = 0
         # A state that is left at once lasts no time and has no extrema.
@@ -111,11 +113,11 @@ def integrate(
             used = collect_peaks(W, lay, lowest(left), g, blocks, meta, used)
             left &= left - 1
         for start in range(0, (used + {slots} - 1) // {slots} * {block}, {block}):
-            find_peaks(blocks[start : start + {block}], 0.0, 0.0)
+            find_peaks(blocks[start : start + {block}], 0.0, 0.0, {slot_groups})
         settle_peaks(W, lay, g, stack, blocks, meta, used)
         if recorded < times.shape[0]:
             recorded = record(W, Z, lay, 0, times, recorded, g, samples, states)
-        advance(W, float(most_steps), 0.0)
+        advance(W, float(most_steps), 0.0, groups)
         left = busy & noted(W)
         while left != 0:
             lane = lowest(left)
@@ -149,7 +151,7 @@ def order_for(tolerance: float) -> int:
 
 @cache
 def lane_count() -> int:
-    """Lanes of this machine's kernels: 40 are five vectors of AVX-512 or ten of AVX2, 24 are twelve of NEON.
+    """Lanes of this machine's kernels, whole groups: 40 are five vectors of AVX-512 or ten of AVX2, 24 are twelve of NEON.
 
     A kernel's code does not fit into the first cache of instructions, so that it pays to use what is fetched for many
     lanes; beyond 40 nothing is gained (benchmarks.kernel_shape; NEON was not measured). A power of two would put all
@@ -161,9 +163,10 @@ def lane_count() -> int:
 def source(layout: Layout) -> str:
     """The text of the kernel module for a layout."""
     assert layout.lanes < 64, "masks of lanes are 64-bit integers"
+    assert layout.lanes % GROUP == 0
     return _MODULE.format(
         n=layout.n, coefficients=layout.coefficients, order=layout.order, lanes=layout.lanes, layout=layout,
-        every=2**layout.lanes - 1,
+        group=GROUP, groups=layout.lanes // GROUP, slot_groups=SLOTS // GROUP,
         slots=SLOTS, block=SLOTS * (layout.order + ROWS),
         roots=roots_loop(layout.order), peaks=peaks_loop(layout.order),
         step=series_loop(layout) + "\n" + bounds_loop(layout), advance=advance_loop(layout),

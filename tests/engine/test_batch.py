@@ -21,7 +21,7 @@ from engine.taylor.batch import (
     peaks_loop,
     roots_loop,
 )
-from engine.taylor.lowering import lane_loops
+from engine.taylor.lowering import GROUP, lane_loops
 from engine.taylor.roots import MAX_DEGREE, NO_ROOT, work_stack
 from tests.engine.polynomials import first_root, largest, put, slot_start, take
 
@@ -34,7 +34,7 @@ def _compiled(loop: str) -> Callable[[Block], None]:
 
     @numba.njit
     def call(block: Block) -> None:
-        run(block, 0.0, 0.0)
+        run(block, 0.0, 0.0, SLOTS // GROUP)
 
     return call  # type: ignore[no-any-return]
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from engine.taylor.batch import aligned_zeros
-from engine.taylor.lowering import constant_record, lane_loops, lane_mask, lowest
+from engine.taylor.lowering import GROUP, constant_record, lane_loops, lane_mask, lowest
 from engine.taylor.straight import (
     LaneCode,
     Span,
@@ -33,11 +33,11 @@ LANES = 8
 
 def run(code: LaneCode, rows: list[list[float]], *, a: float = 0.0, b: float = 0.0) -> np.ndarray:
     """Run one loop over a workspace whose rows are given; the workspace afterwards, one row a line."""
-    loops: Callable[[Any, float, float], None] = lane_loops(code.loop(), "first", "second")
+    loops: Callable[[Any, float, float, int], None] = lane_loops(code.loop(), "first", "second")
 
     @numba.njit
     def call(W: np.ndarray, a: float, b: float) -> None:
-        loops(W, a, b)
+        loops(W, a, b, LANES // GROUP)
 
     workspace = np.array(rows, dtype=np.float64)
     flat = np.ascontiguousarray(workspace).ravel()
@@ -196,7 +196,7 @@ def test_the_stack_of_lane_loops_is_aligned_for_every_vector() -> None:
 
     @numba.njit
     def call(W: np.ndarray) -> None:
-        loops(W, 0.0, 0.0)
+        loops(W, 0.0, 0.0, 1)
 
     workspace = np.zeros(16)
     call(workspace)
