@@ -21,7 +21,7 @@ class _Advance:
         self.taken = code.let("taken", f"{self.x}*{self.h}")
         self.shaft = code.series("W", layout.speed, layout.order + 1)
         self.attention = code.load("at_stop", layout.at_stop)
-        self.impulse = "0.0"
+        self.torques: list[list[str]] = []
 
     def add(self, row: int, amount: str) -> None:
         """Add to the sum at ``row``."""
@@ -51,9 +51,9 @@ class _Advance:
             *(code.let("phi", f"{self.h}*{w[k]}*{1.0 / (k + 1)!r}") for k in range(order)),
         ]
         self.add(row("sum_phi"), self.over(angle))
-        torque = self.over(code.series("T", row("torque"), order + 1))
-        self.impulse = f"{self.impulse} + {torque}"
-        self.add(row("sum_torque"), torque)
+        torque = code.series("T", row("torque"), order + 1)
+        self.torques.append(torque)
+        self.add(row("sum_torque"), self.over(torque))
         self.add(row("work_input"), self.over([code.let("I", product(w, drive, k)) for k in range(order)]))
         self.add(row("work_loss"), self.over([code.let("Q", square(w, k)) for k in range(order)]))
         self.add(row("time_engaged"), f"{code.row(row('engaged'))}*{self.taken}")
@@ -70,7 +70,10 @@ class _Advance:
         """Move the shaft and the clock; settle whether the lane needs attention."""
         layout, code = self.layout, self.code
         rotating = code.load("rotating", layout.rotating)
-        self.add(layout.sum_held, f"(1.0 - {rotating})*({self.impulse})")
+        total = [code.let("S", " + ".join(parts)) for parts in zip(*self.torques, strict=True)]
+        power = [code.let("P", product(total, self.shaft, k)) for k in range(layout.order + 1)]
+        self.add(layout.sum_held, f"(1.0 - {rotating})*({self.over(total)})")
+        self.add(layout.work_clutch, self.over(power))
         self.add(layout.time_held, f"(1.0 - {rotating})*{self.taken}")
         self.add(layout.time_rotating, f"{rotating}*{self.taken}")
         self.add(layout.time_driven, f"{code.row(layout.driven)}*{self.taken}")

@@ -134,10 +134,7 @@ def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
     out["torque.max"] = cases.shaft("sum_max") if cases.lay.n > 1 else cases.pendulum(0, "torque_max")
     out["power.useful.mean"] = cases.load * mean
     out["power.useful.max"] = cases.load * cases.shaft("speed_max")
-    # What the clutches do on the shaft is the work against the load and the gain of its kinetic energy.
-    gained = 0.5 * cases.inertia * (cases.shaft("speed_2") ** 2 - cases.shaft("speed_0") ** 2)
-    idle = cases.shaft("time_driven") == 0.0
-    out["power.clutch.mean"] = np.where(idle, 0.0, cases.load * turn + gained) / cases.length
+    out["power.clutch.mean"] = cases.shaft("work_clutch") / cases.length
     out["power.clutch.max"] = cases.shaft("power_max")
     out["power.input.mean"] = _over_pendulums(cases, out, "power.input")
     out["power.loss.mean"] = _over_pendulums(cases, out, "power.loss")

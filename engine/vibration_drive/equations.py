@@ -115,14 +115,15 @@ def _free_acceleration(code: LaneCode, p: _Pendulum, x: list[str], y: list[str],
     # What is known before the newest coefficients is added up first: the step takes as long as the chain of operations
     # from one order to the next, more than by their number.
     rest = code.let(f"R{i}_{k}", f"-{p.damping}*{p.w[k]} - {p.spring}*{p.phi[k]}")
-    known = ""
+    older = ""
     if k > 0:
         p.sin.append(_turned(code, f"s{i}_{k}", p.cos, p, k, 1.0))
         p.cos.append(_turned(code, f"c{i}_{k}", p.sin, p, k, -1.0))
-        known = " + ".join(f"{a[j]}*{b[k - j]}" for j in range(1, k + 1) for a, b in ((x, p.cos), (y, p.sin))) + " + "
-    push = code.let(f"G{i}_{k}", f"{known}{x[0]}*{p.cos[k]} + lifted*{p.sin[k]}")
-    p.drive.append(code.let(f"D{i}_{k}", f"{push} - gravity*{p.sin[k]}"))
-    p.free = code.let(f"F{i}_{k}", f"{rest} + {p.ml}*{push}")
+        older = " + ".join(f"{a[j]}*{b[k - j]}" for j in range(1, k + 1) for a, b in ((x, p.cos), (y, p.sin))) + " + "
+    # The weight is kept apart: a base at rest drives nothing, not even by a rounding error.
+    p.drive.append(code.let(f"D{i}_{k}", f"{older}{x[0]}*{p.cos[k]} + {y[0]}*{p.sin[k]}"))
+    weight = code.let(f"G{i}_{k}", f"{rest} + weight{i}*{p.sin[k]}")
+    p.free = code.let(f"F{i}_{k}", f"{weight} + {p.ml}*{p.drive[k]}")
 
 
 def _turned(code: LaneCode, name: str, other: list[str], p: _Pendulum, k: int, sign: float) -> str:
@@ -142,8 +143,9 @@ def series_loop(layout: Layout) -> str:
     for name in ("gravity", "load", "mobility"):
         code.load(name, getattr(layout, name))
     x, y = _excitation(code, layout)
-    code.let("lifted", f"{y[0]} + gravity")
     pendulums = [_Pendulum(code, layout, i) for i in range(layout.n)]
+    for p in pendulums:
+        code.let(f"weight{p.index}", f"{p.ml}*gravity")
     shaft = [code.load("W0", layout.speed)]
     for k in range(order + 1):
         for p in pendulums:

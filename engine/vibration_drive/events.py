@@ -215,6 +215,9 @@ def _start(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> None:
     if state != FREE:
         W[(base + lay.p_engagements) * lanes + lane] += 1.0
     set_clutch(W, Z, lay, lane, i, state)
+    if Z[lane, LITERAL] == 1 and state == ENGAGED:
+        # From beyond the data too, w has just risen: it must fall before it can rise again.
+        watch_fall(W, lay, lane, i, True)
 
 
 @part

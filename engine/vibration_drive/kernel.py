@@ -151,7 +151,7 @@ def order_for(tolerance: float) -> int:
 
 @cache
 def lane_count() -> int:
-    """Lanes of this machine's kernels, whole groups: 40 are five vectors of AVX-512 or ten of AVX2, 24 are twelve of NEON.
+    """Lanes of this machine's kernels: 40 are five vectors of AVX-512 or ten of AVX2, 24 are twelve of NEON.
 
     A kernel's code does not fit into the first cache of instructions, so that it pays to use what is fetched for many
     lanes; beyond 40 nothing is gained (benchmarks.kernel_shape; NEON was not measured). A power of two would put all

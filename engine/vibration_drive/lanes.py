@@ -86,7 +86,7 @@ def load_case(W: Floats, Z: Ints, lay: Layout, lane: int, case: int, cases: Floa
 
 @part
 def _zero_sums(W: Floats, lay: Layout, lane: int) -> None:
-    for row in range(lay.sum_held, lay.time_driven + 1):
+    for row in range(lay.sum_held, lay.work_clutch + 1):
         W[row * lay.lanes + lane] = 0.0
     W[lay.energy_lost * lay.lanes + lane] = 0.0
     W[lay.driving_max * lay.lanes + lane] = 0.0

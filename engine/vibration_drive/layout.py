@@ -58,6 +58,7 @@ class Layout(NamedTuple):
     time_held: int
     time_rotating: int
     time_driven: int
+    work_clutch: int
     # extrema over the window
     speed_max: int
     speed_min: int

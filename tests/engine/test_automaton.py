@@ -195,6 +195,21 @@ def test_start_with_no_acceleration_yet() -> None:
     assert at_once["shaft.turn"] == pytest.approx(later["shaft.turn"], rel=1e-7)
 
 
+@pytest.mark.parametrize("backlash", [0.0, 1e-3])
+def test_where_the_data_end_changes_nothing_for_a_straight_law(backlash: float) -> None:
+    """Beyond the data the law goes on straight, and under literal resets a turn of the pendulum counts once."""
+    machine = drive(1, **clutch(0.0, 60.0, 0.0, 0.0)) | pendulum(0, backlash=backlash) | {"shaft.load": 0.8}
+    run = periods(8.0, 3.0, 8.0, reset="literal")
+    free, *limited = (one(machine | {"clutch.windup_limit": end}, run) for end in (math.inf, 1e-2, 1.2e-3, 6e-4))
+    assert free["pendulums.0.fraction.beyond_data"] == 0.0
+    for row in limited:
+        assert row["pendulums.0.fraction.beyond_data"] > 0.4
+        for name in ("pendulums.0.engagements", "clutches.engagements_per_period"):
+            assert row[name] == free[name]
+        for name in ("torque.mean", "reset.energy_lost", "power.clutch.mean"):
+            assert row[name] == pytest.approx(free[name], rel=1e-8)
+
+
 # Simultaneous events: identical pendulums act as one.
 
 

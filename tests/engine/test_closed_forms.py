@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from engine.run import Run, Span
 from engine.vibration_drive.simulate import trajectory
-from tests.engine.drive import Columns, clutch, column, one, pendulum, periods
+from tests.engine.drive import Columns, clutch, column, drive, one, pendulum, periods
 
 G = 9.80665
 #: A backlash that nothing reaches: the clutch never transmits torque.
@@ -94,6 +94,17 @@ def growth_of_kapitza(b: float) -> float:
     first = column(by_angle, "pendulums.0.angle")[0] / small
     second = column(by_speed, "pendulums.0.speed")[0] / (small * NU)
     return 0.5 * float(first + second)
+
+
+@pytest.mark.parametrize("gravity", [0.0, 9.81])
+def test_a_base_at_rest_drives_nothing(gravity: float) -> None:
+    """Not even by rounding: what is supplied is exactly nothing, and there is no efficiency."""
+    machine = drive(1, gravity=gravity, excitation__amplitude_x=0.0, excitation__amplitude_y=0.0)
+    for speed, load in ((3.0, 0.02), (8.0, 0.02), (11.0, 0.2)):
+        row = one(machine | {"pendulums.0.initial_speed": speed, "shaft.load": load}, periods(8.0, 0.0, 8.0))
+        assert row["power.input.mean"] == 0.0
+        assert math.isnan(row["efficiency"])
+        assert row["power.clutch.mean"] > 0.0
 
 
 def test_kapitza_thresholds() -> None:
