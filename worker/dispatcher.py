@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 
 #: Seconds between two looks at the store for new studies and wishes; also the longest wait for the executor.
-POLL_SECONDS = 0.2
+POLL_SECONDS = 0.1
 #: The same where news of the store come by themselves; only what nobody tells of is found by looking.
 QUIET_POLL_SECONDS = 2.0
 HEARTBEAT_SECONDS = 5.0
