@@ -74,23 +74,11 @@ class Cluster:
                 found += [child for child in children if "spawn_main" in " ".join(child.cmdline())]
         return found
 
-    def kill(self, process: subprocess.Popen[bytes]) -> None:
-        """kill -9 of a process and of what it has started."""
-        family = []
-        with suppress(psutil.Error):
-            family = psutil.Process(process.pid).children(recursive=True)
-        process.kill()
-        process.wait()
-        for child in family:
-            with suppress(psutil.Error):
-                child.kill()
-        psutil.wait_procs(family, timeout=60)
-
     def close(self) -> None:
         """Kill everything."""
         for process in (*self.workers, self.scheduler):
             if process is not None:
-                self.kill(process)
+                harness.kill_family(process)
         self.workers.clear()
 
 
@@ -150,7 +138,7 @@ def _kill(dask: Cluster, draw: random.Random) -> str:
         for _ in range(count):
             dask.start_worker()
     elif target == "host":
-        dask.kill(dask.workers.pop(draw.randrange(len(dask.workers))))
+        harness.kill_family(dask.workers.pop(draw.randrange(len(dask.workers))))
         dask.start_worker()
     else:
         harness.until(dask.computing, "there is a worker")

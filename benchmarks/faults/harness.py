@@ -47,6 +47,19 @@ def until(condition: Callable[[], object], what: str, patience: float = PATIENCE
         time.sleep(_LOOK)
 
 
+def kill_family(process: subprocess.Popen[bytes]) -> None:
+    """kill -9 of a process and of what it has started."""
+    family = []
+    with suppress(psutil.Error):
+        family = psutil.Process(process.pid).children(recursive=True)
+    process.kill()
+    process.wait()
+    for child in family:
+        with suppress(psutil.Error):
+            child.kill()
+    psutil.wait_procs(family, timeout=60)
+
+
 def spec(cases: int, periods: float = 60.0) -> dict[str, Any]:
     """The one-pendulum example with one axis of that many loads, so that a load names a case."""
     made: dict[str, Any] = json.loads(preset_text("one_pendulum")[1])

@@ -4,9 +4,9 @@ The loops are thousands of assignments; numba's type inference alone takes longe
 together, although all of it is double precision. Here each statement becomes the LLVM instructions it means, inside the
 numba function that calls the loops (measured in benchmarks/start.py; docs/adr/0002).
 
-The language is a subset of Python: ``for lane in range(N)`` around assignments to names and to ``W[k + lane]``; ``+ - *
-/``, comparisons, ``or``, ``a if c else b``, ``abs``, and the two views of a double's bits of ``straight.log2`` and
-``exp2``.
+The language is a subset of Python: ``for lane in range(N)``, of which the call runs as many groups as it is told,
+around assignments to names and to ``W[k + lane]``; ``+ - * /``, comparisons, ``or``, ``a if c else b``, ``abs``, and
+the two views of a double's bits of ``straight.log2`` and ``exp2``.
 """
 
 import ast

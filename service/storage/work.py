@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import gc
 import json
 from collections import Counter
-from contextlib import contextmanager
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import sqlalchemy as sa
@@ -15,15 +12,14 @@ import sqlalchemy as sa
 from service.storage.part import moment, optional_moment
 from service.storage.records import DispatcherRecord
 from service.storage.reuse import Reuse, copy_rows, endings_of
+from service.storage.rows import target, tuples, without_collector
 from service.storage.tables import (
     CHUNKS,
     DISPATCHER,
     ENDINGS,
     HELD_AT_DEADLINE,
-    KEY_COLUMNS,
     STUDIES,
     WAITS_FOR_ROOM,
-    results_table,
 )
 from worker import kernels
 from worker.kernels import ChunkResult
@@ -32,7 +28,7 @@ from worker.states import TERMINAL, StudyEvent, StudyState
 from worker.study import Study
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from worker.ports import Known
 
@@ -201,9 +197,9 @@ class Work(Reuse):
         ).one()
         numbers = (self._cases(chunk, connection) if known is None else known.missing).tolist()
         if result.count:
-            with _without_collector():
-                rows = _tuples(chunk.study, numbers, result, kernels.result_infos(model, pendulums))
-                self.session.insert_rows(connection, *_target(model, pendulums), rows)
+            with without_collector():
+                rows = tuples(chunk.study, numbers, result, kernels.result_infos(model, pendulums))
+                self.session.insert_rows(connection, *target(model, pendulums), rows)
         endings = Counter(result.endings)
         if known is not None and known.cases.size:
             if not copy_rows(connection, model, pendulums, chunk, known):
@@ -362,40 +358,3 @@ def _why_failed(connection: sa.Connection, number: int, cases: int) -> str:
 
 def _is(chunk: Chunk) -> sa.ColumnElement[bool]:
     return (CHUNKS.c.study == chunk.study) & (CHUNKS.c["first"] == chunk.first) & (CHUNKS.c["count"] == chunk.count)
-
-
-@lru_cache(maxsize=64)
-def _target(model: str, pendulums: int) -> tuple[str, tuple[str, ...]]:
-    """A results table and its columns in the order of `_tuples`."""
-    names = (*KEY_COLUMNS, *(info.column for info in kernels.result_infos(model, pendulums)))
-    return results_table(model, pendulums).name, names
-
-
-def _tuples(
-    study: int, numbers: Sequence[int], result: ChunkResult, infos: Sequence[kernels.ResultInfo]
-) -> list[tuple[Any, ...]]:
-    """Rows for `_target`, of the cases with those numbers: NaN and infinities become NULL, counts whole numbers."""
-    columns: list[list[Any]] = []
-    for index, info in enumerate(infos):
-        column = result.values[:, index]
-        finite = np.isfinite(column)
-        if info.kind == "count":
-            cells: list[Any] = np.where(finite, column, 0.0).astype(np.int64).tolist()
-        else:
-            cells = column.tolist()
-        if not finite.all():
-            cells = [cell if known else None for cell, known in zip(cells, finite.tolist(), strict=True)]
-        columns.append(cells)
-    return list(zip([study] * result.count, numbers, result.endings, result.flags, *columns, strict=True))
-
-
-@contextmanager
-def _without_collector() -> Iterator[None]:
-    """Make many rows without Python's collector looking through them again and again: that was half of the time."""
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collects:
-            gc.enable()

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from datetime import timedelta
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,19 +23,6 @@ from worker.study import Axis, Study
 HOUR = timedelta(hours=1)
 #: Nine values: both ends, the middle, the quarters, the eighths.
 ORDER = [0, 8, 4, 2, 6, 1, 3, 5, 7]
-
-
-@pytest.fixture(params=["sqlite", "postgresql"])
-def url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
-    if request.param == "postgresql":
-        url: str = request.getfixturevalue("postgres_url")
-        return url
-    return f"sqlite:///{tmp_path / 'store.sqlite3'}"
-
-
-@pytest.fixture
-def clock() -> fakes.HandClock:
-    return fakes.HandClock()
 
 
 @pytest.fixture

@@ -5,10 +5,12 @@ from __future__ import annotations
 import csv
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import expect
+
+from tests.web.fields import drawn, fill, named, wrong
 
 if TYPE_CHECKING:
     from tests.web.conftest import Office, Visitor
@@ -37,31 +39,6 @@ MANY = {
     ]
 }
 LOADS = {"axes": [{"path": "shaft.load", "values": [0, 0.1, 0.2]}]}
-
-
-def named(page: Page, name: str) -> Any:
-    """The field of that name."""
-    return page.locator(f'[name="{name}"]').last
-
-
-def fill(page: Page, fields: dict[str, str]) -> None:
-    """Fill in fields by their names."""
-    for name, text in fields.items():
-        named(page, name).fill(text)
-
-
-def wrong(page: Page, name: str) -> Any:
-    """What is said to be wrong beside a field."""
-    return page.locator(f'[id="wrong:{name}"]')
-
-
-def drawn(page: Page, selector: str = ".plot") -> list[dict[str, Any]]:
-    """The lines of a picture, once it is drawn."""
-    page.wait_for_function("selector => document.querySelector(selector).dataset.drawn", arg=selector)
-    lines: list[dict[str, Any]] = page.evaluate(
-        "selector => document.querySelector(selector).data.map(({name, x, y, type}) => ({name, x, y, type}))", selector
-    )
-    return lines
 
 
 def test_from_an_empty_form_to_a_curve_and_a_file(visitor: Visitor, office: Office, tmp_path: Path) -> None:

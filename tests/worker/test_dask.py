@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import os
 import random
-import socket
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event
 
 import numpy as np
-import psutil
 import pytest
 from distributed import Client, Future
 from pydantic import ValidationError
@@ -24,8 +19,8 @@ from service.dispatching import WorkerSettings, pool
 from service.settings import Settings
 from service.storage.part import SystemClock
 from service.storage.store import Store
-from tests.conftest import ROOT
 from tests.worker import fakes
+from tests.worker.clusters import DEADLINE, Cluster, clusters
 from worker import kernels
 from worker.chunking import Chunking
 from worker.dispatcher import Dispatcher
@@ -36,10 +31,6 @@ from worker.executors.process_pool import SPARE_CHUNKS, ProcessPoolExecutor
 from worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
 from worker.states import StudyState
 from worker.study import Study
-
-DEADLINE = 120.0
-#: Without a dashboard there is still a server of health and metrics; any port will do.
-_QUIET = ("--dashboard-address", "127.0.0.1:0")
 
 
 def eventually(true: Callable[[], object]) -> None:
@@ -83,63 +74,6 @@ def cluster() -> Iterator[Cluster]:
         made.start_worker()
         made.start_worker()
         yield made
-
-
-@dataclass
-class Cluster:
-    """Processes of a cluster on this machine."""
-
-    port: int
-    scheduler: subprocess.Popen[bytes] | None = None
-    workers: list[subprocess.Popen[bytes]] = field(default_factory=list)
-
-    @property
-    def url(self) -> str:
-        return f"dask://127.0.0.1:{self.port}"
-
-    def start_scheduler(self) -> None:
-        self.scheduler = _dask("scheduler", "--host", "127.0.0.1", "--port", self.port, "--no-dashboard", *_QUIET)
-
-    def start_worker(self, count: int = 1, **environment: str) -> None:
-        options = ("--nthreads", 1, "--nworkers", count, "--no-dashboard", "--memory-limit", 0, "--host", "127.0.0.1")
-        arguments = ("worker", f"tcp://127.0.0.1:{self.port}", *options, "--death-timeout", DEADLINE)
-        self.workers.append(_dask(*arguments, **environment))
-
-    def computing(self) -> list[psutil.Process]:
-        """The processes that run chunks: children of the workers' nannies."""
-        found = []
-        for worker in self.workers:
-            with suppress(psutil.NoSuchProcess):
-                found += [c for c in psutil.Process(worker.pid).children() if "spawn_main" in " ".join(c.cmdline())]
-        return found
-
-
-def _dask(*arguments: object, **environment: str) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-W", "ignore", "-m", "distributed.cli.dask_" + str(arguments[0])]
-    return subprocess.Popen(
-        [*command, *map(str, arguments[1:])], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
-    )  # fmt: skip
-
-
-@contextmanager
-def clusters() -> Iterator[Cluster]:
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
-    made = Cluster(port)
-    try:
-        yield made
-    finally:
-        for process in (*made.workers, made.scheduler):
-            if process is not None:
-                family = []
-                with suppress(psutil.NoSuchProcess):
-                    family = psutil.Process(process.pid).children(recursive=True)
-                process.kill()
-                process.wait()
-                for child in family:
-                    with suppress(psutil.NoSuchProcess):
-                        child.kill()
 
 
 @pytest.fixture

@@ -1,0 +1,35 @@
+"""Stores on every database driver, empty, with a clock that is set by hand."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from service.storage import session
+from service.storage.store import Store
+from tests.worker import fakes
+from worker.chunking import Chunking
+
+
+@pytest.fixture(params=["pysqlite3", "sqlite3", "postgresql"])
+def url(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    if request.param == "postgresql":
+        url: str = request.getfixturevalue("postgres_url")
+        return url
+    if request.param == "sqlite3":
+        monkeypatch.setattr(session, "sqlite_driver", lambda: sqlite3)
+    return f"sqlite:///{tmp_path / 'store.sqlite3'}"
+
+
+@pytest.fixture
+def clock() -> fakes.HandClock:
+    return fakes.HandClock()
+
+
+@pytest.fixture
+def store(url: str, clock: fakes.HandClock) -> Iterator[Store]:
+    with Store.open(url, chunking=Chunking(cases=10), clock=clock) as store:
+        yield store

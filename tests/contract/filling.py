@@ -1,0 +1,24 @@
+"""Studies as the tests of every store make and finish them."""
+
+from __future__ import annotations
+
+from service.storage.records import StudyRecord
+from service.storage.store import Store
+from tests.worker import fakes
+from worker import kernels
+
+SPEC = {"sprag": 1, "name": "Füllung", "axes": [{"path": "shaft.load", "values": ["0.1 N*m"]}]}
+
+
+def create(store: Store, cases: int = 25, name: str = "a study", **options: str) -> StudyRecord:
+    return store.create_study(SPEC, fakes.study(cases, name), **options)
+
+
+def finish(store: Store, record: StudyRecord, ending: str = kernels.OK) -> int:
+    """Run a study to its end; gives the epoch."""
+    epoch = store.take_over("test")
+    for chunk in store.open_chunks(record.number):
+        assert store.claim(epoch, [chunk]) == [chunk]
+        assert store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count, ending))
+    store.settle(epoch, record.number)
+    return epoch

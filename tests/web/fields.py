@@ -1,0 +1,32 @@
+"""Fields of forms and lines of pictures, as the tests of the pages find them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from playwright.sync_api import Page
+
+
+def named(page: Page, name: str) -> Any:
+    """The field of that name."""
+    return page.locator(f'[name="{name}"]').last
+
+
+def fill(page: Page, fields: dict[str, str]) -> None:
+    """Fill in fields by their names."""
+    for name, text in fields.items():
+        named(page, name).fill(text)
+
+
+def wrong(page: Page, name: str) -> Any:
+    """What is said to be wrong beside a field."""
+    return page.locator(f'[id="wrong:{name}"]')
+
+
+def drawn(page: Page, selector: str = ".plot") -> list[dict[str, Any]]:
+    """The lines of a picture, once it is drawn."""
+    page.wait_for_function("selector => document.querySelector(selector).dataset.drawn", arg=selector)
+    lines: list[dict[str, Any]] = page.evaluate(
+        "selector => document.querySelector(selector).data.map(({name, x, y, type}) => ({name, x, y, type}))", selector
+    )
+    return lines
