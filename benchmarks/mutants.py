@@ -64,9 +64,9 @@ MUTANTS = (
     Mutant(
         "rows and the chunk's end in two transactions",
         "service/storage/work.py",
-        "        endings = Counter(result.endings if known is None",
+        "        endings = Counter(result.endings)",
         '        connection.exec_driver_sql("COMMIT")\n        connection.exec_driver_sql("BEGIN IMMEDIATE")\n'
-        "        endings = Counter(result.endings if known is None",
+        "        endings = Counter(result.endings)",
         (f"{_FAULTS}test_a_power_cut_takes_nothing_that_was_acknowledged",),
     ),
     Mutant(

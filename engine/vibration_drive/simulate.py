@@ -225,11 +225,11 @@ def warm_up(pendulums: int, coefficients: int, tolerance: float) -> None:
 
 
 def estimate_seconds(pendulums: int, coefficients: int, tolerance: float, periods: float) -> float:
-    """Rough time of one case on one core, in s: about 20 steps a period, events and extrema included.
+    """Rough time of one case among many on one core, in s: about 25 steps a period, events and extrema included.
 
-    Measured at 0.17 us a step for one pendulum, 0.25 for two and 0.7 for eight (benchmarks/engine.py), with half as
+    Measured at 0.077 us a step for one pendulum, 0.12 for two and 0.51 for eight (benchmarks/engine.py), with half as
     much again for slower machines.
     """
     order = order_for(tolerance)
-    step = 1.25e-7 * (1 + pendulums) * (0.6 + 0.4 * (order / 14.0) ** 2) * (0.8 + 0.05 * max(4, coefficients))
-    return 1e-5 + periods * 20.0 * step
+    step = (2.1e-8 + 9.4e-8 * pendulums) * (0.6 + 0.4 * (order / 12.0) ** 2) * (0.8 + 0.05 * max(4, coefficients))
+    return 1e-5 + periods * 25.0 * step

@@ -231,10 +231,8 @@ class Studies(Orders):
                 self._lift_deadline(connection, row.number)
             if event is StudyEvent.RESUME and row.waits_for == WAITS_FOR_WINDOW:
                 unbind(connection, row.number)
-            if event is StudyEvent.PAUSE and row.waits_for not in {
-                None,
-                HELD_AT_DEADLINE,
-            }:  # it was paused, but not by the user
+            # It was paused, but not by the user.
+            if event is StudyEvent.PAUSE and row.waits_for not in {None, HELD_AT_DEADLINE}:
                 connection.execute(
                     sa.update(STUDIES)
                     .where(STUDIES.c.number == row.number)
