@@ -13,8 +13,11 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from service.leftovers import sweep
 from service.schedules.times import Timing, read_time_of_day
 from service.storage.errors import StoreError
+from service.storage.maintenance import PART_SUFFIX
+from service.storage.private_files import PRIVATE_FOLDER_MODE
 
 if TYPE_CHECKING:
     from service.storage.store import Store
@@ -112,7 +115,8 @@ class Upkeep(threading.Thread):
         self._done, self._wait_until = due, None
 
     def _back_up(self, folder: Path, now: datetime) -> None:
-        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        folder.mkdir(PRIVATE_FOLDER_MODE, parents=True, exist_ok=True)
+        sweep(folder.glob(f".sprag-*.sqlite3.*{PART_SUFFIX}"))
         target = folder / f"sprag-{now.astimezone(UTC):{_STAMP}}.sqlite3"
         if not target.exists():
             self._store.backup(target)

@@ -53,7 +53,7 @@ def doctor(
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Look at versions, database, disk, backups, kernels, known values of the engine; exit code 3 if one is wrong."""
+    """Look at versions, database, rights, disk, backups, kernels and known values; exit code 3 if one is wrong."""
     shape = {"pendulums": pendulums, "coefficients": coefficients, "tolerance": tolerance}
     given = {name: value for name, value in shape.items() if value is not None}
     if kernel:
@@ -107,7 +107,7 @@ def _checks(db: str | None) -> dict[str, Callable[[], tuple[bool, str]]]:
     file = Path(url.removeprefix("sqlite:///")) if url.startswith("sqlite") else None
     here: dict[str, Callable[[], tuple[bool, str]]] = {}
     if file is not None:
-        here = {"SQLite": _sqlite, "disk": lambda: _disk(file), "backups": _backups}
+        here = {"SQLite": _sqlite, "rights": lambda: _rights(file), "disk": lambda: _disk(file), "backups": _backups}
     return {
         "versions": _versions,
         "database": lambda: _database(url, file),
@@ -145,6 +145,20 @@ def _database(url: str, file: Path | None) -> tuple[bool, str]:
     if found not in (None, HEAD_REVISION):
         return False, f"{location} has revision {found}, this program needs {HEAD_REVISION}: run `sprag db upgrade`"
     return True, f"{location}, revision {found or 'none yet'}"
+
+
+def _rights(file: Path) -> tuple[bool, str]:
+    """Whether the database and its backups are private; earlier versions created them readable by everybody."""
+    from service.storage.private_files import readable_by_others
+    from service.upkeep import backups
+
+    folder = read_settings().backup_folder
+    copies = [path for _, path in backups(Path(folder).expanduser())] if folder else []
+    beside = [file.with_name(f"{file.name}{suffix}") for suffix in ("", "-wal", "-shm", ".lock", ".reserve")]
+    shared = [str(path) for path in (*beside, *copies) if path.exists() and readable_by_others(path)]
+    if shared:
+        return False, f"others may read {', '.join(shared)}: `chmod 600` keeps digests of tokens and designs private"
+    return True, "only their owner may read database and backups"
 
 
 def _disk(location: Path) -> tuple[bool, str]:

@@ -7,6 +7,8 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
+from service.storage.private_files import create_private
+
 if TYPE_CHECKING:
     from service.storage.session import Session
 
@@ -43,7 +45,7 @@ class DispatcherLock:
         """Take the lock if it is free; True when it is ours."""
         if self._file is not None:
             return True
-        file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        file = create_private(self.path, flags=0)
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import glob
 import logging
 import os
+import secrets
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import sqlalchemy as sa
 
+from service.leftovers import mark, sweep
 from service.storage.errors import DatabaseError, SchemaError
+from service.storage.private_files import create_private, sync_folder
 from service.storage.records import CheckReport
 from service.storage.session import damaged, sqlite_version, sqlite_warning
 from service.storage.tables import HEAD_REVISION
@@ -20,6 +24,8 @@ if TYPE_CHECKING:
 
 #: Bytes of a database up to which it is looked over at every start: that takes less than a second.
 CHECKED_BYTES = 256_000_000
+#: How the name of a backup that is not whole yet ends.
+PART_SUFFIX = ".part"
 
 
 def revision(session: Session) -> str | None:
@@ -156,13 +162,19 @@ def backup(session: Session, path: Path) -> None:
         raise DatabaseError(f"{path} exists already; a backup never replaces a file")
     if not path.parent.is_dir():
         raise DatabaseError(f"the backup cannot be written: there is no folder {path.parent}")
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    sweep(path.parent.glob(f".{glob.escape(path.name)}.*{PART_SUFFIX}"))
+    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PART_SUFFIX}")
     try:
-        with session.plain() as connection:
-            connection.exec_driver_sql("VACUUM INTO ?", (str(part),))
-        with part.open("rb") as written:
-            os.fsync(written.fileno())
+        descriptor = create_private(part)
+        try:
+            mark(descriptor)
+            with session.plain() as connection:
+                connection.exec_driver_sql("VACUUM INTO ?", (str(part),))
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
         os.replace(part, path)
+        sync_folder(path.parent)
     except OSError as error:
         raise DatabaseError(f"the backup {path} cannot be written: {error.strerror}") from None
     finally:

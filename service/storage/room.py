@@ -17,6 +17,7 @@ import sqlalchemy as sa
 
 from service.storage.errors import DatabaseFullError
 from service.storage.part import Part
+from service.storage.private_files import create_private
 from service.storage.tables import STUDIES, WAITS_FOR_ROOM
 from service.storage.work import return_claims
 from worker.states import StudyEvent, StudyState
@@ -101,7 +102,7 @@ class Room(Part):
         """Have the file there that is given up when the disk is full; a server has to see to that itself."""
         if self.session.on_server or self._reserve.exists():
             return
-        with suppress(OSError), self._reserve.open("xb") as file:
+        with suppress(OSError), os.fdopen(create_private(self._reserve), "wb") as file:
             file.write(os.urandom(RESERVE_FILE_BYTES))  # zeros could be stored as nothing
             os.fsync(file.fileno())
 

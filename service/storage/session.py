@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import re
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Lock
 from time import perf_counter
@@ -17,6 +17,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import URL, make_url
 
 from service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError
+from service.storage.private_files import PRIVATE_FOLDER_MODE, create_private
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -139,8 +140,14 @@ class Session:
             pool_size=POOL_CONNECTIONS,
             max_overflow=64,
         )
+        sa.event.listen(engine, "do_connect", self._create_file)
         sa.event.listen(engine, "connect", _set_pragmas)
         return engine
+
+    def _create_file(self, *_: object) -> None:
+        """Create the database file before SQLite would, which lets others read it; the log beside it follows suit."""
+        with suppress(OSError):  # it exists, or SQLite tells what is wrong
+            os.close(create_private(self.path))
 
     def _open_server(self) -> sa.Engine:
         postgres = _postgres()
@@ -163,7 +170,7 @@ class Session:
     def _check_place(self) -> None:
         folder = self.path.parent
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(PRIVATE_FOLDER_MODE, parents=True, exist_ok=True)
         except OSError as error:
             raise DatabaseError(f"the folder {folder} cannot be made: {error.strerror}") from None
         if self.path.is_dir():

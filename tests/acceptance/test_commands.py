@@ -264,9 +264,18 @@ def test_doctor_finds_the_installation_sound(tmp_path: Path) -> None:
     done = sprag("doctor", "--json", "--db", tmp_path / "x.sqlite3")
     assert done.code == 0, done.data
     assert done.data["sound"] is True
-    assert {"versions", "SQLite", "database", "disk", "backups", "kernel cache", "engine"} == {
+    assert {"versions", "SQLite", "database", "rights", "disk", "backups", "kernel cache", "engine"} == {
         finding["subject"] for finding in done.data["findings"]
     }
+
+
+def test_doctor_names_files_that_others_may_read(tmp_path: Path) -> None:
+    file = tmp_path / "x.sqlite3"
+    assert sprag("db", "upgrade", "--db", file).code == 0
+    file.chmod(0o640)
+    done = sprag("doctor", "--db", file)
+    assert done.code == 3
+    assert f"others may read {file}: `chmod 600`" in done.out.decode()
 
 
 def test_doctor_finds_a_database_of_another_program(tmp_path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -243,3 +245,49 @@ def test_an_interval_is_narrower_where_the_cases_done_lie_among_those_left() -> 
     assert plain is not None
     assert sampled is not None
     assert plain[0] < sampled[0] < 100.0 < sampled[1] < plain[1]
+
+
+@pytest.fixture
+def _open_umask() -> Iterator[None]:
+    """The umask that gives every right to everybody."""
+    before = os.umask(0)
+    yield
+    os.umask(before)
+
+
+@pytest.mark.usefixtures("_open_umask")
+def test_database_log_lock_reserve_and_backup_are_private_whatever_the_umask(url: str, tmp_path: Path) -> None:
+    with Store.open(url) as store:
+        lock = DispatcherLock(store.session.path)
+        assert lock.take()
+        assert store.shortage() is None
+        store.create_study({}, fakes.study(1))
+        store.backup(tmp_path / "a" / "copy.sqlite3")
+        folder = store.session.path.parent
+        modes = {path.name: path.stat().st_mode & 0o777 for path in folder.iterdir()}
+        lock.release()
+    beside = ("", "-wal", "-shm", ".lock", ".reserve")
+    assert modes == dict.fromkeys([*(f"sprag.sqlite3{suffix}" for suffix in beside), "copy.sqlite3"], 0o600)
+    assert folder.stat().st_mode & 0o777 == 0o700
+
+
+def test_a_backup_removes_what_killed_ones_left_and_writes_the_folder_to_disk(
+    url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left, other = tmp_path / ".copy.sqlite3.4711.part", tmp_path / ".else.sqlite3.4711.part"
+    for path in (left, other):
+        path.touch()
+        os.utime(path, (0, 0))
+    synced: list[Path] = []
+    fsync = os.fsync
+
+    def noting(descriptor: int) -> None:
+        synced.append(Path(os.readlink(f"/proc/self/fd/{descriptor}")))
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", noting)
+    with Store.open(url) as store:
+        store.backup(tmp_path / "copy.sqlite3")
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["a", "copy.sqlite3", other.name])
+    assert synced[-1] == tmp_path
+    assert synced[-2].name.endswith(".part")

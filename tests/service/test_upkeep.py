@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
@@ -88,6 +89,15 @@ def test_a_backup_that_fails_is_said_and_tried_again(
     clock.seconds = 601.0
     upkeep.look()
     assert len(made(folder)) == 1
+
+
+def test_parts_of_killed_backups_are_removed(store: Store, tmp_path: Path) -> None:
+    left, other = tmp_path / ".sprag-20250101T000000Z.sqlite3.1f.part", tmp_path / ".else.part"
+    for path in (left, other):
+        path.touch()
+        os.utime(path, (0, 0))
+    Upkeep(store, UpkeepPlan(tmp_path)).begin()
+    assert (left.exists(), other.exists()) == (False, True)
 
 
 def test_studies_that_ended_long_ago_are_deleted_and_no_others(store: Store, clock: HandClock) -> None:

@@ -1,0 +1,36 @@
+"""Files that only their owner may read: they hold the digests of tokens, the key of sessions, and designs."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PRIVATE_MODE: Final = 0o600
+PRIVATE_FOLDER_MODE: Final = 0o700
+#: What group and others may do with a file that is not private.
+_OTHERS: Final = 0o077
+
+
+def create_private(path: Path, flags: int = os.O_EXCL) -> int:
+    """Create a file that only its owner may read, whatever the umask; the descriptor, open for reading and writing.
+
+    Raises OSError, FileExistsError when the file exists and ``flags`` has ``O_EXCL``.
+    """
+    return os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | flags, PRIVATE_MODE)
+
+
+def readable_by_others(path: Path) -> bool:
+    """Whether the group or others may do anything with the file."""
+    return bool(path.stat().st_mode & _OTHERS)
+
+
+def sync_folder(folder: Path) -> None:
+    """Write the names in ``folder`` to disk, so that a file renamed into it survives a power failure."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
