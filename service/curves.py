@@ -19,15 +19,13 @@ from service.catalogue import result_of, unit_of, unknown_result
 from service.errors import ErrorItem
 from service.selection import Fixed, SelectionError, axis_name, held_text, listed, locate_axes, require_axis
 from worker.kernels import WorkerEnding
+from worker.kernels.codes import PENDING
 from worker.limits import MAX_CURVE_VALUES
 
 if TYPE_CHECKING:
     from service.storage.records import CaseColumns
     from worker.kernels import ResultInfo
     from worker.study import Study
-
-#: Ending of a point whose case has not been computed yet.
-PENDING = "pending"
 
 #: Parameters without which a picture tells nobody what it shows.
 _OPERATING_POINT: Final = (

@@ -15,11 +15,11 @@ from service.api.document import files, format_query, one_of, problems
 from service.api.requests import strict_query
 from service.api.respond import choose_format, json_response
 from service.api.views import study_address
-from service.curves import PENDING
 from service.errors import ApiError, parameter_error, shown
 from service.exports import MEDIA_TYPES, Format, row_json, rows_json
 from service.storage.records import CaseRow
 from worker import kernels
+from worker.kernels.codes import PENDING
 from worker.limits import MAX_CASES, MAX_PAGE_SIZE, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 
 if TYPE_CHECKING:

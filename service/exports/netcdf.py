@@ -1,4 +1,4 @@
-"""Rows as a labelled grid: a NetCDF file whose dimensions are the axes, with units and meanings as attributes."""
+"""Rows as a labelled grid: a CF NetCDF file; its dimensions are the axes, units and meanings are attributes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Iterator
 from functools import partial
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,16 +16,18 @@ from service.catalogue import unit_of
 from service.exports.inputs import description_of
 from service.exports.source import machine
 from service.exports.spool import spooled
+from worker.kernels.codes import ENDING_CODES, FLAG_MASKS, PENDING, flags_mask
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from service.exports.source import Source
-    from worker.study import Study
+    from worker.study import Axis, Study
 
-#: The code of a case that has no row.
-_NONE: Final = -1
+_CONVENTIONS: Final = "CF-1.11"
 _CASE: Final = "case"
+#: Level of zlib: higher ones take several times as long for a few hundredths of the size.
+_LEVEL: Final = 1
 
 
 def netcdf_pieces(source: Source) -> Iterator[bytes]:
@@ -37,56 +40,103 @@ def _write(source: Source, folder: Path) -> Path:
 
     study, path = source.study, folder / "results.nc"
     rows = _Columns(source, folder / "columns")
-    dims, shape = dimensions(study)
-    head = xr.Dataset(coords=_coordinates(study, dims), attrs=_about(source))
-    head["ending"] = (dims, rows.endings.reshape(shape), _codes("how the case ended", rows.ending_names, "flag_values"))
-    head["flags"] = (dims, rows.flags.reshape(shape), _codes("what to know of the case", rows.flag_names, "flag_masks"))
-    head.to_netcdf(path, engine="h5netcdf")
+    grid = _Grid(study)
+    head = xr.Dataset(coords=grid.coordinates(), attrs=_about(source))
+    head["ending"] = grid.variable(rows.endings, _ending_attributes())
+    head["flags"] = grid.variable(rows.flags, _flag_attributes())
+    head.to_netcdf(path, engine="h5netcdf", unlimited_dims=())
     for index, info in enumerate(source.infos):
         attributes = {"units": info.unit, "long_name": info.description}
-        column = xr.Dataset({info.name: (dims, rows.column(index).reshape(shape), attributes)})
-        column.to_netcdf(path, engine="h5netcdf", mode="a")
+        column = grid.variable(rows.column(index), attributes)
+        # The coordinates are in the file already; xarray names them only for variables that are written beside them.
+        if grid.labels:
+            column.attrs["coordinates"] = " ".join(grid.labels)
+        xr.Dataset({info.name: column}).to_netcdf(path, engine="h5netcdf", mode="a")
     return path
 
 
-def dimensions(study: Study) -> tuple[tuple[str, ...], tuple[int, ...]]:
-    """Names and lengths: the first path of each axis of a grid; ``case`` where axes go together."""
-    if study.combine == "grid":
-        return tuple(axis.paths[0] for axis in study.axes), study.shape
-    return (_CASE,), (study.cases,)
+class _Grid:
+    """The places of a study's cases in the file.
+
+    Attributes
+    ----------
+    dims : names of the dimensions: the first path of each axis of a grid; ``case`` where axes go together
+    shape : their lengths
+    labels : coordinates that are no dimension: the case's number in a grid, further paths of tied axes
+    """
+
+    def __init__(self, study: Study) -> None:
+        self._study = study
+        self._together = study.combine != "grid"
+        self.dims = (_CASE,) if self._together else tuple(axis.paths[0] for axis in study.axes)
+        self.shape = study.shape or ((1,) if self._together else ())
+        self._orders = [slice(None)] if self._together else [_order(axis) for axis in study.axes]
+        paths = study.axis_paths if self._together else [path for axis in study.axes for path in axis.paths[1:]]
+        self.labels = [*paths] if self._together else [_CASE, *paths]
+
+    def place(self, column: NDArray[Any]) -> NDArray[Any]:
+        """A column in the order of cases as an array over the dimensions."""
+        array = column.reshape(self.shape)
+        for dimension, order in enumerate(self._orders):
+            array = array[(slice(None),) * dimension + (order,)]
+        return array
+
+    def variable(self, column: NDArray[Any], attributes: dict[str, Any]) -> Any:
+        """A column as a compressed variable over the dimensions."""
+        import xarray as xr
+
+        encoding: dict[str, Any] = {"zlib": True, "complevel": _LEVEL, "shuffle": True} if self.dims else {}
+        return xr.Variable(self.dims, self.place(column), attributes, encoding)
+
+    def coordinates(self) -> dict[str, Any]:
+        """Values of every axis path along its dimension, and the number of every case."""
+        import xarray as xr
+
+        study = self._study
+        unfilled: dict[str, Any] = {"_FillValue": None}
+        found: dict[str, Any] = {}
+        for index, axis in enumerate(study.axes):
+            dimension, order = (0, slice(None)) if self._together else (index, self._orders[index])
+            for path in axis.paths:
+                attributes = {"units": unit_of(study, path), "long_name": description_of(study, path) or path}
+                found[path] = xr.Variable(self.dims[dimension], axis.array[order], attributes, unfilled)
+        numbers = self.variable(
+            np.arange(study.cases, dtype=np.int64), {"units": "1", "long_name": "number of the case"}
+        )
+        return {**found, _CASE: numbers}
 
 
-def _coordinates(study: Study, dims: tuple[str, ...]) -> dict[str, Any]:
-    """Values of every axis path along its dimension; a tied path is a further label of the same dimension."""
-    found: dict[str, Any] = {}
-    for index, axis in enumerate(study.axes):
-        dim = dims[index if study.combine == "grid" else 0]
-        for path in axis.paths:
-            attributes = {"units": unit_of(study, path), "long_name": description_of(study, path)}
-            found[path] = (dim, axis.array, attributes)
-    if dims == (_CASE,):
-        found[_CASE] = (_CASE, np.arange(study.cases, dtype=np.int64), {"long_name": "number of the case"})
-    return found
+def _order(axis: Axis) -> Any:
+    """What brings the values of an axis into the order of CF coordinates, which only rise or only fall."""
+    steps = np.diff(axis.array)
+    return slice(None) if (steps > 0).all() or (steps < 0).all() else np.argsort(axis.array)
 
 
 def _about(source: Source) -> dict[str, Any]:
     study = source.study
     return {
-        "title": study.name,
+        "Conventions": _CONVENTIONS,
+        "title": study.name or "parameter study",
+        "history": f"written by Sprag {version('sprag')}",
         **{name: str(value) for name, value in source.about.items()},
         **{name: part if isinstance(part, str) else json.dumps(part) for name, part in machine(source).items()},
     }
 
 
-def _codes(meaning: str, names: list[str], kind: str) -> dict[str, Any]:
-    """Attributes of a variable of codes, as the CF conventions write them."""
-    codes = range(len(names)) if kind == "flag_values" else [1 << index for index in range(len(names))]
-    attributes: dict[str, Any] = {"long_name": meaning}
-    if names:
-        attributes |= {kind: np.array(codes, dtype=np.int16), "flag_meanings": " ".join(names)}
-    if kind == "flag_values":
-        attributes["comment"] = f"{_NONE}: the case has not been run"
-    return attributes
+def _ending_attributes() -> dict[str, Any]:
+    return {
+        "long_name": "how the case ended",
+        "flag_values": np.array(list(ENDING_CODES.values()), dtype=np.int16),
+        "flag_meanings": " ".join(ENDING_CODES),
+    }
+
+
+def _flag_attributes() -> dict[str, Any]:
+    return {
+        "long_name": "what to know of the case",
+        "flag_masks": np.array(list(FLAG_MASKS.values()), dtype=np.int32),
+        "flag_meanings": " ".join(FLAG_MASKS),
+    }
 
 
 class _Columns:
@@ -95,10 +145,8 @@ class _Columns:
     def __init__(self, source: Source, path: Path) -> None:
         self._path = path
         self._cases = cases = source.study.cases
-        self.endings: NDArray[np.int16] = np.full(cases, _NONE, dtype=np.int16)
-        self.flags: NDArray[np.int16] = np.zeros(cases, dtype=np.int16)
-        self.ending_names: list[str] = []
-        self.flag_names: list[str] = []
+        self.endings: NDArray[np.int16] = np.full(cases, ENDING_CODES[PENDING], dtype=np.int16)
+        self.flags: NDArray[np.int32] = np.zeros(cases, dtype=np.int32)
         file = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
         try:
             for block in source.blocks:
@@ -113,12 +161,9 @@ class _Columns:
             os.close(file)
 
     def _note(self, cases: NDArray[np.int64], endings: list[str], flags: list[str]) -> None:
-        self.endings[cases] = [_position(self.ending_names, ending) for ending in endings]
-        codes = {text: self._mask(text) for text in set(flags)}
-        self.flags[cases] = [codes[text] for text in flags]
-
-    def _mask(self, text: str) -> int:
-        return sum(1 << _position(self.flag_names, name) for name in text.split(",") if name)
+        self.endings[cases] = [ENDING_CODES[ending] for ending in endings]
+        masks = {text: flags_mask(text) for text in set(flags)}
+        self.flags[cases] = [masks[text] for text in flags]
 
     def column(self, index: int) -> NDArray[np.float64]:
         """One result of all cases, NaN where there is none."""
@@ -127,11 +172,5 @@ class _Columns:
             file.seek(8 * index * self._cases)
             read = np.fromfile(file, dtype=np.float64, count=self._cases)
         column[: read.size] = read
-        column[self.endings == _NONE] = np.nan
+        column[self.endings == ENDING_CODES[PENDING]] = np.nan
         return column
-
-
-def _position(names: list[str], name: str) -> int:
-    if name not in names:
-        names.append(name)
-    return names.index(name)

@@ -15,7 +15,6 @@ from service.api.context import Context, Ctx, StudyId
 from service.api.curves import picture_response
 from service.api.respond import entity_tag, json_response, not_modified, tagged
 from service.catalogue import unit_of
-from service.curves import PENDING
 from service.errors import ApiError
 from service.main_curve import characteristic_names
 from service.plots_motion import draw_motion
@@ -25,6 +24,7 @@ from service.web.motion import SAMPLES, motion_figures
 from service.web.study import study_frame
 from service.web.templates import page
 from worker import kernels
+from worker.kernels.codes import PENDING
 
 if TYPE_CHECKING:
     from worker.study import Study

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from service.curves import PENDING, numbers
+from service.curves import numbers
 from service.web.templates import number, unit_text, words
 from service.web.thinning import thin
 from worker.kernels import WorkerEnding
+from worker.kernels.codes import PENDING
 
 if TYPE_CHECKING:
     from service.curves import Curve, Curves, Map

@@ -12,6 +12,7 @@ from service.cli.app import app
 from service.presets import ABOUT, preset_names, preset_text
 from service.settings import table
 from worker import kernels, limits
+from worker.kernels.codes import ENDING_CODES, FLAG_MASKS
 from worker.states import StudyState
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -121,6 +122,12 @@ def test_the_reference_lists_every_ending_flag_and_state() -> None:
     sentences |= {state.value: state.sentence for state in StudyState}
     for key, sentence in sentences.items():
         assert f"| `{key}` | {sentence} |" in REFERENCE
+
+
+def test_the_page_of_exports_has_the_number_of_every_ending_and_flag() -> None:
+    page = (ROOT / "docs" / "exports.md").read_text()
+    told = {name: int(number) for name, number in re.findall(r"\| `(\w+)`(?: \(not run\))? \| (-?\d+) ", page)}
+    assert told == {**ENDING_CODES, **FLAG_MASKS}
 
 
 def test_the_reference_tells_the_limits() -> None:

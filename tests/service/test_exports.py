@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import h5py
 import numpy as np
 import openpyxl
 import pandas as pd
@@ -19,6 +20,7 @@ import xarray as xr
 
 from service import exports
 from service.exports import MEDIA_TYPES, SUFFIXES, Source, format_of, xlsx
+from service.storage.records import RowBlock
 from tests.service.conftest import made_up
 from worker import kernels
 from worker.study import Study
@@ -154,11 +156,84 @@ def test_xarray_opens_a_labelled_grid(filled: Filled, tmp_path: Path) -> None:
             speed.sel({"excitation.frequency": 16.1}).values, filled.column("shaft.speed.mean")[6]
         )
         assert grid["excitation.amplitude_y"].dims == ("excitation.amplitude_x",)
-        meanings = grid["ending"].attrs["flag_meanings"].split()
-        codes = grid["ending"].values.reshape(-1)
-        assert [meanings[code] for code in codes] == filled.rows.endings
+        assert decoded(grid["ending"]) == filled.rows.endings
         assert grid["flags"].values.reshape(-1).tolist() == [int(bool(text)) for text in filled.rows.flags]
+        assert grid["case"].dims == grid["ending"].dims
+        assert grid["case"].values.reshape(-1).tolist() == list(range(12))
         assert json.loads(grid.attrs["base"])["pendulums.0.mass"] == 0.5
+
+
+def decoded(variable: xr.DataArray) -> list[str]:
+    """Endings of all cases by the table that stands in the file."""
+    names = variable.attrs["flag_meanings"].split()
+    table = dict(zip(variable.attrs["flag_values"].tolist(), names, strict=True))
+    return [table[code] for code in variable.values.reshape(-1).tolist()]
+
+
+def netcdf(filled: Filled, endings: list[str], flags: list[str]) -> xr.Dataset:
+    """The grid of a study whose cases ended so."""
+    infos = kernels.study_results(filled.study)
+    block = RowBlock(infos, np.arange(filled.study.cases), endings, flags, filled.rows.values)
+    data = b"".join(exports.export(Source(filled.study, infos, [block], {}), "netcdf"))
+    return xr.load_dataset(io.BytesIO(data), engine="h5netcdf")
+
+
+def test_an_ending_and_a_flag_have_one_number_in_every_file(filled: Filled) -> None:
+    cases = filled.study.cases
+    one = netcdf(filled, ["inertia_insufficient", *["ok"] * (cases - 1)], ["not_settled", *[""] * (cases - 1)])
+    other = netcdf(
+        filled, ["ok", *["timed_out"] * (cases - 1)], ["windup_out_of_data,not_settled", *[""] * (cases - 1)]
+    )
+    assert one["ending"].values.reshape(-1)[:2].tolist() == [5, 0]
+    assert other["ending"].values.reshape(-1)[:2].tolist() == [0, 101]
+    assert (int(one["flags"].values.flat[0]), int(other["flags"].values.flat[0])) == (2, 3)
+    for name in ("ending", "flags"):
+        assert str(one[name].attrs) == str(other[name].attrs)
+
+
+def test_a_netcdf_file_keeps_the_rules_of_the_cf_conventions(service: Service, spec: dict[str, Any]) -> None:
+    """Rules 2.6, 3.1, 3.5, 4 and 5 of CF 1.11: what compliance-checker has errors for where they are broken."""
+    spec["axes"] = [
+        {"path": "shaft.load", "values": [0.1, 0.3, 0.02]},
+        {"path": ["excitation.amplitude_x", "excitation.amplitude_y"], "values": ["3 mm", "1 mm"]},
+    ]
+    study_id = service.submit(spec)
+    rows = service.fill(study_id)
+    content = io.BytesIO(service.http.get(f"{API}/studies/{study_id}/results?format=netcdf").content)
+    with xr.open_dataset(content, engine="h5netcdf") as grid:
+        # Coordinates only rise or only fall; the cases move with their labels.
+        assert grid["shaft.load"].values.tolist() == [0.02, 0.1, 0.3]
+        assert grid["excitation.amplitude_x"].values.tolist() == [3e-3, 1e-3]
+        assert grid["case"].values.tolist() == [[4, 5], [0, 1], [2, 3]]
+        assert decoded(grid["ending"]) == [rows.endings[case] for case in grid["case"].values.reshape(-1)]
+        speed = grid["shaft.speed.mean"]
+        np.testing.assert_array_equal(speed.values.reshape(-1), rows.values[[4, 5, 0, 1, 2, 3], 0])
+    with h5py.File(content) as file:
+        assert file.attrs["Conventions"] == "CF-1.11"
+        assert file.attrs["title"]
+        assert file.attrs["history"]
+        for name, variable in file.items():
+            assert variable.attrs["long_name"], name
+            if name in {"shaft.load", "excitation.amplitude_x", "excitation.amplitude_y"}:
+                assert "_FillValue" not in variable.attrs
+                continue
+            assert (variable.compression, variable.shuffle) == ("gzip", True), name
+            if name != "case":
+                assert set(variable.attrs["coordinates"].split()) == {"case", "excitation.amplitude_y"}
+        for name, kind in (("ending", "flag_values"), ("flags", "flag_masks")):
+            attributes = file[name].attrs
+            assert attributes[kind].dtype == file[name].dtype
+            assert len(attributes[kind]) == len(attributes["flag_meanings"].split())
+
+
+def test_a_study_of_one_case_is_a_grid_without_dimensions(service: Service, spec: dict[str, Any]) -> None:
+    spec["axes"] = []
+    study_id = service.submit(spec)
+    rows = service.fill(study_id)
+    content = io.BytesIO(service.http.get(f"{API}/studies/{study_id}/results?format=netcdf").content)
+    with xr.open_dataset(content, engine="h5netcdf") as grid:
+        assert (dict(grid.sizes), int(grid["case"]), int(grid["ending"])) == ({}, 0, 0)
+        assert float(grid["shaft.speed.mean"]) == rows.values[0, 0]
 
 
 def test_a_grid_that_is_not_finished_has_holes_where_cases_are_missing(service: Service, tmp_path: Path) -> None:

@@ -1,0 +1,41 @@
+"""Numbers of endings and flags wherever a format has no text for them: the same for ever, in every file.
+
+A number that was given is never given again, also when its ending or flag is no longer used.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+#: Name of a case that has not been run, where a table has a place for it.
+PENDING: Final = "pending"
+
+#: Number of each ending: the engine's from 0, the worker's from 100.
+ENDING_CODES: Final[dict[str, int]] = {
+    PENDING: -1,
+    "ok": 0,
+    "accuracy_not_reached": 1,
+    "chatter": 2,
+    "step_budget": 3,
+    "diverged": 4,
+    "inertia_insufficient": 5,
+    "unbalanced_work": 6,
+    "cannot_assemble": 7,
+    "negative_inertia": 8,
+    "motor_stalled": 9,
+    "quadrature_not_reached": 10,
+    "crashed": 100,
+    "timed_out": 101,
+    "cancelled": 102,
+}
+
+#: Bit mask of each flag; the flags of a case are the sum of theirs.
+FLAG_MASKS: Final[dict[str, int]] = {
+    "windup_out_of_data": 1 << 0,
+    "not_settled": 1 << 1,
+}
+
+
+def flags_mask(flags: str) -> int:
+    """The mask of flags joined by commas; 0 for "". Raises KeyError for a flag without a number."""
+    return sum(FLAG_MASKS[name] for name in flags.split(",") if name)
