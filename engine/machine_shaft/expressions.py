@@ -285,10 +285,10 @@ class Expression:
         shape = np.broadcast_shapes(*(np.shape(given) for given in variables.values()))
         return np.broadcast_to(np.asarray(value, dtype=np.float64), shape)
 
-    def switches(self, variables: Mapping[str, Dual]) -> list[Value]:
-        """The quantities whose change of sign is a jump or a kink of the formula."""
+    def switch(self, index: int, variables: Mapping[str, Dual]) -> Value:
+        """Number ``index`` of the quantities whose change of sign is a jump or a kink of the formula."""
         with np.errstate(all="ignore"):
-            return [switch(variables) for switch in self._switches]
+            return self._switches[index](variables)
 
     def _find_switches(self, node: Node) -> None:
         parts = node.parts
@@ -299,10 +299,13 @@ class Expression:
         elif node.kind in {"floor", "mod"}:
             # Each whole turn of the quotient is a change of sign of its sine.
             self._switches.append(lambda v: np.sin(np.pi * _evaluate(parts[0], v)[0] / _divisor(parts, v)))
-        elif node.kind in _COMPARE or node.kind in {"min", "max"}:
-            for i in range(len(parts)):
-                for j in range(i):
-                    self._switches.append(_difference(parts[i], parts[j]))
+        elif node.kind in _COMPARE:
+            self._switches.append(lambda v: _evaluate(parts[0], v)[0] - _evaluate(parts[1], v)[0])
+        elif node.kind in {"min", "max"}:
+            # Each argument against the extreme of those before it: a kink of any pair that shows is a kink of one of
+            # these, and their number grows with the arguments, not with their square.
+            for count in range(1, len(parts)):
+                self._switches.append(_lead(parts[:count], parts[count], larger=node.kind == "max"))
         elif node.kind == "atan2":
             self._switches.append(lambda v: _turn(_evaluate(parts[0], v)[0], _evaluate(parts[1], v)[0]))
         elif node.kind == "if" and parts[0].kind not in _COMPARE:
@@ -317,8 +320,9 @@ def _turn(y: Value, x: Value) -> Value:
     return np.where(np.asarray(x) < 0.0, y, 1.0)
 
 
-def _difference(left: Node, right: Node) -> Callable[[Mapping[str, Dual]], Value]:
-    return lambda v: _evaluate(left, v)[0] - _evaluate(right, v)[0]
+def _lead(before: tuple[Node, ...], part: Node, *, larger: bool) -> Callable[[Mapping[str, Dual]], Value]:
+    """By how much the extreme of ``before`` exceeds ``part``."""
+    return lambda v: _extreme([_evaluate(node, v) for node in before], larger)[0] - _evaluate(part, v)[0]
 
 
 def _evaluate(node: Node, variables: Mapping[str, Dual]) -> Dual:

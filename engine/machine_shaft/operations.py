@@ -84,7 +84,7 @@ def formula_breaks(
     for index in range(expression.switch_count):
 
         def sign(phi: Floats, index: int = index) -> Floats:
-            value = np.asarray(expression.switches(environment(phi))[index])
+            value = np.asarray(expression.switch(index, environment(phi)))
             return np.where(np.broadcast_to(value, np.broadcast_shapes(value.shape, phi.shape)) >= 0.0, 1.0, -1.0)
 
         samples = sign(np.concatenate([grid[..., :1] - 2e-4, grid], axis=2))[:, 0, :]

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engine.machine_shaft.expressions import MAX_DEPTH, MAX_LENGTH, MAX_NODES, RESERVED, Expression
+from engine.machine_shaft.operations import formula_breaks
 from engine.machine_shaft.problems import ExpressionError
 
 PHI = np.linspace(0.1, 6.2, 64)
@@ -126,3 +127,18 @@ def test_any_text_of_the_right_letters_is_a_formula_or_an_error(text: str) -> No
 
 def test_names_that_mean_something_are_reserved() -> None:
     assert {"sin", "if", "pi", "deg"} <= RESERVED
+
+
+def test_switches_grow_with_the_arguments_and_not_with_their_square() -> None:
+    inner = f"min({','.join(['phi'] * 16)})"
+    assert Expression(f"max({','.join([inner] * 16)})").switch_count == 16 * 15 + 15
+
+
+def test_the_kinks_of_many_arguments_are_those_of_their_extreme() -> None:
+    expression = Expression("max(sin(phi), cos(phi), 0.8, sin(phi)-1)")
+    found = formula_breaks(expression, lambda phi: {"phi": (phi, 0.0)}, 1)
+    shown = np.sort(np.concatenate([breaks[0] for breaks in found]))
+    # 0.8 lies above the crossing of sine and cosine, so that only its own crossings with either remain.
+    kinks = [math.acos(0.8), math.asin(0.8), math.pi - math.asin(0.8), 2.0 * math.pi - math.acos(0.8)]
+    for kink in kinks:
+        assert np.abs(shown - kink).min() < 1e-12
