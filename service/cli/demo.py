@@ -106,7 +106,7 @@ def _show(client: ServiceClient, picture: Path, as_json: bool) -> dict[str, Any]
     if not any(cache_folder().iterdir()):
         say("The kernel is compiled first; that takes some seconds, this once.")
     start = time.monotonic()
-    study = follow(client, created["id"])
+    study = follow(client, created["id"], patient=False)
     say(f"{study['progress']['done']} cases done in {time.monotonic() - start:.1f} s, {study['progress']['ok']} ok.")
     query = [("x", _AXIS), *(("y", name) for name in _SHOWN), *(("at", f"{path}={value}") for path, value in _HELD)]
     curves = client.curves(study["id"], query)

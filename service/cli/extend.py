@@ -9,7 +9,7 @@ import typer
 
 from service.cli.console import WrongInputError, say
 from service.cli.files import decode, read_bytes
-from service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
+from service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, WaitTimeout
 from service.cli.remote import connection, exit_as, follow, show_study
 from service.spec_messages import Problem
 from service.written import written_number
@@ -28,6 +28,7 @@ def extend(
         str | None, typer.Option("--points", metavar="FILE", help="CSV file of further cases, a header of paths.")
     ] = None,
     wait: Annotated[bool, typer.Option("--wait", help="Wait until the new study has ended.")] = False,
+    timeout: WaitTimeout = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -40,7 +41,7 @@ def extend(
         say(_what_is_new(old, study))
         say(*(f"warning: {warning}" for warning in study.get("warnings", ())))
         if wait:
-            study = follow(client, study["id"])
+            study = follow(client, study["id"], timeout)
     show_study(study, as_json)
     if wait:
         exit_as(study)

@@ -59,6 +59,13 @@ FinishBy = Annotated[
     ),
 ]
 
+WaitTimeout = Annotated[
+    float | None,
+    typer.Option(
+        "--timeout", metavar="SECONDS", min=0.0, help="Longest time to wait, then exit code 3; default: without end."
+    ),
+]
+
 __all__ = [
     "DEFAULT_SERVER",
     "ChunkCases",
@@ -73,4 +80,5 @@ __all__ = [
     "SpecFile",
     "StudyId",
     "Token",
+    "WaitTimeout",
 ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import StrEnum
@@ -34,6 +33,7 @@ from service.cli.options import (
     SpecFile,
     StudyId,
     Token,
+    WaitTimeout,
 )
 from service.spec_messages import Problem
 from worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
@@ -44,9 +44,6 @@ if TYPE_CHECKING:
     from service.exports import Format
     from service.report import ReportFormat
 
-#: Seconds between two looks at a study that is being watched.
-_POLL_SECONDS = 0.25
-_ENDED = {state.value for state in TERMINAL}
 #: A parameter with its sign, as the service's messages write it: "by=", "at=shaft.load=0.2".
 _PARAMETER_IN_TEXT = re.compile(r"(?<![\w.-])(x|y|by|at)=(?=(\w?))")
 
@@ -73,7 +70,7 @@ class TableFormat(StrEnum):
 @contextmanager
 def connection(server: str, token: str | None) -> Iterator[ServiceClient]:
     """A client of the service; its failures become failures of the command."""
-    from service.client import RefusedError, ServiceClient, UnreachableError
+    from service.client import RefusedError, ServiceClient, StudyTimeoutError, UnreachableError
 
     try:
         client = ServiceClient(server, token)
@@ -89,6 +86,8 @@ def connection(server: str, token: str | None) -> Iterator[ServiceClient]:
             ) from error
         except RefusedError as error:
             raise refusal(error) from error
+        except StudyTimeoutError as error:
+            raise TroubleError(f"{error}; it goes on.") from error
 
 
 def refusal(error: RefusedError) -> CommandFailureError:
@@ -128,6 +127,7 @@ def submit(
     priority: PriorityOption = 0,
     fresh: Fresh = False,
     finish_by: FinishBy = None,
+    timeout: WaitTimeout = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -138,37 +138,49 @@ def submit(
         study = client.create_study(data, key, priority, fresh, finish_by)
         say(*(f"warning: {warning}" for warning in study.get("warnings", ())))
         if wait:
-            study = follow(client, study["id"])
+            study = follow(client, study["id"], timeout)
     show_study(study, as_json)
     if wait:
         exit_as(study)
 
 
-def watch(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
-    """Follow a study until it has ended."""
+def watch(
+    study_id: StudyId,
+    timeout: WaitTimeout = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Follow a study until it has ended, also over a restart of the service."""
     with connection(server, token) as client:
-        study = follow(client, study_id)
+        client.study(study_id)  # a wrong address or id is told at once, not waited for
+        study = follow(client, study_id, timeout)
     show_study(study, as_json)
     exit_as(study)
 
 
-def follow(client: ServiceClient, study_id: str) -> dict[str, Any]:
-    """Look at a study until it has ended or its time is over, with a bar on standard error; the study as it is then.
+def follow(
+    client: ServiceClient, study_id: str, timeout: float | None = None, *, patient: bool = True
+) -> dict[str, Any]:
+    """Wait until a study has ended or its time is over, with a bar on standard error; the study as it is then.
 
     A held study is not left by itself: its reason is said, and the watching goes on until it is resumed or cancelled.
+    So is a service that does not answer, unless ``patient`` is false: then that is the failure of the command.
     """
-    told = None
+    from service.client.waiting import Waiting, wait_for
+
+    told: set[str | None] = set()
     with progress_bar(study_id) as update:
-        while True:
-            study = client.study(study_id)
+
+        def tell(study: dict[str, Any]) -> None:
             progress = study["progress"]
             update(progress["done"], progress["total"], _remark(study))
-            if study["state"] in _ENDED or study["time_over"]:
-                return study
-            if study["state"] == StudyState.PAUSED and study.get("reason") != told:
-                told = study.get("reason")
-                say(f"{study_id} is paused: {told or 'somebody asked for it'}")
-            time.sleep(_POLL_SECONDS)
+            held = study["state"] == StudyState.PAUSED and not study["time_over"]
+            if held and study.get("reason") not in told:
+                told.add(study.get("reason"))
+                say(f"{study_id} is paused: {study.get('reason') or 'somebody asked for it'}")
+
+        return wait_for(client, study_id, Waiting(tell, timeout, patient=patient, notify=say))
 
 
 def _remark(study: dict[str, Any]) -> str:

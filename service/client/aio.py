@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import os
-import time
 import uuid
 from collections.abc import AsyncIterator, Mapping, Sequence
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import httpx
 
-from service.client.errors import StudyTimeoutError, UnreachableError
+from service.client.errors import ServiceError, UnreachableError
 from service.client.frames import Curves, grid_of, table_of
 from service.client.queries import (
-    ENDED,
-    POLLS,
     Progressing,
     Value,
     curve_query,
@@ -29,8 +26,10 @@ from service.client.queries import (
     spec_of,
 )
 from service.client.study import DEFAULT_SERVER
+from service.client.waiting import Waiting, is_event
 from service.client.wire import (
     API,
+    EVENTS_TIMEOUT,
     FILE_TIMEOUT,
     Query,
     connection_options,
@@ -102,6 +101,16 @@ class AsyncClient:
         except httpx.HTTPError as error:
             raise UnreachableError(self.server, reason(error)) from error
 
+    async def events(self, study_id: str) -> AsyncIterator[None]:
+        """One item for each sign of life of a study, until its stream ends; none where there is no stream."""
+        address = f"{API}{study_path(study_id)}/events"
+        with suppress(httpx.HTTPError):
+            async with self._http.stream("GET", address, timeout=EVENTS_TIMEOUT) as response:
+                if response.is_success:
+                    async for line in response.aiter_lines():
+                        if is_event(line):
+                            yield None
+
     async def preview(self, spec: Spec | str | PathLike[str]) -> Preview:
         """What a study would be."""
         return cast("Preview", await self.request("POST", "/studies:preview", json=spec_of(spec)))
@@ -159,18 +168,28 @@ class AsyncStudy:
 
     async def wait(self, *, progress: bool | Progressing = False, timeout: float | None = None) -> AsyncStudy:
         """Wait until the study has ended, as `Study.wait` does."""
-        end = None if timeout is None else time.monotonic() + timeout
         with reporting(progress) as tell:
-            look = 0
+            waiting = Waiting(tell, timeout)
             while True:
-                study = await self.detail()
-                tell(study)
-                if study["state"] in ENDED or study["time_over"]:
-                    return self
-                if end is not None and timeout is not None and time.monotonic() >= end:
-                    raise StudyTimeoutError(study, timeout)
-                await asyncio.sleep(POLLS[min(look, len(POLLS) - 1)])
-                look += 1
+                try:
+                    async for study in self._looks(waiting):
+                        if waiting.over(study):
+                            return self
+                except ServiceError as error:
+                    waiting.failed(error)
+                await asyncio.sleep(waiting.pause())
+
+    async def _looks(self, waiting: Waiting) -> AsyncIterator[StudyDetail]:
+        yield await self.detail()
+        if not waiting.listens():
+            return
+        waiting.listening()
+        async for _ in self._client.events(self.id):
+            waiting.heard()
+            yield await self.detail()
+            if not waiting.listens():
+                return
+        waiting.listened()
 
     async def curves(
         self,

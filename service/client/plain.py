@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import Any
 
 import httpx
 
 from service.client.errors import UnreachableError
+from service.client.waiting import is_event
 from service.client.wire import (
     API,
+    EVENTS_TIMEOUT,
     FILE_TIMEOUT,
     Query,
     connection_options,
@@ -108,6 +111,16 @@ class ServiceClient:
                 yield from response.iter_bytes()
         except httpx.HTTPError as error:
             raise UnreachableError(self.server, reason(error)) from error
+
+    def events(self, study_id: str) -> Iterator[None]:
+        """One item for each sign of life of a study, until its stream ends; none where there is no stream.
+
+        Why it ended does not matter: the next look at the study tells.
+        """
+        address = f"{API}{study_path(study_id)}/events"
+        with suppress(httpx.HTTPError), self._http.stream("GET", address, timeout=EVENTS_TIMEOUT) as response:
+            if response.is_success:
+                yield from (None for line in response.iter_lines() if is_event(line))
 
     def results(self, study_id: str, form: str) -> Iterator[bytes]:
         """All rows of a study in the named format."""

@@ -7,19 +7,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from service.client.errors import SpecFileError
-from worker.states import TERMINAL
 
 if TYPE_CHECKING:
     from datetime import datetime
 
     from service.client.types import Spec, StudyDetail
-
-ENDED: Final = frozenset(state.value for state in TERMINAL)
-#: Seconds between two looks at a study: short at first, then longer, up to the last.
-POLLS: Final = (0.1, 0.2, 0.3, 0.5, 1.0)
 
 Value = float | int | str
 

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from service.client.errors import StudyTimeoutError
 from service.client.frames import Curves, grid_of, table_of
 from service.client.plain import ServiceClient
 from service.client.queries import (
-    ENDED,
-    POLLS,
     Progressing,
     Value,
     curve_query,
@@ -24,6 +20,7 @@ from service.client.queries import (
     result_query,
     spec_of,
 )
+from service.client.waiting import Waiting, wait_for
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -125,6 +122,9 @@ class Study:
     def wait(self, *, progress: bool | Progressing = False, timeout: float | None = None) -> Study:
         """Wait until the study has ended, or its time is over; gives the study itself.
 
+        While the service does not answer, for instance because it is restarted, the waiting goes on; a warning in the
+        log (``service.client.waiting``) says so.
+
         Parameters
         ----------
         progress : bool or callable
@@ -132,18 +132,9 @@ class Study:
         timeout : float, optional
             Seconds after which StudyTimeoutError is raised; the study goes on.
         """
-        end = None if timeout is None else time.monotonic() + timeout
         with reporting(progress) as tell:
-            look = 0
-            while True:
-                study = self.detail()
-                tell(study)
-                if study["state"] in ENDED or study["time_over"]:
-                    return self
-                if end is not None and timeout is not None and time.monotonic() >= end:
-                    raise StudyTimeoutError(study, timeout)
-                time.sleep(POLLS[min(look, len(POLLS) - 1)])
-                look += 1
+            wait_for(self._client.plain, self.id, Waiting(tell, timeout))
+        return self
 
     def curves(
         self,

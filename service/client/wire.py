@@ -11,12 +11,15 @@ from urllib.parse import quote
 import httpx
 
 from service.client.errors import RefusedError, ServiceError, UnreachableError
+from service.client.waiting import SILENCE
 
 API: Final = "/api/v1"
 #: Seconds to wait for an answer; curves of a large study are read from disk first.
 TIMEOUT: Final = httpx.Timeout(60.0, connect=10.0)
 #: A whole study may take minutes to be written before its first byte comes.
 FILE_TIMEOUT: Final = httpx.Timeout(None, connect=10.0)
+#: A stream of events is silent for so long at most.
+EVENTS_TIMEOUT: Final = httpx.Timeout(SILENCE, connect=10.0)
 
 Query = Sequence[tuple[str, str]]
 
