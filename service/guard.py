@@ -2,29 +2,27 @@
 
 import re
 from typing import Final
-from urllib.parse import quote
 
 import anyio
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.requests import Request, cookie_parser
-from starlette.responses import RedirectResponse, Response
+from starlette.requests import ClientDisconnect, Request, cookie_parser
+from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.access import OPEN, Access, Grant
+from service.access import ASKING, OPEN, Access, Grant
 from service.errors import ApiError, problem_response
 from service.settings import Settings
 from service.storage.errors import StoreError
 from service.storage.tokens import TokenScope
 from service.web.problem_page import problem_page
+from service.web.way_in import LOGIN_PATH, way_in
 from worker.limits import BODY_SECONDS, MAX_BODY_BYTES
 
-LOGIN_PATH: Final = "/login"
 #: What anybody may ask for, token or not: whether the service is up, and the way in.
 OPEN_PATHS: Final = frozenset({"/livez", "/readyz", LOGIN_PATH, "/static/sprag.css", "/static/sprag.svg"})
 #: Requests that change nothing, whatever their method says.
 _LOOKING: Final = frozenset({"/api/v1/studies:preview", "/api/v1/clutch-fits", "/new/check", LOGIN_PATH, "/logout"})
 SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
-API_PREFIX: Final = "/api/"
 
 #: An empty style element: the script that draws pictures fills it rule by rule, which asks for no further permission.
 _EMPTY_STYLE: Final = "'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='"
@@ -69,14 +67,27 @@ class Guard:
         try:
             await self._check(scope)
         except ApiError as error:
-            answer = _to_login(scope) if error.problem == "unauthorized" else None
-            answer = answer or problem_page(Request(scope), error) or problem_response(error)
+            answer = await self._refusal(Request(scope, _limited(receive)), error)
             await answer(scope, receive, _with_headers(send))
             return
         if scope["method"] == "HEAD":
             # Whatever can be read can be asked for its headers; the server itself sends no body then.
             scope = {**scope, "method": "GET"}
-        await self._app(scope, _limited(receive), _with_headers(send))
+        asking = ASKING.set(scope["sprag.grant"])
+        try:
+            await self._app(scope, _limited(receive), _with_headers(send))
+        finally:
+            ASKING.reset(asking)
+
+    async def _refusal(self, request: Request, error: ApiError) -> Response:
+        """The answer to a request that was refused: for pages, the login where that helps."""
+        try:
+            answer = await way_in(request, error, self._access)
+        except ApiError as unreadable:
+            answer, error = None, unreadable
+        except ClientDisconnect:
+            answer = None
+        return answer or problem_page(request, error) or problem_response(error)
 
     async def _check(self, scope: Scope) -> None:
         headers = Headers(scope=scope)
@@ -107,11 +118,8 @@ class Guard:
             raise ApiError("unavailable", f"The tokens cannot be read: {error}.") from error
         if not self._access.needed:
             return OPEN
-        # The pages' own script, pictures and downloads have no token but the browser's password.
-        own = safe and headers.get("sec-fetch-site") in ("same-origin", "none")
-        api = scope["path"].startswith(API_PREFIX) and not own
         sent = headers.getlist("authorization")
-        grant = self._access.of_header(sent[0], basic=not api) if len(sent) == 1 else None
+        grant = self._access.of_header(sent[0]) if len(sent) == 1 else None
         if not sent:
             grant = self._access.of_cookies(cookie_parser(headers.get("cookie", "")))
             if grant is not None and not safe and not _names_its_site(headers):
@@ -119,12 +127,12 @@ class Guard:
         if opened:
             return grant
         if grant is None:
-            challenge = "Bearer" if api else 'Basic realm="Sprag", charset="UTF-8"'
-            raise ApiError(
-                "unauthorized", "This request carries no valid token.", headers={"WWW-Authenticate": challenge}
-            )
+            # Another challenge would make a browser ask for a password by itself, and drop the page it was to send.
+            headers_of_answer = {"WWW-Authenticate": "Bearer"}
+            raise ApiError("unauthorized", "This request carries no valid token.", headers=headers_of_answer)
         if grant.scope is not TokenScope.WRITE and not safe and scope["path"] not in _LOOKING:
-            raise ApiError("read-only", f"The token {grant.name or grant.id} allows to look, not to change anything.")
+            scope["sprag.grant"] = grant  # the login says whose token it is
+            raise ApiError("read-only", f"Token {grant.name or grant.id} is read-only.")
         return grant
 
 
@@ -133,17 +141,6 @@ def body_too_large() -> ApiError:
     return ApiError(
         "body-too-large", f"The body may have {MAX_BODY_BYTES} bytes at most.", headers={"Connection": "close"}
     )
-
-
-def _to_login(scope: Scope) -> Response | None:
-    """The way to the page where a browser logs in; None for programs."""
-    if scope["method"] != "GET" or scope["path"].startswith(API_PREFIX):
-        return None
-    if "text/html" not in Headers(scope=scope).get("accept", ""):
-        return None
-    query = scope.get("query_string", b"").decode("latin-1")
-    wanted = scope["path"] + (f"?{query}" if query else "")
-    return RedirectResponse(f"{LOGIN_PATH}?next={quote(wanted, safe='/')}", 303, {"Cache-Control": "no-store"})
 
 
 def _names_its_site(headers: Headers) -> bool:

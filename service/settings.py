@@ -59,7 +59,7 @@ class Settings(BaseSettings):
         default=None,
         description=(
             f"secret of at least {MIN_TOKEN_LENGTH} characters that every request must carry as "
-            "`Authorization: Bearer`; pages in a browser take it as the password"
+            "`Authorization: Bearer`; browsers log in with it"
         ),
     )
     allowed_hosts: Annotated[tuple[str, ...], NoDecode] = Field(

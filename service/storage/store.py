@@ -12,6 +12,7 @@ from service.storage.retry import Retries
 from service.storage.room import Room
 from service.storage.schedules import Schedules
 from service.storage.session import Session
+from service.storage.sessions import Sessions
 from service.storage.studies import Studies
 from service.storage.tokens import Tokens
 from service.storage.work import Work
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from worker.ports import Clock
 
 
-class Store(Studies, Retries, Cases, Room, Schedules, Tokens, Totals, Work):
+class Store(Studies, Retries, Cases, Room, Schedules, Sessions, Tokens, Totals, Work):
     """One database. Safe to use from several threads; close it at the end (it is a context manager)."""
 
     @classmethod

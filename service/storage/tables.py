@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from worker import kernels
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0008"
+HEAD_REVISION = "0009"
 
 METADATA = sa.MetaData(
     naming_convention={

@@ -7,9 +7,8 @@ import json
 import secrets
 from collections.abc import Mapping
 from typing import Annotated, Any, Final
-from urllib.parse import parse_qsl
 
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Query, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
@@ -31,6 +30,7 @@ from service.web.form_spec import (
     values_of,
     with_clutch_defaults,
 )
+from service.web.form_values import Form
 from service.web.templates import fragment, page, spec_text
 from worker import kernels
 from worker.kernels import MAX_PENDULUMS
@@ -38,9 +38,6 @@ from worker.limits import MAX_AXES
 
 router = APIRouter(include_in_schema=False)
 
-_FORM_TYPE: Final = "application/x-www-form-urlencoded"
-#: Fields of a form, at most.
-_MOST_FIELDS: Final = 2000
 #: What an empty form begins with.
 _EMPTY: Final[Values] = {
     "pendulums": "1",
@@ -52,20 +49,6 @@ _EMPTY: Final[Values] = {
     "/base/clutch/kind": "law",
     "/axes/0/way": "linspace",
 }
-
-
-async def read_form(request: Request) -> Values:
-    """The fields of a form as a browser sends them; of a name that is sent twice, the last one."""
-    if request.headers.get("content-type", "").partition(";")[0].strip().lower() != _FORM_TYPE:
-        raise ApiError("unsupported-media-type", f"A form is sent as {_FORM_TYPE}.")
-    try:
-        text = (await request.body()).decode("utf-8")
-        return dict(parse_qsl(text, keep_blank_values=True, max_num_fields=_MOST_FIELDS))
-    except ValueError as error:
-        raise ApiError("bad-request", "The form cannot be read.") from error
-
-
-Form = Annotated[Values, Depends(read_form)]
 
 
 @router.get("/new")

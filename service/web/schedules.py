@@ -20,8 +20,8 @@ from service.schedules.fields import ScheduleFields, change_fields, read_fields
 from service.schedules.times import zones
 from service.spec_messages import SpecError
 from service.storage.errors import StudyNotFound, TooManySchedules
-from service.web.form import Form
 from service.web.form_spec import Values
+from service.web.form_values import Form
 from service.web.templates import page
 from worker.limits import MAX_PRIORITY
 

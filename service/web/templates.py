@@ -13,6 +13,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 from starlette.responses import Response
 
+from service.access import ASKING
+from service.storage.tokens import TokenScope
+
 #: Narrow blank without a line break: between thousands, as ISO 80000 writes them.
 _THIN: Final = "\N{NARROW NO-BREAK SPACE}"
 _RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -54,7 +57,14 @@ def _templates() -> Environment:
         "time_left": time_left,
         "bytes": bytes_text,
     }
+    environment.globals["read_only"] = _read_only
     return environment
+
+
+def _read_only() -> str:
+    """Name of the token that the page is made for, where it only allows to look; "" where it allows everything."""
+    grant = ASKING.get()
+    return "" if grant is None or grant.scope is TokenScope.WRITE else grant.name or grant.id
 
 
 def page(name: str, status: int = 200, **values: Any) -> Response:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import html
+import re
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -10,14 +12,17 @@ from typing import TYPE_CHECKING
 
 import httpx
 import pytest
+from pydantic import SecretStr
 
 from service import access
 from service.api.examples import SPEC
 from service.app import create_app
 from service.settings import Settings
 from service.storage.errors import TokenNotFound
+from service.storage.store import Store
 from service.storage.tokens import TokenScope
 from tests.service.routes import every_route
+from worker.states import StudyState
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
@@ -196,3 +201,121 @@ def test_a_session_ends_in_time_and_cannot_be_made_up(office: Office, monkeypatc
 def test_nobody_is_sent_elsewhere_after_the_login(office: Office, elsewhere: str) -> None:
     answer = office.browser(**OWN).post("/login", data={"token": office.read, "next": elsewhere})
     assert answer.headers["location"] == "/"
+
+
+def fields_of(page: str) -> dict[str, str]:
+    """The fields of a page's last form, as a browser sends them."""
+    form = page[page.rindex("<form") :]
+    return {
+        html.unescape(name): html.unescape(value)
+        for name, value in re.findall(r'<input[^>]* name="([^"]*)"[^>]*? value="([^"]*)"', form)
+    }
+
+
+TYPED = {"/name": 'my "best" drive\n<b>', "/base/shaft/load": "2 N*m", "do": "check", "key": "abc"}
+
+
+def test_a_form_sent_after_its_session_ended_comes_back_as_it_was_typed(office: Office) -> None:
+    browser = office.browser(**OWN)
+    refused = browser.post("/new", data=TYPED)
+    assert (refused.status_code, refused.headers["www-authenticate"]) == (401, "Bearer")
+    assert refused.headers["cache-control"] == "no-store"
+    assert "Your session has ended" in refused.text
+    wrong = browser.post("/login", data={**fields_of(refused.text), "token": "wrong"})
+    assert (wrong.status_code, fields_of(wrong.text)) == (401, fields_of(refused.text))
+    read = browser.post("/login", data={**fields_of(refused.text), "token": office.read})
+    assert (read.status_code, fields_of(read.text)) == (403, fields_of(refused.text))
+    assert "set-cookie" not in read.headers
+    back = browser.post("/login", data={**fields_of(refused.text), "token": office.write})
+    assert back.status_code == 200
+    assert 'action="/new"' in back.text
+    assert fields_of(back.text) == TYPED
+    form = browser.post("/new", data=fields_of(back.text))
+    assert form.status_code == 200
+    assert 'value="2 N*m"' in form.text
+
+
+def test_a_form_sent_with_a_token_to_look_is_kept_for_another_token(office: Office) -> None:
+    browser = office.browser(**OWN)
+    assert browser.post("/login", data={"token": office.read}).status_code == 303
+    refused = browser.post("/schedules/new", data={"name": "nightly"})
+    assert refused.status_code == 403
+    assert "Token manager is read-only." in refused.text
+    back = browser.post("/login", data={**fields_of(refused.text), "token": office.write})
+    assert 'action="/schedules/new"' in back.text
+    assert fields_of(back.text) == {"name": "nightly"}
+
+
+def test_a_form_without_fields_is_kept_too(office: Office) -> None:
+    study_id = office.program(office.write).post("/api/v1/studies", json=SPEC).json()["id"]
+    browser = office.browser(**OWN)
+    empty = {"Content-Type": "application/x-www-form-urlencoded"}
+    refused = browser.post(f"/studies/{study_id}/cancel", headers=empty)
+    back = browser.post("/login", data={**fields_of(refused.text), "token": office.write})
+    assert f'action="/studies/{study_id}/cancel"' in back.text
+    assert browser.post(f"/studies/{study_id}/cancel", headers=empty).status_code == 303
+    assert office.store.get_study(study_id).state is StudyState.CANCELLING
+
+
+def test_what_is_no_form_is_refused_and_not_kept(office: Office) -> None:
+    browser = office.browser(**OWN)
+    assert browser.post("/new", json=SPEC).status_code == 415
+    assert browser.post("/new", data={f"f{number}": "" for number in range(3000)}).status_code == 400
+    assert browser.put("/new", data=TYPED).headers["content-type"].startswith("text/html")
+    other = browser.post("/new", data=TYPED, headers={"Origin": "http://evil.example", "Sec-Fetch-Site": "cross-site"})
+    assert other.status_code == 403
+    assert "my &" not in other.text
+
+
+@pytest.mark.parametrize("path", ["/new", "/new?mode=text", "/schedules/new"])
+def test_a_token_to_look_is_told_so_before_anything_is_typed(office: Office, path: str) -> None:
+    for token, told in ((office.read, True), (office.write, False)):
+        browser = office.browser(**OWN)
+        browser.post("/login", data={"token": token})
+        text = browser.get(path).text
+        assert ("Token <b>manager</b> is read-only" in text) is told
+        assert ("disabled>" in text) is told
+
+
+def test_a_token_to_look_sees_no_buttons_that_change_a_study(office: Office) -> None:
+    study_id = office.program(office.write).post("/api/v1/studies", json=SPEC).json()["id"]
+    for token, seen in ((office.read, False), (office.write, True)):
+        browser = office.browser(**OWN)
+        browser.post("/login", data={"token": token})
+        assert (f'action="/studies/{study_id}/cancel"' in browser.get(f"/studies/{study_id}").text) is seen
+
+
+def test_sessions_outlive_a_restart_and_hold_on_every_host(
+    settings: Settings, office: Office, service: Service, connect: Callable[..., httpx.Client]
+) -> None:
+    browser = office.browser(**OWN)
+    browser.post("/login", data={"token": office.write})
+    cookie = {"Cookie": f"{access.COOKIE}={browser.cookies[access.COOKIE]}", "Accept": "text/html", **OWN}
+    with Store.open(settings.database_url) as store:
+        other = connect(create_app(settings, store=store, computer=service.computer))
+        assert other.get("/", headers=cookie).status_code == 200
+        assert other.post("/logout", headers=cookie).status_code == 303
+    later = connect(create_app(settings, store=service.store, computer=service.computer))
+    assert later.get("/", headers=cookie).status_code == 303
+
+
+def test_a_session_of_the_setting_ends_when_the_setting_changes(
+    settings: Settings, service: Service, connect: Callable[..., httpx.Client]
+) -> None:
+    def app(token: str) -> httpx.Client:
+        changed = settings.model_copy(update={"token": SecretStr(token)})
+        return connect(create_app(changed, store=service.store, computer=service.computer))
+
+    first = app("a" * 20)
+    first.post("/login", data={"token": "a" * 20}, headers=OWN)
+    cookie = {"Cookie": f"{access.COOKIE}={first.cookies[access.COOKIE]}", "Accept": "text/html"}
+    for token, status in (("a" * 20, 200), ("b" * 20, 303)):
+        assert app(token).get("/", headers=cookie).status_code == status
+
+
+def test_ended_sessions_are_forgotten_when_their_time_is_over(service: Service) -> None:
+    now = int(time.time())
+    service.store.end_session("old", now - 10)
+    service.store.end_session("new", now + 1000)
+    service.store.end_session("new", now + 1000)
+    assert service.store.session_secrets().ended == {"new": now + 1000}

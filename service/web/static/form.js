@@ -8,9 +8,16 @@ let whole = false; // after a look at everything, empty required fields are told
 
 const encoded = (extra = []) => new URLSearchParams([...new FormData(form), ...extra]);
 
+// What is typed goes with the button to the login, and comes back from there.
+const ended = () => {
+  document.getElementById("panel").innerHTML = '<p class="fault" role="alert">Your session has ended. '
+    + '<button name="do" value="check" data-login>Log in</button> What you typed is kept.</p>';
+};
+
 const check = async () => {
   const mine = ++latest;
   const answer = await fetch(form.dataset.check, { method: "POST", body: encoded() });
+  if (answer.status === 401) { ended(); return; }
   if (!answer.ok || mine !== latest) return;
   const found = await answer.json();
   for (const place of form.querySelectorAll(".wrong")) {
@@ -45,6 +52,7 @@ const newShape = async (extra) => {
   clearTimeout(waiting);
   latest += 1;
   const answer = await fetch(form.action, { method: "POST", body: encoded(extra), headers: { Accept: "text/html" } });
+  if (answer.status === 401) { ended(); return; }
   const page = new DOMParser().parseFromString(await answer.text(), "text/html");
   const fresh = page.getElementById("study-form");
   if (!fresh) return;
@@ -80,7 +88,7 @@ function listen() {
     if (button && button.matches("[data-shape]")) {
       event.preventDefault();
       reshape([["do", button.value]]);
-    } else if (button && button.value === "check") {
+    } else if (button && button.value === "check" && !button.matches("[data-login]")) {
       event.preventDefault();
       whole = true;
       check();
