@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 from starlette.concurrency import run_in_threadpool
 
+from service.attempts import Attempts
 from service.storage.sessions import SessionSecrets
 from service.storage.tokens import TokenRecord, TokenScope, digest_of
 
@@ -64,7 +65,7 @@ ASKING: ContextVar[Grant | None] = ContextVar("asking", default=None)
 
 
 class Access:
-    """Knows the tokens of one service. For one event loop.
+    """Knows the tokens of one service, and who tried others. For one event loop.
 
     Parameters
     ----------
@@ -77,6 +78,7 @@ class Access:
     def __init__(self, settings: Settings, store: TokenStore | None = None) -> None:
         self._setting = None if settings.token is None else settings.token.get_secret_value().encode("ascii")
         self._always = settings.token is not None or not settings.loopback
+        self.attempts = Attempts(settings.trusted_proxies)
         self._store = store
         self._key = secrets.token_bytes(32) if store is None else None
         self._logged_out: dict[str, int] = {}

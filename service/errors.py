@@ -63,6 +63,12 @@ PROBLEM_TYPES: dict[str, ProblemType] = _catalogue(
     _P("too-slow", 408, "The request came in too slowly", "Send the whole body at once."),
     _P("cross-site", 403, "Requests from other sites are refused", "A browser sent it for a page of another site."),
     _P("wrong-host", 421, "The request is addressed to another host", "SPRAG_ALLOWED_HOSTS allows further names."),
+    _P(
+        "too-many-attempts",
+        429,
+        "Too many attempts with invalid tokens",
+        "Wait as long as the header Retry-After says.",
+    ),
     _P("queue-full", 429, "Too many studies wait", "Wait until some have ended, or cancel some."),
     _P("internal", 500, "The service failed", "This is a fault of the program; the server's log has the details."),
     _P("unavailable", 503, "The service cannot do this now", "Try again later; `sprag doctor` looks for the cause."),

@@ -119,7 +119,11 @@ class Guard:
         if not self._access.needed:
             return OPEN
         sent = headers.getlist("authorization")
+        if sent:
+            self._access.attempts.admit(scope)
         grant = self._access.of_header(sent[0]) if len(sent) == 1 else None
+        if sent and grant is None:
+            await self._access.attempts.failed(scope, "header Authorization")
         if not sent:
             grant = self._access.of_cookies(cookie_parser(headers.get("cookie", "")))
             if grant is not None and not safe and not _names_its_site(headers):

@@ -37,11 +37,26 @@ def configure(form: LogFormat, *, requests: bool) -> None:
     What the program says begins at level INFO, what libraries say at WARNING.
     """
     handler = logging.StreamHandler(sys.stderr)
-    handler.setFormatter(JsonFormatter() if form == "json" else logging.Formatter("%(message)s"))
+    handler.setFormatter(JsonFormatter() if form == "json" else TextFormatter())
     logging.basicConfig(level=logging.WARNING, handlers=[handler])
     for name in ("sprag", "service", "worker"):
         logging.getLogger(name).setLevel(logging.INFO)
     _REQUESTS.setLevel(logging.INFO if requests else logging.WARNING)
+
+
+def _time(record: logging.LogRecord) -> str:
+    return datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds")
+
+
+class TextFormatter(logging.Formatter):
+    """A record as a line for people: time (UTC), level, message; what it was caused by on the lines below."""
+
+    def __init__(self) -> None:
+        super().__init__("%(asctime)s %(levelname)s %(message)s")
+
+    def formatTime(self, record: logging.LogRecord, datefmt: str | None = None) -> str:  # noqa: N802, ARG002
+        """Time of the record as ISO 8601 has it."""
+        return _time(record)
 
 
 class JsonFormatter(logging.Formatter):
@@ -51,7 +66,7 @@ class JsonFormatter(logging.Formatter):
         """The line; fields given as ``extra={"fields": {...}}`` stand in it too."""
         message = record.getMessage()
         line: dict[str, object] = {
-            "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
+            "time": _time(record),
             "level": record.levelname.lower(),
             "logger": record.name,
             "message": message,

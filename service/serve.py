@@ -134,7 +134,7 @@ class Server(uvicorn.Server):
 def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) -> None:
     """Serve until SIGINT or SIGTERM; service and dispatcher have ended when this returns.
 
-    ``announce`` is called with the address once it is listened on (by default it is said on standard error). Raises
+    ``announce`` is called with the address once it is listened on (by default a line of the log tells it). Raises
     UnsafeSettingsError, DatabaseError and AddressError, each with one sentence, before anything is started.
     """
     logs.configure(settings.log_format, requests=settings.log_requests)

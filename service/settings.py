@@ -10,6 +10,7 @@ import re
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from ipaddress import IPv4Network, IPv6Network
 from pathlib import Path
 from typing import Annotated, Any, Literal
 from zoneinfo import available_timezones
@@ -65,6 +66,12 @@ class Settings(BaseSettings):
     allowed_hosts: Annotated[tuple[str, ...], NoDecode] = Field(
         default=(),
         description="names, separated by commas, by which clients may call the service beside localhost and the host",
+    )
+    trusted_proxies: Annotated[tuple[IPv4Network | IPv6Network, ...], NoDecode] = Field(
+        default=(IPv4Network("127.0.0.1/32"), IPv6Network("::1/128")),
+        description=(
+            "addresses or networks, separated by commas, of proxies whose `X-Forwarded-For` tells the client's address"
+        ),
     )
     processes: int = Field(default=0, ge=0, le=1024, description="processes of the pool; 0: one for each core")
     executor: str = Field(
@@ -127,7 +134,7 @@ class Settings(BaseSettings):
             raise ValueError("the name of a time zone is needed, such as Europe/Berlin")
         return value
 
-    @field_validator("allowed_hosts", mode="before")
+    @field_validator("allowed_hosts", "trusted_proxies", mode="before")
     @classmethod
     def _split_hosts(cls, value: object) -> object:
         if isinstance(value, str):
@@ -244,4 +251,6 @@ def table() -> Iterator[SettingRow]:
 def _shown(default: Any) -> str:
     if default is None or default in ("", ()):
         return ""
+    if isinstance(default, tuple):
+        return ",".join(map(str, default))
     return f"{default:g}" if isinstance(default, float) else str(default)

@@ -16,7 +16,7 @@ API_PREFIX: Final = "/api/v1"
 _METRICS: Final = "/metrics"
 _SCHEMAS: Final = "#/components/schemas/"
 #: Problems that any operation of the API may answer with.
-_EVERYWHERE: Final = ("unauthorized", "wrong-host", "internal", "unavailable")
+_EVERYWHERE: Final = ("unauthorized", "too-many-attempts", "wrong-host", "internal", "unavailable")
 _UNSAFE: Final = ("cross-site", "read-only", "too-slow")
 
 _TEXT: Final = {"type": "string"}

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from service.cli.console import TroubleError, WrongInputError, say, write_json
+from service.cli.console import TroubleError, WrongInputError, write_json
 from service.cli.options import ChunkCases, Database, JsonFlag, Processes
 from service.cli.settings import read_settings
 
@@ -33,14 +33,11 @@ def serve(
     settings = read_settings(host=host, port=port, database=db, processes=processes, chunk_cases=chunk)
 
     def announce(address: str) -> None:
-        if as_json:
-            write_json({"address": address})
-            sys.stdout.flush()
-        else:
-            say(f"Sprag serves at {address} (Ctrl-C ends it).")
+        write_json({"address": address})
+        sys.stdout.flush()
 
     try:
-        run_service(settings, announce=announce)
+        run_service(settings, announce=announce if as_json else None)
     except UnsafeSettingsError as error:
         raise WrongInputError(str(error)) from error
     except AddressError as error:
@@ -61,9 +58,4 @@ def worker(
 
     settings = read_settings(database=db, processes=processes)
     logs.configure(settings.log_format, requests=False)
-    run_dispatcher(
-        worker_settings(settings),
-        stop_on_signals(),
-        say=say,
-        take_over=take_over,
-    )
+    run_dispatcher(worker_settings(settings), stop_on_signals(), take_over=take_over)

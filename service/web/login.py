@@ -6,6 +6,7 @@ from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
 
 from service.access import COOKIE, SESSION_SECONDS
+from service.errors import ApiError
 from service.storage.tokens import TokenScope
 from service.web.form_values import Form
 from service.web.way_in import LOGIN_PATH, access_of, kept_form, kept_page, login_page, within
@@ -24,14 +25,21 @@ async def log_in(request: Request, values: Form) -> Response:
     """The token is taken, and the browser sent where it wanted to go; or the form is shown again."""
     wanted, kept = values.get("next", "/"), kept_form(values)
     access = access_of(request)
+    try:
+        access.attempts.admit(request.scope)
+    except ApiError as error:
+        response = login_page(request, access, wanted, fault=error.detail, status=error.type.status, kept=kept)
+        response.headers.update(error.headers)
+        return response
     grant = access.of_token(values.get("token", "").strip().encode("utf-8", "replace"))
     if grant is None:
+        await access.attempts.failed(request.scope, "page /login")
         return login_page(request, access, wanted, fault="This is no valid token.", status=401, kept=kept)
     if kept is not None and grant.scope is not TokenScope.WRITE:
         fault = f"Token {grant.name or grant.id} is read-only: it cannot send the form. Use another one."
         return login_page(request, access, wanted, fault=fault, status=403, kept=kept)
-    response = RedirectResponse(within(wanted), 303) if kept is None else kept_page(grant, wanted, kept)
-    response.set_cookie(
+    answer = RedirectResponse(within(wanted), 303) if kept is None else kept_page(grant, wanted, kept)
+    answer.set_cookie(
         COOKIE,
         await access.log_in(grant),
         max_age=SESSION_SECONDS,
@@ -39,7 +47,7 @@ async def log_in(request: Request, values: Form) -> Response:
         samesite="lax",
         secure=_is_secure(request),
     )
-    return response
+    return answer
 
 
 @router.post("/logout")
