@@ -14,6 +14,8 @@ from pathlib import Path
 
 import numba
 
+from engine.sources import engine_folder, source_hash
+
 #: Environment variable that moves the cache.
 CACHE_VARIABLE = "SPRAG_KERNEL_CACHE"
 _TEMPORARY_NAME = f"sprag-kernels-{os.getuid()}"
@@ -21,12 +23,8 @@ _TEMPORARY_NAME = f"sprag-kernels-{os.getuid()}"
 
 @cache
 def _engine_hash() -> str:
-    digest = hashlib.sha256(numba.__version__.encode())
-    root = Path(__file__).parent
-    for path in sorted(root.rglob("*.py")):
-        digest.update(path.relative_to(root).as_posix().encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+    sources = source_hash(engine_folder())
+    return hashlib.sha256(f"{numba.__version__} {sources}".encode()).hexdigest()[:16]
 
 
 def _writable(folder: Path) -> bool:

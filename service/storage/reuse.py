@@ -14,7 +14,7 @@ import sqlalchemy as sa
 from service.storage.cases import conditions
 from service.storage.order import Orders
 from service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, results_table
-from worker import kernels
+from worker import fingerprint, kernels
 from worker.kernels import WorkerEnding
 from worker.order import order_of
 from worker.ports import Known
@@ -45,6 +45,11 @@ _SOURCE: Final[tuple[sa.ColumnElement[Any], ...]] = (
 )
 #: Endings that say nothing of the case itself: it deserves a run of its own.
 _NO_RESULT: Final = tuple(ending.value for ending in WorkerEnding)
+
+_MIXED: Final = (
+    "The cases of this study were not all computed by one version of Sprag and its libraries on one kind of processor: "
+    "they may differ in more than their parameters, and no other study takes them. A fresh study runs them all alike."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,13 +152,18 @@ class _Spans:
 
 
 def _find(connection: sa.Connection, spans: _Spans, study: Study, kin: str, number: int) -> _Found | None:
-    """Equal cases with rows in the studies of the same kin, however many; the newest study that has a case counts."""
+    """Equal cases with rows in the studies of the same kin, however many; the newest study that has a case counts.
+
+    Only rows that were computed under the fingerprint of this process count.
+    """
     wanted, c = Wanted(study), STUDIES.c
     found: list[tuple[Cases, int, Cases]] = []
     left, taken = study.cases, np.empty(0, dtype=np.bool_)
     for candidate in spans.candidates(connection, wanted, kin, number):
         source = connection.execute(
-            sa.select(*_SOURCE).where(c.number == candidate, c.done > 0, c.deleted_at.is_(None))
+            sa.select(*_SOURCE).where(
+                c.number == candidate, c.done > 0, c.deleted_at.is_(None), c.fingerprint == fingerprint.digest()
+            )
         ).one_or_none()
         if source is None:
             continue
@@ -208,6 +218,17 @@ def _has_rows(connection: sa.Connection, source: sa.Row[Any], study: Study, case
         ).scalars()
         stored &= ~np.isin(cases, np.fromiter(without, dtype=np.int64))
     return stored
+
+
+def mark_origin(connection: sa.Connection, number: int) -> None:
+    """Note on a study that rows of this process's fingerprint come in; rows of several are told in a warning."""
+    this = STUDIES.c.number == number
+    origin, warnings = connection.execute(sa.select(STUDIES.c.fingerprint, STUDIES.c.warnings).where(this)).one()
+    if origin is None:
+        connection.execute(sa.update(STUDIES).where(this).values(fingerprint=fingerprint.digest()))
+    elif origin != fingerprint.digest() and _MIXED not in (told := json.loads(warnings)):
+        values = {"fingerprint": "", "warnings": json.dumps([*told, _MIXED])}
+        connection.execute(sa.update(STUDIES).where(this).values(values))
 
 
 def copy_rows(connection: sa.Connection, model: str, pendulums: int, chunk: Chunk, known: Known) -> bool:

@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from worker import kernels
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0009"
+HEAD_REVISION = "0010"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -57,6 +57,8 @@ STUDIES = sa.Table(
     sa.Column("finish_by", sa.BigInteger),
     # 1: it is run coarse to fine, and its chunks are ranges of positions in that order (`worker.order`).
     sa.Column("coarse", sa.Integer, nullable=False, server_default="0"),
+    # Of the processes that computed its rows (`worker.fingerprint`); NULL: no rows yet, "": unknown, or several.
+    sa.Column("fingerprint", sa.String(64)),
     sqlite_autoincrement=True,
 )
 
@@ -70,7 +72,9 @@ HELD_AT_DEADLINE = "deadline"
 
 #: The columns of a `StudyRecord`: without the texts that can be long.
 RECORD_COLUMNS = tuple(
-    column for column in STUDIES.c if column.name not in {"spec", "study", "deleted_at", "kin_hash", "fresh"}
+    column
+    for column in STUDIES.c
+    if column.name not in {"spec", "study", "deleted_at", "kin_hash", "fresh", "fingerprint"}
 )
 
 CHUNKS = sa.Table(

@@ -11,7 +11,7 @@ import sqlalchemy as sa
 
 from service.storage.part import moment, optional_moment
 from service.storage.records import DispatcherRecord
-from service.storage.reuse import Reuse, copy_rows, endings_of
+from service.storage.reuse import Reuse, copy_rows, endings_of, mark_origin
 from service.storage.rows import target, tuples, without_collector
 from service.storage.tables import (
     CHUNKS,
@@ -195,6 +195,7 @@ class Work(Reuse):
         model, pendulums = connection.execute(
             sa.select(STUDIES.c.model, STUDIES.c.pendulums).where(STUDIES.c.number == chunk.study)
         ).one()
+        mark_origin(connection, chunk.study)
         numbers = (self._cases(chunk, connection) if known is None else known.missing).tolist()
         if result.count:
             with without_collector():

@@ -13,7 +13,7 @@ from service.storage.part import SystemClock
 from service.storage.records import StudyRecord
 from service.storage.store import Store
 from tests.worker.fakes import BASE, RUN
-from worker import kernels
+from worker import fingerprint, kernels
 from worker.chunking import Chunking
 from worker.dispatcher import Dispatcher
 from worker.executors.inline import InlineExecutor
@@ -140,6 +140,40 @@ def test_other_physics_is_never_taken(store: Store) -> None:
     assert store.reusable(Study(other.model, "", {**BASE, "shaft.inertia": 3e-3}, other.run, other.axes)) == 0
     record = run(store, grid([20.0], [0.1, 0.3], tolerance=1e-8), engine)
     assert (record.reused, len(engine.ran)) == (0, 4)
+
+
+def test_rows_of_another_engine_library_or_processor_are_never_taken(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, engine = grid([20.0], [0.1, 0.3]), Engine()
+    run(store, study, engine)
+    with monkeypatch.context() as patch:
+        patch.setattr(fingerprint, "digest", lambda: "another")
+        assert store.reusable(study) == 0
+        record = run(store, study, engine)
+        assert (record.reused, len(engine.ran)) == (0, 4)
+        assert store.reusable(study) == 2
+    assert run(store, study, engine).reused == 2
+
+
+def test_a_study_whose_rows_have_several_origins_says_so_and_is_no_source(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, engine = grid([20.0, 25.0], [0.1, 0.3, 0.5]), Engine()
+    record = store.create_study({}, study, warnings=["odd"])
+    epoch = store.take_over("test")
+    first = store.open_chunks(record.number)[0]
+    store.claim(epoch, [first])
+    store.commit(epoch, first, engine(kernels.chunk_task(study, first.first, first.count)))
+    assert store.get_study(record.id).warnings == ("odd",)
+    monkeypatch.setattr(fingerprint, "digest", lambda: "another")
+    Dispatcher(store, InlineExecutor(engine), SystemClock()).run(lambda: store.get_study(record.id).state.terminal)
+    odd, mixed = store.get_study(record.id).warnings
+    assert odd == "odd"
+    assert mixed.startswith("The cases of this study were not all computed by one version of Sprag")
+    assert store.reusable(study) == 0
+    monkeypatch.undo()
+    assert store.reusable(study) == 0
 
 
 def test_a_fresh_study_runs_everything(store: Store) -> None:

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import psutil
 
@@ -35,10 +36,11 @@ class Cluster:
     def start_scheduler(self) -> None:
         self.scheduler = _dask("scheduler", "--host", "127.0.0.1", "--port", self.port, "--no-dashboard", *_QUIET)
 
-    def start_worker(self, count: int = 1, **environment: str) -> None:
+    def start_worker(self, count: int = 1, folder: Path = ROOT, **environment: str) -> None:
+        """Start workers that import Sprag from ``folder``."""
         options = ("--nthreads", 1, "--nworkers", count, "--no-dashboard", "--memory-limit", 0, "--host", "127.0.0.1")
         arguments = ("worker", f"tcp://127.0.0.1:{self.port}", *options, "--death-timeout", DEADLINE)
-        self.workers.append(_dask(*arguments, **environment))
+        self.workers.append(_dask(*arguments, folder=folder, **environment))
 
     def computing(self) -> list[psutil.Process]:
         """The processes that run chunks: children of the workers' nannies."""
@@ -49,11 +51,11 @@ class Cluster:
         return found
 
 
-def _dask(*arguments: object, **environment: str) -> subprocess.Popen[bytes]:
+def _dask(*arguments: object, folder: Path = ROOT, **environment: str) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-W", "ignore", "-m", "distributed.cli.dask_" + str(arguments[0])]
     return subprocess.Popen(
         [*command, *map(str, arguments[1:])], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+        cwd=folder, env={**os.environ, "PYTHONPATH": str(folder), **environment},
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -19,9 +20,10 @@ from service.dispatching import WorkerSettings, pool
 from service.settings import Settings
 from service.storage.part import SystemClock
 from service.storage.store import Store
+from tests.conftest import ROOT
 from tests.worker import fakes
 from tests.worker.clusters import DEADLINE, Cluster, clusters
-from worker import kernels
+from worker import fingerprint, kernels
 from worker.chunking import Chunking
 from worker.dispatcher import Dispatcher
 from worker.executors.dask import DaskExecutor
@@ -211,15 +213,69 @@ def test_nothing_is_asked_of_a_connection_that_was_closed(
     assert asked == []
 
 
-def test_a_worker_with_another_engine_is_not_used(
+def test_a_worker_with_another_numpy_is_refused(
     start: Callable[..., DaskExecutor], caplog: pytest.LogCaptureFixture
 ) -> None:
-    executor = start(engine="another")
-    eventually(lambda: executor.wait(0.05) or caplog.text.count("is not used") == 2)
-    assert f"has engine {kernels.ENGINE_VERSION} and is not used; this is engine another" in caplog.text
+    executor = start(expected={**fingerprint.own(), "numpy": "0.9"})
+    eventually(lambda: executor.wait(0.05) or caplog.text.count("is refused") == 2)
+    reason = f"is refused: numpy: {np.__version__} instead of 0.9"
+    assert reason in caplog.text
     assert executor.capacity == SPARE_CHUNKS
     assert not executor.ready(fakes.study(1))
     assert (executor.shortage or "").startswith("No usable worker has joined the scheduler tcp://127.0.0.1:")
+    assert f"{reason} (and 1 more)." in (executor.shortage or "")
+
+
+def edited_engine(folder: Path) -> dict[str, str]:
+    """A copy of the sources whose engine is a hundred times less accurate, under the same version."""
+    for package in ("engine", "worker"):
+        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))
+    cases = folder / "engine" / "vibration_drive" / "cases.py"
+    cases.write_text(cases.read_text(encoding="utf-8") + "\nTOLERANCE_FACTOR = 100.0\n", encoding="utf-8")
+    return {}
+
+
+def no_sprag(folder: Path) -> dict[str, str]:
+    """No package of Sprag that could be imported."""
+    (folder / "engine.py").write_text("raise ImportError('there is no Sprag here')\n", encoding="utf-8")
+    return {}
+
+
+def no_fma(folder: Path) -> dict[str, str]:
+    """The same sources on a processor without fused multiplication and addition."""
+    for package in ("engine", "worker"):
+        (folder / package).symlink_to(ROOT / package)
+    features = fingerprint.own()["processor features"].split()
+    return {"NUMBA_CPU_FEATURES": ",".join(("-" if name == "fma" else "+") + name for name in features)}
+
+
+@pytest.mark.parametrize(
+    ("other", "reason"),
+    [
+        (edited_engine, "engine sources: "),
+        (no_sprag, "it cannot run Sprag (ImportError: there is no Sprag here)"),
+        (no_fma, "processor features: without fma"),
+    ],
+)
+def test_a_worker_that_would_give_other_values_runs_nothing_and_the_study_says_so(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, other: Callable[[Path], dict[str, str]], reason: str
+) -> None:
+    folder = tmp_path / "other"
+    folder.mkdir()
+    with clusters() as made, Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}", chunking=Chunking(cases=4)) as store:
+        record = store.create_study({}, fakes.study(20))
+        made.start_scheduler()
+        made.start_worker(folder=folder, **other(folder))
+        executor = DaskExecutor(made.url, 0, chunk_timeout=60.0, run=fakes.run, load=fakes.load)
+
+        def told() -> bool:
+            return reason in (store.get_study(record.id).reason or "")
+
+        begin = time.monotonic()
+        Dispatcher(store, executor, SystemClock()).run(lambda: told() or time.monotonic() - begin > DEADLINE)
+        assert told()
+        assert store.get_study(record.id).done == 0
+        assert reason in caplog.text
 
 
 def test_a_kernel_that_cannot_be_had_is_told(start: Callable[..., DaskExecutor]) -> None:

@@ -18,6 +18,7 @@ from tests.worker import fakes
 from worker import kernels
 from worker.executors.inline import InlineExecutor
 from worker.executors.process_pool import MAX_FAILED_STARTS, SPARE_CHUNKS, ProcessPoolExecutor
+from worker.fingerprint import prepare_as
 from worker.kernels import KernelShape
 from worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
 from worker.study import Study
@@ -265,6 +266,22 @@ def test_one_process_warms_the_cache_and_the_engine_gives_the_same_everywhere() 
             found = np.concatenate([result.values for result in results if result is not None])
             np.testing.assert_array_equal(found, whole.values)
             assert [e for result in results if result is not None for e in result.endings] == whole.endings
+    finally:
+        pool.close()
+
+
+def test_a_process_that_starts_after_an_upgrade_runs_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+    pool = fakes.pool(1, prepare=partial(prepare_as, "the fingerprint of before"))
+
+    def insist() -> None:
+        for _ in range(MAX_FAILED_STARTS + 1):
+            submit(pool, 1)
+            assert gather(pool, 1)[0].fate is Fate.STOPPED
+
+    try:
+        with pytest.raises(ExecutorError, match="die as soon as they start"):
+            insist()
+        assert "changed while the worker ran: it must be started again" in capfd.readouterr().err
     finally:
         pool.close()
 

@@ -23,15 +23,15 @@ import dask
 from distributed import LocalCluster
 from distributed.scheduler import KilledWorker
 
-from worker import kernels
-from worker.executors.dask_jobs import Job, Waiting, Worker
+from worker import fingerprint, kernels
+from worker.executors.dask_jobs import Job, Waiting, Worker, refusals
 from worker.executors.dask_link import Link, value_of
-from worker.executors.dask_tasks import introduce, load_kernel, run_chunk, scheduler_address
+from worker.executors.dask_tasks import INTRODUCE, load_kernel, run_chunk, scheduler_address
 from worker.executors.process_pool import MAX_LOADS, SPARE_CHUNKS
 from worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from distributed import Future
 
@@ -73,8 +73,8 @@ class DaskExecutor:
         Seconds after which a chunk that is being run ends with its worker.
     run, load : functions
         What a worker does with a chunk and with a new kernel; importable by name. Other than the engine's in tests.
-    engine : str
-        The engine's version; workers with another one are not used.
+    expected : mapping, optional
+        Fingerprint that workers must have; default: that of this process.
     scheduler_seconds : float
         Seconds for which a scheduler may be away.
     renew : bool
@@ -89,14 +89,14 @@ class DaskExecutor:
         chunk_timeout: float,
         run: Callable[[kernels.ChunkTask], kernels.ChunkResult] = kernels.run_task,
         load: Callable[[kernels.KernelShape], None] = kernels.load,
-        engine: str = kernels.ENGINE_VERSION,
+        expected: Mapping[str, str] | None = None,
         scheduler_seconds: float = SCHEDULER_SECONDS,
         renew: bool = False,
     ) -> None:
         self._timeout = chunk_timeout
         self._run = run
         self._load = load
-        self._engine = engine
+        self._expected = fingerprint.own() if expected is None else expected
         self._scheduler_seconds = scheduler_seconds
         self._name = uuid4().hex[:12]
         self._lock = RLock()
@@ -139,7 +139,8 @@ class DaskExecutor:
         with self._lock:
             if any(worker.usable for worker in self._workers.values()):
                 return None
-        return f"No usable worker has joined the scheduler {self._link.address}; the study goes on when one does."
+            why = refusals(self._workers.values())
+        return f"No usable worker has joined the scheduler {self._link.address}; the study goes on when one does.{why}"
 
     def ready(self, study: Study) -> bool:
         """Whether some worker has loaded the kernel of ``study``; lets one begin to where none has."""
@@ -224,7 +225,7 @@ class DaskExecutor:
                 if address not in self._workers:
                     self._workers[address] = worker = Worker(address, str(info.get("host", address)))
                     key = f"sprag-introduce-{self._name}-{uuid4().hex}"
-                    self._begin(worker, Job("introduce", now), key, introduce, self._renew)
+                    self._begin(worker, Job("introduce", now), key, eval, INTRODUCE.format(self._renew))
             ended = []
             for worker in self._workers.values():
                 if (job := worker.job) and job.kind == "chunk":
@@ -285,6 +286,8 @@ class DaskExecutor:
                 self._outcomes.put(Outcome(job.ticket, Fate.TIMED_OUT, detail=f"killed after {self._timeout:g} s"))
             else:
                 self._outcomes.put(Outcome(job.ticket, Fate.CRASHED, detail="its worker died"))
+        elif job.kind == "introduce":
+            _LOG.error("The worker %s was gone before it told its fingerprint.", worker.address)
 
     def _died_of(self, host: str, shape: kernels.KernelShape) -> None:
         """A worker died while it loaded a kernel: at the second time the one on its host's disk may be damaged."""
@@ -352,13 +355,13 @@ class DaskExecutor:
                 self._loaded(worker, job.shape, error)
             self._fill()
 
-    def _introduced(self, worker: Worker, engine: str | None, error: BaseException | None) -> None:
-        if error is not None:
-            _LOG.error("The worker %s cannot be used: %s: %s", worker.address, type(error).__name__, error)
-        elif engine != self._engine:
-            _LOG.error(
-                "The worker %s has engine %s and is not used; this is engine %s.", worker.address, engine, self._engine
-            )
+    def _introduced(self, worker: Worker, found: object, error: BaseException | None) -> None:
+        if error is None:
+            worker.refusal = fingerprint.differences(self._expected, found)
+        else:
+            worker.refusal = f"it cannot run Sprag ({type(error).__name__}: {error})"
+        if worker.refusal:
+            _LOG.error("The worker %s is refused: %s.", worker.address, worker.refusal)
         else:
             worker.usable = True
             self._outcomes.put(None)

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from distributed import Future
 
     from worker import kernels
@@ -28,11 +30,15 @@ class Job:
 
 @dataclass(eq=False, slots=True)
 class Worker:
-    """A worker of the cluster. ``usable`` is False until it has said who it is, and for ever when that was wrong."""
+    """A worker of the cluster.
+
+    ``usable`` is False until it has said who it is, and for ever when that was wrong; ``refusal`` then says why.
+    """
 
     address: str
     host: str
     usable: bool = False
+    refusal: str = ""
     shapes: set[kernels.KernelShape] = field(default_factory=set)
     job: Job | None = None
 
@@ -44,3 +50,12 @@ class Waiting:
     ticket: int
     key: str
     task: kernels.ChunkTask
+
+
+def refusals(workers: Iterable[Worker]) -> str:
+    """A sentence, with a blank before it, that says why workers are refused; "" where none is."""
+    refused = [f"The worker {worker.address} is refused: {worker.refusal}" for worker in workers if worker.refusal]
+    if not refused:
+        return ""
+    more = f" (and {len(refused) - 1} more)" if len(refused) > 1 else ""
+    return f" {refused[0]}{more}."

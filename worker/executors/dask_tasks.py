@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from distributed import Security
 
-from worker import kernels
+from worker import fingerprint, kernels
 from worker.limits import LOAD_SECONDS
 from worker.ports import ExecutorError
 
@@ -26,9 +26,13 @@ END_SECONDS: Final = 20.0
 #: Kernels that this process, which is a worker, has in hand.
 _loaded: set[kernels.KernelShape] = set()
 
+#: Calls `introduce`, as an expression for ``eval``. A function is imported as soon as a message with it comes in; a
+#: worker that cannot import Sprag would end for that, be started again for ever, and never say why.
+INTRODUCE: Final = "__import__('worker.executors.dask_tasks', fromlist=['']).introduce('{}')"
 
-def introduce(discard: str) -> str:
-    """Run by each worker that joins: which engine it has.
+
+def introduce(discard: str) -> dict[str, str]:
+    """Run by each worker that joins: its fingerprint, with the engine loaded.
 
     With ``discard`` the compiled kernels of its host are thrown away first, once for each such text. A process that had
     some of them in hand ends, and its nanny starts another.
@@ -36,7 +40,8 @@ def introduce(discard: str) -> str:
     _discard_once(discard)
     if discard and _loaded:
         os._exit(0)
-    return kernels.ENGINE_VERSION
+    kernels.prepare()
+    return fingerprint.collect()
 
 
 def load_kernel(load: Callable[[kernels.KernelShape], None], shape: kernels.KernelShape, discard: str) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import partial
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
-from worker import kernels
+from worker import fingerprint, kernels
 from worker.child_pool import ChildPool, JobStoppedError
 from worker.child_process import ProcessDiedError, ProcessStartError
+from worker.fingerprint import prepare_as
 from worker.limits import LOAD_SECONDS
 from worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
 from worker.processes import single_threaded_children
@@ -42,7 +44,7 @@ class ProcessPoolExecutor:
         Seconds after which a chunk that is being run is killed with its process.
     run, load, prepare : functions
         What a process does with a chunk, with a new kernel, and when it starts; importable by name. Other than the
-        engine's in tests.
+        engine's in tests: its processes load the engine, and end where they are not of this process's fingerprint.
     compiled : function
         Whether a kernel lies in the cache on disk already, so that nobody has to wait for it.
     load_timeout : float
@@ -57,7 +59,7 @@ class ProcessPoolExecutor:
         run: Callable[[kernels.ChunkTask], kernels.ChunkResult] = kernels.run_task,
         load: Callable[[kernels.KernelShape], None] = kernels.load,
         compiled: Callable[[kernels.KernelShape], bool] = kernels.is_compiled,
-        prepare: Callable[[], None] = kernels.prepare,
+        prepare: Callable[[], None] | None = None,
         load_timeout: float = LOAD_SECONDS,
     ) -> None:
         self._processes = processes
@@ -72,7 +74,7 @@ class ProcessPoolExecutor:
         self._failed_loads: Counter[kernels.KernelShape] = Counter()
         self._ready: SimpleQueue[Outcome | None] = SimpleQueue()
         single_threaded_children()
-        self._pool = ChildPool(processes, prepare)
+        self._pool = ChildPool(processes, prepare or partial(prepare_as, fingerprint.digest()))
 
     @property
     def capacity(self) -> int:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from engine import ENGINE_VERSION, Ending, Run, Span
 from engine.machine_shaft.problems import ExpressionError, InsufficientInertiaError, MachineError
+from engine.sources import engine_folder, source_hash
 from engine.vibration_drive.clutch import (
     ClutchFit,
     ClutchFitError,
@@ -89,6 +90,7 @@ __all__ = [
     "discard_compiled",
     "duration_seconds",
     "endings_of",
+    "engine_folder",
     "estimate_seconds_per_case",
     "extent",
     "fit_clutch",
@@ -108,6 +110,7 @@ __all__ = [
     "run_task",
     "run_trajectory",
     "shape_of",
+    "source_hash",
     "study_results",
     "warm_up",
 ]

@@ -1,0 +1,59 @@
+"""What makes two processes give the same bits, and how a difference is told."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.conftest import ROOT
+from worker import fingerprint
+
+OWN = {"numpy": "2.1", "processor features": "avx avx2 fma", "numba settings": ""}
+
+
+def collected(**environment: str) -> str:
+    """The digest of a process of its own."""
+    command = [sys.executable, "-c", "from worker import fingerprint; print(fingerprint.digest())"]
+    return subprocess.run(
+        command, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT), **environment}, capture_output=True, text=True,
+        check=True, timeout=240,
+    ).stdout.strip()  # fmt: skip
+
+
+def test_every_process_of_one_installation_has_the_same() -> None:
+    assert collected() == fingerprint.digest() == collected(NUMBA_NUM_THREADS="1", SPRAG_PROCESSES="3")
+
+
+@pytest.mark.parametrize("setting", ["NUMBA_CPU_FEATURES=+sse2", "NUMBA_ENABLE_AVX=0", "NUMBA_OPT=0"])
+def test_settings_that_change_the_code_change_it(setting: str) -> None:
+    name, value = setting.split("=")
+    assert collected(**{name: value}) != fingerprint.digest()
+
+
+def test_files_that_change_under_a_running_process_change_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = fingerprint.collect()
+    monkeypatch.setattr(fingerprint, "_sources", lambda: "edited")
+    after = fingerprint.collect()
+    assert after["engine sources"].startswith(f"{before['engine sources']}, changed to edited while process ")
+    assert {name for name in before if before[name] != after[name]} == {"engine sources"}
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        (OWN, ""),
+        ({**OWN, "numpy": "2.2"}, "numpy: 2.2 instead of 2.1"),
+        ({**OWN, "processor features": "avx sse5"}, "processor features: without avx2, fma and with sse5"),
+        ({**OWN, "processor features": ""}, "processor features: without avx, avx2, fma"),
+        ({**OWN, "more": "1"}, "more: 1 instead of unknown"),
+        ({"numpy": "2.1", "numba settings": "NUMBA_OPT=0"},
+         "processor features: without avx, avx2, fma and with unknown; numba settings: NUMBA_OPT=0 instead of none"),
+        ("2", "it runs another version of Sprag, which does not tell its fingerprint"),
+        (None, "it runs another version of Sprag, which does not tell its fingerprint"),
+    ],
+)  # fmt: skip
+def test_differences_are_named(other: object, said: str) -> None:
+    assert fingerprint.differences(OWN, other) == said

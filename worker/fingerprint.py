@@ -1,0 +1,131 @@
+"""What decides the bits of a result besides its parameters: code, libraries and processor of the computing process.
+
+Two processes with the same fingerprint give the same bits for the same case. A worker of a cluster whose fingerprint
+differs from the dispatcher's is refused, a process of the pool ends, and rows are reused only under the fingerprint
+they were computed with.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Final
+
+from worker import kernels
+
+_SOURCES: Final = "engine sources"
+_FEATURES: Final = "processor features"
+_PACKAGES: Final = ("sprag", "numpy", "numba", "llvmlite", "scipy")
+#: Settings of numba that change the code it makes; those of the processor are in the features.
+_NUMBA_SETTINGS: Final = (
+    "NUMBA_DISABLE_JIT", "NUMBA_OPT", "NUMBA_LOOP_VECTORIZE", "NUMBA_SLP_VECTORIZE", "NUMBA_DISABLE_INTEL_SVML",
+)  # fmt: skip
+#: Differences of one subject that are named one by one.
+_NAMED: Final = 6
+
+
+def _sources() -> str:
+    return kernels.source_hash(kernels.engine_folder(), Path(kernels.__file__).parent)[:16]
+
+
+# Of the files as this process began to import them. An upgrade under a running process changes the files, not its code.
+_AT_START: Final = _sources()
+
+
+def collect() -> dict[str, str]:
+    """The fingerprint of this process, by subject.
+
+    Where the engine's files have changed since the process started it equals no other fingerprint.
+    """
+    now = _sources()
+    changed = f", changed to {now} while process {os.getpid()} ran"
+    return {
+        _SOURCES: _AT_START if now == _AT_START else _AT_START + changed,
+        **{name: _version(name) for name in _PACKAGES},
+        "Python": platform.python_version(),
+        "C library": " ".join(platform.libc_ver()),
+        "machine": platform.machine(),
+        _FEATURES: _features(),
+        "numba settings": " ".join(f"{name}={os.environ[name]}" for name in _NUMBA_SETTINGS if name in os.environ),
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def _features() -> str:
+    """The processor features that numba compiles for, sorted; without AVX where its setting says so."""
+    chosen = os.environ.get("NUMBA_CPU_FEATURES")
+    if chosen is not None:
+        return " ".join(sorted(item[1:] for item in chosen.split(",") if item.startswith("+")))
+    import llvmlite.binding as llvm
+
+    present = [name for name, there in llvm.get_host_cpu_features().items() if there]
+    if os.environ.get("NUMBA_ENABLE_AVX") == "0":
+        present = [name for name in present if not name.startswith("avx")]
+    return " ".join(sorted(present))
+
+
+@cache
+def own() -> Mapping[str, str]:
+    """The fingerprint of this process as it was when first asked for; `collect` looks again."""
+    return collect()
+
+
+def digest() -> str:
+    """SHA-256 (hexadecimal) of `own`."""
+    return _digest(own())
+
+
+def _digest(fingerprint: Mapping[str, str]) -> str:
+    return hashlib.sha256(json.dumps(dict(fingerprint), sort_keys=True).encode()).hexdigest()
+
+
+def differences(own: Mapping[str, str], other: object) -> str:
+    """In what another process differs from this one, as a clause; "" where in nothing.
+
+    ``other`` may be of any type: it comes from a process whose code is not known.
+    """
+    if not isinstance(other, Mapping):
+        return "it runs another version of Sprag, which does not tell its fingerprint"
+    found = []
+    for subject in dict.fromkeys((*own, *map(str, other))):
+        here, there = own.get(subject, "unknown"), str(other.get(subject, "unknown"))
+        if here == there:
+            continue
+        if subject == _FEATURES:
+            lacks, more = set(here.split()) - set(there.split()), set(there.split()) - set(here.split())
+            parts = [f"{word} {_named(names)}" for word, names in (("without", lacks), ("with", more)) if names]
+            found.append(f"{subject}: {' and '.join(parts)}")
+        else:
+            found.append(f"{subject}: {there or 'none'} instead of {here or 'none'}")
+    return "; ".join(found)
+
+
+def _named(names: set[str]) -> str:
+    more = len(names) - _NAMED
+    return ", ".join(sorted(names)[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+def prepare_as(expected: str) -> None:
+    """First thing a process of a pool does: load the engine. It ends where its fingerprint is not ``expected``."""
+    _require(expected)
+    kernels.prepare()
+    _require(expected)  # the files may have changed while they were loaded
+
+
+def _require(expected: str) -> None:
+    if _digest(collect()) != expected:
+        raise SystemExit(
+            "Sprag, a library or the engine's files changed while the worker ran: it must be started again."
+        )
