@@ -7,6 +7,6 @@ from engine.endings import Ending
 from engine.run import Run, Span
 
 #: Changes whenever a change of the engine can change a stored number.
-ENGINE_VERSION = "2"
+ENGINE_VERSION = "3"
 
 __all__ = ["ENGINE_VERSION", "Ending", "Run", "Span"]

@@ -266,6 +266,8 @@ class Expression:
         self.root = parser.comparison()
         if parser.index < len(parser.tokens):
             raise ExpressionError(f"{parser.peek()!r} is not expected here", parser.position())
+        #: The variables that it has.
+        self.used = frozenset(_names(self.root))
         self._switches: list[Callable[[Mapping[str, Dual]], Value]] = []
         self._find_switches(self.root)
 
@@ -310,6 +312,11 @@ class Expression:
             self._switches.append(lambda v: _turn(_evaluate(parts[0], v)[0], _evaluate(parts[1], v)[0]))
         elif node.kind == "if" and parts[0].kind not in _COMPARE:
             self._switches.append(lambda v: np.abs(np.sign(_evaluate(parts[0], v)[0])) - 0.5)
+
+
+def _names(node: Node) -> set[str]:
+    own = {node.kind[5:]} if node.kind.startswith("name ") else set()
+    return own.union(*(_names(part) for part in node.parts))
 
 
 def _divisor(parts: tuple[Node, ...], variables: Mapping[str, Dual]) -> Value:

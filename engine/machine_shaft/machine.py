@@ -14,6 +14,7 @@ from engine.machine_shaft.linkages import CrankShaper, FourBar, SliderCrank, Whi
 from engine.machine_shaft.mechanisms import Mechanism, Motion
 from engine.machine_shaft.operations import Operation, Stroke, every_revolution, formula_breaks
 from engine.machine_shaft.parameters import parameters
+from engine.machine_shaft.pieces import Formula, Part
 from engine.machine_shaft.problems import ExpressionError, StructureError, TableError
 from engine.machine_shaft.spec import LINKED, MAX_CONSTANTS, MAX_STEPS, REVOLUTIONS, MachineSpec, MechanismChoice
 from engine.machine_shaft.tables import Curve, periodic
@@ -220,6 +221,21 @@ class Machine:
             if formula is not None:
                 breaks += formula_breaks(formula, self._environment, revolutions)
         return breaks
+
+    def formulas(self) -> list[Formula]:
+        """The formulas that the fields are made of. A drive that balancing replaces is none of them."""
+        own: list[tuple[Part, Expression | None]] = [
+            ("inertia", self._inertia_formula),
+            ("drive", None if self.spec.balance == "constant" else self._drive_formula),
+            ("resistance", self._operation.expression),
+        ]
+        return [
+            Formula(
+                part, expression, {name: value for name, value in self.constants.items() if name in expression.used},
+                self._stroke if "x" in expression.used else None,
+            )
+            for part, expression in own if expression is not None
+        ]  # fmt: skip
 
     def _motion(self, phi: Floats) -> Motion | None:
         return None if self.mechanism is None else self.mechanism.motion(self.mechanism_values, phi)

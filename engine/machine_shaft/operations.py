@@ -45,6 +45,12 @@ class Stroke:
             end = start + np.mod(end - start, _TURN)
             return cls(mechanism, values, start, end, mechanism.motion(values, end).way)
 
+    def take(self, rows: NDArray[np.int64]) -> "Stroke":
+        """The strokes of some of the cases."""
+        values = {name: value[rows] if len(value) > 1 else value for name, value in self.values.items()}
+        own = (value[rows] if len(value) > 1 else value for value in (self.start, self.end, self.length))
+        return Stroke(self.mechanism, values, *own)
+
     def fraction(self, phi: Floats) -> Floats:
         """Fraction of the stroke at ``phi``, 0 where the forward stroke starts, 1 where it ends."""
         return np.clip(self.mechanism.motion(self.values, phi).way / self.length, 0.0, 1.0)
@@ -220,6 +226,11 @@ class Operation:
         v = self._values
         low, high = v["gas.suction_pressure"], v["gas.discharge_pressure"]
         return np.minimum(np.maximum(high, low), reachable_pressure(low, v["gas.clearance"], v["gas.exponent"]))
+
+    @property
+    def expression(self) -> Expression | None:
+        """The formula of its diagram, if that is one."""
+        return None if self._choice.quantity in {"none", "gas"} else self._expression
 
     def breaks(self) -> list[Floats]:
         """Angles at which the torque jumps or has a kink, arrays of shape (cases or 1, n); NaN is none."""

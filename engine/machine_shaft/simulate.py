@@ -13,6 +13,7 @@ from engine.machine_shaft.flywheel import required_inertia
 from engine.machine_shaft.machine import Columns, Fields, Machine, check_structure
 from engine.machine_shaft.motor import limit_cycle
 from engine.machine_shaft.panels import Panels
+from engine.machine_shaft.pieces import Pieces, pieces
 from engine.machine_shaft.problems import (
     AssemblyError,
     InsufficientInertiaError,
@@ -23,6 +24,7 @@ from engine.machine_shaft.problems import (
     UnbalancedWorkError,
 )
 from engine.machine_shaft.relations import check_relations
+from engine.machine_shaft.resolution import compare, rough_pace, rough_panels
 from engine.machine_shaft.results import result_infos
 from engine.machine_shaft.spec import MachineSpec
 from engine.machine_shaft.start import Shape, Stop, least_mean_speed, start_energy
@@ -33,7 +35,7 @@ Bools = NDArray[np.bool_]
 
 #: Panels of a revolution to begin with, and with how many a case is given up.
 PANELS, MAX_PANELS = 16, 600
-MAX_ATTEMPTS = 32
+MAX_ATTEMPTS = 48
 #: Cases computed together: few enough for their arrays to stay in the processor's cache.
 BLOCK = 64
 
@@ -75,6 +77,8 @@ class Solved:
     rough, slow, rough_pace : arrays of bool, shape (cases, panels)
         Panels that do not resolve their torques or inertia; those in which the shaft is too near to rest for the
         speed, or its mean over time where that is asked for, to be resolved; and those that do not resolve 1/omega.
+    unknown : array of bool, shape (cases,)
+        Cases with a formula that may hide something between any two angles.
     """
 
     decomposition: Decomposition
@@ -83,33 +87,7 @@ class Solved:
     rough: Bools
     slow: Bools
     rough_pace: Bools
-
-
-def _rough(d: Decomposition) -> tuple[Bools, Bools]:
-    """Panels that do not resolve their torques or inertia, and those that do not resolve a speed near to rest."""
-    panels, still = d.panels, np.isnan(d.start)[:, None]
-    # A case without motion is judged by what was given.
-    drive = np.where(still[..., None], d.fields.drive, d.drive.torque)
-    torque = panels.roughness(drive) + panels.roughness(d.fields.resistance)
-    scale = largest_work(panels, drive, d.fields.resistance)[:, None]
-    fine = (torque * panels.half <= 1e-10 * scale) & _resolved(panels, d.fields.inertia, 1e-11)
-    with np.errstate(invalid="ignore"):
-        square = _resolved(panels, d.squares, 1e-10) | still
-        speed = _resolved(panels, np.sqrt(d.squares), 1e-6) | still
-        resting = (panels.extremes(d.squares).lowest <= 1e-6 * panels.largest(d.squares))[:, None]
-    fine &= square | resting
-    return np.asarray(~fine), np.asarray(~(square & speed))
-
-
-def _rough_pace(d: Decomposition) -> Bools:
-    """Panels in which the shaft turns so slowly that the time is not resolved."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        fine = _resolved(d.panels, 1.0 / np.sqrt(d.squares), 1e-6)
-    return np.asarray(~(fine | np.isnan(d.start)[:, None]))
-
-
-def _resolved(panels: Panels, values: Floats, limit: float) -> Bools:
-    return np.asarray(panels.roughness(values) <= limit * panels.largest(values)[:, None])
+    unknown: Bools
 
 
 def attempts(spec: MachineSpec, columns: Columns) -> Iterator[tuple[NDArray[np.int64], Solved]]:
@@ -119,18 +97,27 @@ def attempts(spec: MachineSpec, columns: Columns) -> Iterator[tuple[NDArray[np.i
     """
     rows = np.arange(columns.cases)
     cuts = np.empty((rows.size, 0))
+    found: list[Pieces] | None = None
     for _ in range(MAX_ATTEMPTS):
         if not rows.size:
             return
         solved = _attempt(spec, columns.take(rows), cuts)
         _mark_unreached(spec, columns.take(rows), solved)
+        panels = solved.decomposition.panels
+        first = found is None
+        if found is None:
+            found = [pieces(formula, panels, 2.0 * np.pi * spec.cycle) for formula in Machine(spec, columns).formulas()]
+        for own in found:
+            solved.unknown[...] |= np.broadcast_to(own.unknown, (columns.cases,))[rows]
+        compare(spec, columns, rows, found, solved.decomposition, solved.rough)
         yield rows, solved
         chosen = solved.rough | solved.slow | solved.rough_pace
-        panels = solved.decomposition.panels
         real = np.broadcast_to((panels.half > 0.0).sum(axis=1), rows.shape)
-        again = np.nonzero(chosen.any(axis=1) & (real <= MAX_PANELS * spec.cycle))[0]
-        middles = panels.take(again).middles(chosen[again])
-        rows, cuts = rows[again], np.concatenate([cuts[again], middles], axis=1)
+        again = np.nonzero(chosen.any(axis=1) & (real <= MAX_PANELS * spec.cycle) & ~solved.unknown)[0]
+        more = [panels.take(again).middles(chosen[again])]
+        if first:
+            more += [np.broadcast_to(own.breaks, (columns.cases, own.breaks.shape[1]))[again] for own in found]
+        rows, cuts = rows[again], np.concatenate([cuts[again], *more], axis=1)
 
 
 def _mark_unreached(spec: MachineSpec, columns: Columns, solved: Solved) -> None:
@@ -162,7 +149,7 @@ def settle(spec: MachineSpec, columns: Columns, solved: Solved) -> Bools:
     """
     ok = solved.endings == _CODE[Ending.OK]
     slow = ok & solved.slow.any(axis=1)
-    lost = solved.rough.any(axis=1) | (slow & (spec.balance == "motor"))
+    lost = solved.rough.any(axis=1) | solved.unknown | (slow & (spec.balance == "motor"))
     if spec.mechanism.kind == "formula":
         lost |= ~np.isnan(Machine(spec, columns).inertia_jumps().angle)
     lost &= solved.endings != _CODE[Ending.NEGATIVE_INERTIA]
@@ -206,8 +193,9 @@ def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
         for name, values in results.items():
             if name.startswith(_OF_MOTOR):
                 results[name] = np.where(stalled, np.nan, values)
-    (rough, slow), rough_pace = _rough(d), _rough_pace(d)
-    return Solved(d, results, endings, rough, slow | rough_pace if spec.mean_speed_is == "time" else slow, rough_pace)
+    (rough, slow), pace = rough_panels(d), rough_pace(d)
+    slow = slow | pace if spec.mean_speed_is == "time" else slow
+    return Solved(d, results, endings, rough, slow, pace, np.zeros(columns.cases, dtype=np.bool_))
 
 
 def _motored(

@@ -1,0 +1,64 @@
+"""Whether panels resolve what they stand for: torques, inertia, speed."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.machine_shaft.balance import largest_work
+from engine.machine_shaft.decomposition import Decomposition
+from engine.machine_shaft.machine import Columns, Machine
+from engine.machine_shaft.panels import Panels
+from engine.machine_shaft.pieces import Part, Pieces, missed
+from engine.machine_shaft.spec import MachineSpec
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+def rough_panels(d: Decomposition) -> tuple[Bools, Bools]:
+    """Panels that do not resolve their torques or inertia, and those that do not resolve a speed near to rest."""
+    panels, still = d.panels, np.isnan(d.start)[:, None]
+    # A case without motion is judged by what was given.
+    drive = np.where(still[..., None], d.fields.drive, d.drive.torque)
+    torque = panels.roughness(drive) + panels.roughness(d.fields.resistance)
+    scale = largest_work(panels, drive, d.fields.resistance)[:, None]
+    fine = (torque * panels.half <= 1e-10 * scale) & _resolved(panels, d.fields.inertia, 1e-11)
+    with np.errstate(invalid="ignore"):
+        square = _resolved(panels, d.squares, 1e-10) | still
+        speed = _resolved(panels, np.sqrt(d.squares), 1e-6) | still
+        resting = (panels.extremes(d.squares).lowest <= 1e-6 * panels.largest(d.squares))[:, None]
+    fine &= square | resting
+    return np.asarray(~fine), np.asarray(~(square & speed))
+
+
+def rough_pace(d: Decomposition) -> Bools:
+    """Panels in which the shaft turns so slowly that the time is not resolved."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        fine = _resolved(d.panels, 1.0 / np.sqrt(d.squares), 1e-6)
+    return np.asarray(~(fine | np.isnan(d.start)[:, None]))
+
+
+def _resolved(panels: Panels, values: Floats, limit: float) -> Bools:
+    return np.asarray(panels.roughness(values) <= limit * panels.largest(values)[:, None])
+
+
+def compare(
+    spec: MachineSpec, columns: Columns, rows: NDArray[np.int64], found: list[Pieces], d: Decomposition, rough: Bools
+) -> None:
+    """Mark in ``rough`` (cases, panels) the panels of the cases ``rows`` that miss something of a formula.
+
+    Cases with panels that are rough as they are wait for finer ones.
+    """
+    ready = np.nonzero(~rough.any(axis=1))[0]
+    panels = d.panels.take(ready)
+    for own in found if ready.size else []:
+        part = own.formula.part
+
+        def exact(place: NDArray[np.int64], phi: Floats, part: Part = part) -> Floats:
+            with np.errstate(all="ignore"):
+                fields = Machine(spec, columns.take(rows[ready[place]])).fields(phi)
+            return np.asarray(getattr(fields, part))
+
+        values: Floats = getattr(d.fields, part)[ready]
+        works = (d.fields.drive[ready], d.fields.resistance[ready])
+        largest = panels.largest(values) if part == "inertia" else largest_work(panels, *works)
+        rough[ready] |= missed(own, rows[ready], panels, values, exact, largest)
