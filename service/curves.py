@@ -250,7 +250,7 @@ def draw_map(
     x_axis, y_axis = require_axis(study, "x", x), require_axis(study, "y", y)
     fixed = locate_axes(study, at)
     _no_axis_twice({x: x_axis}, "y", {y: y_axis}, fixed)
-    x_values, lines = _grid_lines(study, x_axis, {y: y_axis}, fixed, 1)
+    x_values, lines = _grid_lines(study, x_axis, {y: y_axis}, fixed, 1, way_out="give")
     rows = list(lines)
     cases = np.stack([row.cases for row in rows])
     columns = fetch(cases.reshape(-1), [z])
@@ -305,13 +305,13 @@ def _check_size(points: int, results: int) -> None:
 
 
 def _grid_lines(
-    study: Study, x_axis: int, by: dict[str, int], fixed: Fixed, results: int
+    study: Study, x_axis: int, by: dict[str, int], fixed: Fixed, results: int, way_out: str = "name it in by=, or give"
 ) -> tuple[tuple[float, ...], Iterator[Line]]:
     axes = study.axes
     named = {x_axis, *by.values(), *fixed}
     faults = [
         ErrorItem(
-            f"the axis {axis.paths[0]} is left open: name it in by=, or give its value as at={axis.paths[0]}=VALUE",
+            f"the axis {axis.paths[0]} is left open: {way_out} its value as at={axis.paths[0]}=VALUE",
             parameter="at",
             allowed=listed(axis.values),
             unit=unit_of(study, axis.paths[0]),

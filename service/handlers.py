@@ -32,6 +32,7 @@ _STORE_PROBLEMS: tuple[tuple[type[storage.StoreError], str], ...] = (
     (storage.TooManySchedules, "wrong-state"),
     (storage.IdempotencyConflict, "idempotency-conflict"),
     (storage.StudyBusy, "wrong-state"),
+    (storage.StudyEnded, "wrong-state"),
     (storage.NothingToRetry, "wrong-state"),
     (storage.DatabaseFullError, "storage-full"),
     (storage.StoreError, "unavailable"),

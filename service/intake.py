@@ -13,6 +13,7 @@ from service.storage.room import RESERVE_BYTES
 from worker.limits import MAX_WAITING_STUDIES
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from datetime import datetime
 
     from service.spec import ParsedSpec
@@ -27,9 +28,15 @@ def accept(
     priority: int = 0,
     fresh: bool = False,
     finish_by: datetime | None = None,
+    given: Mapping[str, object] | None = None,
 ) -> StudyRecord:
-    """Take a study in, warnings and all; ApiError when its results would not fit on the disk."""
-    body_hash = hashlib.sha256(json.dumps(parsed.spec, sort_keys=True).encode("ascii")).hexdigest()
+    """Take a study in, warnings and all; ApiError when its results would not fit on the disk.
+
+    One key means one spec with one set of ``given`` parameters, as the client wrote them: a deadline "8 h" is another
+    moment at each sending.
+    """
+    asked = [parsed.spec, dict(given)] if given else parsed.spec
+    body_hash = hashlib.sha256(json.dumps(asked, sort_keys=True).encode("ascii")).hexdigest()
     known = store.study_of_key(idempotency_key, body_hash) if idempotency_key else None
     if known is not None:
         return known

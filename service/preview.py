@@ -27,23 +27,30 @@ def estimated_bytes(study: Study) -> int:
 
 
 def estimated_seconds(study: Study, chunking: Chunking, to_run: int) -> float:
-    """Rough time (s) of running that many cases of ``study`` on the processes of ``chunking``."""
+    """Rough time (s) of running that many cases of ``study`` on the processes of ``chunking``, compilation included."""
+    if not to_run:
+        return 0.0
     # A study of fewer cases than processes still takes the time of one case.
     rounds = max(to_run / chunking.processes, 1.0)
-    return work_of(rounds) * kernels.estimate_seconds_per_case(study) if to_run else 0.0
+    return work_of(rounds) * kernels.estimate_seconds_per_case(study) + kernels.estimate_compile_seconds(study)
 
 
 def preview_json(
-    parsed: ParsedSpec, chunking: Chunking, reusable: int = 0, seconds_left: float | None = None
+    parsed: ParsedSpec,
+    chunking: Chunking,
+    reusable: int = 0,
+    seconds_left: float | None = None,
+    start_seconds: float = 0.0,
 ) -> dict[str, Any]:
     """What ``parsed`` would be as a study that is cut and run so, as JSON data.
 
     ``reusable`` of its cases need not be run, because studies of the database have them. ``estimated_seconds`` (wall
-    time) and ``estimated_bytes`` (in the database) are rough. When ``seconds_left`` until a deadline will hardly do, it
+    time, the compilation of a kernel that the cache does not have and ``start_seconds`` of the pool included) and
+    ``estimated_bytes`` (in the database) are rough. When ``seconds_left`` until a deadline will hardly do, it
     is told.
     """
     study = parsed.study
-    seconds = estimated_seconds(study, chunking, study.cases - reusable)
+    seconds = start_seconds + estimated_seconds(study, chunking, study.cases - reusable)
     late = () if seconds_left is None else finish_warnings(study, seconds, seconds_left)
     first = range(min(_FIRST_CASES, study.cases))
     return {

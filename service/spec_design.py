@@ -22,7 +22,7 @@ from service.spec_messages import Report, did_you_mean, join, quantity_text
 from service.spec_points import read_points
 from service.spec_sample import read_sample
 from service.spec_values import count_text
-from worker.limits import MAX_AXES, MAX_AXIS_VALUES
+from worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_COLUMNS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -193,6 +193,9 @@ def _axis(report: Report, pointer: str, data: object, combine: Combine, machine:
 
 def _fits(report: Report, block: Block) -> bool:
     """Whether the table may be made: every number of it is kept with the study."""
+    if len(block.paths) > MAX_COLUMNS:
+        report.problem("/axes", f"{len(block.paths)} parameters vary", allowed=f"at most {MAX_COLUMNS} parameters")
+        return False
     most = MAX_AXIS_VALUES // max(len(block.paths), 1)
     if block.count <= most:
         return True

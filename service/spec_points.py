@@ -16,7 +16,7 @@ from service.spec_fields import exact, read_object
 from service.spec_messages import Report, join, shorten_text
 from service.units import QuantityError, to_float
 from service.written import written_number
-from worker.limits import MAX_AXES, MAX_AXIS_VALUES
+from worker.limits import MAX_AXIS_VALUES, MAX_COLUMNS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -43,10 +43,10 @@ def read_points(report: Report, pointer: str, data: Mapping[str, Any], machine: 
         report.problem(where, f"is no CSV text: {error}")
         return None
     columns = len(rows[0].cells) if rows else 0
-    if len(rows) < 2 or not 1 <= columns <= MAX_AXES or len(rows) - 1 > MAX_AXIS_VALUES:
+    if len(rows) < 2 or not 1 <= columns <= MAX_COLUMNS or len(rows) - 1 > MAX_AXIS_VALUES:
         report.problem(
             where, f"has {max(len(rows) - 1, 0)} lines of {columns} columns under its header",
-            allowed=f"1 line or more of 1 to {MAX_AXES} columns",
+            allowed=f"1 line or more of 1 to {MAX_COLUMNS} columns",
         )  # fmt: skip
         return None
     headings = [_read_heading(report, where, cell, machine) for cell in rows[0].cells]

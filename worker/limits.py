@@ -4,6 +4,8 @@ from typing import Final
 
 #: Axes of one study.
 MAX_AXES: Final = 16
+#: Columns of a table of cases: parameters that vary side by side. Eight pendulums have some 70.
+MAX_COLUMNS: Final = 256
 #: Cases of one study.
 MAX_CASES: Final = 10_000_000
 #: Values on all axes of one study together (they are kept with the study).

@@ -13,7 +13,7 @@ from typing import Any, Literal, cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES
+from worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_COLUMNS
 
 Combine = Literal["grid", "zip"]
 
@@ -108,7 +108,8 @@ class Study:
             raise ValueError("a path stands on two axes")
         if self.combine == "zip" and len({len(axis) for axis in self.axes}) > 1:
             raise ValueError("axes that are zipped must have equal lengths")
-        if len(self.axes) > MAX_AXES or sum(map(len, self.axes)) > MAX_AXIS_VALUES or self.cases > MAX_CASES:
+        most = MAX_AXES if self.combine == "grid" else MAX_COLUMNS
+        if len(self.axes) > most or sum(map(len, self.axes)) > MAX_AXIS_VALUES or self.cases > MAX_CASES:
             raise ValueError("the study is larger than the limits allow")
 
     @property

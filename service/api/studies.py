@@ -40,7 +40,7 @@ IdempotencyKey = Annotated[
         min_length=1,
         max_length=200,
         pattern=r"^[!-~]+$",
-        description="the same key with the same body submits the study once, however often it is sent",
+        description="the same key with the same body and parameters submits the study once, however often it is sent",
         examples=["0b6e9a52-feeder"],
     ),
 ]
@@ -98,7 +98,9 @@ def create_study(
     so that whatever is done then makes whole curves.
     """
     finish = _finish(context, finish_by)
-    record = accept(context.store, _parsed(received), idempotency_key, priority, fresh, finish)
+    options = {"priority": priority, "fresh": fresh, "finish_by": finish_by}
+    given = {name: value for name, value in options.items() if value}
+    record = accept(context.store, _parsed(received), idempotency_key, priority, fresh, finish, given)
     return json_response(views.summary(record), 202, {"Location": views.study_address(record.id)})
 
 
@@ -234,8 +236,8 @@ def extend_study(
     "/studies/{study_id:study}:prioritize",
     status_code=202,
     response_model=m.StudySummary,
-    responses=problems("invalid-parameter", "study-not-found"),
+    responses=problems("invalid-parameter", "study-not-found", "wrong-state"),
 )
 def prioritize_study(context: Ctx, study_id: StudyId, priority: Priority) -> Response:
-    """Give a study another priority."""
+    """Give a study that has not ended another priority."""
     return json_response(views.summary(context.store.prioritize_study(study_id, priority)), 202)

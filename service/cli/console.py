@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from enum import IntEnum
@@ -96,10 +96,14 @@ def console() -> Console:
     return Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH, soft_wrap=False, highlight=False)
 
 
-def table(title: str, columns: Iterable[tuple[str, bool]], rows: Iterable[Sequence[object]]) -> Table:
+#: A heading, whether the column holds numbers, and (False where it is left out) whether its texts are never cut.
+Column = tuple[str, bool] | tuple[str, bool, bool]
+
+
+def table(title: str, columns: Iterable[Column], rows: Iterable[Sequence[object]]) -> Table:
     """A table for people.
 
-    ``columns`` are pairs (heading, whether it holds numbers). None becomes a dash: a value that could not be computed.
+    None becomes a dash: a value that could not be computed.
     """
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
@@ -107,16 +111,16 @@ def table(title: str, columns: Iterable[tuple[str, bool]], rows: Iterable[Sequen
 
     made = Table(title=Text(title) if title else None, title_justify="left", box=SIMPLE_HEAD, header_style="bold")
     texts = [[cell_text(cell) for cell in row] for row in rows]
-    for index, (heading, numeric) in enumerate(columns):
-        # Half a number is worse than a wide table.
-        longest = max((len(row[index]) for row in texts), default=0) if numeric else None
+    for index, (heading, numeric, *whole) in enumerate(columns):
+        # Half a number, or half an id, is worse than a wide table.
+        longest = max((len(row[index]) for row in texts), default=0) if numeric or any(whole) else None
         made.add_column(Text(heading), justify="right" if numeric else "left", min_width=longest)
     for row in texts:
         made.add_row(*map(Text, row))
     return made
 
 
-def show_table(title: str, columns: Iterable[tuple[str, bool]], rows: Iterable[Sequence[object]]) -> None:
+def show_table(title: str, columns: Iterable[Column], rows: Iterable[Sequence[object]]) -> None:
     """Print a table on standard output, as wide as its numbers need."""
     from rich.measure import Measurement
 
@@ -134,6 +138,15 @@ def cell_text(cell: object) -> str:
     if isinstance(cell, float):
         return f"{cell:.6g}" if math.isfinite(cell) else "-"
     return str(cell)
+
+
+def ending_lines(endings: Mapping[str, int]) -> Iterator[str]:
+    """A line for each ending but ok: how many cases ended so, and what it means."""
+    from worker.kernels import ENDING_SENTENCES, OK
+
+    for name, count in endings.items():
+        if name != OK:
+            yield f"  {count} {name}: {ENDING_SENTENCES[name]}"
 
 
 def duration_text(seconds: float) -> str:

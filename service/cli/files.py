@@ -165,6 +165,11 @@ def output(path: str | None) -> Iterator[Write]:
         yield from _replaced(target)
 
 
+def to_file(path: str | None) -> bool:
+    """Whether `output` writes to a file, and standard output is free for what is said of it."""
+    return path not in (None, "-")
+
+
 def _replaced(target: Path) -> Iterator[Write]:
     prefix = f".{target.name[:100]}."
     with _told(target):

@@ -14,6 +14,7 @@ from service.cli.console import (
     ExitCode,
     WrongInputError,
     duration_text,
+    ending_lines,
     progress_bar,
     progress_text,
     say,
@@ -21,7 +22,7 @@ from service.cli.console import (
     write_json,
     write_text,
 )
-from service.cli.files import output, read_study
+from service.cli.files import output, read_study, to_file
 from service.cli.options import ChunkCases, FinishBy, Fresh, JsonFlag, OutputFile, PointsFile, Processes, SpecFile
 from service.cli.remote import TableFormat, table_format
 from service.cli.settings import read_settings
@@ -47,7 +48,9 @@ class ValueFormat(StrEnum):
     JSON = "json"
 
 
-#: A pool of processes starts in about two seconds.
+#: Rough time until the program and its pool of processes have started.
+_START_SECONDS = 2.0
+#: A study that takes less is not worth a pool.
 _NO_POOL_SECONDS = 1.0
 
 
@@ -98,7 +101,8 @@ def preview(
     settings = read_settings(database=db, processes=processes)
     parsed = read_study(spec, points)
     reusable = 0 if db is None else _reusable(settings, parsed)
-    made = preview_json(parsed, Chunking(0, settings.pool_processes, settings.chunk_timeout), reusable, left)
+    chunking = Chunking(0, settings.pool_processes, settings.chunk_timeout)
+    made = preview_json(parsed, chunking, reusable, left, _START_SECONDS)
     if as_json:
         write_json(made)
         return
@@ -153,14 +157,23 @@ def trajectory(
     study = read_study(spec).study
     with output(file) as write:
         made = _trajectory(study, case, start, end, points)
-        as_text = as_json or (file or "").lower().endswith(".json") if form is None else form is ValueFormat.JSON
-        write(_trajectory_bytes(made, study, case, as_text))
+        write(_trajectory_bytes(made, study, case, _is_json(form, file, as_json)))
     told = f"{points} points {'in time' if made.along == 'time' else 'over the angle'}"
     if not len(made.values):
         told = f"no points: {ENDING_SENTENCES[made.ending]}"
     say(f"case {case}: {made.ending}, {told}")
+    if as_json and to_file(file):
+        write_json({"file": file, "case": case, "ending": made.ending, "points": len(made.values)})
     if made.ending != OK:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
+
+
+def _is_json(form: ValueFormat | None, file: str | None, as_json: bool) -> bool:
+    """Whether instantaneous values are written as JSON: by name, by ``--json``, or by the ending of the file's name."""
+    if form is not None:
+        return form is ValueFormat.JSON
+    name = (file or "").lower()
+    return name.endswith(".json") or (as_json and not name.endswith(".csv"))
 
 
 def _trajectory(study: Study, case: int, start: str | None, end: str | None, points: int) -> Trajectory:
@@ -262,11 +275,17 @@ def run(
         for piece in _rows(done, parsed.study, table_format(form, file, as_json)):
             write(piece)
         record, unaffecting = done.record, Unaffected().of(done.store, done.record)
+        endings = done.store.progress(record.id).endings
     kept = f", kept as {record.id}" if db is not None else ""
     known = f", {record.reused} of them known from before" if record.reused else ""
     say(*(f"warning: {text}" for text in unaffecting))
     seconds = time.monotonic() - start
     say(f"{record.done} of {record.cases} cases done{known}, {record.ok} ok, {seconds:.1f} s{kept}")
+    say(*ending_lines(endings))
+    if as_json and to_file(file):
+        numbers = {"cases": record.cases, "done": record.done, "ok": record.ok, "reused": record.reused}
+        study_id = record.id if db is not None else None
+        write_json({"file": file, "study": study_id, **numbers, "endings": endings, "seconds": round(seconds, 3)})
     if record.time_over:
         say(str(record.reason))
     if record.ok != record.cases:

@@ -21,7 +21,7 @@ from service.cli.console import (
     show_table,
     write_json,
 )
-from service.cli.files import naming_points, read_spec, write_pieces
+from service.cli.files import naming_points, read_spec, to_file, write_pieces
 from service.cli.options import (
     DEFAULT_SERVER,
     FinishBy,
@@ -236,7 +236,7 @@ def list_studies(
     if as_json:
         write_json({"studies": studies})
         return
-    columns = (("id", False), ("state", False), ("done", True), ("cases", True), ("created", False),
+    columns = (("id", False, True), ("state", False, True), ("done", True), ("cases", True), ("created", False),
                ("finish by", False), ("name", False))  # fmt: skip
     rows = [
         (s["id"], s["state"], s["progress"]["done"], s["progress"]["total"], s["created_at"], s["finish_by"], s["name"])
@@ -325,18 +325,19 @@ def export(
         table = chosen in get_args(Format)
         pieces = client.results(study_id, chosen) if table else client.report(study_id, chosen)
         written = write_pieces(file, pieces)
-    if file not in (None, "-"):
+    if to_file(file):
         say(f"{file}: {written} bytes")
+        if as_json:
+            write_json({"file": file, "format": chosen, "bytes": written})
 
 
 def table_format(form: TableFormat | None, file: str | None, as_json: bool) -> Format | ReportFormat:
-    """The format that was asked for: by name, by ``--json``, or by the ending of the file's name."""
+    """The format that was asked for: by name, by the ending of the file's name, or by ``--json``; csv otherwise."""
     from service.exports import FORMATS, format_of
     from service.report import REPORT_FORMATS
 
     if form is not None:
         return next(known for known in (*FORMATS, *REPORT_FORMATS) if known == form.value)
-    if as_json:
-        return "json"
     ending = (file or "").rpartition(".")[2].lower()
-    return next((known for known in REPORT_FORMATS if known == ending), None) or format_of(file or "") or "csv"
+    told = next((known for known in REPORT_FORMATS if known == ending), None) or format_of(file or "")
+    return told or ("json" if as_json else "csv")

@@ -84,7 +84,10 @@ def list_schedules(server: Server = DEFAULT_SERVER, token: Token = None, as_json
     if as_json:
         write_json(found)
         return
-    columns = [(heading, False) for heading in ("id", "when", "window", "finish by", "last run", "next run", "name")]
+    columns = [
+        (heading, False, heading == "id")
+        for heading in ("id", "when", "window", "finish by", "last run", "next run", "name")
+    ]
     rows = [
         (
             s["id"],
@@ -111,7 +114,7 @@ def show(
         write_json(schedule)
         return
     _show(schedule, as_json)
-    columns = (("due", False), ("missed before", True), ("study", False), ("problem", False))
+    columns = (("due", False), ("missed before", True), ("study", False, True), ("problem", False))
     show_table("", columns, [(r["due"], r["missed"], r["study"], r["problem"]) for r in schedule["runs"]])
 
 

@@ -65,7 +65,7 @@ def list_tokens(db: Database = None, as_json: JsonFlag = False) -> None:
     if as_json:
         write_json({"tokens": found})
         return
-    columns = [(heading, False) for heading in ("id", "name", "scope", "created", "revoked")]
+    columns = [(heading, False, heading == "id") for heading in ("id", "name", "scope", "created", "revoked")]
     show_table("", columns, [[t["id"], t["name"], t["scope"], t["created_at"], t["revoked_at"]] for t in found])
 
 

@@ -13,6 +13,7 @@ __all__ = [
     "SchemaError",
     "StoreError",
     "StudyBusy",
+    "StudyEnded",
     "StudyNotFound",
     "TokenNotFound",
     "TooManySchedules",
@@ -65,12 +66,16 @@ class StudyBusy(StoreError):  # noqa: N818
     """The study has not come to its end, so it cannot be deleted."""
 
 
+class StudyEnded(StoreError):  # noqa: N818
+    """The study has come to its end, so its priority cannot be changed."""
+
+
 class NothingToRetry(StoreError):  # noqa: N818
     """The study has no case that could be run again as asked."""
 
 
 class IdempotencyConflict(StoreError):  # noqa: N818
-    """The idempotency key was already used with another body."""
+    """The idempotency key was already used with another body or other parameters."""
 
 
 class PageTokenError(StoreError):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
 
-from service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyNotFound
+from service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyEnded, StudyNotFound
 from service.storage.order import Orders
 from service.storage.part import MAX_INTEGER, announce, micros_of, optional_moment
 from service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
@@ -241,9 +241,15 @@ class Studies(Orders):
             return record_of(self._row(connection, study_id, *RECORD_COLUMNS))
 
     def prioritize_study(self, study_id: str, priority: int) -> StudyRecord:
-        """Give the study another priority: of studies that wait, the highest goes first; raises StudyNotFound."""
+        """Give the study another priority: of studies that wait, the highest goes first.
+
+        Raises StudyNotFound, and StudyEnded where there is nothing left to go first with.
+        """
         with self.session.write() as connection:
-            number = self._row(connection, study_id, STUDIES.c.number).number
+            row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.state)
+            number, state = row.number, StudyState(row.state)
+            if state.terminal:
+                raise StudyEnded(f"the study {study_id} is {state.value}: it waits for nothing, so no priority counts")
             connection.execute(
                 sa.update(STUDIES)
                 .where(STUDIES.c.number == number, STUDIES.c.priority != priority)
@@ -317,7 +323,7 @@ def _study_of_key(connection: sa.Connection, key: str, body_hash: str) -> StudyR
     if row is None:
         return None
     if row.body_hash != body_hash:
-        raise IdempotencyConflict(f"the idempotency key {key!r} was already used with another body")
+        raise IdempotencyConflict(f"the idempotency key {key!r} was already used with another body or other parameters")
     return record_of(row)
 
 

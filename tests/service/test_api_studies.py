@@ -229,3 +229,24 @@ def test_priorities_are_given_and_changed(service: Service) -> None:
         assert refused.status_code == 422
         assert refused.json()["errors"][0]["parameter"] == "priority"
     assert service.http.post(address).status_code == 422
+
+
+def test_a_study_that_has_ended_gets_no_priority(service: Service) -> None:
+    study_id = service.submit()
+    service.fill(study_id)
+    refused = service.http.post(f"{STUDIES}/{study_id}:prioritize", params={"priority": 5})
+    assert (refused.status_code, refused.json()["type"]) == (409, "/problems/wrong-state")
+    assert "is finished" in refused.json()["detail"]
+    assert service.get(f"/studies/{study_id}")["priority"] == 0
+
+
+@pytest.mark.parametrize("changed", [{"finish_by": "9 h"}, {"priority": 3}, {"fresh": "true"}, {}], ids=str)
+def test_a_key_with_other_parameters_is_a_conflict(service: Service, changed: dict[str, str]) -> None:
+    """A deadline that is given as a duration is the same for the same words, whatever the time is."""
+    headers = {"Idempotency-Key": "nightly"}
+    first = service.http.post(STUDIES, json=SPEC, headers=headers, params={"finish_by": "8 h"})
+    again = service.http.post(STUDIES, json=SPEC, headers=headers, params={"finish_by": "8 h"})
+    assert (first.status_code, again.json()["id"]) == (202, first.json()["id"])
+    other = service.http.post(STUDIES, json=SPEC, headers=headers, params=changed)
+    assert (other.status_code, other.json()["type"]) == (422, "/problems/idempotency-conflict")
+    assert "other parameters" in other.json()["detail"]

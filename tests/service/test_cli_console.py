@@ -16,6 +16,7 @@ from service.cli.console import (
     WrongInputError,
     cell_text,
     duration_text,
+    ending_lines,
     progress_text,
     say,
     show_table,
@@ -132,3 +133,16 @@ def test_a_bar_on_a_terminal_and_nothing_elsewhere() -> None:
     assert b"4/4" in shown
     assert b"\x1b" in shown
     assert b"\x1b" not in done.stdout
+
+
+def test_an_id_is_never_cut(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.cli.console._PLAIN_WIDTH", 80)
+    columns = (("id", False, True), ("state", False, True), ("done", True), ("created", False), ("name", False))
+    rows = [("st_38b213f6175b1470", "finished", 10**6, "2026-11-22T02:22:59.079014Z", "Feeder motor: speed " * 4)]
+    show_table("", columns, rows)
+    assert "st_38b213f6175b1470 " in capsys.readouterr().out
+
+
+def test_endings_are_told_with_their_meaning() -> None:
+    (line,) = ending_lines({"ok": 49, "inertia_insufficient": 3})
+    assert line.startswith("  3 inertia_insufficient: The inertia is insufficient for the mean speed")

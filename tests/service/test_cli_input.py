@@ -235,3 +235,44 @@ def test_a_kernel_that_there_is_not(sprag: Sprag, options: list[str]) -> None:
     done = sprag("doctor", *options)
     assert done.code == 2
     assert options[-2] in done.err
+
+
+def small(examples: Path, tmp_path: Path) -> Path:
+    """A crank press in three cases, of which one ends otherwise than ok."""
+    text = (examples / "press.toml").read_text(encoding="utf-8")
+    path = tmp_path / "press.toml"
+    path.write_text(
+        text.partition("[[axes]]")[0] + '[[axes]]\npath = "mean_speed"\nvalues = ["20 rpm", "120 rpm", "180 rpm"]\n'
+    )
+    return path
+
+
+def test_a_run_tells_how_its_cases_ended(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    done = sprag("run", small(examples, tmp_path), "-o", tmp_path / "rows.csv")
+    assert done.code == 1
+    assert "3 of 3 cases done, 2 ok" in done.err
+    assert "  1 inertia_insufficient: The inertia is insufficient" in done.err
+    assert done.out == ""
+
+
+def test_a_run_into_a_file_tells_programs_what_came_of_it(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    file = tmp_path / "rows.csv"
+    done = sprag("run", small(examples, tmp_path), "--json", "-o", file)
+    told = done.data
+    assert told.pop("seconds") > 0.0
+    assert told == {
+        "file": str(file), "study": None, "cases": 3, "done": 3, "ok": 2, "reused": 0,
+        "endings": {"ok": 2, "inertia_insufficient": 1},
+    }  # fmt: skip
+    assert file.read_text().startswith("case,mean_speed,ending,flags,")
+    motion = tmp_path / "motion.csv"
+    told = sprag("trajectory", small(examples, tmp_path), "--case", "1", "--points", "5", "--json", "-o", motion).data
+    assert told == {"file": str(motion), "case": 1, "ending": "ok", "points": 5}
+    assert not motion.read_text().startswith("{")
+
+
+def test_an_estimate_has_start_and_compilation_in_it(
+    sprag: Sprag, examples: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kernels, "estimate_compile_seconds", lambda _study: 40.0)
+    assert sprag("preview", examples / "press.toml", "--json").data["estimated_seconds"] > 42.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 import math
 from typing import Any
@@ -12,6 +13,7 @@ from scipy.stats import qmc
 
 from service.measured import MeasuredDataError, parse_measured
 from service.spec import parse_spec
+from service.spec_messages import SpecError
 from service.spec_sample import unit_sample
 from service.spec_schema import spec_schema
 from service.units import parse_quantity
@@ -238,3 +240,31 @@ def test_kernels_take_compiled_studies() -> None:
         [0.1, 0.3],
         [30.0, 20.0],
     )  # type: ignore[union-attr]
+
+
+def eight(columns: int) -> dict[str, Any]:
+    """A drive of eight pendulums, and points that vary that many of their parameters."""
+    spec = copy.deepcopy(SPEC)
+    pendulum = spec["base"]["pendulums"][0]
+    spec["base"]["pendulums"] = [copy.deepcopy(pendulum) for _ in range(8)]
+    names = [name for name, value in pendulum.items() if not isinstance(value, dict)]
+    paths = [f"pendulums.{index}.{name}" for index in range(8) for name in names][:columns]
+    rows = [",".join(str(0.1 + 0.01 * case) for _ in paths) for case in range(3)]
+    spec["axes"] = [{"points": "\n".join([",".join(paths), *rows])}]
+    return spec
+
+
+def test_points_may_have_a_column_for_every_parameter_of_eight_pendulums() -> None:
+    study = parse_spec(eight(1000)).study
+    assert (len(study.axes) > 60, study.cases) == (True, 3)
+    assert study.case_parameters(2)["pendulums.7.mass"] == pytest.approx(0.12)
+
+
+def test_more_columns_than_the_limit_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.spec_points.MAX_COLUMNS", 20)
+    with pytest.raises(SpecError, match="of 21 columns under its header"):
+        parse_spec(eight(21))
+    monkeypatch.setattr("service.spec_points.MAX_COLUMNS", 256)
+    monkeypatch.setattr("service.spec_design.MAX_COLUMNS", 20)
+    with pytest.raises(SpecError, match="21 parameters vary"):
+        parse_spec(eight(21))

@@ -121,9 +121,12 @@ def test_a_trajectory_is_that_of_the_case() -> None:
 def test_a_kernel_counts_as_compiled_once_it_was_loaded(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(kernels, "cache_folder", lambda: tmp_path)
     monkeypatch.setattr("engine.vibration_drive.simulate.warm_up", lambda *_: None)
-    shape = kernels.KernelShape("vibration-drive", 2, 3, 1e-9)
+    study = fakes.study(3)
+    shape = kernels.shape_of(study)
     assert not kernels.is_compiled(shape)
+    assert kernels.estimate_compile_seconds(study) > 1.0
     kernels.load(shape)
     assert kernels.is_compiled(shape)
+    assert kernels.estimate_compile_seconds(study) == 0.0
     assert not kernels.is_compiled(replace(shape, tolerance=1e-8))
-    assert not kernels.is_compiled(replace(shape, coefficients=4))
+    assert not kernels.is_compiled(replace(shape, coefficients=shape.coefficients + 1))

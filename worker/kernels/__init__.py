@@ -91,6 +91,7 @@ __all__ = [
     "duration_seconds",
     "endings_of",
     "engine_folder",
+    "estimate_compile_seconds",
     "estimate_seconds_per_case",
     "extent",
     "fit_clutch",
@@ -258,6 +259,16 @@ def estimate_seconds_per_case(study: Study) -> float:
     if _is_shaft(study.model):
         return machine_shaft.estimate_seconds_per_case(study)
     return vibration_drive.estimate_seconds_per_case(study)
+
+
+def estimate_compile_seconds(study: Study) -> float:
+    """Rough time until the kernel of ``study`` is there, in s; 0 where it lies compiled in the cache on disk."""
+    shape = shape_of(study)
+    if is_compiled(shape):
+        return 0.0
+    if _is_shaft(study.model):
+        return machine_shaft.estimate_compile_seconds()
+    return vibration_drive.estimate_compile_seconds(shape)
 
 
 def prepare() -> None:

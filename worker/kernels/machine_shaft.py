@@ -188,6 +188,11 @@ def estimate_seconds_per_case(study: Study) -> float:
     return estimate_seconds(spec_of(study.structure))
 
 
+def estimate_compile_seconds() -> float:
+    """Rough time of compiling what all machines share, in s."""
+    return 5.0
+
+
 def prepare() -> None:
     """Load the engine with its compiler."""
     import engine.machine_shaft.simulate  # noqa: F401
