@@ -22,6 +22,7 @@ from service.metrics import Metrics
 from service.settings import Settings, UnsafeSettingsError
 from service.spec_design_schema import extension_schema
 from service.spec_schema import spec_schema
+from service.storage.readiness import Readiness
 from service.storage.store import Store
 from service.web import case, compare, form, laboratory, login, pages, results, study, table
 from service.web import schedules as schedule_pages
@@ -121,6 +122,7 @@ def create_app(
     )
     app.state.access = access
     app.state.metrics = metrics
+    app.state.readiness = Readiness(used_store)
     app.state.context = Context(settings, used_store, used_computer)
     api = APIRouter(prefix=API_PREFIX)
     for module in (studies, events, curves, sensitivity, cases, clutch_fits, schedules, catalogues):

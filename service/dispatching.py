@@ -16,7 +16,8 @@ from service import logs
 from service.logs import LogFormat
 from service.schedules.scheduler import Scheduler
 from service.storage.lock import lock_of
-from service.storage.part import SystemClock
+from service.storage.part import SILENT_SECONDS, SystemClock
+from service.storage.readiness import LOCKED_SECONDS
 from service.storage.store import Store
 from service.upkeep import Upkeep, UpkeepPlan
 from worker import kernels
@@ -38,8 +39,8 @@ _LOG = logging.getLogger(__name__)
 
 #: Seconds between two tries of a standby to take the lock.
 STANDBY_SECONDS = 0.3
-#: Seconds without a sign of life after which a standby says so: several times what lies between two signs.
-SILENT_SECONDS = 60.0
+#: Seconds without a sign of life after which a worker that is to be replaced counts as hung.
+HUNG_SECONDS = 20.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +129,8 @@ def run_dispatcher(
 ) -> None:
     """Run every study of the database until ``stopping()``. Waits as a standby while another dispatcher is at work.
 
-    With ``take_over`` it does not wait: the other one can store nothing any more, and ends when it finds that out.
+    With ``take_over`` it does not wait: the other one can store nothing any more, and ends when it finds that out. One
+    that hangs on this host is killed.
 
     Raises StoreError (EpochLostError when another dispatcher took over) and ExecutorError, each with one sentence.
     """
@@ -139,7 +141,7 @@ def run_dispatcher(
         lock = lock_of(store.session, owner_name())
         try:
             if take_over:
-                lock.seize()
+                _take_over(store, lock, say)
             elif not _stand_by(store, lock, stopping, say):
                 return
             store.purge()
@@ -178,7 +180,7 @@ def _stand_by(store: Store, lock: OneHolder, stopping: Callable[[], bool], say: 
     while not lock.take():
         if stopping():
             return False
-        if not told and (silence := _silence(store)) > SILENT_SECONDS:
+        if not told and (silence := store.silence() or 0.0) > SILENT_SECONDS:
             told = True
             say(
                 f"nothing was heard of process {lock.holder()} for {silence:.0f} s; end it, or go on without it: "
@@ -188,10 +190,15 @@ def _stand_by(store: Store, lock: OneHolder, stopping: Callable[[], bool], say: 
     return True
 
 
-def _silence(store: Store) -> float:
-    """Seconds since the dispatcher at work was last heard of."""
-    found = store.dispatcher()
-    return 0.0 if found is None else (store.clock.now() - found.heartbeat_at).total_seconds()
+def _take_over(store: Store, lock: OneHolder, say: Callable[[str], None]) -> None:
+    """Take the lock from its holder. One that hangs is ended: its transaction may keep all others out."""
+    if lock.take():
+        return
+    holder = lock.holder()
+    hung = (store.silence() or 0.0) > HUNG_SECONDS or not store.session.can_write(LOCKED_SECONDS)
+    if hung and lock.end_holder():
+        say(f"process {holder} hung and was ended")
+    lock.seize()
 
 
 def stop_on_signals() -> StopFlag:

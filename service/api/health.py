@@ -7,12 +7,13 @@ from typing import Any, cast
 from fastapi import APIRouter, Depends, Request
 from starlette.responses import Response
 
-from service.api.context import Ctx
 from service.api.document import files, problems
 from service.api.models import Health
 from service.api.requests import strict_query
 from service.api.respond import json_response
+from service.errors import ApiError
 from service.metrics import CONTENT_TYPE, Metrics
+from service.storage.readiness import Readiness
 
 router = APIRouter(tags=["health"], dependencies=[Depends(strict_query)])
 
@@ -24,9 +25,11 @@ async def livez() -> Any:
 
 
 @router.get("/readyz", response_model=Health, responses=problems("invalid-parameter", "unavailable"))
-def readyz(context: Ctx) -> Any:
-    """Whether studies can be submitted and read: the database answers and has the right schema."""
-    context.store.ping()
+def readyz(request: Request) -> Any:
+    """Whether studies can be submitted, read and run: database, its schema, file and write lock, the worker."""
+    readiness = cast("Readiness", request.app.state.readiness)
+    if found := readiness.problems():
+        raise ApiError("unavailable", " ".join(found), headers={"Retry-After": "5"})
     return json_response({"status": "ok"})
 
 

@@ -49,7 +49,10 @@ def worker(
     processes: Processes = None,
     take_over: Annotated[
         bool,
-        typer.Option("--take-over", help="Do not wait for another worker: it can store nothing more, and gives up."),
+        typer.Option(
+            "--take-over",
+            help="Do not wait for another worker: it can store nothing more; one that hangs is killed.",
+        ),
     ] = False,
 ) -> None:
     """Run the studies of a database without a service; Ctrl-C ends it."""

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import fcntl
 import os
+import select
+import signal
+import socket
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 from service.storage.private_files import create_private
+from worker.process_table import start_time
 
 if TYPE_CHECKING:
     from service.storage.session import Session
+
+
+#: Seconds for a killed process to be gone.
+_KILL_SECONDS: Final = 10.0
 
 
 class OneHolder(Protocol):
@@ -21,6 +29,9 @@ class OneHolder(Protocol):
 
     def seize(self) -> None:
         """Take the lock from whoever has it, which only the epoch then keeps from the database."""
+
+    def end_holder(self) -> bool:
+        """End the process that has the lock, at once, where it can be told and reached; whether it was ended."""
 
     def holder(self) -> str:
         """Whoever took the lock last, "" where nobody did."""
@@ -52,7 +63,7 @@ class DispatcherLock:
             os.close(file)
             return False
         os.ftruncate(file, 0)
-        os.write(file, f"{os.getpid()}\n".encode())
+        os.write(file, f"{os.getpid()} {start_time(os.getpid()) or ''} {socket.gethostname()}\n".encode())
         self._file = file
         return True
 
@@ -66,10 +77,36 @@ class DispatcherLock:
 
     def holder(self) -> str:
         """Process id of whoever took the lock last, "" where nobody did."""
+        return self._noted().partition(" ")[0]
+
+    def _noted(self) -> str:
         try:
-            return self.path.read_text(encoding="ascii").strip()
+            return self.path.read_text(encoding="ascii", errors="replace").strip()
         except OSError:
             return ""
+
+    def end_holder(self) -> bool:
+        """End the process that has the lock, at once, where it runs on this host; whether it was ended.
+
+        A process is ended only if it is the very one that took the lock: its id may be another's by now, so the time of
+        its start must be the same, too.
+        """
+        pid, start, host = [*self._noted().split(" "), "", "", ""][:3]
+        if host != socket.gethostname() or not (pid.isdecimal() and start.isdecimal()) or int(pid) == os.getpid():
+            return False
+        try:
+            process = os.pidfd_open(int(pid))  # from here on the id cannot become another's
+        except (AttributeError, OSError):
+            return False
+        try:
+            if start_time(int(pid)) != int(start):
+                return False
+            signal.pidfd_send_signal(process, signal.SIGKILL)
+            return bool(select.select([process], [], [], _KILL_SECONDS)[0])
+        except OSError:
+            return False
+        finally:
+            os.close(process)
 
     def release(self) -> None:
         """Give the lock up."""

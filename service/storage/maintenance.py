@@ -107,7 +107,8 @@ def require_sound(session: Session) -> None:
         return
     with session.read() as connection:
         if connection.exec_driver_sql("PRAGMA quick_check(1)").scalar_one() != "ok":
-            raise DatabaseError(damaged(session.path))
+            session.damage = damaged(session.path)
+            raise DatabaseError(session.damage)
 
 
 def check(session: Session) -> CheckReport:

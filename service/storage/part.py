@@ -47,6 +47,8 @@ def optional_moment(micros: int | None) -> datetime | None:
     return None if micros is None else moment(micros)
 
 
+#: Seconds without a sign of life of the worker after which it counts as gone: several times what lies between two.
+SILENT_SECONDS = 60.0
 #: The largest number that a column of integers takes on every server.
 MAX_INTEGER = 2**31 - 1
 

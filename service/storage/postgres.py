@@ -149,6 +149,17 @@ def explained(error: BaseException, where: str) -> DatabaseError | None:
     return None
 
 
+def writer_is_free(connection: sa.Connection, seconds: float) -> bool:
+    """Whether the writers' lock can be had within ``seconds``; it is given back at once."""
+    until = time.monotonic() + seconds
+    while True:
+        if connection.exec_driver_sql(f"SELECT pg_try_advisory_xact_lock({_LOCKS}, {_WRITER})").scalar_one():
+            return True
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.05)
+
+
 def copy_in(connection: sa.Connection, table: str, columns: Sequence[str], rows: Iterable[tuple[Any, ...]]) -> None:
     """Insert many rows by COPY, which is several times faster than INSERT. Raises sqlalchemy.exc.DBAPIError."""
     driver: psycopg.Connection[Any] | None = connection.connection.driver_connection
@@ -189,6 +200,10 @@ class ServerLock:
         """
         while not self.take():
             self._ask(f"SELECT pg_terminate_backend(a.pid, {LOST_SECONDS * 1000}) {_HOLDER}")
+
+    def end_holder(self) -> bool:
+        """False: the server ends the connection of a hung holder, and with it its lock and its transaction."""
+        return False
 
     def holder(self) -> str:
         """Host and process of whoever has the lock, "" where nobody does."""

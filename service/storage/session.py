@@ -18,6 +18,7 @@ from sqlalchemy.engine import URL, make_url
 
 from service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError
 from service.storage.private_files import PRIVATE_FOLDER_MODE, create_private
+from worker.ports import StoreError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -107,6 +108,10 @@ class Session:
                 "in a name or password write @ as %40 and / as %2F"
             )
         self._path: Path | None = None
+        #: Device and number of the file that was opened first.
+        self._file: tuple[int, int] | None = None
+        #: Why the database cannot be trusted any more; None where nothing wrong was met.
+        self.damage: str | None = None
         match self.url.get_backend_name():
             case "sqlite":
                 self._engine = self._open_file()
@@ -142,6 +147,7 @@ class Session:
         )
         sa.event.listen(engine, "do_connect", self._create_file)
         sa.event.listen(engine, "connect", _set_pragmas)
+        sa.event.listen(engine, "connect", self._note_file)
         return engine
 
     def _create_file(self, *_: object) -> None:
@@ -187,6 +193,50 @@ class Session:
                 "name a file on a local disk with --db"
             )
 
+    def _note_file(self, _connection: Any, _record: object) -> None:
+        if self._file is None:
+            found = self.path.stat()
+            self._file = found.st_dev, found.st_ino
+
+    def require_same_file(self) -> None:
+        """Raise DatabaseError when the file is not the one that was opened: what is written would be lost with it."""
+        if self._file is None:
+            return
+        try:
+            found = self.path.stat()
+        except OSError:
+            raise DatabaseError(
+                f"the database file {self.path} was deleted or moved while it was in use: stop Sprag, put the file or "
+                "a backup in its place, and start again"
+            ) from None
+        if self._file != (found.st_dev, found.st_ino):
+            raise DatabaseError(
+                f"the database file {self.path} was replaced while it was in use: stop Sprag, delete the files beside "
+                "it that end in -wal and -shm if it is a backup, and start again"
+            )
+
+    def can_write(self, seconds: float) -> bool:
+        """Whether a write transaction could begin within ``seconds``. Raises DatabaseError."""
+        if self.on_server:
+            with self.plain() as connection:
+                return bool(_postgres().writer_is_free(connection, seconds))
+        driver = sqlite_driver()
+        try:
+            connection = driver.connect(
+                f"{self.path.as_uri()}?mode=rw", uri=True, timeout=seconds, isolation_level=None
+            )
+            try:
+                connection.execute("BEGIN IMMEDIATE")
+                connection.execute("ROLLBACK")
+            finally:
+                connection.close()
+        except driver.Error as error:
+            found = explained(sa.exc.DBAPIError("", None, error), self.path)
+            if isinstance(found, DatabaseBusyError):
+                return False
+            raise (found if isinstance(found, StoreError) else DatabaseError(str(error))) from error
+        return True
+
     @property
     def dialect(self) -> sa.engine.Dialect:
         """The SQL dialect in use."""
@@ -203,6 +253,7 @@ class Session:
         """A write transaction, with the write lock from its first moment; commits at the end, or changes nothing."""
         # Threads of one process queue here: SQLite's own waiting is by sleeping ever longer, and the last wakes last.
         began = perf_counter()
+        self.require_same_file()
         if not self._writing.acquire(timeout=BUSY_SECONDS):
             raise DatabaseBusyError(_BUSY.format(self.location))
         try:
@@ -254,6 +305,8 @@ class Session:
     def _explained(self, error: sa.exc.DBAPIError) -> Exception:
         if self.on_server:
             return (_postgres().explained(error.orig, self.location) if error.orig else None) or error
+        if "malformed" in str(error.orig):
+            self.damage = damaged(self.path)
         return explained(error, self.path)
 
     def close(self) -> None:

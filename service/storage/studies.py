@@ -6,6 +6,8 @@ import json
 import secrets
 from collections import OrderedDict
 from contextlib import suppress
+from dataclasses import replace
+from datetime import timedelta
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +15,13 @@ import sqlalchemy as sa
 
 from service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyEnded, StudyNotFound
 from service.storage.order import Orders
-from service.storage.part import MAX_INTEGER, announce, micros_of, optional_moment
+from service.storage.part import MAX_INTEGER, SILENT_SECONDS, announce, micros_of, moment, optional_moment
 from service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
 from service.storage.records import Progress, StudyPage, StudyRecord, record_of
 from service.storage.schedules import unbind
 from service.storage.tables import (
     CHUNKS,
+    DISPATCHER,
     ENDINGS,
     HELD_AT_DEADLINE,
     IDEMPOTENCY_KEYS,
@@ -123,7 +126,21 @@ class Studies(Orders):
     def get_study(self, study_id: str) -> StudyRecord:
         """The study of that id; raises StudyNotFound."""
         with self.session.read() as connection:
-            return record_of(self._row(connection, study_id, *RECORD_COLUMNS))
+            return self._told(connection, record_of(self._row(connection, study_id, *RECORD_COLUMNS)))
+
+    def _told(self, connection: sa.Connection, record: StudyRecord) -> StudyRecord:
+        """The study, with the reason why it does not go on where its worker is silent and cannot note one itself."""
+        if record.reason is not None or record.state not in {StudyState.QUEUED, StudyState.RUNNING}:
+            return record
+        row = connection.execute(sa.select(DISPATCHER.c.owner, DISPATCHER.c.heartbeat_at)).one_or_none()
+        if row is None or self.clock.now() - moment(row.heartbeat_at) <= timedelta(seconds=SILENT_SECONDS):
+            return record
+        since = moment(row.heartbeat_at).isoformat(timespec="seconds")
+        return replace(
+            record,
+            reason=f"nothing has been heard of the worker (process {row.owner}) since {since}; the study goes on when "
+            "a worker is at work",
+        )
 
     def spec(self, study_id: str) -> dict[str, Any]:
         """The user's own spec, as it was given; raises StudyNotFound."""
@@ -158,7 +175,7 @@ class Studies(Orders):
             query = query.where(STUDIES.c.state == state.value)
         with self.session.read() as connection:
             rows = connection.execute(query.order_by(STUDIES.c.number.desc()).limit(size + 1)).all()
-        records = tuple(record_of(row) for row in rows[:size])
+            records = tuple(self._told(connection, record_of(row)) for row in rows[:size])
         return StudyPage(records, str(records[-1].number) if len(rows) > size else None)
 
     def waiting_studies(self) -> int:
@@ -195,6 +212,7 @@ class Studies(Orders):
                 )
             ).all()
             covered = self._coverage(connection, row.number, row.cases)
+            record = self._told(connection, record_of(row))
         now = self.clock.now()
         state = StudyState(row.state)
         rate, left = estimate(
@@ -207,7 +225,7 @@ class Studies(Orders):
         )
         going = state in {StudyState.QUEUED, StudyState.RUNNING}
         finish_by = optional_moment(row.finish_by)
-        return record_of(row), Progress(
+        return record, Progress(
             state, row.cases, row.done, row.ok, dict(endings), rate, left if going else None, covered, finish_by, now
         )
 

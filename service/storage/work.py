@@ -74,6 +74,11 @@ class Work(Reuse):
             return None
         return DispatcherRecord(row.epoch, row.owner, moment(row.started_at), moment(row.heartbeat_at))
 
+    def silence(self) -> float | None:
+        """Seconds since the dispatcher that took over last was heard of; None when there never was one."""
+        found = self.dispatcher()
+        return None if found is None else (self.clock.now() - found.heartbeat_at).total_seconds()
+
     def heartbeat(self, epoch: int) -> None:
         """Note that the dispatcher is alive."""
         with self.session.write() as connection:

@@ -1,0 +1,70 @@
+"""Whether a database can take and run studies: its file, its write lock, and the worker."""
+
+from __future__ import annotations
+
+from threading import Lock
+from typing import TYPE_CHECKING, Final
+
+from service.storage.errors import DatabaseError
+from service.storage.part import SILENT_SECONDS
+from worker.ports import StoreError
+
+if TYPE_CHECKING:
+    from service.storage.store import Store
+
+#: Seconds that the write lock may be held by others: far longer than any write transaction of Sprag takes.
+LOCKED_SECONDS: Final = 5.0
+#: Seconds for which an answer holds, since everybody may ask.
+_KEPT_SECONDS: Final = 2.0
+#: Seconds between two looks at all pages of a database of moderate size.
+_CHECK_SECONDS: Final = 600.0
+
+
+class Readiness:
+    """Looks at a store when asked, one look at a time."""
+
+    def __init__(self, store: Store, locked_seconds: float = LOCKED_SECONDS) -> None:
+        self._store = store
+        self._locked_seconds = locked_seconds
+        self._looking = Lock()
+        self._found: tuple[str, ...] = ()
+        self._until = float("-inf")
+        # Services look over the pages when they start.
+        self._next_check = store.clock.monotonic() + _CHECK_SECONDS
+
+    def problems(self) -> tuple[str, ...]:
+        """What keeps studies from being taken or run, a sentence each; while somebody looks, what was found before."""
+        if self._store.clock.monotonic() < self._until or not self._looking.acquire(blocking=False):
+            return self._found
+        try:
+            self._found = tuple(self._look())
+            self._until = self._store.clock.monotonic() + _KEPT_SECONDS
+        finally:
+            self._looking.release()
+        return self._found
+
+    def _look(self) -> list[str]:
+        try:
+            self._store.ping()
+            self._store.session.require_same_file()
+            if self._store.clock.monotonic() >= self._next_check:
+                self._next_check = self._store.clock.monotonic() + _CHECK_SECONDS
+                self._store.require_sound()
+            if self._store.session.damage is not None:
+                raise DatabaseError(self._store.session.damage)
+            if not self._store.session.can_write(self._locked_seconds):
+                return [
+                    f"The write lock of the database was not free for {self._locked_seconds:g} s: a process that holds "
+                    "it hangs or was stopped (`sprag worker --take-over` ends a hung worker).",
+                    *self._worker(),
+                ]
+            return self._worker()
+        except (DatabaseError, StoreError) as error:
+            text = str(error)
+            return [text[:1].upper() + text[1:] + "."]
+
+    def _worker(self) -> list[str]:
+        silence = self._store.silence()
+        if silence is None or silence <= SILENT_SECONDS:
+            return []
+        return [f"No worker has been heard of for {silence:.0f} s: studies are not run."]
