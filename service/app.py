@@ -8,6 +8,7 @@ from importlib.metadata import version
 from typing import Any
 
 from fastapi import APIRouter, FastAPI
+from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp
 
 from service import handlers
@@ -17,6 +18,7 @@ from service.api.context import Context
 from service.api.document import API_PREFIX, build_openapi
 from service.computer import Computes, ProcessComputer
 from service.guard import Guard
+from service.housekeeping import Housekeeping
 from service.logs import Noted, RequestLog
 from service.metrics import Metrics
 from service.settings import Settings, UnsafeSettingsError
@@ -97,7 +99,10 @@ def create_app(
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        housekeeping = Housekeeping(used_store)
+        housekeeping.start()
         yield
+        await run_in_threadpool(housekeeping.stop)
         if computer is None:
             used_computer.close()
         if own_store:
