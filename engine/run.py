@@ -50,3 +50,27 @@ class Run:
             end = self.duration.in_periods(frequency)
             return end * 2.0 / 3.0, end
         return self.window[0].in_periods(frequency), self.window[1].in_periods(frequency)
+
+
+@dataclass(frozen=True, slots=True)
+class SettledRun:
+    """Settings of a search for the settled motion, shared by every case of a batch.
+
+    Attributes
+    ----------
+    at_most : int
+        Excitation periods from the start of a case after which the search ends.
+    settled : float
+        Scaled distance from its orbit below which a run counts as settled.
+    max_period : int
+        Largest order of an orbit, in excitation periods.
+    tolerance, reset, max_events_per_period :
+        As of ``Run``.
+    """
+
+    at_most: int = 1000
+    settled: float = 1e-8
+    max_period: int = 32
+    tolerance: float = 1e-9
+    reset: Reset = "contact"
+    max_events_per_period: int = 2_000

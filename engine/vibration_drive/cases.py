@@ -122,3 +122,27 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     ]  # fmt: skip
     stops = [part for time in times for part in _stop(time)]
     return np.ascontiguousarray(np.column_stack([*shaft, *stops, *pendulums]))
+
+
+def with_lengths(matrix: Floats, begin: Floats, periods: Floats, *, windowed: bool | NDArray[np.bool_]) -> Floats:
+    """The same cases, each run for its own number of periods from where in the period it begins.
+
+    Parameters
+    ----------
+    matrix : array, shape (cases, columns)
+        From ``case_matrix``.
+    begin : array, shape (cases,)
+        Part of the period at which a case begins.
+    periods : array, shape (cases,)
+        Whole periods that it runs.
+    windowed : bool, or array of shape (cases,)
+        Whether the characteristics are taken over all of the run, or not at all.
+    """
+    changed = matrix.copy()
+    end = periods + begin
+    start = np.where(windowed, begin, end)
+    for k, time in enumerate((start, start, end, end)):
+        whole, fraction = _stop(time)
+        changed[:, SHAFT_COLUMNS + 2 * k] = whole
+        changed[:, SHAFT_COLUMNS + 2 * k + 1] = fraction
+    return changed

@@ -87,6 +87,50 @@ def characteristics(lay: Layout, matrix: Floats, sums: Floats) -> Floats:
     return np.column_stack([out[info.name] for info in result_infos(lay.n)])
 
 
+_SMALLEST = ("speed_min", "p_phi_min", "p_speed_min", "p_acc_min")
+_LARGEST = (
+    "speed_max", "acc_max", "sum_max", "power_max", "driving_max", "p_phi_max", "p_speed_max", "p_acc_max",
+    "p_torque_max", "p_u_max",
+)  # fmt: skip
+_LATEST = ("speed_2", "energy_2")
+_FIRST = ("speed_0", "energy_0", "turn_0", "turn_1", "input_1")
+
+
+def combined(lay: Layout, parts: list[Floats]) -> Floats:
+    """Sums over windows that follow each other, each with its marks taken from its own start.
+
+    ``parts`` holds the matrices of sums of the windows, all of the same cases; the result is as ``characteristics``
+    reads it.
+    """
+    total = parts[0].copy()
+    shaft = [(name, [OUT_SUMS + getattr(lay, name) - lay.sum_held]) for name in _rows(lay, "sum_held", "energy_lost")]
+    first = OUT_SUMS + _shaft_width(lay) - lay.p_sum_phi
+    width = _pendulum_width(lay)
+    pendulums = [
+        (name, [first + i * width + getattr(lay, name) for i in range(lay.n)])
+        for name in _rows(lay, "p_sum_phi", "p_u_max")
+    ]
+    for part in parts[1:]:
+        total[:, OUT_STEPS] += part[:, OUT_STEPS]
+        total[:, OUT_EVENTS] += part[:, OUT_EVENTS]
+        for name, columns in shaft + pendulums:
+            for column in columns:
+                if name in _LARGEST:
+                    total[:, column] = np.maximum(total[:, column], part[:, column])
+                elif name in _SMALLEST:
+                    total[:, column] = np.minimum(total[:, column], part[:, column])
+                elif name in _LATEST:
+                    total[:, column] = part[:, column]
+                elif name not in _FIRST:
+                    total[:, column] += part[:, column]
+    return total
+
+
+def _rows(lay: Layout, first: str, last: str) -> tuple[str, ...]:
+    """Names of the layout's fields from one to another."""
+    return lay._fields[lay._fields.index(first) : lay._fields.index(last) + 1]
+
+
 def _pendulum(cases: _Cases, i: int, out: dict[str, Floats]) -> None:
     def put(name: str, values: Floats) -> None:
         out[f"pendulums.{i}.{name}"] = values

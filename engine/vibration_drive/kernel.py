@@ -36,8 +36,9 @@ import numpy as np
 from engine.jit import compiled, unmanaged
 from engine.taylor.lowering import constant_record, lane_loops, lane_mask, lowest
 from engine.vibration_drive.events import settle_guards
-from engine.vibration_drive.lanes import load_case, look_for_events, next_stop, record, settle
+from engine.vibration_drive.lanes import highest, load_case, look_for_events, next_stop, pack, record, settle
 from engine.vibration_drive.layout import Layout, as_record
+from engine.vibration_drive.strobes import FRACTION
 from engine.vibration_drive.window import collect_peaks, settle_peaks
 
 LAYOUT = {layout!r}
@@ -72,17 +73,18 @@ noted = lane_mask("!=", LAYOUT.attention, LAYOUT.lanes)
 
 @compiled
 def integrate(
-    lay, cases, tolerance, log2_tolerance, literal, most_steps, most_events, W, Z, g, stack, blocks, meta, turns, sums,
-    times, samples, states,
+    lay, cases, starts, strobes, tolerance, log2_tolerance, literal, most_steps, most_events, W, Z, g, stack, blocks,
+    meta, turns, sums, times, samples, states,
 ):
     """Run every case, filling a lane again the moment its case ends; the number of samples recorded (of case 0)."""
     lay = fixed(lay)
+    starts, strobes = unmanaged(starts), unmanaged(strobes)
     cases, turns, sums, times = unmanaged(cases), unmanaged(turns), unmanaged(sums), unmanaged(times)
     W, Z, g, stack, blocks, meta = (
         unmanaged(W), unmanaged(Z), unmanaged(g), unmanaged(stack), unmanaged(blocks), unmanaged(meta)
     )
     samples, states = unmanaged(samples), unmanaged(states)
-    groups = min((cases.shape[0] + {group} - 1) // {group}, {groups})  # of lanes that are ever used
+    groups = min((cases.shape[0] + {group} - 1) // {group}, {groups})  # of lanes that are used
     busy = 0  # bit k: lane k has a case
     queue = 0
     recorded = 0
@@ -91,8 +93,8 @@ def integrate(
         while idle != 0 and queue < cases.shape[0]:
             lane = lowest(idle)
             idle &= idle - 1
-            load_case(W, Z, lay, lane, queue, cases, literal)
-            next_stop(W, Z, lay, lane, cases, sums[queue])
+            load_case(W, Z, lay, lane, queue, cases, starts, literal)
+            next_stop(W, Z, lay, lane, cases, starts[queue, FRACTION], sums[queue])
             busy |= 1 << lane
             queue += 1
         if busy == 0:
@@ -119,11 +121,15 @@ def integrate(
             recorded = record(W, Z, lay, 0, times, recorded, g, samples, states)
         advance(W, float(most_steps), 0.0, groups)
         left = busy & noted(W)
+        before = busy
         while left != 0:
             lane = lowest(left)
             left &= left - 1
-            if not settle(W, Z, lay, lane, cases, turns, sums, most_steps, most_events):
+            if not settle(W, Z, lay, lane, cases, starts, strobes, turns, sums, most_steps, most_events):
                 busy &= ~(1 << lane)
+        if busy != before and queue == cases.shape[0]:
+            busy = pack(W, Z, lay, turns, busy, groups)
+            groups = (highest(busy) + {group}) // {group}
 '''
 
 
@@ -134,9 +140,9 @@ class Kernel(Protocol):
     RECORD: Layout
 
     def integrate(
-        self, lay: Layout, cases: Floats, tolerance: float, log2_tolerance: float, literal: int,
-        most_steps: int, most_events: int, W: Floats, Z: Ints, g: Floats, stack: Floats, blocks: Floats, meta: Ints,
-        turns: Floats, sums: Floats, times: Floats, samples: Floats, states: Ints,
+        self, lay: Layout, cases: Floats, starts: Floats, strobes: Floats, tolerance: float, log2_tolerance: float,
+        literal: int, most_steps: int, most_events: int, W: Floats, Z: Ints, g: Floats, stack: Floats, blocks: Floats,
+        meta: Ints, turns: Floats, sums: Floats, times: Floats, samples: Floats, states: Ints,
     ) -> int: ...  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from engine.endings import ENDING_CODES, Ending
 from engine.jit import part
+from engine.taylor.lowering import GROUP
 from engine.taylor.roots import evaluate
 from engine.vibration_drive import states as ev
 from engine.vibration_drive.advance import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR
@@ -16,6 +17,7 @@ from engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS
 from engine.vibration_drive.events import collect_guards, transit
 from engine.vibration_drive.layout import Layout
 from engine.vibration_drive.states import law, set_clutch, set_shaft
+from engine.vibration_drive.strobes import FRACTION, begin_at, note
 from engine.vibration_drive.window import energy, primitive, sample, series, watch_extrema
 
 Floats = NDArray[np.float64]
@@ -47,8 +49,13 @@ OUT_ENDING, OUT_STEPS, OUT_EVENTS, OUT_RUNUP, OUT_SUMS = 0, 1, 2, 3, 4
 
 
 @part
-def load_case(W: Floats, Z: Ints, lay: Layout, lane: int, case: int, cases: Floats, literal: int) -> None:
-    """Put a case into a lane at t = 0 (MODEL.md A2, "Start"). ``cases`` has the columns of ``cases.case_matrix``."""
+def load_case(
+    W: Floats, Z: Ints, lay: Layout, lane: int, case: int, cases: Floats, starts: Floats, literal: int
+) -> None:
+    """Put a case into a lane at t = 0 (MODEL.md A2, "Start") or at the strobe in its row of ``starts``.
+
+    ``cases`` has the columns of ``cases.case_matrix``.
+    """
     lanes = lay.lanes
     row = cases[case]
     for k in range(lay.rows):
@@ -81,6 +88,7 @@ def load_case(W: Floats, Z: Ints, lay: Layout, lane: int, case: int, cases: Floa
         W[(base + lay.p_u) * lanes + lane] = -W[(base + lay.p_backlash) * lanes + lane]
         set_clutch(W, Z, lay, lane, i, _FREE)
     set_shaft(W, Z, lay, lane, _HELD if row[_SPEED] == 0.0 and row[_LOAD] > 0.0 else _ROTATING)
+    begin_at(W, Z, lay, lane, starts[case])
     watch_extrema(W, lay, lane, False)
 
 
@@ -139,24 +147,28 @@ def _pass_stop(W: Floats, Z: Ints, lay: Layout, lane: int, stop: int, sums: Floa
 
 
 @part
-def next_stop(W: Floats, Z: Ints, lay: Layout, lane: int, cases: Floats, sums: Floats) -> bool:
+def next_stop(W: Floats, Z: Ints, lay: Layout, lane: int, cases: Floats, strobe: float, sums: Floats) -> bool:
     """Pass every stop that is due, set the next one (at the latest the period's end); False when the run is over.
+
+    ``strobe`` is the part of each period at which a step ends too.
 
     Stops are pairs (whole periods, fraction), so that a window given in periods is met exactly.
     """
     row = cases[Z[lane, ev.CASE]]
+    f = W[lay.f * lay.lanes + lane]
+    period_end = strobe if f < strobe else 1.0
     while Z[lane, ev.NEXT_STOP] < STOPS:
         stop = Z[lane, ev.NEXT_STOP]
         whole = row[_STOPS + 2 * stop]
         fraction = row[_STOPS + 2 * stop + 1]
         if whole > Z[lane, ev.PERIOD]:
             break
-        if whole == Z[lane, ev.PERIOD] and fraction > W[lay.f * lay.lanes + lane]:
-            W[lay.f_stop * lay.lanes + lane] = fraction
+        if whole == Z[lane, ev.PERIOD] and fraction > f:
+            W[lay.f_stop * lay.lanes + lane] = min(fraction, period_end)
             return True
         _pass_stop(W, Z, lay, lane, stop, sums)
         Z[lane, ev.NEXT_STOP] = stop + 1
-    W[lay.f_stop * lay.lanes + lane] = 1.0
+    W[lay.f_stop * lay.lanes + lane] = period_end
     return bool(Z[lane, ev.NEXT_STOP] < STOPS)
 
 
@@ -239,6 +251,8 @@ def settle(
     lay: Layout,
     lane: int,
     cases: Floats,
+    starts: Floats,
+    strobes: Floats,
     turns: Floats,
     sums: Floats,
     most_steps: int,
@@ -257,18 +271,63 @@ def settle(
         ending = _take_event(W, Z, lay, lane, h, most_events)
         Z[lane, ev.EVENT_PENDULUM] = ev.NO_EVENT
     if ending == _RUNNING and at_stop and h > 0.0:
+        case = Z[lane, ev.CASE]
+        strobe = starts[case, FRACTION]
+        at_strobe = W[lay.f * lanes + lane] == strobe
         if W[lay.f * lanes + lane] == 1.0:
             W[lay.f * lanes + lane] = 0.0
             Z[lane, ev.PERIOD] += 1
             Z[lane, ev.EVENTS_IN_PERIOD] = 0
             if Z[lane, ev.PERIOD] < turns.shape[1]:
                 turns[lane, Z[lane, ev.PERIOD]] = W[lay.turn * lanes + lane]
-        if not next_stop(W, Z, lay, lane, cases, sums[Z[lane, ev.CASE]]):
+        if at_strobe and 0 < Z[lane, ev.PERIOD] <= strobes.shape[1]:
+            note(W, Z, lay, lane, strobe, strobes[case, Z[lane, ev.PERIOD] - 1])
+        if not next_stop(W, Z, lay, lane, cases, strobe, sums[case]):
             ending = _OK
     if ending == _RUNNING:
         return True
     _finish(W, Z, lay, lane, ending, cases, turns, sums)
     return False
+
+
+@part
+def highest(mask: int) -> int:
+    """Number of the highest bit that is set; -1 where none is."""
+    bit = -1
+    while mask != 0:
+        mask >>= 1
+        bit += 1
+    return bit
+
+
+@part
+def pack(W: Floats, Z: Ints, lay: Layout, turns: Floats, busy: int, groups: int) -> int:
+    """Move the lanes that have a case together where fewer groups of lanes hold them; the mask of lanes then.
+
+    ``busy`` has bit k set where lane k has a case, all of them in the first ``groups`` groups.
+    """
+    left = busy
+    count = 0
+    while left != 0:
+        left &= left - 1
+        count += 1
+    most = (count + GROUP - 1) // GROUP * GROUP
+    if most == groups * GROUP:
+        return busy
+    free = 0
+    for lane in range(most, groups * GROUP):
+        if (busy >> lane) & 1 == 0:
+            continue
+        while (busy >> free) & 1 == 1:
+            free += 1
+        for row in range(lay.rows):
+            W[row * lay.lanes + free] = W[row * lay.lanes + lane]
+        for k in range(ev.LANE_INTEGERS):
+            Z[free, k] = Z[lane, k]
+        for k in range(min(turns.shape[1], Z[lane, ev.PERIOD] + 1)):
+            turns[free, k] = turns[lane, k]
+        busy ^= (1 << lane) | (1 << free)
+    return busy
 
 
 @part

@@ -11,20 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from engine.endings import ENDING_CODES, Ending
 from engine.run import Run
-from engine.taylor.batch import aligned_zeros, blocks_for
-from engine.taylor.roots import MAX_DEGREE, work_stack
 from engine.vibration_drive.automaton import Clutch, Shaft
 from engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count
-from engine.vibration_drive.characteristics import characteristics, sum_columns
+from engine.vibration_drive.characteristics import characteristics
+from engine.vibration_drive.integration import PENDULUM_SAMPLES, SHAFT_SAMPLES, integrate
 from engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
 from engine.vibration_drive.lanes import OUT_ENDING
 from engine.vibration_drive.parameters import PARAMETERS
-from engine.vibration_drive.states import LANE_INTEGERS
 
 Floats = NDArray[np.float64]
 
-#: Numbers sampled per pendulum and for the shaft by ``window.sample``.
-_SHAFT_SAMPLES, _PENDULUM_SAMPLES = 4, 6
 _CLUTCH_NAMES = {int(state): state.name.lower() for state in Clutch}
 _SHAFT_NAMES = {int(state): state.name.lower() for state in Shaft}
 
@@ -69,29 +65,8 @@ class Trajectory:
     ending: Ending
 
 
-def _integrate(
-    columns: Mapping[str, ArrayLike], run: Run, cases: int, times: Floats
-) -> tuple[Kernel, Floats, Floats, Floats, NDArray[np.int64], int]:
-    matrix = case_matrix(columns, run, cases)
-    n, count = pendulum_count(columns), coefficient_count(columns)
-    module = kernel(n, count, order_for(run.tolerance), lane_count())
-    lay = module.LAYOUT
-    sums = np.full((cases, sum_columns(lay)), np.nan)
-    frequency = np.broadcast_to(np.asarray(columns["excitation.frequency"], dtype=np.float64), (cases,))
-    periods = int(max((run.duration.in_periods(f) for f in frequency), default=0.0)) + 2
-    samples = np.empty((len(times), _SHAFT_SAMPLES + n * _PENDULUM_SAMPLES))
-    states = np.zeros((len(times), 1 + n), dtype=np.int64)
-    # Guards (7 a pendulum and shaft at most) and extrema (13) that all lanes together can list in a step.
-    listed = lay.lanes * (5 + 8 * n)
-    done = module.integrate(
-        module.RECORD, matrix, run.tolerance, math.log2(run.tolerance), int(run.reset == "literal"),
-        run.max_steps, run.max_events_per_period,
-        aligned_zeros(lay.rows * lay.lanes), np.zeros((lay.lanes, LANE_INTEGERS), dtype=np.int64),
-        np.zeros(MAX_DEGREE + 1), work_stack(),
-        blocks_for(listed, lay.order), np.zeros((listed, 3), dtype=np.int64),
-        np.zeros((lay.lanes, periods)), sums, times, samples, states,
-    )  # fmt: skip
-    return module, matrix, sums, samples, states, done
+def _kernel(columns: Mapping[str, ArrayLike], run: Run) -> Kernel:
+    return kernel(pendulum_count(columns), coefficient_count(columns), order_for(run.tolerance), lane_count())
 
 
 def simulate(columns: Mapping[str, ArrayLike], run: Run, *, cases: int) -> Batch:
@@ -121,7 +96,8 @@ def simulate(columns: Mapping[str, ArrayLike], run: Run, *, cases: int) -> Batch
     if cases == 0:
         count = len(characteristics_names(pendulum_count(columns)))
         return Batch(np.empty((0, count)), np.empty(0, dtype=np.int8))
-    module, matrix, sums, *_ = _integrate(columns, run, cases, np.empty(0))
+    module, matrix = _kernel(columns, run), case_matrix(columns, run, cases)
+    sums = integrate(module, matrix, run).sums
     return Batch(characteristics(module.LAYOUT, matrix, sums), sums[:, OUT_ENDING].astype(np.int8))
 
 
@@ -178,10 +154,10 @@ def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike) -> 
     if asked.size and (np.any(np.diff(asked) < 0) or asked[0] < 0 or asked[-1] > end * (1 + 1e-12)):
         raise ValueError(f"times must ascend within 0 .. {end:g} s")
     periods = np.minimum(asked * frequency, run.duration.in_periods(frequency))
-    _, _, sums, samples, states, done = _integrate(values, run, 1, periods)
-    n = pendulum_count(values)
+    found = integrate(_kernel(values, run), case_matrix(values, run, 1), run, times=periods)
+    n, done = pendulum_count(values), found.recorded
     names, units = _trajectory_columns(n)
-    times_done, samples, states = asked[:done], samples[:done], states[:done]
+    times_done, samples, states = asked[:done], found.samples[:done], found.states[:done]
     defaults = {parameter.path: parameter.default for parameter in PARAMETERS}
     value = {**{k: v for k, v in defaults.items() if v is not None}, **values}
     nu = 2.0 * math.pi * frequency
@@ -197,7 +173,7 @@ def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike) -> 
     out["power.useful"] = value["shaft.load"] * out["shaft.speed"]
     out["power.clutch"] = out["torque"] * out["shaft.speed"]
     for i in range(n):
-        block = samples[:, _SHAFT_SAMPLES + _PENDULUM_SAMPLES * i :]
+        block = samples[:, SHAFT_SAMPLES + PENDULUM_SAMPLES * i :]
         for column, name in enumerate(("angle", "speed", "acceleration", "torque")):
             out[f"pendulums.{i}.{name}"] = block[:, column]
         engaged = states[:, 1 + i] >= Clutch.ENGAGED
@@ -211,7 +187,7 @@ def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike) -> 
     named = {"shaft": [_SHAFT_NAMES[int(s)] for s in states[:, 0]]}
     for i in range(n):
         named[f"pendulums.{i}"] = [_CLUTCH_NAMES[int(s)] for s in states[:, 1 + i]]
-    ending = ENDING_CODES[int(sums[0, OUT_ENDING])]
+    ending = ENDING_CODES[int(found.sums[0, OUT_ENDING])]
     return Trajectory(times_done, names, units, np.column_stack([out[name] for name in names]), named, ending)
 
 

@@ -1,0 +1,80 @@
+"""One call of a kernel: the work arrays it needs, and what it leaves in them."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.run import Run
+from engine.taylor.batch import aligned_zeros, blocks_for
+from engine.taylor.roots import MAX_DEGREE, work_stack
+from engine.vibration_drive.cases import SHAFT_COLUMNS, STOPS
+from engine.vibration_drive.characteristics import sum_columns
+from engine.vibration_drive.kernel import Kernel
+from engine.vibration_drive.states import LANE_INTEGERS
+from engine.vibration_drive.strobes import from_rest, width
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Numbers sampled for the shaft and for each pendulum by ``window.sample``.
+SHAFT_SAMPLES, PENDULUM_SAMPLES = 4, 6
+
+
+@dataclass(frozen=True, slots=True)
+class Integration:
+    """What a kernel leaves behind.
+
+    Attributes
+    ----------
+    sums : array, shape (cases, sum_columns(layout))
+    strobes : array, shape (cases, strobes, strobes.width(n))
+        States at the strobes; the shaft's turn counts from the start of the call.
+    samples, states : arrays, shape (times, columns)
+        Instantaneous values of case 0, and states of its shaft and clutches.
+    recorded : int
+        Times that were reached.
+    """
+
+    sums: Floats
+    strobes: Floats
+    samples: Floats
+    states: Ints
+    recorded: int
+
+
+def integrate(
+    kernel: Kernel,
+    matrix: Floats,
+    run: Run,
+    *,
+    starts: Floats | None = None,
+    strobes: int = 0,
+    times: Floats | None = None,
+) -> Integration:
+    """Run the cases of ``matrix`` (from ``cases.case_matrix``) from rest or from ``starts``.
+
+    ``run`` gives tolerance, reset and budgets; the lengths of the runs stand in the matrix. ``strobes`` is the number
+    of strobes recorded of each case, ``times`` (in excitation periods) where case 0 is sampled.
+    """
+    lay = kernel.LAYOUT
+    cases, n = len(matrix), lay.n
+    asked = np.empty(0) if times is None else times
+    sums = np.full((cases, sum_columns(lay)), np.nan)
+    recorded = np.full((cases, strobes, width(n)), np.nan)
+    end = matrix[:, SHAFT_COLUMNS + 2 * (STOPS - 1)]
+    samples = np.empty((len(asked), SHAFT_SAMPLES + n * PENDULUM_SAMPLES))
+    states = np.zeros((len(asked), 1 + n), dtype=np.int64)
+    # Guards (7 a pendulum and shaft at most) and extrema (13) that all lanes together can list in a step.
+    listed = lay.lanes * (5 + 8 * n)
+    done = kernel.integrate(
+        kernel.RECORD, matrix, from_rest(cases, n) if starts is None else starts, recorded,
+        run.tolerance, math.log2(run.tolerance), int(run.reset == "literal"),
+        run.max_steps, run.max_events_per_period,
+        aligned_zeros(lay.rows * lay.lanes), np.zeros((lay.lanes, LANE_INTEGERS), dtype=np.int64),
+        np.zeros(MAX_DEGREE + 1), work_stack(),
+        blocks_for(listed, lay.order), np.zeros((listed, 3), dtype=np.int64),
+        np.zeros((lay.lanes, int(np.max(end, initial=0.0)) + 3)), sums, asked, samples, states,
+    )  # fmt: skip
+    return Integration(sums, recorded, samples, states, done)

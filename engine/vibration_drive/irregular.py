@@ -1,0 +1,126 @@
+"""Means of motions that never repeat themselves: batches of periods, their intervals, and the Lyapunov exponent."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.vibration_drive import orbits
+from engine.vibration_drive.cases import with_lengths
+from engine.vibration_drive.characteristics import characteristics, combined
+from engine.vibration_drive.integration import integrate
+from engine.vibration_drive.regimes import Regime, means
+from engine.vibration_drive.results import result_infos
+from engine.vibration_drive.search import ROUND, Search
+from engine.vibration_drive.strobes import BEGIN
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Batches of `ROUND` periods that an interval takes, and the 97.5 % point of Student's t for them.
+BATCHES = 20
+_STUDENT = 2.093024054408263
+#: Batches beside which a disturbed run goes; during the first of them it only turns into the growing direction.
+_BESIDE = 6
+#: Scaled distance at which the disturbed run begins, and beyond which it says nothing.
+_NEAR, _FAR = 1e-9, 1e-5
+#: With an exponent below this, or halves that differ by more than so many standard errors, the motion still changes.
+_SHRINKS = -0.02
+_DRIFT = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Means:
+    """What batches tell of cases: results, half widths of the means, exponents per period, regimes."""
+
+    values: Floats
+    half_widths: Floats
+    exponents: Floats
+    regimes: NDArray[np.int8]
+
+
+@dataclass(slots=True)
+class Batches:
+    """Sums of each of ``count`` batches of every case, and the disturbed runs beside the last ones."""
+
+    search: Search
+    count: int
+    sums: list[Floats] = field(default_factory=list)
+    grown: Floats = field(init=False)
+    over: Ints = field(init=False)
+    beside: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        cases = len(self.search.matrix)
+        self.grown, self.over = np.zeros(cases), np.zeros(cases, dtype=np.int64)
+        self.beside = self.search.starts.copy()
+
+    def advance(self, active: Ints) -> None:
+        """Run cases on by one batch."""
+        number, search = len(self.sums), self.search
+        starts = search.starts[active]
+        own = search.advance(active, ROUND, windowed=True)
+        sums = np.full((len(search.matrix), own.shape[1]), np.nan)
+        sums[active] = own
+        self.sums.append(sums)
+        if self.count < BATCHES or number < self.count - _BESIDE:
+            return
+        units = search.units(active)
+        if number == self.count - _BESIDE:
+            self.beside[active] = orbits.disturbed(starts, np.ones_like(starts), units, _NEAR)
+        matrix = with_lengths(
+            search.matrix[active], starts[:, BEGIN], np.full(len(active), float(ROUND)), windowed=False
+        )
+        other = integrate(search.kernel, matrix, search.run, starts=self.beside[active], strobes=ROUND).strobes
+        search.spent[active] += ROUND
+        base = np.ascontiguousarray(search.history[active, -ROUND:])
+        grown, over = np.zeros(len(active)), np.zeros(len(active), dtype=np.int64)
+        direction = np.zeros_like(starts)
+        orbits.growth(base, other, units, _NEAR, _FAR, grown, over, direction)
+        if number > self.count - _BESIDE:
+            self.grown[active] += grown
+            self.over[active] += over
+        self.beside[active] = orbits.disturbed(search.starts[active], direction, units, _NEAR)
+
+    def finish(self, active: Ints) -> Means:
+        """Results of cases that went through every batch."""
+        search, lay = self.search, self.search.kernel.LAYOUT
+        places = list(means(lay.n))
+        begin = search.starts[active, BEGIN]
+        parts = [sums[active] for sums in self.sums]
+        periods = np.full(len(active), float(ROUND))
+        total = with_lengths(search.matrix[active], begin, self.count * periods, windowed=True)
+        values = characteristics(lay, total, combined(lay, parts))
+        one = with_lengths(search.matrix[active], begin, periods, windowed=True)
+        batches = np.array([characteristics(lay, one, part)[:, places] for part in parts])
+        if self.count < BATCHES:
+            nothing = np.full((len(active), len(places)), np.nan)
+            regimes = np.full(len(active), Regime.UNSETTLED, dtype=np.int8)
+            return Means(values, nothing, nothing[:, 0], regimes)
+        half_widths = _STUDENT * _standard_error(batches)
+        exponents = np.where(self.over[active] > 0, self.grown[active] / np.maximum(self.over[active], 1), np.nan)
+        speed = places.index([info.name for info in result_infos(lay.n)].index("shaft.speed.mean"))
+        halves = batches[: self.count // 2, :, speed], batches[self.count // 2 :, :, speed]
+        drift = np.abs(_mean(halves[0]) - _mean(halves[1]))
+        spread = np.sqrt(_standard_error(halves[0]) ** 2 + _standard_error(halves[1]) ** 2)
+        changes = (exponents < _SHRINKS) | (drift > _DRIFT * spread)
+        regimes = np.where(changes, Regime.UNSETTLED, Regime.IRREGULAR).astype(np.int8)
+        return Means(values, half_widths, exponents, regimes)
+
+
+def _mean(batches: Floats) -> Floats:
+    """Mean over the first axis, added up in order."""
+    total: Floats = batches[0].copy()
+    for batch in batches[1:]:
+        total += batch
+    total /= len(batches)
+    return total
+
+
+def _standard_error(batches: Floats) -> Floats:
+    """Standard error of the mean over the first axis."""
+    mean = _mean(batches)
+    total = np.zeros_like(mean)
+    for batch in batches:
+        total += (batch - mean) ** 2
+    return np.sqrt(total / (len(batches) * (len(batches) - 1)))

@@ -1,0 +1,134 @@
+"""The no-load point: the limit of a vanishing load.
+
+Without a load every shaft speed above the pendulums' is steady, so the run-up alone would decide. In the limit it does
+not: under a vanishing load the shaft slows down until one of the clutches just takes up its whole backlash. On its
+contact-free orbit a pendulum with backlash delta then drives a shaft of the speed w at which
+
+    integral of (phi' - w) over one stretch with phi' > w  =  delta
+
+(its largest speed where delta = 0), and the fastest pendulum decides (docs/theory.md, "No load").
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS, with_lengths
+from engine.vibration_drive.integration import PENDULUM_SAMPLES, SHAFT_SAMPLES, integrate
+from engine.vibration_drive.layout import Layout
+from engine.vibration_drive.search import Search
+from engine.vibration_drive.strobes import BEGIN
+
+Floats = NDArray[np.float64]
+
+#: Samples of a period; cubics between them are good to 1e-11 of the speed.
+_SAMPLES = 4096
+#: Place of the backlash among a pendulum's columns of the case matrix.
+_BACKLASH = 5
+
+
+def limit_speed(times: Floats, angle: Floats, speed: Floats, acceleration: Floats, backlash: float) -> float:
+    """Speed of the shaft that a pendulum just reaches with its backlash taken up; NaN where none above 0 is.
+
+    Parameters
+    ----------
+    times : array, shape (m,)
+        In s, ascending, over whole turns of a periodic motion.
+    angle, speed, acceleration : array, shape (m,)
+        Of the pendulum, in rad, rad/s, rad/s^2.
+    backlash : float
+        In rad.
+    """
+    top = _largest(times, speed, acceleration)
+    if backlash == 0.0:
+        return top if top > 0.0 else math.nan
+
+    def short_of(w: float) -> float:
+        return _longest_stretch(times, angle, speed, acceleration, w) - backlash
+
+    if not (top > 0.0 and short_of(0.0) >= 0.0):
+        return math.nan
+    return float(brentq(short_of, 0.0, top, xtol=1e-14 * top, rtol=1e-14))
+
+
+def _hermite(times: Floats, speed: Floats, acceleration: Floats, k: int) -> tuple[float, float, float, float]:
+    """Coefficients of the cubic for the speed between samples k and k + 1, in fractions of the interval."""
+    h = times[k + 1] - times[k]
+    a, b = speed[k], speed[k + 1]
+    da, db = h * acceleration[k], h * acceleration[k + 1]
+    return a, da, 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db
+
+
+def _largest(times: Floats, speed: Floats, acceleration: Floats) -> float:
+    k = int(np.argmax(speed))
+    best = float(speed[k])
+    for left in (k - 1, k):
+        if 0 <= left < len(times) - 1:
+            a, b, c, d = _hermite(times, speed, acceleration, left)
+            for x in np.roots([3.0 * d, 2.0 * c, b]):
+                if abs(x.imag) < 1e-12 and 0.0 < x.real < 1.0:
+                    best = max(best, a + x.real * (b + x.real * (c + x.real * d)))
+    return best
+
+
+def _crossing(times: Floats, speed: Floats, acceleration: Floats, k: int, w: float) -> float:
+    a, b, c, d = _hermite(times, speed, acceleration, k)
+
+    def above(x: float) -> float:
+        return a + x * (b + x * (c + x * d)) - w
+
+    x = 0.0 if above(0.0) == 0.0 else (1.0 if above(1.0) == 0.0 else brentq(above, 0.0, 1.0, xtol=1e-15))
+    return float(times[k] + x * (times[k + 1] - times[k]))
+
+
+def _angle_at(times: Floats, angle: Floats, speed: Floats, acceleration: Floats, k: int, t: float) -> float:
+    h = times[k + 1] - times[k]
+    x = (t - times[k]) / h
+    a, b, c, d = _hermite(times, speed, acceleration, k)
+    return float(angle[k] + h * x * (a + x * (b / 2.0 + x * (c / 3.0 + x * d / 4.0))))
+
+
+def _longest_stretch(times: Floats, angle: Floats, speed: Floats, acceleration: Floats, w: float) -> float:
+    """Largest integral of speed - w over a stretch in which the speed is above w; the motion repeats itself."""
+    above = speed > w
+    if above.all():
+        return math.inf
+    if not above.any():
+        return 0.0
+    ups = np.flatnonzero(~above[:-1] & above[1:])
+    downs = np.flatnonzero(above[:-1] & ~above[1:])
+    length, turn = times[-1] - times[0], angle[-1] - angle[0]
+    best = 0.0
+    for up in ups.tolist():
+        down = next((int(k) for k in downs if k >= up), None)
+        later = 0.0 if down is not None else 1.0
+        down = int(downs[0]) if down is None else down
+        begin, end = (_crossing(times, speed, acceleration, k, w) for k in (up, down))
+        covered = _angle_at(times, angle, speed, acceleration, down, end) + later * turn
+        covered -= _angle_at(times, angle, speed, acceleration, up, begin)
+        best = max(best, covered - w * (end + later * length - begin))
+    return best
+
+
+def limit_of(search: Search, case: int, point: Floats, order: int) -> float:
+    """Speed in the limit of a vanishing load of a case whose contact-free orbit is known; NaN where it is held."""
+    begin = float(point[BEGIN])
+    matrix = with_lengths(search.matrix[case : case + 1], np.array([begin]), np.array([float(order)]), windowed=False)
+    places = begin + np.linspace(0.0, order, _SAMPLES * order + 1)
+    done = integrate(search.kernel, matrix, search.run, starts=point[None, :], times=places)
+    times = places[: done.recorded] * search.matrix[case, 1]
+    best = math.nan
+    for i in range(search.kernel.LAYOUT.n):
+        column = SHAFT_SAMPLES + PENDULUM_SAMPLES * i
+        angle, speed, acceleration = done.samples[: done.recorded, column : column + 3].T
+        speed_limit = limit_speed(times, angle, speed, acceleration, backlash(search.kernel.LAYOUT, matrix, i))
+        best = float(np.fmax(best, speed_limit))
+    return best
+
+
+def backlash(layout: Layout, matrix: Floats, pendulum: int) -> float:
+    """Backlash of the clutch of a pendulum of the only case of a matrix, in rad."""
+    first = SHAFT_COLUMNS + 2 * STOPS + pendulum * (PENDULUM_COLUMNS + layout.coefficients)
+    return float(matrix[0, first + _BACKLASH])

@@ -1,0 +1,82 @@
+"""What a settled motion can be, and the results that tell of it."""
+
+from enum import IntEnum
+
+from engine.vibration_drive.results import ResultInfo, result_infos
+
+
+class Regime(IntEnum):
+    """The motion a case comes to from its own start."""
+
+    #: There is none: the case did not end ok.
+    NONE = 0
+    #: A stable orbit of the strobe map, to which the run goes.
+    PERIODIC = 1
+    #: Periodic, and the shaft never turns.
+    HELD = 2
+    #: Without a load: no clutch transmits any more, the shaft turns steadily.
+    COASTING = 3
+    #: No orbit up to the largest order; means are stationary and have an interval.
+    IRREGULAR = 4
+    #: The search ended while the motion still changed.
+    UNSETTLED = 5
+
+    @property
+    def sentence(self) -> str:
+        """What the regime means, for people."""
+        return _SENTENCES[self]
+
+
+_SENTENCES = {
+    Regime.NONE: "The case did not end ok.",
+    Regime.PERIODIC: (
+        "The motion repeats itself after regime.order excitation periods, and disturbances of it die away."
+    ),
+    Regime.HELD: "The pendulums settle to a periodic motion and never turn the shaft.",
+    Regime.COASTING: "Without a load the shaft turns steadily at the limit of a vanishing load.",
+    Regime.IRREGULAR: (
+        "The motion never repeats itself but its means are steady: means stand with the half width of their 95 % "
+        "interval, extremes are the largest seen."
+    ),
+    Regime.UNSETTLED: "The motion still changed when the search ended: the results are those of its last periods.",
+}
+
+#: Results that are means over the window, with or without a pendulum's prefix; irregular motion gives them half widths.
+_MEANS = frozenset(
+    {
+        "shaft.speed.mean", "torque.mean", "power.useful.mean", "power.clutch.mean", "power.input.mean",
+        "power.loss.mean", "power.stored.mean", "efficiency", "fraction.rotating", "fraction.held", "fraction.driven",
+        "clutches.engagements_per_period", "angle.mean", "fraction.engaged", "fraction.beyond_data", "power.input",
+        "power.loss",
+    }
+)  # fmt: skip
+
+_OWN = (
+    ResultInfo("regime.order", "1", "excitation periods after which the motion repeats itself", "count"),
+    ResultInfo("regime.multiplier", "1", "factor by which disturbances of the orbit shrink in one turn of it"),
+    ResultInfo("regime.settled_after", "1", "excitation periods from the start until the motion is settled"),
+    ResultInfo("regime.residual", "1", "scaled distance by which the orbit misses itself"),
+    ResultInfo("regime.exponent", "1", "growth of disturbances of an irregular motion per period (Lyapunov exponent)"),
+    ResultInfo("shaft.speed.from_rest", "rad/s", "without a load: speed that the shaft reaches from its own start"),
+)
+
+
+def means(pendulums: int) -> tuple[int, ...]:
+    """Places, among ``result_infos``, of the results that are means."""
+    names = [info.name for info in result_infos(pendulums)]
+    own = [name.split(".", 2)[2] if name.startswith("pendulums.") else name for name in names]
+    return tuple(place for place, name in enumerate(own) if name in _MEANS)
+
+
+def settled_infos(pendulums: int) -> tuple[ResultInfo, ...]:
+    """Every result of a settled case, in the order of the columns of ``settle``."""
+    infos = result_infos(pendulums)
+    widths = [
+        ResultInfo(
+            f"{infos[place].name}.half_width",
+            infos[place].unit,
+            f"half width of the 95 % interval of {infos[place].name}",
+        )
+        for place in means(pendulums)
+    ]
+    return (*infos, *_OWN, *widths)

@@ -1,0 +1,252 @@
+"""The search for settled motions of a batch: run on, look for an orbit, certify it by Newton's method.
+
+Every decision about a case follows from that case alone, so its numbers do not depend on the batch.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.endings import ENDING_CODES, Ending
+from engine.run import Run, SettledRun
+from engine.vibration_drive import orbits
+from engine.vibration_drive.cases import with_lengths
+from engine.vibration_drive.integration import Integration, integrate
+from engine.vibration_drive.kernel import Kernel
+from engine.vibration_drive.lanes import OUT_ENDING, OUT_EVENTS, OUT_STEPS
+from engine.vibration_drive.strobes import BEGIN, FRACTION, NOT_GIVEN, SHAFT, TURN, from_rest, width
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+#: Periods run before each look for an orbit, then as many as `ROUND` each time.
+FIRST_ROUNDS = (12, 8, 10, 10, 15, 15, 20, 20, 30, 30, 30)
+ROUND = 40
+#: Strobes that near to those one orbit earlier, and coming nearer, make an orbit worth Newton's method.
+NEAR = 0.01
+#: Strobes over which a run must have come nearer.
+WINDOW = 6
+#: Distance of an orbit from the run beyond which nothing says that the run goes to it.
+AWAY = 0.005
+#: Scaled disturbance of the differences that make the derivative, and the residual of an orbit.
+DISTURBANCE = 1e-7
+RESIDUAL = 1e-10
+#: A multiplier up to this is stable; with a residual below the second number an unstable one ends the search at once.
+STABLE = 1.0 - 1e-4
+_TELLING = 1e-2
+_STEPS = 8
+#: Steps after which an orbit whose residual is small counts although rounding keeps its steps from shrinking.
+_ENOUGH_STEPS = 5
+#: After a search that came to nothing a case runs on for this factor before the next.
+_BACK = 1.25
+#: Halves of an orbit nearer than this are the same: its order is less.
+_SAME = 1e-7
+#: Where in the period strobes are moved to when no orbit was found with those at its end; exact in binary, so that
+#: whole periods later are too.
+MOVED = 0.375
+
+_OK = ENDING_CODES.index(Ending.OK)
+
+
+@dataclass(slots=True)
+class Orbits:
+    """Orbits that were certified, one a row: case numbers, points at the strobe, orders, and what Newton tells."""
+
+    cases: Ints
+    points: Floats
+    orders: Ints
+    multipliers: Floats
+    residuals: Floats
+    sums: Floats
+    #: The least period in the orbit's own strobes.
+    least: Ints
+
+    def take(self, rows: Ints | Flags) -> "Orbits":
+        """Some of them."""
+        return Orbits(
+            self.cases[rows], self.points[rows], self.orders[rows], self.multipliers[rows], self.residuals[rows],
+            self.sums[rows], self.least[rows],
+        )  # fmt: skip
+
+
+@dataclass(slots=True)
+class Search:
+    """Where the cases of a batch have come to.
+
+    ``steady_shaft`` leaves the shaft's speed out of the orbits: nothing changes it where no clutch transmits.
+    """
+
+    kernel: Kernel
+    matrix: Floats
+    settings: SettledRun
+    steady_shaft: bool = False
+    starts: Floats = field(init=False)
+    #: The last strobes of each case, the newest last, and how many of them are filled for those that still go on.
+    history: Floats = field(init=False)
+    count: int = 0
+    periods: Ints = field(init=False)
+    #: Turn of the shaft in each period, from the start.
+    turns: Floats = field(init=False)
+    steps: Floats = field(init=False)
+    events: Floats = field(init=False)
+    endings: NDArray[np.int8] = field(init=False)
+    #: Periods before which no orbit is looked for again.
+    wait: Floats = field(init=False)
+    #: Periods computed for each case in all, those of disturbed runs included.
+    spent: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        cases, n = len(self.matrix), self.kernel.LAYOUT.n
+        self.starts = from_rest(cases, n)
+        self.history = np.zeros((cases, 3 * max(self.settings.max_period, WINDOW) + 1, width(n)))
+        self.periods = np.zeros(cases, dtype=np.int64)
+        self.turns = np.zeros((cases, self.settings.at_most))
+        self.steps, self.events, self.wait, self.spent = (np.zeros(cases) for _ in range(4))
+        self.endings = np.full(cases, _OK, dtype=np.int8)
+
+    @property
+    def run(self) -> Run:
+        """Accuracy and budgets."""
+        own = self.settings
+        return Run(tolerance=own.tolerance, reset=own.reset, max_events_per_period=own.max_events_per_period)
+
+    def units(self, active: Ints) -> Floats:
+        """Scales of the strobes' columns."""
+        units = np.empty((len(active), self.history.shape[2]))
+        orbits.find_units(
+            self._newest(active), self.settings.max_period, self.matrix[active, 0], self.steady_shaft, units,
+        )  # fmt: skip
+        return units
+
+    def _newest(self, active: Ints) -> Floats:
+        """Strobes of cases, oldest first."""
+        return self.history[active, self.history.shape[1] - self.count :]
+
+    def advance(self, active: Ints, periods: int, *, windowed: bool) -> Floats:
+        """Run cases on by the same number of periods; the kernel's sums of each.
+
+        The cases are those of the calls before or some of them. Cases that end otherwise than ok are noted with their
+        ending.
+        """
+        starts = self.starts[active]
+        # A case whose strobes have just been moved begins before its first strobe and ends at one.
+        begin = np.where(starts[:, SHAFT] == NOT_GIVEN, 0.0, starts[:, BEGIN])
+        extra = np.where(starts[:, FRACTION] < 1.0, starts[:, FRACTION], 0.0) - begin
+        matrix = with_lengths(self.matrix[active], begin, periods + extra, windowed=windowed)
+        done = integrate(self.kernel, matrix, self.run, starts=starts, strobes=periods)
+        self.endings[active] = done.sums[:, OUT_ENDING].astype(np.int8)
+        first = self.periods[active[0]]
+        self.turns[active, first : first + periods] = np.diff(done.strobes[:, :, TURN], axis=1, prepend=0.0)
+        self.periods[active] += periods
+        self.spent[active] += periods
+        self.steps[active] += done.sums[:, OUT_STEPS]
+        self.events[active] += done.sums[:, OUT_EVENTS]
+        kept = min(periods, self.history.shape[1])
+        older = self.history[active, kept:]
+        self.history[active] = np.concatenate([older, done.strobes[:, periods - kept :]], axis=1)
+        self.count = min(self.count + kept, self.history.shape[1])
+        self.starts[active] = done.strobes[:, -1]
+        self.starts[active, TURN] = 0.0
+        return done.sums
+
+    def look(self, active: Ints) -> Orbits:
+        """Orbits to which cases go, of those that seem to approach one."""
+        units = self.units(active)
+        found = np.zeros(len(active), dtype=np.int64)
+        orbits.find_candidates(self._newest(active), units, NEAR, WINDOW, self.settings.max_period, found)
+        found[self.periods[active] < self.wait[active]] = 0
+        rows = np.flatnonzero(found)
+        certified = self.certify(active[rows], self.starts[active[rows]], found[rows], units[rows])
+        return self._of_least_order(certified)
+
+    def certify(self, cases: Ints, points: Floats, orders: Ints, units: Floats) -> Orbits:
+        """Newton's method from points near orbits of those orders; the stable ones that are near the points."""
+        begun, all_points = points, points.copy()
+        where = np.arange(len(cases))
+        certified: list[Orbits] = []
+        for step in range(_STEPS):
+            if not len(where):
+                break
+            own = all_points[where]
+            disturbed, first, done = self._disturbed_runs(cases[where], own, orders[where], units[where])
+            last = orders[where][disturbed] - 1
+            moved, told = np.empty_like(own), np.empty((len(where), 4))
+            ends = np.ascontiguousarray(done.strobes[np.arange(len(last)), last])
+            orbits.newton(own, ends, first, units[where], DISTURBANCE, self.steady_shaft, moved, told)
+            away = np.empty(len(where))
+            orbits.distances(moved, begun[where], units[where], away)
+            residual, size, multiplier = told[:, orbits.RESIDUAL], told[:, orbits.STEP], told[:, orbits.MULTIPLIER]
+            converged = (residual < RESIDUAL) & ((size < RESIDUAL) | (step >= _ENOUGH_STEPS))
+            accepted = converged & (multiplier < STABLE) & (away < AWAY)
+            least = np.empty(len(where), dtype=np.int64)
+            orbits.find_least(own, done.strobes[first[:-1]], orders[where], units[where], _SAME, least)
+            certified.append(
+                Orbits(
+                    cases[where], own, orders[where], multiplier.copy(), residual.copy(), done.sums[first[:-1]], least
+                ).take(accepted)
+            )
+            fails = converged | (told[:, orbits.AGREES] == 0.0) | ~(size < 1.0) | ~(away < AWAY)
+            fails |= (residual < _TELLING) & (multiplier > 1.0)
+            self._failed(cases[where[fails & ~accepted]])
+            go_on = ~(fails | accepted)
+            all_points[where[go_on]] = moved[go_on]
+            where = where[go_on]
+        self._failed(cases[where])
+        return _joined(certified, self)
+
+    def _disturbed_runs(
+        self, cases: Ints, points: Floats, orders: Ints, units: Floats
+    ) -> tuple[Ints, Ints, Integration]:
+        """Run the points, and those disturbed in each free column, once around: whose run, first runs, the runs."""
+        rows = np.empty((len(cases) * (2 + 3 * self.kernel.LAYOUT.n), points.shape[1]))
+        first = np.zeros(len(cases) + 1, dtype=np.int64)
+        count = orbits.disturb(points, units, DISTURBANCE, self.steady_shaft, rows, first)
+        of_row = np.repeat(np.arange(len(cases)), np.diff(first))
+        self.spent[cases] += orders * np.diff(first)
+        # Characteristics are wanted of the points' own runs only.
+        own = np.zeros(count, dtype=bool)
+        own[first[:-1]] = True
+        matrix = with_lengths(
+            self.matrix[cases[of_row]], points[of_row, BEGIN], orders[of_row].astype(float), windowed=own
+        )
+        done = integrate(self.kernel, matrix, self.run, starts=rows[:count], strobes=int(orders.max()))
+        return of_row, first, done
+
+    def _failed(self, cases: Ints) -> None:
+        """Let cases run on before the next search."""
+        self.wait[cases] = _BACK * self.periods[cases]
+
+    def move_strobes(self, active: Ints) -> None:
+        """Take the strobes elsewhere in the period, in case an event falls on them."""
+        self.starts[active, FRACTION] = MOVED
+        self.count = 0
+
+    def _of_least_order(self, found: Orbits) -> Orbits:
+        """The same orbits with an order that no divisor of it undercuts."""
+        again = np.flatnonzero(found.least < found.orders)
+        if not len(again):
+            return found
+        cases = found.cases[again]
+        better = self.certify(cases, found.points[again], found.least[again], self.units(cases))
+        kept = ~np.isin(found.cases, better.cases)
+        return _joined([found.take(kept), better], self)
+
+
+def _joined(parts: list[Orbits], search: Search) -> Orbits:
+    if not parts:
+        none, numbers = np.empty(0), np.empty(0, dtype=np.int64)
+        return Orbits(numbers, np.empty((0, search.history.shape[2])), numbers, none, none, np.empty((0, 0)), numbers)
+    return Orbits(*(np.concatenate([getattr(part, name) for part in parts]) for name in Orbits.__slots__))
+
+
+def transient_rounds(periods: int) -> list[int]:
+    """Periods of each round of a search that is to run that many in all before it takes means."""
+    plan: list[int] = []
+    for length in (*FIRST_ROUNDS, *[ROUND] * math.ceil(periods / ROUND)):
+        if periods <= sum(plan):
+            break
+        plan.append(min(length, periods - sum(plan)))
+    return plan

@@ -1,0 +1,274 @@
+"""Settled motions of a batch of cases: which regime each comes to from its own start, and its characteristics there."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from engine.endings import ENDING_CODES, Ending
+from engine.run import Run, SettledRun
+from engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count, with_lengths
+from engine.vibration_drive.characteristics import characteristics
+from engine.vibration_drive.irregular import BATCHES, Batches
+from engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
+from engine.vibration_drive.lanes import OUT_EVENTS, OUT_STEPS, RUNUP_SHARE
+from engine.vibration_drive.no_load import limit_of
+from engine.vibration_drive.orbits import distances
+from engine.vibration_drive.regimes import Regime, means, settled_infos
+from engine.vibration_drive.results import result_infos
+from engine.vibration_drive.search import ROUND, Orbits, Search, transient_rounds
+from engine.vibration_drive.strobes import BEGIN, SHAFT_SPEED
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_LOAD, _SPEED = 6, 9
+#: Periods before the strobes of a case without an orbit are moved.
+_MOVE_AFTER = 140
+#: Speed in rad/s of a shaft that no pendulum reaches.
+_OUT_OF_REACH = 1e6
+#: Periods in which the speed of an unloaded shaft must not change.
+_UNCHANGED = 40
+_OK = ENDING_CODES.index(Ending.OK)
+
+
+@dataclass(frozen=True, slots=True)
+class SettledBatch:
+    """Settled motions of a batch.
+
+    Attributes
+    ----------
+    values : array, shape (cases, results)
+        Results in the order of ``settled_infos(pendulums)``; NaN where a value could not be computed.
+    endings : int8 array, shape (cases,)
+        Index into ``engine.endings.ENDING_CODES``.
+    regimes : int8 array, shape (cases,)
+        Members of ``Regime``.
+    points : array, shape (cases, strobes.width(n))
+        State at a strobe on the orbit, or where the search ended; it can be gone on from.
+    spent : array, shape (cases,)
+        Excitation periods computed for each case in all, those of disturbed runs included.
+    """
+
+    values: Floats
+    endings: NDArray[np.int8]
+    regimes: NDArray[np.int8]
+    points: Floats
+    spent: Floats
+
+
+class _Results:
+    """The columns of a batch's results by name, filled as cases are settled."""
+
+    def __init__(self, cases: int, pendulums: int, width: int) -> None:
+        self.names = [info.name for info in settled_infos(pendulums)]
+        self.plain = len(result_infos(pendulums))
+        self.means = list(means(pendulums))
+        self.values = np.full((cases, len(self.names)), np.nan)
+        self.regimes = np.zeros(cases, dtype=np.int8)
+        self.endings = np.full(cases, _OK, dtype=np.int8)
+        self.points = np.full((cases, width), np.nan)
+
+    def column(self, name: str) -> int:
+        return self.names.index(name)
+
+    def put(self, cases: Ints, name: str, values: ArrayLike) -> None:
+        self.values[cases, self.column(name)] = values
+
+
+def settle(columns: Mapping[str, ArrayLike], settings: SettledRun, *, cases: int) -> SettledBatch:
+    """Find the settled motion of each case, from its own start.
+
+    A case is run on and its strobes are watched. Where they seem to approach an orbit, Newton's method finds it; the
+    orbit counts if it is stable by its multipliers and the run is near it (docs/theory.md, "Settled motion"). Results
+    are those of whole turns of the orbit, from the orbit. A case without an orbit up to ``settings.max_period`` has
+    means over the last 800 periods, with intervals.
+
+    Parameters
+    ----------
+    columns : mapping
+        As for ``simulate``.
+    settings : SettledRun
+    cases : int
+        Number of cases, at least 0.
+
+    Returns
+    -------
+    SettledBatch
+
+    Raises
+    ------
+    ValueError
+        If a required parameter is missing or the number of pendulums or coefficients is out of range.
+    """
+    n = pendulum_count(columns)
+    run = Run(tolerance=settings.tolerance, reset=settings.reset)
+    module = kernel(n, coefficient_count(columns), order_for(settings.tolerance), lane_count())
+    matrix = case_matrix(columns, run, cases)
+    search = Search(module, matrix, settings)
+    results = _Results(cases, n, search.starts.shape[1])
+    if cases:
+        loaded = matrix[:, _LOAD] > 0.0
+        _settle(search, np.flatnonzero(loaded), results)
+        _unloaded(module, search, np.flatnonzero(~loaded), results)
+        results.values[results.endings != _OK] = np.nan
+        results.regimes[results.endings != _OK] = Regime.NONE
+    return SettledBatch(results.values, results.endings, results.regimes, results.points, search.spent)
+
+
+def _settle(search: Search, active: Ints, results: _Results) -> None:
+    """Bring cases to their settled motion, and write their results."""
+    settings = search.settings
+    count = BATCHES
+    if settings.at_most < BATCHES * ROUND + sum(transient_rounds(_MOVE_AFTER)):
+        count = max(1, (2 * settings.at_most // 3) // ROUND)
+    plan = transient_rounds(settings.at_most - count * ROUND)
+    moved = False
+    for number, periods in enumerate(plan):
+        if not len(active):
+            return
+        search.advance(active, periods, windowed=False)
+        active = _take_settled(search, active, results)
+        # Not before the batches: their windows begin at a strobe.
+        if not moved and number + 1 < len(plan) and sum(plan[: number + 1]) >= _MOVE_AFTER:
+            search.move_strobes(active)
+            moved = True
+    batches = Batches(search, count)
+    for _ in range(count):
+        if not len(active):
+            return
+        batches.advance(active)
+        active = _take_settled(search, active, results)
+    if len(active):
+        found = batches.finish(active)
+        results.values[active, : results.plain] = found.values
+        results.values[active, -len(results.means) :] = found.half_widths
+        results.put(active, "regime.exponent", found.exponents)
+        results.regimes[active] = found.regimes
+        results.points[active] = search.starts[active]
+        _whole_run(search, active, results)
+
+
+def _take_settled(search: Search, active: Ints, results: _Results) -> Ints:
+    """Write the results of cases that have ended or whose orbit is found; the others."""
+    ended = search.endings[active] != _OK
+    results.endings[active[ended]] = search.endings[active[ended]]
+    active = active[~ended]
+    if not len(active):
+        return active
+    found = search.look(active)
+    if len(found.cases):
+        _write(search, found, results)
+    return active[~np.isin(active, found.cases)]
+
+
+def _write(search: Search, found: Orbits, results: _Results) -> None:
+    cases, lay = found.cases, search.kernel.LAYOUT
+    matrix = with_lengths(search.matrix[cases], found.points[:, BEGIN], found.orders.astype(float), windowed=True)
+    results.values[cases, : results.plain] = characteristics(lay, matrix, found.sums)
+    search.steps[cases] += found.sums[:, OUT_STEPS]
+    search.events[cases] += found.sums[:, OUT_EVENTS]
+    results.put(cases, "regime.order", found.orders)
+    results.put(cases, "regime.multiplier", found.multipliers)
+    results.put(cases, "regime.residual", found.residuals)
+    results.put(cases, "regime.settled_after", _settled_after(search, found))
+    held = results.values[cases, results.column("fraction.rotating")] == 0.0
+    results.regimes[cases] = np.where(held, Regime.HELD, Regime.PERIODIC)
+    results.points[cases] = found.points
+    _whole_run(search, cases, results)
+
+
+def _settled_after(search: Search, found: Orbits) -> Floats:
+    """Periods from the start until a run is within the settled distance of its orbit, by the orbit's multiplier."""
+    cases = found.cases
+    apart = np.empty(len(cases))
+    distances(search.starts[cases], found.points, search.units(cases), apart)
+    periods = search.periods[cases].astype(float)
+    for k, (distance, multiplier) in enumerate(zip(apart.tolist(), found.multipliers.tolist(), strict=True)):
+        if distance > search.settings.settled and 0.0 < multiplier < 1.0:
+            periods[k] += found.orders[k] * math.log(distance / search.settings.settled) / -math.log(multiplier)
+    return periods
+
+
+def _whole_run(search: Search, cases: Ints, results: _Results) -> None:
+    """Write what belongs to the whole run from its start: steps, events, run-up."""
+    results.put(cases, "run.steps", search.steps[cases])
+    results.put(cases, "run.events", search.events[cases])
+    speed = results.values[cases, results.column("shaft.speed.mean")]
+    for case, mean in zip(cases.tolist(), speed.tolist(), strict=True):
+        period = search.matrix[case, 1]
+        turns = search.turns[case, : search.periods[case]]
+        started = search.matrix[case, _SPEED] == 0.0
+        value = period * _runup(turns, RUNUP_SHARE * mean * period) if started else math.nan
+        results.put(np.array([case]), "runup.time", value)
+
+
+def _runup(turns: Floats, wanted: float) -> float:
+    """Periods until the turn in a period first reaches ``wanted``, linearly between whole periods."""
+    reached = np.flatnonzero(turns >= wanted)
+    if not wanted > 0.0 or not len(reached):
+        return math.nan
+    k = int(reached[0])
+    before = float(turns[k - 1]) if k else 0.0
+    return k + (wanted - before) / (float(turns[k]) - before)
+
+
+def _unloaded(module: Kernel, search: Search, cases: Ints, results: _Results) -> None:
+    """Write the results of cases without a load: the limit of a vanishing one, and the speed from rest."""
+    if not len(cases):
+        return
+    results.put(cases, "shaft.speed.from_rest", _speed_from_rest(search, cases))
+    free = search.matrix[cases].copy()
+    free[:, _SPEED] = _OUT_OF_REACH
+    apart = Search(module, free, search.settings, steady_shaft=True)
+    own = _Results(len(cases), module.LAYOUT.n, apart.starts.shape[1])
+    _settle(apart, np.arange(len(cases)), own)
+    search.spent[cases] += apart.spent
+    steps, events = (results.column(name) for name in ("run.steps", "run.events"))
+    for row, case in enumerate(cases.tolist()):
+        if search.endings[case] != _OK or own.endings[row] != _OK:
+            results.endings[case] = search.endings[case] if search.endings[case] != _OK else own.endings[row]
+            continue
+        results.values[case] = np.where(np.isnan(results.values[case]), own.values[row], results.values[case])
+        results.values[case, steps], results.values[case, events] = search.steps[case], search.events[case]
+        results.points[case], results.regimes[case] = own.points[row], own.regimes[row]
+        speed = math.nan
+        if own.regimes[row] == Regime.PERIODIC:
+            order = int(own.values[row, own.column("regime.order")])
+            speed = limit_of(apart, row, own.points[row], order)
+            results.regimes[case] = Regime.HELD if math.isnan(speed) else Regime.COASTING
+            speed = 0.0 if math.isnan(speed) else speed
+        _steady_shaft(search, case, speed, results)
+
+
+def _steady_shaft(search: Search, case: int, speed: float, results: _Results) -> None:
+    """Write what the shaft does at a steady speed that no clutch changes."""
+    at = np.array([case])
+    order = results.values[case, results.column("regime.order")]
+    for name in ("shaft.speed.mean", "shaft.speed.max", "shaft.speed.min"):
+        results.put(at, name, speed)
+    results.put(at, "shaft.irregularity", 0.0 if speed > 0.0 else math.nan)
+    results.put(at, "shaft.turn", speed * order * search.matrix[case, 1])
+    results.put(at, "fraction.rotating", 1.0 if speed > 0.0 else 0.0)
+    results.put(at, "fraction.held", 0.0 if speed > 0.0 else 1.0)
+    results.points[case, SHAFT_SPEED] = speed
+    turns = search.turns[case, : search.periods[case]]
+    period = search.matrix[case, 1]
+    rest = results.values[case, results.column("shaft.speed.from_rest")]
+    started = search.matrix[case, _SPEED] == 0.0
+    results.put(at, "runup.time", period * _runup(turns, RUNUP_SHARE * rest * period) if started else math.nan)
+
+
+def _speed_from_rest(search: Search, cases: Ints) -> Floats:
+    """Speed that the unloaded shaft comes to from the case's own start: it never falls, and ends where none drives."""
+    active = cases
+    while len(active):
+        before = search.starts[active, SHAFT_SPEED].copy()
+        search.advance(active, _UNCHANGED, windowed=False)
+        going = (search.starts[active, SHAFT_SPEED] != before) | (search.periods[active] == _UNCHANGED)
+        going &= (search.endings[active] == _OK) & (search.periods[active] + _UNCHANGED <= search.settings.at_most)
+        active = active[going]
+    speed: Floats = search.starts[cases, SHAFT_SPEED]
+    return speed
