@@ -166,13 +166,15 @@ class Dispatcher:
             self._priorities[study.number] = study.priority
             if self._only not in {None, study.number}:
                 continue
-            if study.state in {StudyState.PAUSED, StudyState.CANCELLING}:
+            over = study.finish_by is not None and study.finish_by <= self._clock.now()
+            paused = study.state is StudyState.PAUSED and not (over and study.goes_on)
+            if paused or study.state is StudyState.CANCELLING:
                 self._notes.pop(study.number, None)
                 if self._compiling.pop(study.number, None) is not None:
                     self._forget(study.number)
                 wish = dispatch.Paused if study.state is StudyState.PAUSED else dispatch.Cancelled
                 self._handle(wish(study.number))
-            elif study.finish_by is not None and study.finish_by <= self._clock.now():
+            elif over:
                 self._time_is_over(study.number)
             elif study.number in self._machine.studies:
                 self._tell_shortage(study.number)

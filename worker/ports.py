@@ -60,8 +60,8 @@ class Known:
 class ActiveStudy:
     """A study that has not come to its end, as the dispatcher's poll sees it.
 
-    Higher ``priority`` goes first. ``waits_for_room`` tells a paused study that goes on by itself. No chunk is to be
-    started after ``finish_by``.
+    Higher ``priority`` goes first. ``waits_for_room`` tells a paused study that goes on when there is room, ``goes_on``
+    one that goes on by itself for whatever it waits. No chunk is to be started after ``finish_by``.
     """
 
     number: int
@@ -70,6 +70,7 @@ class ActiveStudy:
     priority: int = 0
     waits_for_room: bool = False
     finish_by: datetime | None = None
+    goes_on: bool = False
 
 
 class StoreError(Exception):
@@ -152,7 +153,7 @@ class Store(Protocol):
         """Hold the study with a reason and return its claims to waiting."""
 
     def time_is_over(self, epoch: int, number: int) -> None:
-        """Hold a queued or running study, nothing of which is in flight: its deadline has come."""
+        """Hold a study that is queued, running or would go on by itself, at its deadline; nothing is in flight."""
 
     def begin_again(self, epoch: int, number: int) -> None:
         """Return every claim of this epoch to waiting, and take all blame from the study's chunks."""

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import logging
 import threading
+from datetime import timedelta
 from typing import TYPE_CHECKING
 
 from service.storage.errors import StoreError
 from worker.states import StudyState
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from service.storage.schedules import OpenRun, ScheduleRecord
     from service.storage.store import Store
 
@@ -21,6 +24,11 @@ _LOG = logging.getLogger("sprag.schedules")
 
 #: Seconds between two looks at what is due.
 LOOK_SECONDS = 1.0
+#: Seconds between two tries of a run that was refused for a reason that passes, and for how long it is tried.
+RETRY_SECONDS = 30.0
+GRACE = timedelta(hours=12)
+#: Problems that pass by themselves: the disk is short, the queue is full, a process is not to be had.
+_TRANSIENT = frozenset({"storage-full", "queue-full", "unavailable"})
 
 
 class Scheduler(threading.Thread):
@@ -30,6 +38,8 @@ class Scheduler(threading.Thread):
         super().__init__(name="sprag-scheduler", daemon=True)
         self._store = store
         self._ending = threading.Event()
+        #: By schedule and due time: before when (monotonic, s) what was refused for the time being is not tried again.
+        self._next_try: dict[tuple[int, int], float] = {}
 
     def run(self) -> None:
         """Look, and again. Trouble with the database is said once and waited out."""
@@ -58,7 +68,8 @@ class Scheduler(threading.Thread):
         for record in self._store.due_schedules(now):
             self._take(record)
         for run in self._store.open_runs():
-            self._submit(run)
+            if self._store.clock.monotonic() >= self._next_try.get((run.schedule, run.due), 0.0):
+                self._submit(run)
         for study in self._store.bound_studies():
             inside = study.window.open_at(now)
             if inside and study.held:
@@ -75,11 +86,17 @@ class Scheduler(threading.Thread):
         if self._store.take_due(record, due, missed, timing.next_after(now)) and missed:
             _LOG.warning("The schedule %s was missed %d times before %s.", record.id, missed, due.isoformat())
 
+    def _put_off(self, run: OpenRun, problem: str) -> None:
+        """Try a run again later that was refused for a reason that passes."""
+        self._next_try[run.schedule, run.due] = self._store.clock.monotonic() + RETRY_SECONDS
+        if run.problem is None:
+            _LOG.warning("The schedule %s was due, and no study came of it yet: %s", run.id, problem)
+        self._store.put_off_run(run, problem)
+
     def _submit(self, run: OpenRun) -> None:
         from dataclasses import replace
 
         from service.errors import ApiError
-        from service.finish import run_finish_at
         from service.intake import accept
         from service.spec import parse_spec
         from service.spec_messages import SpecError
@@ -90,12 +107,32 @@ class Scheduler(threading.Thread):
                 parsed = replace(parsed, study=replace(parsed.study, name=run.fields.name))
             # No client can send a key with a blank in it.
             key = f"schedule {run.id} {run.due}"
-            fields, now = run.fields, self._store.clock.now()
-            finish = None if fields.finish_by is None else run_finish_at(fields.finish_by, fields.timing.zone, now)
+            fields = run.fields
+            # Of the beginning that was meant: a run that is put off must not slip to the deadline of the next day.
+            finish = _finish_of(run)
             study = accept(self._store, parsed, key, fields.priority, fields.fresh, finish)
         except (SpecError, ApiError) as error:
+            now, end = self._store.clock.now(), _grace_end(run)
+            if isinstance(error, ApiError) and error.problem in _TRANSIENT and now < end:
+                self._put_off(run, f"{error} It is tried again until {end.isoformat(timespec='seconds')}.")
+                return
             _LOG.error("The schedule %s was due, and no study came of it: %s", run.id, error)
             self._store.close_run(run, problem=str(error))
             return
+        self._next_try.pop((run.schedule, run.due), None)
         self._store.close_run(run, study=study.number)
         _LOG.info("The schedule %s was due: study %s.", run.id, study.id)
+
+
+def _finish_of(run: OpenRun) -> datetime | None:
+    """The deadline of a run; None where it has none."""
+    from service.finish import run_finish_at
+
+    text = run.fields.finish_by
+    return None if text is None else run_finish_at(text, run.fields.timing.zone, run.begun_at)
+
+
+def _grace_end(run: OpenRun) -> datetime:
+    """Until when a run that is refused for a reason that passes is tried: its deadline, the next due time, `GRACE`."""
+    ends = (run.begun_at + GRACE, _finish_of(run), run.fields.timing.next_after(run.begun_at))
+    return min(end for end in ends if end is not None)

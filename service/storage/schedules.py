@@ -62,12 +62,14 @@ class ScheduleRecord:
 
 @dataclass(frozen=True, slots=True)
 class OpenRun:
-    """A due time that was taken up and of which nothing has become yet."""
+    """A due time that was taken up at ``begun_at`` and of which nothing has become yet; ``problem`` says why."""
 
     schedule: int
     id: str
     due: int
     fields: ScheduleFields
+    begun_at: datetime
+    problem: str | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,12 +166,20 @@ class Schedules(Part):
         """Due times that were taken up and have neither a study nor a problem yet."""
         with self.session.read() as connection:
             query = (
-                sa.select(_R.due, SCHEDULES)
+                sa.select(_R.due, _R.begun_at, _R.problem, SCHEDULES)
                 .join_from(SCHEDULE_RUNS, SCHEDULES)
                 .where(_R.state == RunState.TAKEN.value, _S.deleted_at.is_(None))
                 .order_by(_R.due)
             )
-            return [OpenRun(row.number, row.id, row.due, _fields(row)) for row in connection.execute(query).all()]
+            rows = connection.execute(query).all()
+        return [OpenRun(row.number, row.id, row.due, _fields(row), moment(row.begun_at), row.problem) for row in rows]
+
+    def put_off_run(self, run: OpenRun, problem: str) -> None:
+        """Note why no study came of a due time yet; it stays open."""
+        with self.session.write() as connection:
+            connection.execute(
+                sa.update(SCHEDULE_RUNS).where(_R.schedule == run.schedule, _R.due == run.due).values(problem=problem)
+            )
 
     def close_run(self, run: OpenRun, *, study: int | None = None, problem: str | None = None) -> None:
         """Note what became of a due time: a study by its number, or why there is none."""

@@ -66,6 +66,8 @@ STUDIES = sa.Table(
 WAITS_FOR_ROOM = "room"
 #: What a study waits for that is held outside its window.
 WAITS_FOR_WINDOW = "window"
+#: What a paused study waits for that goes on by itself.
+GO_ON = frozenset({WAITS_FOR_ROOM, WAITS_FOR_WINDOW})
 
 #: What holds a study whose deadline came; it does not go on by itself.
 HELD_AT_DEADLINE = "deadline"

@@ -17,6 +17,7 @@ from service.storage.tables import (
     CHUNKS,
     DISPATCHER,
     ENDINGS,
+    GO_ON,
     HELD_AT_DEADLINE,
     STUDIES,
     WAITS_FOR_ROOM,
@@ -111,6 +112,7 @@ class Work(Reuse):
                 row.priority,
                 row.waits_for == WAITS_FOR_ROOM,
                 optional_moment(row.finish_by),
+                row.waits_for in GO_ON,
             )
             for row in rows
         ]
@@ -299,29 +301,33 @@ class Work(Reuse):
                 self._move(connection, number, StudyEvent.FAULT, reason)
 
     def time_is_over(self, epoch: int, number: int) -> None:
-        """Hold a queued or running study, nothing of which is in flight: its deadline has come.
+        """Hold a study that is queued, running or would go on by itself, at its deadline; nothing is in flight.
 
         A study without open chunks comes to its end instead.
         """
         c = STUDIES.c
         with self.session.write() as connection:
             self._own(connection, epoch)
-            state, cases, done, finish_by = connection.execute(
-                sa.select(c.state, c.cases, c.done, c.finish_by).where(c.number == number)
+            state, waits_for, cases, done, finish_by = connection.execute(
+                sa.select(c.state, c.waits_for, c.cases, c.done, c.finish_by).where(c.number == number)
             ).one()
-            if StudyState(state) not in {StudyState.QUEUED, StudyState.RUNNING}:
+            paused = StudyState(state) is StudyState.PAUSED and waits_for in GO_ON
+            if not paused and StudyState(state) not in {StudyState.QUEUED, StudyState.RUNNING}:
                 return
             if done < cases:
                 covered = self._coverage(connection, number, cases)
                 complete = f"; {covered}" if covered else ""
-                self._move(
-                    connection,
-                    number,
-                    StudyEvent.FAULT,
+                reason = (
                     f"its time was over at {moment(finish_by).isoformat(timespec='seconds')}: {done:,} of {cases:,} "
-                    f"cases are done{complete}. Resume it to have the others run, too.",
+                    f"cases are done{complete}. Resume it to have the others run, too."
                 )
-                connection.execute(sa.update(STUDIES).where(c.number == number).values(waits_for=HELD_AT_DEADLINE))
+                if not paused:
+                    self._move(connection, number, StudyEvent.FAULT)
+                connection.execute(
+                    sa.update(STUDIES)
+                    .where(c.number == number)
+                    .values(waits_for=HELD_AT_DEADLINE, reason=reason, revision=c.revision + 1)
+                )
                 return
         self.settle(epoch, number)
 
