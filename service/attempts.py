@@ -1,7 +1,7 @@
 """Attempts to come in with a token that is not valid: told in the log, answered ever more slowly, limited in number.
 
-Delays hold up refusals only: a valid token is let in at once, so that nobody who shares an address with a guesser is
-shut out. As few refusals of one address wait at a time, guessing does not get faster with more connections.
+Delays hold up refusals only: a valid token is let in at once, unless several refusals of its address wait; so guessing
+does not get faster with more connections. Guessers at many addresses shut nobody else out.
 """
 
 from __future__ import annotations
@@ -28,8 +28,9 @@ FIRST_SECONDS: Final = 0.25
 LONGEST_SECONDS: Final = 4.0
 #: Seconds without a failed attempt after which an address begins anew.
 FORGET_SECONDS: Final = 900.0
-#: Refusals that wait, of one address and of all; further attempts are refused at once, whatever their token.
+#: Refusals of one address that wait; further attempts from there are refused at once, whatever their token.
 MOST_WAITING: Final = 4
+#: Refusals that wait in all, as each keeps a connection; further ones do not wait.
 MOST_WAITING_IN_ALL: Final = 64
 #: Addresses that are remembered: the latest ones.
 _MOST_ADDRESSES: Final = 10_000
@@ -86,23 +87,24 @@ class Attempts:
         return parsed is not None and any(parsed in network for network in self._trusted)
 
     def admit(self, scope: Scope) -> None:
-        """Raise ApiError when too many refusals wait already, of this address or of all."""
+        """Raise ApiError when too many refusals of the client's address wait already."""
         history = self._histories.get(_network(self.address_of(scope)))
-        if (history is not None and history.waiting >= MOST_WAITING) or self._waiting >= MOST_WAITING_IN_ALL:
-            raise ApiError(
-                "too-many-attempts",
-                "Too many attempts with tokens that are not valid.",
-                headers={"Retry-After": str(int(LONGEST_SECONDS))},
-            )
+        if history is not None and history.waiting >= MOST_WAITING:
+            raise _too_many()
 
     async def failed(self, scope: Scope, place: str) -> None:
-        """Note that a token was not valid at ``place``, and wait before it is told."""
+        """Note that a token was not valid at ``place``, and wait before it is told.
+
+        Raises ApiError at once where too many refusals wait already.
+        """
         address = self.address_of(scope)
         # The words and their order are those of the filter for fail2ban in the documentation.
         _LOG.warning("Failed login from %s: %s", address, place)
         history, now = self._history(_network(address)), self._clock()
         history.failures = 1 if now - history.latest > FORGET_SECONDS else history.failures + 1
         history.latest = now
+        if self._waiting >= MOST_WAITING_IN_ALL:
+            raise _too_many()
         with self._in_line(history):
             await self._sleep(min(FIRST_SECONDS * 2.0 ** min(history.failures - 1, 30), LONGEST_SECONDS))
 
@@ -122,6 +124,14 @@ class Attempts:
         finally:
             history.waiting -= 1
             self._waiting -= 1
+
+
+def _too_many() -> ApiError:
+    return ApiError(
+        "too-many-attempts",
+        "Too many attempts with tokens that are not valid.",
+        headers={"Retry-After": str(int(LONGEST_SECONDS))},
+    )
 
 
 def _parsed(address: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:

@@ -27,14 +27,14 @@ async def log_in(request: Request, values: Form) -> Response:
     access = access_of(request)
     try:
         access.attempts.admit(request.scope)
+        grant = access.of_token(values.get("token", "").strip().encode("utf-8", "replace"))
+        if grant is None:
+            await access.attempts.failed(request.scope, "page /login")
+            return login_page(request, access, wanted, fault="This is no valid token.", status=401, kept=kept)
     except ApiError as error:
         response = login_page(request, access, wanted, fault=error.detail, status=error.type.status, kept=kept)
         response.headers.update(error.headers)
         return response
-    grant = access.of_token(values.get("token", "").strip().encode("utf-8", "replace"))
-    if grant is None:
-        await access.attempts.failed(request.scope, "page /login")
-        return login_page(request, access, wanted, fault="This is no valid token.", status=401, kept=kept)
     if kept is not None and grant.scope is not TokenScope.WRITE:
         fault = f"Token {grant.name or grant.id} is read-only: it cannot send the form. Use another one."
         return login_page(request, access, wanted, fault=fault, status=403, kept=kept)
