@@ -8,7 +8,6 @@ from importlib.metadata import version
 from typing import Any
 
 from fastapi import APIRouter, FastAPI
-from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp
 
 from service import handlers
@@ -18,7 +17,6 @@ from service.api.context import Context
 from service.api.document import API_PREFIX, build_openapi
 from service.computer import Computes, ProcessComputer
 from service.guard import Guard
-from service.housekeeping import Housekeeping
 from service.logs import Noted, RequestLog
 from service.metrics import Metrics
 from service.settings import Settings, UnsafeSettingsError
@@ -99,10 +97,7 @@ def create_app(
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        housekeeping = Housekeeping(used_store)
-        housekeeping.start()
         yield
-        await run_in_threadpool(housekeeping.stop)
         if computer is None:
             used_computer.close()
         if own_store:
