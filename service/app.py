@@ -10,16 +10,18 @@ from typing import Any
 from fastapi import APIRouter, FastAPI
 from starlette.types import ASGIApp
 
-from service import handlers
+from service import checks, handlers
 from service.access import Access
 from service.api import cases, catalogues, clutch_fits, curves, events, health, schedules, sensitivity, studies
 from service.api.context import Context
 from service.api.document import API_PREFIX, build_openapi
-from service.computer import Computes, ProcessComputer
+from service.computer import Computes, Limits, ProcessComputer
+from service.drain import Drain
 from service.guard import Guard
 from service.logs import Noted, RequestLog
 from service.metrics import Metrics
 from service.settings import Settings, UnsafeSettingsError
+from service.shares import Shares
 from service.spec_design_schema import extension_schema
 from service.spec_schema import spec_schema
 from service.storage.readiness import Readiness
@@ -27,6 +29,7 @@ from service.storage.store import Store
 from service.web import case, compare, form, laboratory, login, pages, results, study, table
 from service.web import schedules as schedule_pages
 from worker.chunking import Chunking
+from worker.limits import COMPUTATION_BYTES, MAX_CHECKS, MAX_CHECKS_EACH, MAX_COMPUTATIONS
 
 DESCRIPTION = """\
 Design studies of vibration drives with freewheel clutches and of main shafts of machines:
@@ -55,11 +58,13 @@ class Application(FastAPI):
         self._settings = settings
         self._access = access
         self._metrics = metrics
+        self.drain: Drain | None = None
 
     def build_middleware_stack(self) -> ASGIApp:
         """The framework's layers inside the guard."""
         guarded = Guard(Noted(super().build_middleware_stack()), self._settings, self._access)
-        return RequestLog(guarded, self._metrics.answered)
+        self.drain = Drain(RequestLog(guarded, self._metrics.answered))
+        return self.drain
 
     def openapi(self) -> dict[str, Any]:
         """The OpenAPI document, made once."""
@@ -76,12 +81,16 @@ class Application(FastAPI):
 
 
 def create_app(
-    settings: Settings | None = None, *, store: Store | None = None, computer: Computes | None = None
+    settings: Settings | None = None,
+    *,
+    store: Store | None = None,
+    computer: Computes | None = None,
+    checker: Computes | None = None,
 ) -> FastAPI:
     """The application for ``settings`` (by default from the environment).
 
-    A store or a computer that is handed in stays open when the application ends. Raises UnsafeSettingsError for an
-    address that others can reach without a token, and DatabaseError when the database cannot be used.
+    A store, a computer or a checker that is handed in stays open when the application ends. Raises UnsafeSettingsError
+    for an address that others can reach without a token, and DatabaseError when the database cannot be used.
     """
     settings = settings or Settings()
     own_store = store is None
@@ -93,13 +102,19 @@ def create_app(
             used_store.close()
         raise
     access = Access(settings, used_store)
-    used_computer = computer or ProcessComputer(settings.trajectory_timeout)
+    used_computer, used_checker = computer or _computer(settings), checker or _checker(settings)
 
     @asynccontextmanager
-    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+    async def lifespan(running: FastAPI) -> AsyncIterator[None]:
+        if isinstance(used_checker, ProcessComputer) and checker is None:
+            used_checker.start()
         yield
+        if isinstance(running, Application) and running.drain is not None:
+            await running.drain.idle()
         if computer is None:
             used_computer.close()
+        if checker is None:
+            used_checker.close()
         if own_store:
             used_store.close()
 
@@ -123,7 +138,14 @@ def create_app(
     app.state.access = access
     app.state.metrics = metrics
     app.state.readiness = Readiness(used_store)
-    app.state.context = Context(settings, used_store, used_computer)
+    app.state.context = Context(
+        settings,
+        used_store,
+        used_computer,
+        used_checker,
+        checks.Library(used_store),
+        check_shares=Shares(max(settings.check_processes - 1, 1), MAX_CHECKS_EACH),
+    )
     api = APIRouter(prefix=API_PREFIX)
     for module in (studies, events, curves, sensitivity, cases, clutch_fits, schedules, catalogues):
         api.include_router(module.router)
@@ -133,6 +155,20 @@ def create_app(
         app.include_router(page.router)
     handlers.install(app)
     return app
+
+
+def _computer(settings: Settings) -> ProcessComputer:
+    limits = Limits(
+        settings.trajectory_timeout, COMPUTATION_BYTES, MAX_COMPUTATIONS, setting="SPRAG_TRAJECTORY_TIMEOUT"
+    )
+    return ProcessComputer(limits)
+
+
+def _checker(settings: Settings) -> ProcessComputer:
+    limits = Limits(
+        settings.check_timeout, settings.check_memory * 2**20, MAX_CHECKS, "too-costly", "SPRAG_CHECK_TIMEOUT"
+    )
+    return ProcessComputer(limits, settings.check_processes, checks.prepare)
 
 
 def _sound_store(settings: Settings) -> Store:

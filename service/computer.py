@@ -1,4 +1,4 @@
-"""Short computations for the service, in a process of its own: they neither hold up answers nor take them down."""
+"""Computations for the service, in processes of their own: they neither hold up answers nor take them down."""
 
 from __future__ import annotations
 
@@ -6,19 +6,24 @@ import asyncio
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
 from typing import Protocol, TypeVar, TypeVarTuple
 
 from service.errors import ApiError
 from worker import kernels
-from worker.child_pool import ChildPool, Job
+from worker.child_pool import ChildPool, Job, JobStoppedError
 from worker.child_process import ProcessDiedError, ProcessStartError
 from worker.limits import LOAD_SECONDS
+from worker.processes import limit_memory, single_threaded_children
 
 Args = TypeVarTuple("Args")
 R = TypeVar("R")
 
 #: Computations that may wait for the process; more are refused at once rather than late.
 MAX_WAITING = 8
+_LATER = {"Retry-After": "5"}
+_ENDING = "The service is ending: what was asked for was not done."
 
 
 class Computes(Protocol):
@@ -34,33 +39,77 @@ class Computes(Protocol):
         """Leave no process behind."""
 
 
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What each computation may take, and what is said of one that takes more.
+
+    Attributes
+    ----------
+    seconds : float
+        Time after which it is killed.
+    memory : int
+        Bytes that it may take beyond what its process has at the start.
+    waiting : int
+        Computations that may be there at once; more are refused at once rather than late.
+    problem : str
+        Key of the problem that its client is told of.
+    setting : str
+        Name of the setting of the time, where there is one.
+    """
+
+    seconds: float
+    memory: int
+    waiting: int = MAX_WAITING
+    problem: str = "timed-out"
+    setting: str = ""
+
+
 class ProcessComputer:
-    """One spawned process, started with the first computation.
+    """Spawned processes, started with the first computation or by `start`.
 
     Parameters
     ----------
-    timeout : float
-        Seconds after which a computation is killed.
-    load : function
-        Compiles a kernel into the cache on disk, or loads it; importable by name. Other than the engine's in tests.
+    limits : Limits
+        Of each computation.
+    processes : int
+        How many there are side by side.
+    prepare, load : functions
+        What a process does first, and what compiles a kernel into the cache on disk or loads it; importable by name.
     """
 
-    def __init__(self, timeout: float, load: Callable[[kernels.KernelShape], None] = kernels.load) -> None:
-        self._timeout = timeout
+    def __init__(
+        self,
+        limits: Limits,
+        processes: int = 1,
+        prepare: Callable[[], None] = kernels.prepare,
+        load: Callable[[kernels.KernelShape], None] = kernels.load,
+    ) -> None:
+        self._limits = limits
+        self._processes = processes
+        self._prepare = partial(_prepare, prepare, limits.memory)
         self._load = load
         self._loads: dict[kernels.KernelShape, Job[None]] = {}
         self._pool: ChildPool | None = None
         self._waiting = 0
+        self._closed = False
         self._lock = threading.Lock()
+
+    def start(self) -> None:
+        """Have the processes ready before they are needed. The calling thread has to outlive them."""
+        with self._lock:
+            self._started()
 
     async def run(self, function: Callable[[*Args], R], *args: *Args) -> R:
         """The function's value. Function, arguments and value must be picklable."""
-        with self._turn(self._timeout):
-            job = self._schedule(self._timeout, function, *args)
+        with self._turn(self._limits.seconds):
+            job = self._schedule(self._limits.seconds, function, *args)
             try:
                 return await asyncio.wrap_future(job.future)
-            except asyncio.CancelledError:  # nobody waits for it any more
-                job.stop()
+            except asyncio.CancelledError:
+                task = asyncio.current_task()
+                if task is not None and not task.cancelling():  # it was `close` that cancelled what waited
+                    raise JobStoppedError from None
+                job.stop()  # nobody waits for it any more
                 raise
 
     async def load(self, shape: kernels.KernelShape) -> None:
@@ -74,29 +123,48 @@ class ProcessComputer:
     @contextmanager
     def _turn(self, timeout: float) -> Iterator[None]:
         """One of the computations that may wait; what goes wrong with it becomes an ApiError."""
-        if self._waiting >= MAX_WAITING:
-            raise ApiError("unavailable", "Too many computations are waiting already.", headers={"Retry-After": "5"})
+        if self._waiting >= self._limits.waiting:
+            raise ApiError("unavailable", "Too many computations are waiting already.", headers=_LATER)
         self._waiting += 1
+        named = f", the limit of {self._limits.setting}" if self._limits.setting else ""
         try:
             yield
         except TimeoutError as error:
-            raise ApiError("timed-out", f"The computation did not end within {timeout:g} s.") from error
+            detail = f"The computation did not end within {timeout:g} s{named}."
+            raise ApiError(self._limits.problem, detail) from error
+        except MemoryError as error:
+            detail = f"The computation needs more memory than the {self._limits.memory // 2**20} MiB that it may take."
+            raise ApiError(self._limits.problem, detail) from error
         except ProcessDiedError as error:
             raise ApiError("not-computed", "The process that ran the computation died.") from error
         except ProcessStartError as error:
-            raise ApiError("unavailable", "The process for computations cannot be started.") from error
+            raise ApiError("unavailable", "The process for computations cannot be started.", headers=_LATER) from error
+        except JobStoppedError as error:
+            raise ApiError("unavailable", _ENDING, headers=_LATER) from error
         finally:
             self._waiting -= 1
 
     def _schedule(self, timeout: float, function: Callable[[*Args], R], *args: *Args) -> Job[R]:
         with self._lock:
-            if self._pool is None:
-                self._pool = ChildPool(1, kernels.prepare)
-            return self._pool.schedule(timeout, function, *args)
+            return self._started().schedule(timeout, function, *args)
+
+    def _started(self) -> ChildPool:
+        if self._closed:
+            raise JobStoppedError
+        if self._pool is None:
+            single_threaded_children()
+            self._pool = ChildPool(self._processes, self._prepare)
+        return self._pool
 
     def close(self) -> None:
-        """End the process, whatever it is doing."""
+        """End the processes, whatever they are doing; what waits is told that the service ends."""
         with self._lock:
-            if self._pool is not None:
-                self._pool.close()
-                self._pool = None
+            pool, self._pool, self._closed = self._pool, None, True
+        if pool is not None:
+            pool.close()
+
+
+def _prepare(prepare: Callable[[], None], memory: int) -> None:
+    """First thing that a process does."""
+    prepare()
+    limit_memory(memory)

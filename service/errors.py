@@ -69,6 +69,8 @@ PROBLEM_TYPES: dict[str, ProblemType] = _catalogue(
         "Too many attempts with invalid tokens",
         "Wait as long as the header Retry-After says.",
     ),
+    _P("too-costly", 422, "This takes too much time or memory", "Ask for a smaller study, formula or picture."),
+    _P("too-many-requests", 429, "Too many requests of one token at once", "Wait as long as Retry-After says."),
     _P("queue-full", 429, "Too many studies wait", "Wait until some have ended, or cancel some."),
     _P("internal", 500, "The service failed", "This is a fault of the program; the server's log has the details."),
     _P("unavailable", 503, "The service cannot do this now", "Try again later; `sprag doctor` looks for the cause."),
@@ -117,6 +119,9 @@ class ApiError(Exception):
         self.detail = detail
         self.errors = tuple(errors)
         self.headers = dict(headers or {})
+
+    def __reduce__(self) -> tuple[type["ApiError"], tuple[Any, ...]]:
+        return ApiError, (self.problem, self.detail, self.errors, self.headers)
 
     @property
     def type(self) -> ProblemType:

@@ -1,12 +1,20 @@
-"""The report of a clutch fit as JSON data, the same for the HTTP interface and the commands."""
+"""A clutch fit as asked for in JSON data, and its report, the same for the HTTP interface and the commands."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
+
+from service.spec_clutch import read_clutch
+from service.spec_fields import placed, read_number, read_object
+from service.spec_messages import Report
+from worker import kernels
 
 if TYPE_CHECKING:
     from worker.kernels import ClutchFit
+
+#: Fields of a request for a fit.
+REQUEST_FIELDS: Final = ("data", "accuracy", "max_degree", "through_origin", "angles_include_backlash", "backlash")
 
 
 def fit_json(fit: ClutchFit) -> dict[str, Any]:
@@ -47,3 +55,28 @@ def degrees_json(degrees: Any) -> list[dict[str, Any]]:
 
 def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
+
+
+def read_fit(data: object) -> ClutchFit:
+    """The fit that plain JSON data with rows, accuracy and choices ask for; raises SpecError."""
+    report = Report(data)
+    found = dict(read_object(report, "", data, REQUEST_FIELDS) or {})
+    backlash = read_number(report, "/backlash", found.pop("backlash", 0.0), _backlash())
+    if backlash and found.get("angles_include_backlash") is not True:
+        report.problem(
+            "/backlash", "is taken off the angles only where they include it", backlash,
+            allowed="with `angles_include_backlash` true; else 0 or left out", unit="rad",
+        )  # fmt: skip
+    clutch = None
+    if not report.problems:
+        # Without rows this would be taken for a law that lacks its coefficients.
+        clutch = read_clutch(report, "", {"data": None, **found}, "clutch.", [backlash or 0.0])
+    report.raise_if_any()
+    assert clutch is not None
+    assert clutch.fit is not None
+    return clutch.fit
+
+
+def _backlash() -> kernels.Parameter:
+    entry = next(e for e in kernels.parameter_catalogue(kernels.models()[0]) if e.path.endswith(".backlash"))
+    return placed(entry, "backlash")

@@ -22,6 +22,7 @@ from worker.states import TransitionError
 
 _log = logging.getLogger("sprag.service")
 
+_LATER = {"Retry-After": "5"}
 #: What the patterns of texts mean, for people.
 _PATTERNS = {r"^[!-~]+$": "printable ASCII characters without blanks"}
 
@@ -53,7 +54,7 @@ def as_api_error(error: Exception) -> ApiError | None:
         return parameter_error("page_token", str(error), allowed="`next_page_token` of a page")
     if isinstance(error, storage.StoreError):
         kind = next(problem for fault, problem in _STORE_PROBLEMS if isinstance(error, fault))
-        return ApiError(kind, _sentence(error))
+        return ApiError(kind, _sentence(error), headers=_LATER if kind == "unavailable" else None)
     return None
 
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from service.errors import ErrorItem
 from service.selection import SelectionError
-from service.turns import Turns
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,9 +60,6 @@ _METADATA: Final[dict[Picture, dict[str, str | None]]] = {
     "png": {"Software": "Sprag"},
     "pdf": {"CreationDate": None, "Creator": "Sprag", "Producer": "Sprag"},
 }
-#: matplotlib keeps its style and its fonts in globals, so that only one picture is drawn at a time. Each that waits
-#: holds one of the 40 threads that all requests share.
-_TURNS = Turns("pictures", 16)
 
 
 def draw_curves(curves: Curves, title: str, picture: Picture) -> bytes:
@@ -136,12 +132,20 @@ def check_size(what: str, count: int, most: int) -> None:
         raise SelectionError([ErrorItem(message, parameter="format", allowed=f"<= {most} {what}")])
 
 
+def prepare_painting() -> None:
+    """Load what the first picture would wait for: matplotlib, and its list of fonts, which it makes once."""
+    import matplotlib.backends.backend_agg
+    import matplotlib.backends.backend_svg
+    import matplotlib.figure
+    import matplotlib.font_manager  # noqa: F401
+
+
 @contextmanager
 def painting() -> Iterator[None]:
-    """The one turn in which matplotlib draws, with the style of every picture."""
+    """The style of every picture. matplotlib keeps it in globals, so that a process draws one picture at a time."""
     import matplotlib as mpl
 
-    with _TURNS.take(), mpl.rc_context(_STYLE):
+    with mpl.rc_context(_STYLE):
         yield
 
 

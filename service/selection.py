@@ -28,6 +28,9 @@ class SelectionError(Exception):
         self.errors = tuple(errors)
         super().__init__("; ".join(f"{item.parameter}: {item.message}" for item in self.errors))
 
+    def __reduce__(self) -> tuple[type[SelectionError], tuple[tuple[ErrorItem, ...]]]:
+        return SelectionError, (self.errors,)
+
 
 def listed(values: Iterable[object]) -> str:
     """Values for a message, the middle of a long list left out."""

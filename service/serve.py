@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
+import os
 import signal
 import socket
 import threading
@@ -12,6 +14,7 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Protocol
 
+import psutil
 import uvicorn
 
 from service import logs
@@ -23,9 +26,12 @@ from worker.limits import MAX_CONNECTIONS
 
 _LOG = logging.getLogger("sprag.service")
 
-#: Seconds that requests under way are given when the service ends, and then the dispatcher for its chunks.
-_GRACE_SECONDS = 5
+#: Seconds that requests under way are given when the service ends; then those that were cut off, to be answered; then
+#: the dispatcher for its chunks. After the last the process ends, whatever is left of it.
+_GRACE_SECONDS = 5.0
+_ANSWER_SECONDS = 3
 _STOP_SECONDS = 15.0
+_LAST_SECONDS = 30.0
 #: Seconds before a dead dispatcher is started again: doubled each time, back to the first after a long life.
 _FIRST_DELAY = 0.5
 _LONGEST_DELAY = 10.0
@@ -119,16 +125,56 @@ class Supervisor(threading.Thread):
 
 
 class Server(uvicorn.Server):
-    """A server that tells the application when it is about to end, so that open streams end too."""
+    """A server that tells the application when it is about to end, so that open streams end too.
 
-    def __init__(self, config: uvicorn.Config, ending: threading.Event) -> None:
+    Parameters
+    ----------
+    config : uvicorn.Config
+    ending : Event
+        Set by the first signal.
+    cut : function
+        Called when the grace of the requests is over, in a thread: has them come to an answer.
+    give_up : function
+        Called when the service has not ended long after the signal.
+    """
+
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        ending: threading.Event,
+        cut: Callable[[], None],
+        give_up: Callable[[], None],
+    ) -> None:
         super().__init__(config)
         self._told = ending
+        self._cut = cut
+        self._last = threading.Timer(_LAST_SECONDS, give_up)
+        self._last.daemon = True
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """A signal asks for the end."""
-        self._told.set()
+        if not self._told.is_set():
+            self._told.set()
+            self._last.start()
         super().handle_exit(sig, frame)
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Let requests end by themselves, then have them ended."""
+        loop = asyncio.get_running_loop()
+        cutting = loop.call_later(_GRACE_SECONDS, lambda: loop.run_in_executor(None, self._cut))
+        try:
+            await super().shutdown(sockets)
+        finally:
+            cutting.cancel()
+
+
+def _give_up() -> None:
+    """End this process and all that it started, now."""
+    _LOG.critical("The service has not ended %g s after it was asked to; it is ended now.", _LAST_SECONDS)
+    for child in psutil.Process().children(recursive=True):
+        with suppress(psutil.Error):
+            child.kill()
+    os._exit(1)
 
 
 def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) -> None:
@@ -151,7 +197,7 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
         limit_concurrency=MAX_CONNECTIONS,
         server_header=False,
         proxy_headers=False,
-        timeout_graceful_shutdown=_GRACE_SECONDS,
+        timeout_graceful_shutdown=int(_GRACE_SECONDS) + _ANSWER_SECONDS,
         lifespan="on",
     )
     supervisor = Supervisor(
@@ -162,7 +208,8 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
         try:
             (announce or _say)(address)
             with suppress(KeyboardInterrupt):
-                Server(config, app.state.context.ending).run(sockets=[listener])
+                context = app.state.context
+                Server(config, context.ending, context.cut, _give_up).run(sockets=[listener])
         finally:
             supervisor.stop()
 

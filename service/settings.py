@@ -93,6 +93,21 @@ class Settings(BaseSettings):
         le=3_600.0,
         description="seconds after which the instantaneous values of a case are given up",
     )
+    check_processes: int = Field(
+        default=2,
+        ge=1,
+        le=64,
+        description="processes that check specs, fit clutches and draw; one token has all but one of them at most",
+    )
+    check_timeout: float = Field(
+        default=10.0,
+        gt=0.0,
+        le=3_600.0,
+        description="seconds after which the check of a spec, a fit or a picture is given up",
+    )
+    check_memory: int = Field(
+        default=512, ge=64, le=1_048_576, description="MiB that the check of a spec, a fit or a picture may take"
+    )
 
     log_format: Literal["text", "json"] = Field(
         default="text", description="form of the log: `text` for people, `json` for machines"

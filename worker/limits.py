@@ -66,3 +66,12 @@ MAX_SCHEDULES: Final = 1_000
 
 #: Seconds in which a kernel must be compiled: many times what the largest takes on a slow, busy machine.
 LOAD_SECONDS = 3600.0
+
+#: Checks of specs, fits and pictures of one token, and of all together, that may be there at once.
+MAX_CHECKS_EACH: Final = 32
+MAX_CHECKS: Final = 64
+#: Computations of one token, and of all together, that may be there at once.
+MAX_COMPUTATIONS_EACH: Final = 6
+MAX_COMPUTATIONS: Final = 8
+#: Bytes that a computation of the engine, or the compilation of a kernel, may take.
+COMPUTATION_BYTES: Final = 2 * 1024**3

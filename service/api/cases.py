@@ -15,6 +15,7 @@ from service.api.document import files, format_query, one_of, problems
 from service.api.requests import strict_query
 from service.api.respond import choose_format, json_response
 from service.api.views import study_address
+from service.api.work import Attended
 from service.errors import ApiError, parameter_error, shown
 from service.exports import MEDIA_TYPES, Format, row_json, rows_json
 from service.storage.records import CaseRow
@@ -103,11 +104,12 @@ def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
     response_model=m.Trajectory | m.AngleTable,
     responses={
         **files("Instantaneous values, as JSON or CSV.", (MEDIA_TYPES["json"], MEDIA_TYPES["csv"])),
-        **problems(*_CASE_PROBLEMS, "not-acceptable", "not-computed", "timed-out", "unavailable"),
+        **problems(*_CASE_PROBLEMS, "not-acceptable", "not-computed", "timed-out", "too-many-requests", "unavailable"),
     },
 )
 async def get_trajectory(
     context: Ctx,
+    work: Attended,
     request: Request,
     study_id: StudyId,
     case: CaseNumber,
@@ -147,8 +149,8 @@ async def get_trajectory(
         return study, trajectories.span(study, case, start, end)
 
     study, (first, last) = await run_in_threadpool(find)
-    await context.computer.load(kernels.shape_of(study))
-    content = await context.computer.run(trajectories.trajectory_file, study, case, first, last, points, written)
+    await work.load(kernels.shape_of(study))
+    content = await work.compute(trajectories.trajectory_file, study, case, first, last, points, written)
     name = f'attachment; filename="{study_id}-case-{case}.csv"'
     headers = {"Content-Disposition": name} if written == "csv" else {}
     return Response(content, media_type=MEDIA_TYPES[written], headers=headers)

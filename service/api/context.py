@@ -9,11 +9,13 @@ from typing import Annotated, Final, cast
 from fastapi import Depends, Path, Request
 from starlette.convertors import Convertor, register_url_convertor
 
+from service.checks import Library
 from service.computer import Computes
 from service.settings import Settings
+from service.shares import Shares
 from service.storage.store import Store
 from service.unaffected import Unaffected
-from worker.limits import MAX_STREAMS
+from worker.limits import MAX_CHECKS_EACH, MAX_COMPUTATIONS_EACH, MAX_STREAMS
 
 
 class Places:
@@ -39,15 +41,27 @@ class Places:
 class Context:
     """Settings, store and computer of one service; ``ending`` is set when the service is about to end.
 
-    ``unaffected`` tells of parameters that change nothing; ``streams`` are the places for streams of events.
+    ``checker`` runs what reads, expands, fits or draws what users wrote, and ``library`` is the store for it; requests
+    use it and the computer through `service.api.work`, which keeps to the shares of each token. ``unaffected`` tells of
+    parameters that change nothing; ``streams`` are the places for streams of events.
     """
 
     settings: Settings
     store: Store
     computer: Computes
+    checker: Computes
+    library: Library
     ending: Event = field(default_factory=Event)
     streams: Places = field(default_factory=lambda: Places(MAX_STREAMS))
     unaffected: Unaffected = field(default_factory=Unaffected)
+    compute_shares: Shares = field(default_factory=lambda: Shares(1, MAX_COMPUTATIONS_EACH))
+    check_shares: Shares = field(default_factory=lambda: Shares(1, MAX_CHECKS_EACH))
+
+    def cut(self) -> None:
+        """End what is being computed and let no write begin: what waits is told so. Takes as long as killing does."""
+        self.store.session.refuse_writes()
+        for computer in (self.checker, self.computer):
+            computer.close()
 
 
 #: What an id can be; without a colon, which begins a verb.

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from service import exports, plots, report
 from service.api import models as m
-from service.api.context import Ctx, StudyId
+from service.api.context import Context, Ctx, StudyId
 from service.api.document import files, format_query, problems
 from service.api.document import not_modified as documented_304
 from service.api.requests import strict_query
 from service.api.respond import choose_format, entity_tag, json_response, not_modified, streamed, tagged
+from service.api.work import CHECK_PROBLEMS, Attended, Work
 from service.curves import CurveQuery, Curves, draw, draw_map, select
 from service.errors import parameter_error, shown
 from service.report.content import report_of
@@ -30,7 +33,7 @@ _PICTURES: dict[str, str] = {str(picture): media for picture, media in plots.MED
 _JSON = {"json": "application/json"}
 _CURVE_FORMATS = _JSON | {"csv": exports.MEDIA_TYPES["csv"]} | _PICTURES
 _MAP_FORMATS = _JSON | _PICTURES
-_PROBLEMS = ("invalid-parameter", "invalid-selection", "study-not-found", "not-acceptable")
+_PROBLEMS = ("invalid-parameter", "invalid-selection", "study-not-found", "not-acceptable", *CHECK_PROBLEMS)
 #: matplotlib puts its styles into the picture, which the pages' policy forbids; a picture can do nothing else.
 _PICTURE_POLICY = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
 
@@ -55,8 +58,9 @@ Fixed = Annotated[
         **documented_304(),
     },
 )
-def get_curves(
+async def get_curves(
     context: Ctx,
+    work: Attended,
     request: Request,
     study_id: StudyId,
     x: XPath,
@@ -77,7 +81,7 @@ def get_curves(
     chosen = choose_format(request, form, _CURVE_FORMATS)
     query = CurveQuery(x, tuple(y), tuple(by or ()), _pairs(at))
 
-    def make(record: StudyRecord) -> Response:
+    def make(record: StudyRecord) -> Response | Drawing:
         study = context.store.study(study_id)
         selection = select(study, kernels.study_results(study), query)
         curves = draw(selection, partial(context.store.rows_for_cases, study_id))
@@ -85,10 +89,9 @@ def get_curves(
             return json_response({"study": study_id, **curves.to_json()})
         if chosen == "csv":
             return attachment(_curves_csv(curves), _CURVE_FORMATS["csv"], f"{study_id}-curves.csv")
-        picture = picture_of(chosen)
-        return picture_response(plots.draw_curves(curves, record.name or record.model, picture), picture)
+        return picture(plots.draw_curves, picture_of(chosen), curves, record.name or record.model)
 
-    return conditional(context, request, study_id, chosen, make)
+    return await conditional(context, work, request, study_id, chosen, make)
 
 
 @router.get(
@@ -100,8 +103,9 @@ def get_curves(
         **documented_304(),
     },
 )
-def get_map(
+async def get_map(
     context: Ctx,
+    work: Attended,
     request: Request,
     study_id: StudyId,
     x: XPath,
@@ -113,16 +117,15 @@ def get_map(
     """One result over two axes."""
     chosen = choose_format(request, form, _MAP_FORMATS)
 
-    def make(record: StudyRecord) -> Response:
+    def make(record: StudyRecord) -> Response | Drawing:
         study = context.store.study(study_id)
         fetch = partial(context.store.rows_for_cases, study_id)
         drawn = draw_map(study, kernels.study_results(study), x, y, z, _pairs(at), fetch)
         if chosen == "json":
             return json_response({"study": study_id, **drawn.to_json()})
-        picture = picture_of(chosen)
-        return picture_response(plots.draw_map(drawn, record.name or record.model, picture), picture)
+        return picture(plots.draw_map, picture_of(chosen), drawn, record.name or record.model)
 
-    return conditional(context, request, study_id, chosen, make)
+    return await conditional(context, work, request, study_id, chosen, make)
 
 
 @router.get(
@@ -134,8 +137,9 @@ def get_map(
         **documented_304(),
     },
 )
-def get_results(
+async def get_results(
     context: Ctx,
+    work: Attended,
     request: Request,
     study_id: StudyId,
     form: Annotated[str | None, format_query(exports.FORMATS, "csv")] = None,
@@ -153,7 +157,7 @@ def get_results(
             exports.export(source, form), exports.MEDIA_TYPES[form], f"{study_id}.{exports.SUFFIXES[form][0]}"
         )
 
-    return conditional(context, request, study_id, chosen, make)
+    return await conditional(context, work, request, study_id, chosen, make)
 
 
 @router.get(
@@ -161,12 +165,13 @@ def get_results(
     response_class=Response,
     responses={
         **files("The study as a document to be printed.", report.MEDIA_TYPES.values()),
-        **problems("invalid-parameter", "study-not-found", "not-acceptable"),
+        **problems("invalid-parameter", "study-not-found", "not-acceptable", *CHECK_PROBLEMS),
         **documented_304(),
     },
 )
-def get_report(
+async def get_report(
     context: Ctx,
+    work: Attended,
     request: Request,
     study_id: StudyId,
     form: Annotated[str | None, format_query(report.REPORT_FORMATS, "pdf")] = None,
@@ -174,22 +179,56 @@ def get_report(
     """A study as a printable page or a PDF: inputs, endings, ranges of all results, curves."""
     chosen = choose_format(request, form, {str(name): media for name, media in report.MEDIA_TYPES.items()})
 
-    def make(_record: StudyRecord) -> Response:
+    def make(_record: StudyRecord) -> Drawing:
         form = next(form for form in report.REPORT_FORMATS if form == chosen)
-        content = report.write_report(report_of(context.store, study_id), form)
-        headers = {"Content-Security-Policy": _REPORT_POLICY} if form == "html" else {}
-        return Response(content, media_type=report.MEDIA_TYPES[form], headers=headers)
+        policy = {"Content-Security-Policy": _REPORT_POLICY} if form == "html" else {}
+        return Drawing(
+            report.write_report, (report_of(context.store, study_id), form), report.MEDIA_TYPES[form], policy
+        )
 
-    return conditional(context, request, study_id, chosen, make)
+    return await conditional(context, work, request, study_id, chosen, make)
 
 
-def conditional(
-    context: Ctx, request: Request, study_id: str, form: str, make: Callable[[StudyRecord], Response]
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """A file that is still to be drawn, in another process: by what, from what, and how it is sent."""
+
+    draw: Callable[..., bytes]
+    args: tuple[Any, ...]
+    media_type: str
+    headers: Mapping[str, str]
+
+    async def response(self, work: Work) -> Response:
+        """The file."""
+        content = await work.check(self.draw, *self.args)
+        return Response(content, media_type=self.media_type, headers=dict(self.headers))
+
+
+def picture(draw: Callable[..., bytes], form: plots.Picture, *shown: object) -> Drawing:
+    """A picture of something, with a policy under which it can do nothing but be looked at."""
+    headers = {"Content-Security-Policy": _PICTURE_POLICY} if form == "svg" else {}
+    return Drawing(draw, (*shown, form), plots.MEDIA_TYPES[form], headers)
+
+
+async def conditional(
+    context: Context,
+    work: Work,
+    request: Request,
+    study_id: str,
+    form: str,
+    make: Callable[[StudyRecord], Response | Drawing],
 ) -> Response:
     """The answer that ``make`` gives, or 304 when the client has it: it depends on the study's rows and the query."""
-    record = context.store.get_study(study_id)
-    tag = entity_tag(record.id, record.revision, request.url.path, request.url.query, form)
-    return not_modified(request, tag) or tagged(make(record), tag)
+
+    def look() -> tuple[str, Response | Drawing, bool]:
+        record = context.store.get_study(study_id)
+        tag = entity_tag(record.id, record.revision, request.url.path, request.url.query, form)
+        unchanged = not_modified(request, tag)
+        return tag, unchanged or make(record), unchanged is not None
+
+    tag, made, unchanged = await run_in_threadpool(look)
+    response = await made.response(work) if isinstance(made, Drawing) else made
+    return response if unchanged else tagged(response, tag)
 
 
 def _pairs(at: list[str] | None) -> tuple[tuple[str, str], ...]:
@@ -205,12 +244,6 @@ def _pairs(at: list[str] | None) -> tuple[tuple[str, str], ...]:
 def picture_of(form: str) -> plots.Picture:
     """The kind of picture of that name."""
     return next(picture for picture in plots.PICTURES if picture == form)
-
-
-def picture_response(content: bytes, picture: plots.Picture) -> Response:
-    """A picture, with a policy under which it can do nothing but be looked at."""
-    headers = {"Content-Security-Policy": _PICTURE_POLICY} if picture == "svg" else {}
-    return Response(content, media_type=plots.MEDIA_TYPES[picture], headers=headers)
 
 
 def attachment(content: bytes, media_type: str, filename: str) -> Response:

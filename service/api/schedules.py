@@ -5,20 +5,22 @@ from __future__ import annotations
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Depends, Path
+from starlette.concurrency import run_in_threadpool
 from starlette.convertors import register_url_convertor
 from starlette.responses import Response
 
+from service import checks
 from service.api import examples
 from service.api import schedule_models as m
-from service.api.context import ID_PATTERN, Ctx, StudyIdConvertor
+from service.api.context import ID_PATTERN, Context, Ctx, StudyIdConvertor
 from service.api.document import API_PREFIX, body, located, problems
 from service.api.requests import Body, read_body, strict_query
 from service.api.respond import json_response, timestamp
 from service.api.views import study_address
+from service.api.work import CHECK_PROBLEMS, Attended, Work
 from service.errors import ApiError, spec_items
 from service.finish import ALLOWED_OF_RUNS
-from service.schedules.fields import change_fields, read_fields
-from service.spec import load_spec
+from service.schedules.fields import ScheduleFields
 from service.spec_messages import SpecError
 from service.storage.schedules import RunRecord, ScheduleRecord
 from worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
@@ -99,17 +101,21 @@ Fields = Annotated[Body, Depends(read_body)]
     "/schedules",
     status_code=201,
     response_model=m.ScheduleDetail,
-    responses=located(201) | problems(*_PROBLEMS, "wrong-state"),
+    responses=located(201) | problems(*_PROBLEMS, *CHECK_PROBLEMS, "wrong-state"),
     openapi_extra=body({"every working night": EXAMPLE}, {"$ref": "#/components/schemas/ScheduleRequest"}),
 )
-def create_schedule(context: Ctx, received: Fields) -> Response:
+async def create_schedule(context: Ctx, work: Attended, received: Fields) -> Response:
     """Keep a schedule: its study is submitted whenever it is due. Due times that were missed are made up for once."""
-    try:
-        fields = read_fields(load_spec(received.content, received.format), context.store.clock.now())
-    except SpecError as error:
-        raise _refusal(error) from error
-    record = context.store.create_schedule(fields)
+    fields = await _fields(context, work, received, None)
+    record = await run_in_threadpool(context.store.create_schedule, fields)
     return json_response(detail(record, ()), 201, {"Location": schedule_address(record.id)})
+
+
+async def _fields(context: Context, work: Work, received: Body, old: ScheduleFields | None) -> ScheduleFields:
+    try:
+        return await work.check(checks.schedule_body, received.content, received.format, context.store.clock.now(), old)
+    except SpecError as error:
+        raise ApiError("invalid-body", str(error), spec_items(error.problems)) from error
 
 
 @router.get("/schedules", response_model=m.ScheduleList, responses=problems("invalid-parameter"))
@@ -131,19 +137,19 @@ def get_schedule(context: Ctx, schedule_id: ScheduleId) -> Response:
 @router.patch(
     "/schedules/{schedule_id:schedule}",
     response_model=m.ScheduleDetail,
-    responses=problems(*_PROBLEMS, "schedule-not-found"),
+    responses=problems(*_PROBLEMS, *CHECK_PROBLEMS, "schedule-not-found"),
     openapi_extra=body({"disabled": {"enabled": False}}, {"$ref": "#/components/schemas/ScheduleChange"}),
 )
-def change_schedule(context: Ctx, schedule_id: ScheduleId, received: Fields) -> Response:
+async def change_schedule(context: Ctx, work: Attended, schedule_id: ScheduleId, received: Fields) -> Response:
     """Change some fields of a schedule; the others stay. It begins anew: nothing missed is made up for."""
-    record = context.store.get_schedule(schedule_id)
-    try:
-        data = load_spec(received.content, received.format)
-        fields = change_fields(record.fields, data, context.store.clock.now())
-    except SpecError as error:
-        raise _refusal(error) from error
-    changed = context.store.change_schedule(schedule_id, fields)
-    return json_response(detail(changed, context.store.schedule_runs(schedule_id)))
+    record = await run_in_threadpool(context.store.get_schedule, schedule_id)
+    fields = await _fields(context, work, received, record.fields)
+
+    def change() -> dict[str, Any]:
+        changed = context.store.change_schedule(schedule_id, fields)
+        return detail(changed, context.store.schedule_runs(schedule_id))
+
+    return json_response(await run_in_threadpool(change))
 
 
 @router.delete(
@@ -156,10 +162,6 @@ def delete_schedule(context: Ctx, schedule_id: ScheduleId) -> Response:
     """Delete a schedule. Studies that came of it stay."""
     context.store.delete_schedule(schedule_id)
     return Response(status_code=204)
-
-
-def _refusal(error: SpecError) -> ApiError:
-    return ApiError("invalid-body", str(error), spec_items(error.problems))
 
 
 def schedule_address(schedule_id: str) -> str:

@@ -11,11 +11,12 @@ from starlette.responses import Response
 from service import exports, plots
 from service.api import models as m
 from service.api.context import Ctx, StudyId
-from service.api.curves import attachment, conditional, picture_of, picture_response
+from service.api.curves import Drawing, attachment, conditional, picture, picture_of
 from service.api.document import files, format_query, problems
 from service.api.document import not_modified as documented_304
 from service.api.requests import strict_query
 from service.api.respond import choose_format, json_response
+from service.api.work import CHECK_PROBLEMS, Attended
 from service.plots_sensitivity import draw_sensitivity
 from service.sensitivity import Sensitivity, sensitivity
 
@@ -36,12 +37,13 @@ _FORMATS: dict[str, str] = {
     response_model=m.SensitivityReport,
     responses={
         **files("Effects, as JSON, a table of indices or a picture.", _FORMATS.values()),
-        **problems("invalid-parameter", "invalid-selection", "study-not-found", "not-acceptable"),
+        **problems("invalid-parameter", "invalid-selection", "study-not-found", "not-acceptable", *CHECK_PROBLEMS),
         **documented_304(),
     },
 )
-def get_sensitivity(
+async def get_sensitivity(
     context: Ctx,
+    work: Attended,
     request: Request,
     study_id: StudyId,
     y: Annotated[
@@ -52,7 +54,7 @@ def get_sensitivity(
     """Main effects of every axis on results, and shares of their variance (Sobol indices)."""
     chosen = choose_format(request, form, _FORMATS)
 
-    def make(record: StudyRecord) -> Response:
+    def make(record: StudyRecord) -> Response | Drawing:
         store = context.store
         names = list(dict.fromkeys(y))
         fetch = partial(store.rows_for_cases, study_id)
@@ -62,10 +64,9 @@ def get_sensitivity(
             return json_response({**data, "warnings": list(context.unaffected.of(store, record))})
         if chosen == "csv":
             return attachment(indices_csv(found), _FORMATS["csv"], f"{study_id}-sensitivity.csv")
-        picture = picture_of(chosen)
-        return picture_response(draw_sensitivity(found, record.name or record.model, picture), picture)
+        return picture(draw_sensitivity, picture_of(chosen), found, record.name or record.model)
 
-    return conditional(context, request, study_id, chosen, make)
+    return await conditional(context, work, request, study_id, chosen, make)
 
 
 def indices_csv(found: list[Sensitivity]) -> bytes:

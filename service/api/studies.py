@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Query, Request
 from pydantic import Field
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
+from service import checks
 from service.api import examples, views
 from service.api import models as m
 from service.api.context import Context, Ctx, StudyId
 from service.api.document import body, located, one_of, problems
 from service.api.document import not_modified as documented_304
 from service.api.requests import Body, read_body, strict_query
-from service.api.respond import entity_tag, json_response, not_modified, tagged
+from service.api.respond import JSON, entity_tag, json_response, not_modified, tagged
+from service.api.work import CHECK_PROBLEMS, Attended
 from service.errors import parameter_error
-from service.extend import parse_extended
 from service.finish import ALLOWED, FinishError, finish_at
-from service.intake import accept
-from service.preview import preview_json
-from service.spec import ParsedSpec, load_spec, parse_spec
+from service.intake import Submission, take_in
 from worker.kernels import ENDING_SENTENCES, OK, WorkerEnding
 from worker.limits import MAX_PAGE_SIZE, MAX_PRIORITY
 from worker.states import StudyState
@@ -33,17 +33,21 @@ _FAILED = [str(name) for name in ENDING_SENTENCES if name not in {OK, WorkerEndi
 _BODY_PROBLEMS = ("invalid-parameter", "invalid-spec", "body-too-large", "unsupported-media-type")
 
 SpecBody = Annotated[Body, Depends(read_body)]
-IdempotencyKey = Annotated[
-    str | None,
-    Header(
+
+
+def _key(example: str) -> Any:
+    return Header(
         alias="Idempotency-Key",
         min_length=1,
         max_length=200,
         pattern=r"^[!-~]+$",
         description="the same key with the same body and parameters submits the study once, however often it is sent",
-        examples=["0b6e9a52-feeder"],
-    ),
-]
+        examples=[example],
+    )
+
+
+IdempotencyKey = Annotated[str | None, _key("0b6e9a52-feeder")]
+ExtensionKey = Annotated[str | None, _key("0b6e9a52-further")]
 Priority = Annotated[
     int,
     Query(
@@ -73,19 +77,17 @@ def _finish(context: Context, text: str | None) -> datetime | None:
         raise parameter_error("finish_by", str(error), text, ALLOWED) from None
 
 
-def _parsed(received: Body) -> ParsedSpec:
-    return parse_spec(load_spec(received.content, received.format))
-
-
 @router.post(
     "/studies",
     status_code=202,
     response_model=m.StudySummary,
-    responses=located(202) | problems(*_BODY_PROBLEMS, "idempotency-conflict", "storage-full", "queue-full"),
+    responses=located(202)
+    | problems(*_BODY_PROBLEMS, *CHECK_PROBLEMS, "idempotency-conflict", "storage-full", "queue-full"),
     openapi_extra=_SPEC_BODY,
 )
-def create_study(
+async def create_study(
     context: Ctx,
+    work: Attended,
     received: SpecBody,
     idempotency_key: IdempotencyKey = None,
     priority: Priority = 0,
@@ -97,22 +99,35 @@ def create_study(
     Its cases are run in the order of their numbers; with `finish_by` coarse to fine, each pass a complete coarser grid,
     so that whatever is done then makes whole curves.
     """
-    finish = _finish(context, finish_by)
-    options = {"priority": priority, "fresh": fresh, "finish_by": finish_by}
-    given = {name: value for name, value in options.items() if value}
-    record = accept(context.store, _parsed(received), idempotency_key, priority, fresh, finish, given)
+    finish, now = _finish(context, finish_by), context.store.clock.now()
+    given = _given(priority=priority, fresh=fresh, finish_by=finish_by)
+    made = await work.check(
+        checks.new_study, context.library, received.content, received.format, fresh, finish, now, given
+    )
+    return await run_in_threadpool(_take_in, context, made, idempotency_key, priority)
+
+
+def _given(**options: object) -> dict[str, object]:
+    """The parameters of a request beside its body, as the client wrote them, without those left out."""
+    return {name: value for name, value in options.items() if value}
+
+
+def _take_in(context: Context, made: Submission, idempotency_key: str | None, priority: int) -> Response:
+    record = take_in(context.store, made, idempotency_key, priority)
     return json_response(views.summary(record), 202, {"Location": views.study_address(record.id)})
 
 
 @router.post(
-    "/studies:preview", response_model=m.Preview, responses=problems(*_BODY_PROBLEMS), openapi_extra=_SPEC_BODY
+    "/studies:preview",
+    response_model=m.Preview,
+    responses=problems(*_BODY_PROBLEMS, *CHECK_PROBLEMS),
+    openapi_extra=_SPEC_BODY,
 )
-def preview_study(context: Ctx, received: SpecBody, finish_by: FinishBy = None) -> Response:
+async def preview_study(context: Ctx, work: Attended, received: SpecBody, finish_by: FinishBy = None) -> Response:
     """What a study would be: cases, time, size, warnings and fitted clutch laws. Nothing is submitted."""
-    finish = _finish(context, finish_by)
-    parsed, store = _parsed(received), context.store
-    left = None if finish is None else (finish - store.clock.now()).total_seconds()
-    return json_response(preview_json(parsed, store.chunking, store.reusable(parsed.study), left))
+    finish, now = _finish(context, finish_by), context.store.clock.now()
+    text = await work.check(checks.preview, context.library, received.content, received.format, finish, now)
+    return Response(text, media_type=JSON)
 
 
 @router.get("/studies", response_model=m.StudyPage, responses=problems("invalid-parameter"))
@@ -211,25 +226,31 @@ def retry_study(
     "/studies/{study_id:study}:extend",
     status_code=202,
     response_model=m.StudySummary,
-    responses=located(202) | problems(*_BODY_PROBLEMS, "study-not-found", "storage-full", "queue-full"),
+    responses=located(202)
+    | problems(
+        *_BODY_PROBLEMS, *CHECK_PROBLEMS, "study-not-found", "idempotency-conflict", "storage-full", "queue-full"
+    ),
     openapi_extra=body(
         {"further loads": examples.EXTENSION_AXES, "further cases": examples.EXTENSION_CASES},
         {"$ref": "#/components/schemas/Extension"},
     ),
 )
-def extend_study(
+async def extend_study(
     context: Ctx,
+    work: Attended,
     study_id: StudyId,
     received: SpecBody,
+    idempotency_key: ExtensionKey = None,
     priority: Priority = 0,
     finish_by: FinishBy = None,
 ) -> Response:
     """Submit a study with more values on the axes of an old one, or more cases; only what is new is run."""
-    finish = _finish(context, finish_by)
-    spec, study = context.store.spec(study_id), context.store.study(study_id)
-    parsed = parse_extended(spec, study, load_spec(received.content, received.format))
-    record = accept(context.store, parsed, priority=priority, finish_by=finish)
-    return json_response(views.summary(record), 202, {"Location": views.study_address(record.id)})
+    finish, now = _finish(context, finish_by), context.store.clock.now()
+    given = _given(priority=priority, finish_by=finish_by)
+    made = await work.check(
+        checks.extended_study, context.library, study_id, received.content, received.format, finish, now, given
+    )
+    return await run_in_threadpool(_take_in, context, made, idempotency_key, priority)
 
 
 @router.post(

@@ -6,6 +6,7 @@ __all__ = [
     "DatabaseBusyError",
     "DatabaseError",
     "DatabaseFullError",
+    "EndingError",
     "IdempotencyConflict",
     "NothingToRetry",
     "PageTokenError",
@@ -32,6 +33,10 @@ class DatabaseBusyError(DatabaseError):
     """Another process kept the database for longer than the busy timeout."""
 
 
+class EndingError(DatabaseError):
+    """The service is ending, and writes nothing any more."""
+
+
 class DatabaseFullError(DatabaseError, StoreFullError):
     """The disk has no room, or does not take what is written."""
 
@@ -42,6 +47,9 @@ class StudyNotFound(StoreError):  # noqa: N818 - the name callers read
     def __init__(self, study_id: str) -> None:
         super().__init__(f"there is no study {study_id!r}")
         self.study_id = study_id
+
+    def __reduce__(self) -> "tuple[type[StudyNotFound], tuple[str]]":
+        return StudyNotFound, (self.study_id,)
 
 
 class ScheduleNotFound(StoreError):  # noqa: N818

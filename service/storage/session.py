@@ -9,14 +9,14 @@ import os
 import re
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from threading import Lock
+from threading import Condition
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
 from sqlalchemy.engine import URL, make_url
 
-from service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError
+from service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError, EndingError
 from service.storage.private_files import PRIVATE_FOLDER_MODE, create_private
 from worker.ports import StoreError
 
@@ -124,7 +124,8 @@ class Session:
             case other:
                 raise DatabaseError(f"databases of kind {other!r} are not supported; use sqlite or postgresql")
         sa.event.listen(self._engine, "begin", _begin)
-        self._writing = Lock()
+        self._turn = Condition()
+        self._writing = self._refusing = False
         #: Told how long ("read" or "write", s) each transaction waited for its beginning.
         self.on_wait: Callable[[str, float], None] | None = None
         self._reader = self._engine.execution_options(**{_BEGIN: begin["read"]}, **reading)
@@ -254,13 +255,25 @@ class Session:
         # Threads of one process queue here: SQLite's own waiting is by sleeping ever longer, and the last wakes last.
         began = perf_counter()
         self.require_same_file()
-        if not self._writing.acquire(timeout=BUSY_SECONDS):
-            raise DatabaseBusyError(_BUSY.format(self.location))
+        with self._turn:
+            if not self._turn.wait_for(lambda: self._refusing or not self._writing, BUSY_SECONDS):
+                raise DatabaseBusyError(_BUSY.format(self.location))
+            if self._refusing:
+                raise EndingError("the service is ending: nothing was written")
+            self._writing = True
         try:
             with self._transaction(self._writer, "write", began) as connection:
                 yield connection
         finally:
-            self._writing.release()
+            with self._turn:
+                self._writing = False
+                self._turn.notify()
+
+    def refuse_writes(self) -> None:
+        """Let no write begin from now on: EndingError for those that wait. The one under way goes on."""
+        with self._turn:
+            self._refusing = True
+            self._turn.notify_all()
 
     @contextmanager
     def _transaction(self, engine: sa.Engine, kind: str, began: float) -> Iterator[sa.Connection]:

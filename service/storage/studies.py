@@ -77,24 +77,33 @@ class Studies(Orders):
         study of that time; with another one raises IdempotencyConflict. A ``fresh`` study takes no rows from others.
         One with a moment to ``finish_by`` is run coarse to fine, and held then.
         """
-        size = self.chunking.cases_of(study)
+        return self.insert_study(
+            study_row(spec, study, self.chunking, warnings),
+            idempotency_key=idempotency_key,
+            body_hash=body_hash,
+            priority=priority,
+            fresh=fresh,
+            finish_by=finish_by,
+        )
+
+    def insert_study(
+        self,
+        row: Mapping[str, Any],
+        *,
+        idempotency_key: str | None = None,
+        body_hash: str = "",
+        priority: int = 0,
+        fresh: bool = False,
+        finish_by: datetime | None = None,
+    ) -> StudyRecord:
+        """Accept the study of a `study_row`; the rest as for `create_study`."""
         values = {
+            **row,
             "id": f"st_{secrets.token_hex(8)}",
-            "name": study.name,
-            "model": study.model,
-            "pendulums": kernels.pendulums(study),
             "state": StudyState.QUEUED.value,
-            "cases": study.cases,
             "done": 0,
             "ok": 0,
-            "chunk_cases": size,
-            "engine_version": kernels.ENGINE_VERSION,
-            "physics_hash": study.physics_hash(kernels.ENGINE_VERSION),
-            "spec": json.dumps(spec, allow_nan=False),
-            "study": json.dumps(study.to_json(), allow_nan=False),
-            "warnings": json.dumps(list(warnings)),
             "priority": priority,
-            "kin_hash": kin_hash(study, kernels.ENGINE_VERSION),
             "fresh": int(fresh),
             "finish_by": None if finish_by is None else micros_of(finish_by),
             "coarse": int(finish_by is not None),
@@ -111,7 +120,7 @@ class Studies(Orders):
                 sa.insert(CHUNKS),
                 [
                     {"study": number, "first": first, "count": count, "state": "waiting", "failures": 0}
-                    for first, count in spans(study.cases, size)
+                    for first, count in spans(row["cases"], row["chunk_cases"])
                 ],
             )
             if idempotency_key is not None:
@@ -330,6 +339,28 @@ class Studies(Orders):
                         )
             with self.session.write() as connection:
                 connection.execute(sa.delete(STUDIES).where(c.number == number))
+
+
+def study_row(
+    spec: Mapping[str, Any], study: Study, chunking: Chunking, warnings: Sequence[str] = ()
+) -> dict[str, Any]:
+    """The columns of a new study that follow from the study itself.
+
+    Takes about a second for a million values, so that it is made where studies are checked.
+    """
+    return {
+        "name": study.name,
+        "model": study.model,
+        "pendulums": kernels.pendulums(study),
+        "cases": study.cases,
+        "chunk_cases": chunking.cases_of(study),
+        "engine_version": kernels.ENGINE_VERSION,
+        "physics_hash": study.physics_hash(kernels.ENGINE_VERSION),
+        "spec": json.dumps(spec, allow_nan=False),
+        "study": json.dumps(study.to_json(), allow_nan=False),
+        "warnings": json.dumps(list(warnings)),
+        "kin_hash": kin_hash(study, kernels.ENGINE_VERSION),
+    }
 
 
 def _study_of_key(connection: sa.Connection, key: str, body_hash: str) -> StudyRecord | None:

@@ -12,8 +12,9 @@ from starlette.responses import Response
 from service import trajectories
 from service.api.cases import CaseNumber, study_with
 from service.api.context import Context, Ctx, StudyId
-from service.api.curves import picture_response
+from service.api.curves import picture
 from service.api.respond import entity_tag, json_response, not_modified, tagged
+from service.api.work import Attended
 from service.catalogue import unit_of
 from service.errors import ApiError
 from service.main_curve import characteristic_names
@@ -113,26 +114,37 @@ async def _asked(
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/motion")
 async def motion(
-    context: Ctx, request: Request, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = ""
+    context: Ctx,
+    work: Attended,
+    request: Request,
+    study_id: StudyId,
+    case: CaseNumber,
+    begin: Begin = "",
+    end: End = "",
 ) -> Response:
     """The figures of a motion."""
     study, times, tag, unchanged = await _asked(context, request, study_id, case, (begin, end))
     if unchanged:
         return unchanged
-    await context.computer.load(kernels.shape_of(study))
-    return tagged(json_response(await context.computer.run(motion_figures, study, case, *times)), tag)
+    await work.load(kernels.shape_of(study))
+    return tagged(json_response(await work.compute(motion_figures, study, case, *times)), tag)
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/motion.svg")
 async def motion_picture(
-    context: Ctx, request: Request, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = ""
+    context: Ctx,
+    work: Attended,
+    request: Request,
+    study_id: StudyId,
+    case: CaseNumber,
+    begin: Begin = "",
+    end: End = "",
 ) -> Response:
     """The motion as one picture, for pages without JavaScript."""
     study, times, tag, unchanged = await _asked(context, request, study_id, case, (begin, end))
     if unchanged:
         return unchanged
-    await context.computer.load(kernels.shape_of(study))
-    made = await context.computer.run(kernels.run_trajectory, study, case, *times, SAMPLES // 3)
+    await work.load(kernels.shape_of(study))
+    made = await work.compute(kernels.run_trajectory, study, case, *times, SAMPLES // 3)
     paint = draw_shaft if made.along == "angle" else draw_motion
-    content = await run_in_threadpool(paint, made, f"{study.name}, case {case}", "svg")
-    return tagged(picture_response(content, "svg"), tag)
+    return tagged(await picture(paint, "svg", made, f"{study.name}, case {case}").response(work), tag)

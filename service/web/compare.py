@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Request
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from service.api import views
 from service.api.context import Context, Ctx
-from service.api.curves import picture_response
+from service.api.curves import Drawing, picture
 from service.api.respond import entity_tag, json_response, not_modified, tagged
+from service.api.work import Attended
 from service.catalogue import unit_of
 from service.curves import CurveQuery, Curves, draw, select
 from service.errors import ErrorItem
@@ -174,10 +176,16 @@ def compare_figure(context: Ctx, request: Request) -> Response:
 
 
 @router.get("/compare/picture.svg")
-def compare_picture(context: Ctx, request: Request) -> Response:
+async def compare_picture(context: Ctx, work: Attended, request: Request) -> Response:
     """The same as a picture, for pages without JavaScript."""
-    tag = _tag(context, request)
-    if unchanged := not_modified(request, tag):
-        return unchanged
-    content = draw_compare(drawn(context, comparison(context, request.query_params)), "svg")
-    return tagged(picture_response(content, "svg"), tag)
+
+    def look() -> tuple[str, Response | Drawing, bool]:
+        tag = _tag(context, request)
+        unchanged = not_modified(request, tag)
+        if unchanged is not None:
+            return tag, unchanged, True
+        return tag, picture(draw_compare, "svg", drawn(context, comparison(context, request.query_params))), False
+
+    tag, made, unchanged = await run_in_threadpool(look)
+    response = await made.response(work) if isinstance(made, Drawing) else made
+    return response if unchanged else tagged(response, tag)

@@ -12,13 +12,14 @@ from fastapi import APIRouter, Query, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
+from service import checks
 from service.api.catalogues import preset_of
 from service.api.context import Context, Ctx
 from service.api.respond import json_response
+from service.api.work import Attended, Work
 from service.errors import ApiError
-from service.intake import accept
+from service.intake import Submission, take_in
 from service.presets import preset_names
-from service.web import form_check
 from service.web.form_check import Checked
 from service.web.form_fields import FORM_MODEL, path_choices, pendulum, sections
 from service.web.form_spec import (
@@ -52,15 +53,16 @@ _EMPTY: Final[Values] = {
 
 
 @router.get("/new")
-def new_study(
+async def new_study(
     context: Ctx,
+    work: Attended,
     request: Request,
     preset: Annotated[str | None, Query(max_length=80)] = None,
     clone: Annotated[str | None, Query(max_length=80)] = None,
     mode: Annotated[str, Query(max_length=10)] = "form",
 ) -> Response:
     """The form, empty or filled in from an example or from another study."""
-    spec = _start(context, preset, clone)
+    spec = await run_in_threadpool(_start, context, preset, clone)
     if spec is None:
         values = {"/text": "", "format": "json"} if mode == "text" else with_clutch_defaults(dict(_EMPTY))
         return form_page(request, values, None)
@@ -72,8 +74,8 @@ def new_study(
         values = {"/text": spec_text(spec), "format": "json"}
     if clone is not None and "/name" in values:
         values["/name"] = f"{values['/name']} (copy)"
-    checked = look_over(context, values)
-    return form_page(request, values, checked)
+    checked = await look_over(context, work, values)
+    return await run_in_threadpool(form_page, request, values, checked)
 
 
 def _start(context: Context, preset: str | None, clone: str | None) -> dict[str, Any] | None:
@@ -88,26 +90,27 @@ def _start(context: Context, preset: str | None, clone: str | None) -> dict[str,
 
 
 @router.post("/new")
-async def send_form(context: Ctx, request: Request, values: Form) -> Response:
+async def send_form(context: Ctx, work: Attended, request: Request, values: Form) -> Response:
     """What the pressed button asks for: look the form over, change its shape, or submit the study."""
     wanted = values.pop("do", "check")
     share_clutches(values)
     if wanted == "submit":
-        return await run_in_threadpool(_submit, context, request, values)
+        checked, made = await work.check(checks.form_study, context.library, values, context.store.clock.now())
+        return await run_in_threadpool(_submit, context, request, values, checked, made)
     reshape(values, wanted)
-    return await run_in_threadpool(lambda: form_page(request, values, look_over(context, values)))
+    checked = await look_over(context, work, values)
+    return await run_in_threadpool(form_page, request, values, checked)
 
 
-def _submit(context: Context, request: Request, values: Values) -> Response:
-    checked = look_over(context, values)
-    if checked.parsed is None:
+def _submit(context: Context, request: Request, values: Values, checked: Checked, made: Submission | None) -> Response:
+    if made is None:
         return form_page(request, values, checked, status=422)
     # Sent twice, by a second click, the same form is one study; changed and sent again it is another.
     text = json.dumps([checked.spec, values.get("finish_by", "")], sort_keys=True)
     key = f"form-{values.get('key', '')[:64]}-{hashlib.sha256(text.encode()).hexdigest()[:32]}"
     key = "".join(character for character in key if "!" <= character <= "~")
     try:
-        record = accept(context.store, checked.parsed, key, finish_by=checked.finish)
+        record = take_in(context.store, made, key)
     except ApiError as error:
         checked.faults.setdefault("", []).append(error.detail)
         return form_page(request, values, checked, status=error.type.status)
@@ -115,11 +118,11 @@ def _submit(context: Context, request: Request, values: Values) -> Response:
 
 
 @router.post("/new/check")
-async def check(context: Ctx, request: Request, values: Form) -> Response:
+async def check(context: Ctx, work: Attended, request: Request, values: Form) -> Response:
     """The live preview: what is wrong by field, and the panel that tells cases, time, size, warnings and fits."""
+    checked = await look_over(context, work, values)
 
     def answer() -> dict[str, Any]:
-        checked = look_over(context, values)
         return {
             "faults": checked.faults,
             "panel": fragment("_form_panel.html", checked=checked, address=_address(request)),
@@ -132,10 +135,9 @@ async def check(context: Ctx, request: Request, values: Form) -> Response:
     return json_response(await run_in_threadpool(answer))
 
 
-def look_over(context: Context, values: Mapping[str, str]) -> Checked:
+async def look_over(context: Context, work: Work, values: Mapping[str, str]) -> Checked:
     """A form, field by field or as text, looked over."""
-    store = context.store
-    return form_check.look_over(values, store.chunking, store.reusable, store.clock.now())
+    return await work.check(checks.form, context.library, values, context.store.clock.now())
 
 
 def reshape(values: Values, wanted: str) -> None:

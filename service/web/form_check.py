@@ -190,3 +190,22 @@ def _fit(found: Checked, pointer: str, values: Mapping[str, str]) -> None:
     read = read_clutch(Report(), pointer, clutch, pointer.removeprefix("/base/").replace("/", ".") + ".", known)
     if read is not None and read.fit is not None:
         found.fits[pointer] = (fit_json(read.fit), fit_chart(read.fit, clutch, known[0] if known else 0.0))
+
+
+def has_measured_clutch(spec: Mapping[str, Any]) -> bool:
+    """Whether any clutch of a spec is given as measured data."""
+    base = spec.get("base", {})
+    pendulums = base.get("pendulums")
+    clutches = [base.get("clutch"), *(item.get("clutch") for item in pendulums or () if isinstance(item, dict))]
+    return any(isinstance(clutch, dict) and "data" in clutch for clutch in clutches)
+
+
+def fits_of(spec: dict[str, Any]) -> dict[str, tuple[dict[str, Any], FitChart]]:
+    """Report and picture of each clutch law that the spec gives as measured data, by their JSON Pointers."""
+    # The fit is not stored: it follows from the spec, to the last bit.
+    found = {}
+    alone = {key: value for key, value in spec.items() if key in ("sprag", "model", "name", "base", "run")}
+    for pointer, fit in parse_spec(alone).fits.items():
+        known = backlashes(spec, pointer)
+        found[pointer] = (fit_json(fit), fit_chart(fit, clutch_at(spec, pointer), known[0] if known else 0.0))
+    return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
@@ -13,9 +13,10 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from service.api.catalogues import preset_of
-from service.api.context import Context, Ctx
-from service.api.curves import picture_response
+from service.api.context import Ctx
+from service.api.curves import picture
 from service.api.respond import json_response
+from service.api.work import Attended, Work
 from service.catalogue import parameter_of
 from service.errors import ApiError, spec_items
 from service.plots_shaft import draw_shaft
@@ -30,7 +31,7 @@ from service.web.templates import fragment, number, page, spec_text, words
 from worker import kernels
 
 if TYPE_CHECKING:
-    from starlette.datastructures import QueryParams
+    from collections.abc import Mapping
 
     from worker.study import Study
 
@@ -90,7 +91,7 @@ def machines() -> tuple[str, ...]:
     return tuple(name for name in shafts if not name.startswith(_QUESTION))
 
 
-def setting(given: QueryParams) -> Setting:
+def setting(given: Mapping[str, str]) -> Setting:
     """What an address sets; ApiError for a machine that there is not."""
     name = given.get("machine") or next(iter(machines()), "")
     if name not in machines():
@@ -147,12 +148,12 @@ def number_text(value: float) -> str:
 
 
 @router.get("/laboratory")
-async def laboratory(context: Ctx, request: Request) -> Response:
+async def laboratory(work: Attended, request: Request) -> Response:
     """The laboratory."""
-    chosen = await run_in_threadpool(setting, request.query_params)
+    chosen = await work.check(setting, dict(request.query_params))
     # Compiling takes seconds, once: the page is shown at once, and its script waits for the numbers.
     ready = kernels.is_compiled(kernels.shape_of(chosen.study))
-    case = await _case(context, chosen) if ready and not chosen.faults else None
+    case = await _case(work, chosen) if ready and not chosen.faults else None
     return page(
         "laboratory.html",
         status=422 if chosen.faults else 200,
@@ -174,9 +175,9 @@ def position(slider: Slider) -> float:
     return 1000.0 * (slider.value - slider.low) / span if span else 0.0
 
 
-async def _case(context: Context, chosen: Setting) -> dict[str, Any]:
-    await context.computer.load(kernels.shape_of(chosen.study))
-    return await context.computer.run(machine_case, chosen.study)
+async def _case(work: Work, chosen: Setting) -> dict[str, Any]:
+    await work.load(kernels.shape_of(chosen.study))
+    return await work.compute(machine_case, chosen.study)
 
 
 def _told(chosen: Setting, case: dict[str, Any] | None) -> str:
@@ -192,10 +193,10 @@ def _told(chosen: Setting, case: dict[str, Any] | None) -> str:
 
 
 @router.get("/laboratory/figure")
-async def laboratory_figure(context: Ctx, request: Request) -> Response:
+async def laboratory_figure(work: Attended, request: Request) -> Response:
     """Picture and numbers of a setting, for the sliders."""
-    chosen = await run_in_threadpool(setting, request.query_params)
-    case = None if chosen.faults else await _case(context, chosen)
+    chosen = await work.check(setting, dict(request.query_params))
+    case = None if chosen.faults else await _case(work, chosen)
     return json_response(
         {
             "figure": None if case is None else case["figure"],
@@ -207,22 +208,21 @@ async def laboratory_figure(context: Ctx, request: Request) -> Response:
 
 
 @router.get("/laboratory/picture.svg")
-async def laboratory_picture(context: Ctx, request: Request) -> Response:
+async def laboratory_picture(work: Attended, request: Request) -> Response:
     """The motion as one picture, for pages without JavaScript."""
-    chosen = await run_in_threadpool(setting, request.query_params)
+    chosen = await work.check(setting, dict(request.query_params))
     if chosen.faults:
         raise ApiError("invalid-spec", "; ".join(text for texts in chosen.faults.values() for text in texts))
-    await context.computer.load(kernels.shape_of(chosen.study))
+    await work.load(kernels.shape_of(chosen.study))
     end = kernels.extent(chosen.study, 0).end
-    made = await context.computer.run(kernels.run_trajectory, chosen.study, 0, 0.0, end, SAMPLES // 4)
-    content = await run_in_threadpool(partial(draw_shaft, made, chosen.study.name, "svg"))
-    return picture_response(content, "svg")
+    made = await work.compute(kernels.run_trajectory, chosen.study, 0, 0.0, end, SAMPLES // 4)
+    return await picture(draw_shaft, "svg", made, chosen.study.name).response(work)
 
 
 @router.get("/laboratory/study")
-def laboratory_study(context: Ctx, request: Request, question: str = "inertia") -> Response:
+async def laboratory_study(context: Ctx, work: Attended, request: Request, question: str = "inertia") -> Response:
     """One of the course's questions about the machine as it is set, as a study to be looked over and submitted."""
-    chosen = setting(request.query_params)
+    chosen = await work.check(setting, dict(request.query_params))
     if question not in QUESTIONS:
         raise ApiError("not-found", f"There is no such question; there are: {', '.join(QUESTIONS)}.")
     paths = {
@@ -238,4 +238,4 @@ def laboratory_study(context: Ctx, request: Request, question: str = "inertia") 
         axes.append({"path": path, way: [float(number_text(slider.low)), float(number_text(slider.high)), count]})
     spec = {**chosen.spec, "name": f"{chosen.study.name}: irregularity against {QUESTIONS[question]}", "axes": axes}
     values = {"/text": spec_text(spec), "format": "json"}
-    return form_page(request, values, look_over(context, values))
+    return await run_in_threadpool(form_page, request, values, await look_over(context, work, values))

@@ -11,12 +11,14 @@ from fastapi import APIRouter, Query
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
+from service import checks
 from service.api.catalogues import preset_of
 from service.api.context import Context, Ctx
 from service.api.schedules import summary
+from service.api.work import Attended, Work
 from service.errors import ApiError
 from service.presets import preset_names
-from service.schedules.fields import ScheduleFields, change_fields, read_fields
+from service.schedules.fields import ScheduleFields, change_fields
 from service.schedules.times import zones
 from service.spec_messages import SpecError
 from service.storage.errors import StudyNotFound, TooManySchedules
@@ -53,9 +55,9 @@ def new_schedule(context: Ctx, study: Annotated[str | None, Query(max_length=80)
 
 
 @router.post("/schedules/new")
-async def keep_schedule(context: Ctx, values: Form) -> Response:
+async def keep_schedule(context: Ctx, work: Attended, values: Form) -> Response:
     """The form filled in: the schedule is kept, or the form is shown again with what is wrong."""
-    return await run_in_threadpool(_save, context, values, None)
+    return await _save(context, work, values, None)
 
 
 @router.get("/schedules/{schedule_id:schedule}")
@@ -66,9 +68,9 @@ def edit_schedule(context: Ctx, schedule_id: str) -> Response:
 
 
 @router.post("/schedules/{schedule_id:schedule}")
-async def change_schedule(context: Ctx, schedule_id: str, values: Form) -> Response:
+async def change_schedule(context: Ctx, work: Attended, schedule_id: str, values: Form) -> Response:
     """The form of a schedule filled in."""
-    return await run_in_threadpool(_save, context, values, schedule_id)
+    return await _save(context, work, values, schedule_id)
 
 
 @router.post("/schedules/{schedule_id:schedule}/{verb}")
@@ -85,18 +87,16 @@ def act(context: Ctx, schedule_id: str, verb: str) -> Response:
     return RedirectResponse("/schedules", status_code=303)
 
 
-def _save(context: Context, values: Values, schedule_id: str | None) -> Response:
+async def _save(context: Context, work: Work, values: Values, schedule_id: str | None) -> Response:
     now = context.store.clock.now()
     faults: dict[str, list[str]] = {}
     try:
-        data = _data_of(context, values)
+        data, old = await run_in_threadpool(_asked, context, values, schedule_id)
+        fields = await work.check(checks.schedule_fields, data, now, old)
         if schedule_id is None:
-            context.store.create_schedule(read_fields(data, now))
+            await run_in_threadpool(context.store.create_schedule, fields)
         else:
-            old = context.store.get_schedule(schedule_id).fields
-            if data.get("at") == _values_of(old)["at"] and data.get("zone") == old.timing.zone:
-                del data["at"]  # as it was: it may have passed
-            context.store.change_schedule(schedule_id, change_fields(old, data, now))
+            await run_in_threadpool(context.store.change_schedule, schedule_id, fields)
     except SpecError as error:
         for problem in error.problems:
             first = problem.pointer.split("/")[1] if problem.pointer else ""
@@ -105,8 +105,19 @@ def _save(context: Context, values: Values, schedule_id: str | None) -> Response
     except (StudyNotFound, TooManySchedules) as error:
         faults["source"] = [str(error)]
     if faults:
-        return _form(context, values, faults, schedule_id, status=422)
+        return await run_in_threadpool(_form, context, values, faults, schedule_id, status=422)
     return RedirectResponse("/schedules", status_code=303)
+
+
+def _asked(context: Context, values: Values, schedule_id: str | None) -> tuple[dict[str, Any], ScheduleFields | None]:
+    """What a filled-in form asks for, and the schedule that it changes."""
+    data = _data_of(context, values)
+    if schedule_id is None:
+        return data, None
+    old = context.store.get_schedule(schedule_id).fields
+    if data.get("at") == _values_of(old)["at"] and data.get("zone") == old.timing.zone:
+        del data["at"]  # as it was: it may have passed
+    return data, old
 
 
 def _data_of(context: Context, values: Mapping[str, str]) -> dict[str, Any]:

@@ -9,24 +9,23 @@ from urllib.parse import urlencode
 
 import numpy as np
 from fastapi import APIRouter
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from service import exports, plots
 from service.api import views
 from service.api.context import Context, Ctx, StudyId
 from service.api.respond import timestamp
+from service.api.work import Attended
 from service.catalogue import parameter_of, unit_of
 from service.curves import select
 from service.errors import ApiError
 from service.exports.inputs import inputs as every_input
 from service.exports.inputs import run_inputs
-from service.fits import fit_json
 from service.main_curve import caption, drawn_numbers
 from service.selection import SelectionError
-from service.spec import parse_spec
 from service.web.choice import characteristic, map_query, pairs_of
-from service.web.fit_chart import FitChart, fit_chart
-from service.web.form_check import backlashes, clutch_at
+from service.web.form_check import fits_of, has_measured_clutch
 from service.web.templates import page
 from service.written import written_number
 from worker import kernels
@@ -38,6 +37,7 @@ if TYPE_CHECKING:
     from starlette.datastructures import QueryParams
 
     from service.curves import CurveQuery
+    from service.web.fit_chart import FitChart
     from worker.study import Study
 
 router = APIRouter(include_in_schema=False)
@@ -76,8 +76,14 @@ def _verbs(state: StudyState, some_failed: bool) -> list[str]:
 
 
 @router.get("/studies/{study_id:study}")
-def study_page(context: Ctx, study_id: StudyId) -> Response:
+async def study_page(context: Ctx, work: Attended, study_id: StudyId) -> Response:
     """One study: how far it is, its mechanical characteristic, its inputs."""
+    spec = await run_in_threadpool(context.store.spec, study_id)
+    fits = await work.check(fits_of, spec) if has_measured_clutch(spec) else {}
+    return await run_in_threadpool(_study_page, context, study_id, fits)
+
+
+def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[dict[str, Any], FitChart]]) -> Response:
     study = context.store.study(study_id)
     frame = study_frame(context, study_id)
     query = _with_rows(context, study, study_id, characteristic(study, kernels.study_results(study)))
@@ -97,7 +103,7 @@ def study_page(context: Ctx, study_id: StudyId) -> Response:
         units={info.name: info.unit for info in kernels.study_results(study)},
         inputs=inputs(study, frame["study"]["spec"]),
         run=run_inputs(study, frame["study"]["spec"]),
-        fits=fits_of(frame["study"]["spec"]),
+        fits=fits,
     )
 
 
@@ -126,22 +132,6 @@ def inputs(study: Study, spec: Mapping[str, Any]) -> list[tuple[str, list[dict[s
         symbol = f"c_{int(name) + 1}" if name.isdigit() else "" if entry is None else entry.symbol
         sections.setdefault(section, []).append({"name": name, "symbol": symbol, "item": item})
     return [(section or "in general", rows) for section, rows in sections.items()]
-
-
-def fits_of(spec: dict[str, Any]) -> dict[str, tuple[dict[str, Any], FitChart]]:
-    """Report and picture of each clutch law that the spec gives as measured data, by their JSON Pointers."""
-    base = spec.get("base", {})
-    pendulums = base.get("pendulums")
-    clutches = [base.get("clutch"), *(item.get("clutch") for item in pendulums or () if isinstance(item, dict))]
-    if not any(isinstance(clutch, dict) and "data" in clutch for clutch in clutches):
-        return {}
-    # The fit is not stored: it follows from the spec, to the last bit.
-    found = {}
-    alone = {key: value for key, value in spec.items() if key in ("sprag", "model", "name", "base", "run")}
-    for pointer, fit in parse_spec(alone).fits.items():
-        known = backlashes(spec, pointer)
-        found[pointer] = (fit_json(fit), fit_chart(fit, clutch_at(spec, pointer), known[0] if known else 0.0))
-    return found
 
 
 @router.get("/studies/{study_id:study}/delete")

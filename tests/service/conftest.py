@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +71,7 @@ class Service:
     http: httpx.Client
     store: Store
     computer: InThread
+    checker: InThread = field(default_factory=InThread)
 
     def submit(self, spec: Any = None, **headers: str) -> str:
         """Submit a study; its id."""
@@ -164,8 +165,9 @@ def service(settings: Settings, connect: Callable[..., httpx.Client]) -> Iterato
     """A service with an empty database."""
     computer = InThread()
     with Store.open(settings.database_url, chunking=chunking(settings)) as store:
-        app = create_app(settings, store=store, computer=computer)
-        yield Service(app, connect(app), store, computer)
+        checker = InThread()
+        app = create_app(settings, store=store, computer=computer, checker=checker)
+        yield Service(app, connect(app), store, computer, checker)
 
 
 @pytest.fixture

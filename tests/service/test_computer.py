@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from service.computer import MAX_WAITING, ProcessComputer
+from service.computer import MAX_WAITING, Limits, ProcessComputer
 from service.errors import ApiError
 from tests.worker import fakes
 from worker import kernels
+from worker.limits import COMPUTATION_BYTES
 
 if TYPE_CHECKING:
     from anyio.from_thread import BlockingPortal
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 @pytest.fixture
 def computer() -> Iterator[ProcessComputer]:
     """A computer with little patience."""
-    made = ProcessComputer(timeout=1.0)
+    made = ProcessComputer(Limits(1.0, COMPUTATION_BYTES))
     yield made
     made.close()
 
@@ -51,7 +52,9 @@ def test_a_kernel_takes_longer_than_a_computation_may_and_outlives_its_request(
     begun, told = tmp_path / "begun", tmp_path / "told"
     os.mkfifo(begun)
     os.mkfifo(told)
-    computer = ProcessComputer(timeout=0.01, load=partial(fakes.load_between, begun=str(begun), told=str(told)))
+    computer = ProcessComputer(
+        Limits(0.01, COMPUTATION_BYTES), load=partial(fakes.load_between, begun=str(begun), told=str(told))
+    )
     try:
         left = portal.start_task_soon(computer.load, SHAPE)
         begun.read_text()  # waits until it compiles
@@ -65,7 +68,7 @@ def test_a_kernel_takes_longer_than_a_computation_may_and_outlives_its_request(
 
 
 def test_a_kernel_that_fails_is_told_and_tried_again(portal: BlockingPortal) -> None:
-    computer = ProcessComputer(timeout=60.0, load=fakes.load_dies)
+    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES), load=fakes.load_dies)
     try:
         for _ in range(2):
             with pytest.raises(ApiError) as died:

@@ -126,3 +126,12 @@ def test_over_http_only_new_cases_are_run(service: Service, spec: dict[str, Any]
     refused = service.http.post(f"{API}/studies/{first['id']}:extend", json={"axes": 1})
     assert refused.status_code == 422
     assert service.http.post(f"{API}/studies/st_0/:extend", json=body).status_code == 404
+
+
+def test_the_same_key_extends_once(service: Service) -> None:
+    study, body = service.submit(), {"axes": [{"path": "shaft.load", "values": [0.123]}]}
+    address, key = f"{API}/studies/{study}:extend", {"Idempotency-Key": "once"}
+    first, again = (service.http.post(address, json=body, headers=key).json() for _ in range(2))
+    assert first["id"] == again["id"]
+    other = {"axes": [{"path": "shaft.load", "values": [0.124]}]}
+    assert service.http.post(address, json=other, headers=key).status_code == 422

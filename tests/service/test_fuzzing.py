@@ -50,7 +50,7 @@ def test_made_up_requests_are_answered_as_documented(
     ids = things(service)
     service.computer.answer = not_here
     with_token = settings.model_copy(update={"token": SecretStr(TOKEN)})
-    app = create_app(with_token, store=service.store, computer=service.computer)
+    app = create_app(with_token, store=service.store, computer=service.computer, checker=service.checker)
     app.state.context.ending.set()  # streams of events end at once
     document = connect(app).get("/openapi.json", headers={"Authorization": f"Bearer {TOKEN}"}).json()
     summary = fuzz(with_ids(document, ids), TOKEN, 3, app=app, skip=HEAVY)

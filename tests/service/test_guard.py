@@ -29,7 +29,7 @@ TOKEN = "correct-horse-battery-staple"
 def guarded(settings: Settings, service: Service, connect: Callable[..., httpx.Client]) -> httpx.Client:
     """A client of a service with a token."""
     with_token = settings.model_copy(update={"token": SecretStr(TOKEN)})
-    return connect(create_app(with_token, store=service.store, computer=service.computer))
+    return connect(create_app(with_token, store=service.store, computer=service.computer, checker=service.checker))
 
 
 def test_an_address_with_a_line_feed_is_another_address(service: Service) -> None:
@@ -116,7 +116,7 @@ def test_further_host_names_can_be_allowed(
     settings: Settings, service: Service, connect: Callable[..., httpx.Client]
 ) -> None:
     named = settings.model_copy(update={"allowed_hosts": ("Sprag.example",)})
-    client = connect(create_app(named, store=service.store, computer=service.computer))
+    client = connect(create_app(named, store=service.store, computer=service.computer, checker=service.checker))
     assert client.get("/livez", headers={"Host": "sprag.example:443"}).status_code == 200
 
 

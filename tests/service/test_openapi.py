@@ -70,7 +70,7 @@ def test_links_give_what_their_targets_take(document: dict[str, Any]) -> None:
 
 def test_the_document_says_whether_a_token_is_needed(service: Service, settings: Settings, connect: Connect) -> None:
     with_token = settings.model_copy(update={"token": SecretStr("correct-horse-battery-staple")})
-    app = create_app(with_token, store=service.store, computer=service.computer)
+    app = create_app(with_token, store=service.store, computer=service.computer, checker=service.checker)
     header = {"Authorization": "Bearer correct-horse-battery-staple"}
     guarded = connect(app).get("/openapi.json", headers=header).json()
     OpenAPIV31SpecValidator(guarded).validate()

@@ -222,7 +222,7 @@ def test_the_service_answers_as_it_does_with_a_file(
     settings = Settings(database=postgres_url, chunk_cases=2, processes=2)
     computer = InThread()
     with Store.open(settings.database_url, chunking=chunking(settings)) as store:
-        app = create_app(settings, store=store, computer=computer)
+        app = create_app(settings, store=store, computer=computer, checker=InThread())
         service = Service(app, connect(app), store, computer)
         study = service.submit(spec)
         rows = service.fill(study)

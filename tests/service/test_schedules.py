@@ -48,7 +48,7 @@ def service(settings: Settings, clock: Clock, connect: Callable[..., httpx.Clien
     """A service by the clock of the test."""
     computer = InThread()
     with Store.open(settings.database_url, chunking=chunking(settings), clock=clock) as store:
-        app = create_app(settings, store=store, computer=computer)
+        app = create_app(settings, store=store, computer=computer, checker=InThread())
         yield Service(app, connect(app), store, computer)
 
 

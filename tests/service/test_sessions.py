@@ -36,7 +36,10 @@ class Office:
         self.write, self.writer = self.store.create_token("designer", TokenScope.WRITE)
         self.read, self.reader = self.store.create_token("manager", TokenScope.READ)
         self.app = create_app(
-            settings.model_copy(update={"host": "0.0.0.0"}), store=service.store, computer=service.computer
+            settings.model_copy(update={"host": "0.0.0.0"}),
+            store=service.store,
+            computer=service.computer,
+            checker=service.checker,
         )
         self._connect = connect
 
@@ -101,7 +104,7 @@ def test_a_service_of_this_machine_needs_a_token_as_soon_as_there_was_one(
     settings: Settings, service: Service, connect: Callable[..., httpx.Client], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(access, "BELIEVED_SECONDS", 0.0)
-    client = connect(create_app(settings, store=service.store, computer=service.computer))
+    client = connect(create_app(settings, store=service.store, computer=service.computer, checker=service.checker))
     assert client.get("/api/v1/studies").status_code == 200
     assert "needs no token" in client.get("/login").text
     secret, record = service.store.create_token("me", TokenScope.WRITE)

@@ -58,7 +58,7 @@ def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[House]:
     settings = Settings(database=str(tmp_path / "sprag.sqlite3"), processes=1)
     clock = NewYear()
     with Store.open(settings.database_url, chunking=chunking(settings), clock=clock) as store:
-        app = create_app(settings, store=store, computer=InThread())
+        app = create_app(settings, store=store, computer=InThread(), checker=InThread())
         with served(app) as address:
             yield House(address, store, clock, finished_study(store))
 
