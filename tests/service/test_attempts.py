@@ -140,7 +140,10 @@ def guarded(
 ) -> httpx.Client:
     """A client, behind a proxy on this machine, of a service with a token."""
     app = create_app(
-        settings.model_copy(update={"token": SecretStr(TOKEN)}), store=service.store, computer=service.computer
+        settings.model_copy(update={"token": SecretStr(TOKEN)}),
+        store=service.store,
+        computer=service.computer,
+        checker=service.checker,
     )
     app.state.access.attempts = attempts
     return connect(app, headers={"X-Forwarded-For": "198.51.100.1"})

@@ -295,10 +295,10 @@ def test_sessions_outlive_a_restart_and_hold_on_every_host(
     browser.post("/login", data={"token": office.write})
     cookie = {"Cookie": f"{access.COOKIE}={browser.cookies[access.COOKIE]}", "Accept": "text/html", **OWN}
     with Store.open(settings.database_url) as store:
-        other = connect(create_app(settings, store=store, computer=service.computer))
+        other = connect(create_app(settings, store=store, computer=service.computer, checker=service.checker))
         assert other.get("/", headers=cookie).status_code == 200
         assert other.post("/logout", headers=cookie).status_code == 303
-    later = connect(create_app(settings, store=service.store, computer=service.computer))
+    later = connect(create_app(settings, store=service.store, computer=service.computer, checker=service.checker))
     assert later.get("/", headers=cookie).status_code == 303
 
 
@@ -307,7 +307,7 @@ def test_a_session_of_the_setting_ends_when_the_setting_changes(
 ) -> None:
     def app(token: str) -> httpx.Client:
         changed = settings.model_copy(update={"token": SecretStr(token)})
-        return connect(create_app(changed, store=service.store, computer=service.computer))
+        return connect(create_app(changed, store=service.store, computer=service.computer, checker=service.checker))
 
     first = app("a" * 20)
     first.post("/login", data={"token": "a" * 20}, headers=OWN)
