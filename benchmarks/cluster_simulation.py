@@ -74,6 +74,7 @@ def dispatch_seconds(url: str, size: int, chunks: int = 8) -> float:
             times.append(time.perf_counter() - begin)
         store.settle(epoch, record.number)
         store.delete_study(record.id)
+        store.purge()
     return min(times)
 
 

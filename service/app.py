@@ -8,6 +8,7 @@ from importlib.metadata import version
 from typing import Any
 
 from fastapi import APIRouter, FastAPI
+from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp
 
 from service import checks, handlers
@@ -18,6 +19,7 @@ from service.api.document import API_PREFIX, build_openapi
 from service.computer import Computes, Limits, ProcessComputer
 from service.drain import Drain
 from service.guard import Guard
+from service.housekeeping import Housekeeping
 from service.logs import Noted, RequestLog
 from service.metrics import Metrics
 from service.settings import Settings, UnsafeSettingsError
@@ -108,9 +110,12 @@ def create_app(
     async def lifespan(running: FastAPI) -> AsyncIterator[None]:
         if isinstance(used_checker, ProcessComputer) and checker is None:
             used_checker.start()
+        housekeeping = Housekeeping(used_store)
+        housekeeping.start()
         yield
         if isinstance(running, Application) and running.drain is not None:
             await running.drain.idle()
+        await run_in_threadpool(housekeeping.stop)
         if computer is None:
             used_computer.close()
         if checker is None:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service import logs
+from service.housekeeping import Housekeeping
 from service.logs import LogFormat
 from service.schedules.scheduler import Scheduler
 from service.storage.lock import lock_of
@@ -138,13 +139,13 @@ def run_dispatcher(
     with Store.open(settings.database_url, chunking=chunking) as store:
         store.require_sound()
         scheduler, upkeep = Scheduler(store), Upkeep(store, _possible(store, settings.upkeep, say))
+        housekeeping = Housekeeping(store)
         lock = lock_of(store.session, owner_name())
         try:
             if take_over:
                 _take_over(store, lock, say)
             elif not _stand_by(store, lock, stopping, say):
                 return
-            store.purge()
             say(f"worker with {settings.processes} processes at work on {store.session.location}")
             dispatcher = Dispatcher(
                 store,
@@ -156,10 +157,12 @@ def run_dispatcher(
             )
             scheduler.start()
             upkeep.start()
+            housekeeping.start()
             dispatcher.run(stopping)
         finally:
             scheduler.stop()
             upkeep.stop()
+            housekeeping.stop()
             lock.release()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -19,8 +19,8 @@ from service.storage.store import Store
 from worker.chunking import Chunking
 from worker.dispatcher import Dispatcher
 from worker.executors.inline import InlineExecutor
-from worker.ports import StoreError
-from worker.states import StudyState
+from worker.ports import ExecutorError, StoreError
+from worker.states import StudyState, TransitionError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -39,6 +39,14 @@ REPORT_SECONDS = 0.25
 
 class StudyHeldError(StoreError):
     """The study was held before its end; the message says why."""
+
+
+class RunInterruptedError(KeyboardInterrupt):
+    """The run was interrupted and its study cancelled; ``record`` tells what of it is kept."""
+
+    def __init__(self, record: StudyRecord) -> None:
+        super().__init__()
+        self.record = record
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +77,8 @@ def run_here(
     Without ``database_url`` the database is a temporary one and gone with the context. When another dispatcher is at
     work on the database given, that one runs the study and this process waits. ``processes`` 0 runs the cases in this
     process, which suits a few; 1 and more start a pool. At ``finish_by`` it ends with what is done. Raises StoreError
-    and ExecutorError, each with one sentence.
+    and ExecutorError, each with one sentence; RunInterruptedError on Ctrl-C, when the study has been cancelled, so that
+    no later worker goes on with it.
     """
     sweep(Path(tempfile.gettempdir()).glob(f"{_FOLDER_PREFIX}*"))
     with tempfile.TemporaryDirectory(prefix=_FOLDER_PREFIX) as folder, marked(Path(folder)):
@@ -89,9 +98,23 @@ def run_here(
                         ).run(watch.ended)
                     else:
                         time.sleep(STANDBY_SECONDS)
+            except (KeyboardInterrupt, ExecutorError) as error:
+                ended = _cancelled(store, record.id, ours=lock.take())
+                if isinstance(error, KeyboardInterrupt) and database_url is not None:
+                    raise RunInterruptedError(ended) from None
+                raise
             finally:
                 lock.release()
             yield LocalRun(store, watch.final(passing=database_url is None))
+
+
+def _cancelled(store: Store, study_id: str, *, ours: bool) -> StudyRecord:
+    """Cancel the study unless it has ended; ``ours``: no other dispatcher is there to bring it to its end."""
+    with suppress(TransitionError):
+        record = store.cancel_study(study_id)
+        if ours:
+            store.settle(store.take_over(owner_name()), record.number)
+    return store.get_study(study_id)
 
 
 class _Watch:

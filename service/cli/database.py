@@ -90,6 +90,7 @@ def prune(
         location = session.url.render_as_string(hide_password=False)
     with Store.open(location) as store:
         found = store.prune(store.clock.now() - timedelta(days=older_than), dry=dry_run)
+        store.purge()
     if as_json:
         write_json({"deleted": [] if dry_run else found, "found": found})
     else:

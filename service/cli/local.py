@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import UTC, datetime
 from enum import StrEnum
@@ -255,6 +256,7 @@ def run(
     _say_warnings(parsed)
     start = time.monotonic()
     with (
+        _telling_what_is_kept(),
         output(file) as write,
         progress_bar(parsed.study.name or "study") as update,
         run_here(
@@ -290,6 +292,22 @@ def run(
         say(str(record.reason))
     if record.ok != record.cases:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
+
+
+@contextmanager
+def _telling_what_is_kept() -> Iterator[None]:
+    """Tell after Ctrl-C what became of the study, and how to go on with it."""
+    from service.local import RunInterruptedError
+
+    try:
+        yield
+    except RunInterruptedError as stop:
+        record = stop.record
+        say(
+            f"the study {record.id} is {record.state.value}: {record.done} of {record.cases} cases are kept, "
+            "and the same command without --fresh takes them from there"
+        )
+        raise
 
 
 def _finish(text: str | None) -> datetime | None:

@@ -8,6 +8,7 @@ from service.storage import maintenance
 from service.storage.cases import Cases
 from service.storage.figures import Totals
 from service.storage.part import SystemClock
+from service.storage.purging import Purging
 from service.storage.retry import Retries
 from service.storage.room import Room
 from service.storage.schedules import Schedules
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from worker.ports import Clock
 
 
-class Store(Studies, Retries, Cases, Room, Schedules, Sessions, Tokens, Totals, Work):
+class Store(Studies, Purging, Retries, Cases, Room, Schedules, Sessions, Tokens, Totals, Work):
     """One database. Safe to use from several threads; close it at the end (it is a context manager)."""
 
     @classmethod
@@ -61,6 +62,10 @@ class Store(Studies, Retries, Cases, Room, Schedules, Sessions, Tokens, Totals, 
     def backup(self, path: Path) -> None:
         """Write a consistent copy to ``path`` while others go on working; raises DatabaseError."""
         maintenance.backup(self.session, path)
+
+    def checkpoint(self) -> None:
+        """Move the write-ahead log to its place, as far as nobody reads the old state; holds up nobody."""
+        maintenance.checkpoint(self.session)
 
     def close(self) -> None:
         """Close every connection."""

@@ -8,7 +8,7 @@ from collections import OrderedDict
 from contextlib import suppress
 from dataclasses import replace
 from datetime import timedelta
-from threading import Lock
+from threading import Event, Lock
 from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
@@ -28,7 +28,6 @@ from service.storage.tables import (
     RECORD_COLUMNS,
     STUDIES,
     WAITS_FOR_WINDOW,
-    results_table,
 )
 from worker import kernels
 from worker.chunking import Chunking, spans
@@ -44,8 +43,6 @@ if TYPE_CHECKING:
     from worker.ports import Clock
 
 MAX_PAGE = 1000
-#: Rows deleted in one transaction: other writers wait for it.
-DELETE_ROWS = 20_000
 #: Studies kept in memory after they were read.
 KEPT_STUDIES = 32
 
@@ -58,6 +55,8 @@ class Studies(Orders):
         self.chunking = chunking
         self._studies: OrderedDict[str, Study] = OrderedDict()
         self._lock = Lock()
+        #: Set when a study is deleted, for `service.housekeeping`.
+        self.deleted = Event()
 
     def create_study(
         self,
@@ -291,7 +290,10 @@ class Studies(Orders):
             return _study_of_key(connection, idempotency_key, body_hash)
 
     def delete_study(self, study_id: str) -> None:
-        """Delete a study with its rows that has ended, or whose time was over; raises StudyNotFound, else StudyBusy."""
+        """Delete a study that has ended, or whose time was over; raises StudyNotFound, else StudyBusy.
+
+        Nobody sees it any more when this returns; its rows are removed afterwards, by `Purging.purge_steps`.
+        """
         with self.session.write() as connection:
             row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.state, STUDIES.c.waits_for)
             state = StudyState(row.state)
@@ -300,7 +302,7 @@ class Studies(Orders):
             for table in (ENDINGS, IDEMPOTENCY_KEYS):
                 connection.execute(sa.delete(table).where(table.c.study == row.number))
             connection.execute(sa.update(STUDIES).where(STUDIES.c.number == row.number).values(deleted_at=self._now()))
-        self.purge()
+        self.deleted.set()
 
     def prune(self, ended_before: datetime, *, dry: bool = False) -> list[str]:
         """Delete every study that ended, or whose time was over, before ``ended_before``; their ids.
@@ -317,28 +319,6 @@ class Studies(Orders):
             with suppress(StudyNotFound, StudyBusy):  # somebody else deleted it, or runs it again
                 self.delete_study(study_id)
         return found
-
-    def purge(self) -> None:
-        """Remove what is left of deleted studies, in short transactions."""
-        c = STUDIES.c
-        with self.session.read() as connection:
-            gone = connection.execute(
-                sa.select(c.number, c.model, c.pendulums, c.cases).where(c.deleted_at.is_not(None))
-            ).all()
-        for number, model, pendulums, cases in gone:
-            for table, column in (
-                (rows := results_table(model, pendulums), rows.c.case_number),
-                (CHUNKS, CHUNKS.c["first"]),
-            ):
-                for first in range(0, cases, DELETE_ROWS):
-                    with self.session.write() as connection:
-                        connection.execute(
-                            sa.delete(table).where(
-                                table.c.study == number, column >= first, column < first + DELETE_ROWS
-                            )
-                        )
-            with self.session.write() as connection:
-                connection.execute(sa.delete(STUDIES).where(c.number == number))
 
 
 def study_row(

@@ -125,6 +125,7 @@ def test_only_ended_studies_are_deleted_and_then_wholly(store: Store) -> None:
     store.delete_study(record.id)
     with pytest.raises(StudyNotFound):
         store.get_study(record.id)
+    store.purge()
     assert [study.id for study in store.list_studies().studies] == [other.id]
     assert len(store.case_rows(other.id)) == 25
     assert create(store, idempotency_key="k", body_hash="b").id != record.id

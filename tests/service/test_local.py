@@ -16,7 +16,7 @@ import pytest
 
 from service import dispatching
 from service.dispatching import StopFlag, WorkerSettings, run_dispatcher, start_dispatcher_process
-from service.local import StudyHeldError, run_here
+from service.local import RunInterruptedError, StudyHeldError, run_here
 from service.storage import room
 from service.storage.lock import DispatcherLock
 from service.storage.records import Progress
@@ -182,7 +182,7 @@ def test_a_standby_ends_when_it_is_asked_to(url: str) -> None:
         lock.release()
 
 
-def test_a_new_dispatcher_clears_away_half_deleted_studies(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_new_dispatcher_clears_away_half_deleted_studies(url: str) -> None:
     with Store.open(url, chunking=Chunking(cases=4)) as store:
         record = store.create_study({}, fakes.study(9))
         run_dispatcher(
@@ -191,15 +191,18 @@ def test_a_new_dispatcher_clears_away_half_deleted_studies(url: str, monkeypatch
             say=lambda _: None,
             executor=inline,
         )
-        with monkeypatch.context() as patch:
-            patch.setattr(Store, "purge", lambda _: None)
-            store.delete_study(record.id)
+        store.delete_study(record.id)
         with store.session.read() as connection:
             assert connection.exec_driver_sql("SELECT count(*) FROM vibration_drive_1").scalar_one() == 9
-        run_dispatcher(WorkerSettings(url, 1, DEADLINE), lambda: True, say=lambda _: None, executor=inline)
-        with store.session.read() as connection:
-            for table in ("vibration_drive_1", "chunks", "studies"):
-                assert connection.exec_driver_sql(f"SELECT count(*) FROM {table}").scalar_one() == 0
+
+        def clear() -> bool:
+            with store.session.read() as connection:
+                return all(
+                    connection.exec_driver_sql(f"SELECT count(*) FROM {table}").scalar_one() == 0
+                    for table in ("vibration_drive_1", "chunks", "studies")
+                )
+
+        run_dispatcher(WorkerSettings(url, 1, DEADLINE), clear, say=lambda _: None, executor=inline)
 
 
 def test_a_dispatcher_process_runs_studies_and_ends_in_order(url: str) -> None:
@@ -238,3 +241,57 @@ def test_no_process_outlives_a_parent_that_is_killed(url: str, tmp_path: Path) -
         family = [dispatcher, *dispatcher.children(recursive=True)]
         parent.kill()
     assert psutil.wait_procs(family, timeout=DEADLINE)[1] == []
+
+
+def test_a_run_that_is_interrupted_leaves_nothing_to_later_workers_and_its_rows_to_later_runs(url: str) -> None:
+    study, chunks = fakes.study(20), iter(range(3))
+
+    def interrupted(task: kernels.ChunkTask) -> kernels.ChunkResult:
+        if next(chunks, None) is None:
+            raise KeyboardInterrupt
+        return kernels.run_task(task)
+
+    with (
+        pytest.raises(RunInterruptedError) as caught,
+        run_here({}, study, processes=0, database_url=url, chunk_cases=4, executor=InlineExecutor(interrupted)),
+    ):
+        pass
+    record = caught.value.record
+    assert (record.state, record.cases) == (StudyState.CANCELLED, 20)
+    assert record.done == 12
+    with Store.open(url) as store:
+        assert store.active_studies() == []
+        assert store.list_studies().studies[0].state is StudyState.CANCELLED
+    with run_here({}, study, processes=0, database_url=url, chunk_cases=4) as run:
+        assert (run.record.state, run.record.reused) == (StudyState.FINISHED, record.done)
+
+
+def test_a_run_that_another_dispatcher_works_on_is_cancelled_too(url: str) -> None:
+    lock = DispatcherLock(Path(url.removeprefix("sqlite:///")))
+    assert lock.take()
+
+    def interrupt(_: Progress) -> None:
+        raise KeyboardInterrupt
+
+    with (
+        pytest.raises(RunInterruptedError) as caught,
+        run_here({}, fakes.study(20), processes=0, database_url=url, on_progress=interrupt),
+    ):
+        pass
+    assert caught.value.record.state is StudyState.CANCELLING
+    lock.release()
+
+
+def test_ctrl_c_tells_what_is_kept_and_how_to_go_on(
+    sprag: Callable[..., Finished], examples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("service.local.Dispatcher.run", interrupt)
+        stopped = sprag("run", examples / "press.toml", "--db", tmp_path / "kept.sqlite3", "-o", tmp_path / "rows.csv")
+    assert stopped.code == 130
+    assert "is cancelled: 0 of" in stopped.err
+    assert "the same command without --fresh takes them from there" in stopped.err
+    assert not (tmp_path / "rows.csv").exists()

@@ -209,6 +209,7 @@ def test_a_source_that_is_deleted_meanwhile_costs_a_run_and_no_row(
     def deleted_first(*args: Any) -> bool:
         if store.list_studies().studies[-1].id == source.id:
             store.delete_study(source.id)
+            store.purge()
         return commit(*args)
 
     monkeypatch.setattr(store, "commit", deleted_first)

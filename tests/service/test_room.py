@@ -75,6 +75,7 @@ def test_what_deleted_studies_left_free_is_room(store: Store, world: Callable[..
     assert store.shortage() is not None
     world(free=PLENTY)
     store.delete_study(study)
+    store.purge()
     world(free=0)
     assert store.room() > 5e6
     assert store.shortage() is None

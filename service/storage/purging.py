@@ -1,0 +1,52 @@
+"""Removing what is left of deleted studies, step by step, so that other writers get their turn in between."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import sqlalchemy as sa
+
+from service.storage.part import Part
+from service.storage.tables import CHUNKS, STUDIES, results_table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+#: Rows deleted in one transaction: other writers wait for it.
+PURGED_ROWS: Final = 5_000
+
+
+class Purging(Part):
+    """The rows of deleted studies."""
+
+    def purge(self) -> None:
+        """Remove all of it now."""
+        for _ in self.purge_steps():
+            pass
+
+    def purge_steps(self) -> Iterator[int]:
+        """Remove it in short transactions; the rows that each of them deleted."""
+        c = STUDIES.c
+        with self.session.read() as connection:
+            gone = connection.execute(sa.select(c.number, c.model, c.pendulums).where(c.deleted_at.is_not(None))).all()
+        for number, model, pendulums in gone:
+            rows = results_table(model, pendulums)
+            yield from self._emptied(rows, rows.c.case_number, number)
+            yield from self._emptied(CHUNKS, CHUNKS.c["first"], number)
+            with self.session.write() as connection:
+                connection.execute(sa.delete(STUDIES).where(c.number == number))
+            yield 1
+
+    def _emptied(self, table: sa.Table, key: sa.Column[int], number: int) -> Iterator[int]:
+        """Delete the rows of a study from a table, in the order of ``key``, which is unique in the study."""
+        mine = table.c.study == number
+        while True:
+            with self.session.write() as connection:
+                # The first row that stays; none where the rest is small enough.
+                edge = connection.execute(
+                    sa.select(key).where(mine).order_by(key).offset(PURGED_ROWS).limit(1)
+                ).scalar_one_or_none()
+                deleted = connection.execute(sa.delete(table).where(mine, sa.true() if edge is None else key < edge))
+            yield deleted.rowcount
+            if edge is None:
+                return
