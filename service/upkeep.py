@@ -8,11 +8,14 @@ from __future__ import annotations
 import logging
 import re
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from service.clock_watch import ClockWatch
 from service.leftovers import sweep
 from service.schedules.times import Timing, read_time_of_day
 from service.storage.errors import StoreError
@@ -26,7 +29,7 @@ _LOG = logging.getLogger("sprag.upkeep")
 
 #: Seconds between two looks at the clock, and before something that failed is tried again.
 LOOK_SECONDS = 20.0
-AGAIN_SECONDS = 600.0
+AGAIN = timedelta(minutes=10)
 _NAME: Final = re.compile(r"sprag-(\d{8}T\d{6}Z)\.sqlite3")
 _STAMP: Final = "%Y%m%dT%H%M%SZ"
 
@@ -63,22 +66,36 @@ def backups(folder: Path) -> list[tuple[datetime, Path]]:
     )
 
 
+@dataclass(slots=True)
+class _Task:
+    """Something to be done each night; `do` is told the time and whether the clock is believed, and says if it did it.
+
+    ``done`` is the due time that is done with, ``wait_until`` the time before which it is not tried again.
+    """
+
+    name: str
+    do: Callable[[datetime, bool], bool]
+    done: datetime | None = None
+    wait_until: datetime | None = None
+
+
 class Upkeep(threading.Thread):
     """Does what the plan says, every night by the store's clock, until `stop`."""
 
-    def __init__(self, store: Store, plan: UpkeepPlan) -> None:
+    def __init__(self, store: Store, plan: UpkeepPlan, watch: ClockWatch | None = None) -> None:
         super().__init__(name="sprag-upkeep", daemon=True)
         self._store = store
         self._plan = plan
+        self._watch = watch or ClockWatch(store)
         self._ending = threading.Event()
-        #: The due time that is done with, and the time before which nothing is tried again.
-        self._done = plan.timing.latest_until(store.clock.now())
-        self._wait_until: datetime | None = None
+        self._tasks: list[_Task] = []
+        if plan.folder is not None:
+            self._tasks.append(_Task("backup", partial(self._back_up, plan.folder)))
+        if plan.study_days:
+            self._tasks.append(_Task("deletion of old studies", self._prune))
 
     def run(self) -> None:
-        """Look, and again."""
-        if not self._plan.wanted:
-            return
+        """Look, and again; at the clock even where nothing else is wanted."""
         self.begin()
         while not self._ending.wait(LOOK_SECONDS):
             self.look()
@@ -90,41 +107,54 @@ class Upkeep(threading.Thread):
             self.join()
 
     def begin(self) -> None:
-        """Make up for a backup that was due while nothing was running."""
-        if self._plan.folder is not None:
-            made = backups(self._plan.folder)
-            if not made or (self._done is not None and made[-1][0] < self._done):
-                self._done = None
+        """Make up for what was due while nothing was running; a backup that was made since is enough."""
+        now = self._store.clock.now()
+        due = self._plan.timing.latest_until(now)
+        for task in self._tasks:
+            if task.name == "backup" and self._plan.folder is not None:
+                made = [when for when, _ in backups(self._plan.folder) if when <= now]
+                if made and (due is None or made[-1] >= due):
+                    task.done = due
         self.look()
 
     def look(self) -> None:
-        """Do what is due; what fails is said, and tried again later."""
+        """Do what is due, each task for itself; what fails is said, and tried again later."""
         now = self._store.clock.now()
         due = self._plan.timing.latest_until(now)
-        if due == self._done or (self._wait_until is not None and now < self._wait_until):
-            return
         try:
-            if self._plan.folder is not None:
-                self._back_up(self._plan.folder, now)
-            if self._plan.study_days:
-                self._prune(now)
-        except (StoreError, OSError) as error:
-            _LOG.error("The nightly upkeep failed and is tried again in 10 minutes: %s", error)
-            self._wait_until = now + timedelta(seconds=AGAIN_SECONDS)
-            return
-        self._done, self._wait_until = due, None
+            believed = self._watch.believable()
+        except StoreError as error:
+            _LOG.error("The clock cannot be judged, and nothing is deleted: %s", error)
+            believed = False
+        for task in self._tasks:
+            if task.done == due or (task.wait_until is not None and task.wait_until - AGAIN <= now < task.wait_until):
+                continue
+            try:
+                if not task.do(now, believed):
+                    continue
+            except (StoreError, OSError) as error:
+                _LOG.error("The nightly %s failed and is tried again in 10 minutes: %s", task.name, error)
+                task.wait_until = now + AGAIN
+                continue
+            task.done, task.wait_until = due, None
 
-    def _back_up(self, folder: Path, now: datetime) -> None:
+    def _back_up(self, folder: Path, now: datetime, believed: bool) -> bool:
         folder.mkdir(PRIVATE_FOLDER_MODE, parents=True, exist_ok=True)
         sweep(folder.glob(f".sprag-*.sqlite3.*{PART_SUFFIX}"))
         target = folder / f"sprag-{now.astimezone(UTC):{_STAMP}}.sqlite3"
         if not target.exists():
             self._store.backup(target)
             _LOG.info("Backup: %s (%.3g MB).", target, target.stat().st_size / 1e6)
-        for _, path in backups(folder)[: -self._plan.keep]:
-            path.unlink()
+        if believed:
+            # A name from the future was made under a wrong clock: it neither goes nor pushes a true one out.
+            for _, path in [made for made in backups(folder) if made[0] <= now][: -self._plan.keep]:
+                path.unlink()
+        return True
 
-    def _prune(self, now: datetime) -> None:
+    def _prune(self, now: datetime, believed: bool) -> bool:
+        if not believed:
+            return False
         gone = self._store.prune(now - timedelta(days=self._plan.study_days))
         if gone:
             _LOG.info("Deleted, because they ended more than %d days ago: %s.", self._plan.study_days, ", ".join(gone))
+        return True

@@ -30,7 +30,8 @@ def readyz(request: Request) -> Any:
     readiness = cast("Readiness", request.app.state.readiness)
     if found := readiness.problems():
         raise ApiError("unavailable", " ".join(found), headers={"Retry-After": "5"})
-    return json_response({"status": "ok"})
+    warnings = readiness.warnings()
+    return json_response({"status": "ok", **({"warnings": list(warnings)} if warnings else {})})
 
 
 @router.get(

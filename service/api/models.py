@@ -371,3 +371,4 @@ class Health(Body):
     """Whether the service is up."""
 
     status: Annotated[str, Field(examples=["ok"])]
+    warnings: list[str] | None = Field(None, description="What should be looked at, such as a clock that jumped")

@@ -117,3 +117,16 @@ def _opened(db: str | None, *, existing: bool = True) -> Iterator[Session]:
         yield session
     finally:
         session.close()
+
+
+@app.command("trust-clock")
+def trust_clock(db: Database = None) -> None:
+    """Say that the clock of this machine is right, after it jumped ahead or the worker was away for long."""
+    from service.storage.store import Store
+
+    with _opened(db) as session:
+        url = session.url.render_as_string(hide_password=False)
+    with Store.open(url) as store:
+        now = store.clock.now()
+        store.note_clock(now)
+        say(f"the clock is believed: it is {now.isoformat(timespec='seconds')}")

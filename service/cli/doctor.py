@@ -111,6 +111,7 @@ def _checks(db: str | None) -> dict[str, Callable[[], tuple[bool, str]]]:
     return {
         "versions": _versions,
         "database": lambda: _database(url, file),
+        "clock": lambda: _clock(url, file),
         **here,
         "kernel cache": _cache,
         "engine": _known_values,
@@ -159,6 +160,18 @@ def _rights(file: Path) -> tuple[bool, str]:
     if shared:
         return False, f"others may read {', '.join(shared)}: `chmod 600` keeps digests of tokens and designs private"
     return True, "only their owner may read database and backups"
+
+
+def _clock(url: str, file: Path | None) -> tuple[bool, str]:
+    from service.clock_watch import clock_problem
+    from service.storage.store import Store
+
+    now = f"it is {datetime.now(UTC).isoformat(timespec='seconds')}"
+    if file is not None and not file.exists():
+        return True, now
+    with Store.open(url) as store:
+        problem = clock_problem(store)
+    return problem is None, problem or now
 
 
 def _disk(location: Path) -> tuple[bool, str]:

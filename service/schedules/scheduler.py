@@ -27,6 +27,8 @@ LOOK_SECONDS = 1.0
 #: Seconds between two tries of a run that was refused for a reason that passes, and for how long it is tried.
 RETRY_SECONDS = 30.0
 GRACE = timedelta(hours=12)
+#: Seconds between two looks for schedules that a clock that was ahead has put off.
+RECOVERY_SECONDS = 30.0
 #: Problems that pass by themselves: the disk is short, the queue is full, a process is not to be had.
 _TRANSIENT = frozenset({"storage-full", "queue-full", "unavailable"})
 
@@ -38,6 +40,7 @@ class Scheduler(threading.Thread):
         super().__init__(name="sprag-scheduler", daemon=True)
         self._store = store
         self._ending = threading.Event()
+        self._next_recovery = float("-inf")
         #: By schedule and due time: before when (monotonic, s) what was refused for the time being is not tried again.
         self._next_try: dict[tuple[int, int], float] = {}
 
@@ -65,6 +68,10 @@ class Scheduler(threading.Thread):
     def look(self) -> None:
         """One look: what is due is submitted, and windows are kept."""
         now = self._store.clock.now()
+        if self._store.clock.monotonic() >= self._next_recovery:
+            self._next_recovery = self._store.clock.monotonic() + RECOVERY_SECONDS
+            for schedule in self._store.recover_schedules(now):
+                _LOG.warning("The clock was put back: the schedule %s is due at its next time again.", schedule)
         for record in self._store.due_schedules(now):
             self._take(record)
         for run in self._store.open_runs():

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from threading import Lock
 from typing import TYPE_CHECKING, Final
 
+from service.clock_watch import clock_problem
 from service.storage.errors import DatabaseError
 from service.storage.part import SILENT_SECONDS
 from worker.ports import StoreError
@@ -42,6 +44,13 @@ class Readiness:
         finally:
             self._looking.release()
         return self._found
+
+    def warnings(self) -> tuple[str, ...]:
+        """What keeps nobody from working and should be looked at, a sentence each."""
+        with suppress(StoreError):
+            if problem := clock_problem(self._store):
+                return (f"{problem}.",)
+        return ()
 
     def _look(self) -> list[str]:
         try:

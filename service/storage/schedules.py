@@ -137,6 +137,24 @@ class Schedules(Part):
             query = sa.select(SCHEDULES).where(_S.next_due <= _micros(now)).order_by(_S.next_due, _S.number)
             return [self._record(connection, row) for row in connection.execute(query).all()]
 
+    def recover_schedules(self, now: datetime) -> list[str]:
+        """Have schedules due again at their next time after ``now`` that a clock that was ahead put off; their ids."""
+        recovered = []
+        with self.session.read() as connection:
+            rows = connection.execute(sa.select(SCHEDULES).where(_S.next_due > _micros(now))).all()
+        for row in rows:
+            due = _fields(row).next_due(now)
+            if due is None or _micros(due) >= row.next_due:
+                continue
+            with self.session.write() as connection:
+                connection.execute(
+                    sa.update(SCHEDULES)
+                    .where(_S.number == row.number, _S.next_due == row.next_due)
+                    .values(next_due=_micros(due))
+                )
+            recovered.append(row.id)
+        return recovered
+
     def take_due(self, record: ScheduleRecord, due: datetime, missed: int, following: datetime | None) -> bool:
         """Take ``due`` up, for whoever comes first: False when another did, or the schedule was changed meanwhile."""
         assert record.next_due is not None

@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from worker import kernels
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0010"
+HEAD_REVISION = "0011"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -124,6 +124,8 @@ DISPATCHER = sa.Table(
     sa.Column("owner", sa.Text, nullable=False),
     sa.Column("started_at", sa.BigInteger, nullable=False),
     sa.Column("heartbeat_at", sa.BigInteger, nullable=False),
+    # The last moment at which the clock was believed; NULL: nobody has looked yet.
+    sa.Column("clock_at", sa.BigInteger),
 )
 
 #: Columns of a table of results before the results themselves.

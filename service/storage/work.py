@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import sqlalchemy as sa
 
-from service.storage.part import moment, optional_moment
+from service.storage.part import micros_of, moment, optional_moment
 from service.storage.records import DispatcherRecord
 from service.storage.reuse import Reuse, copy_rows, endings_of, mark_origin
 from service.storage.rows import target, tuples, without_collector
@@ -30,6 +30,7 @@ from worker.study import Study
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from datetime import datetime
 
     from worker.ports import Known
 
@@ -74,6 +75,16 @@ class Work(Reuse):
         if row is None:
             return None
         return DispatcherRecord(row.epoch, row.owner, moment(row.started_at), moment(row.heartbeat_at))
+
+    def believed_clock(self) -> datetime | None:
+        """The last moment at which the clock was believed; None when nobody has looked yet."""
+        with self.session.read() as connection:
+            return optional_moment(connection.execute(sa.select(DISPATCHER.c.clock_at)).scalar_one_or_none())
+
+    def note_clock(self, now: datetime) -> None:
+        """Note that the clock is believed at ``now``; nothing where there was no dispatcher yet."""
+        with self.session.write() as connection:
+            connection.execute(sa.update(DISPATCHER).values(clock_at=micros_of(now)))
 
     def silence(self) -> float | None:
         """Seconds since the dispatcher that took over last was heard of; None when there never was one."""
