@@ -23,7 +23,7 @@ LONGEST_PAUSE: Final = timedelta(days=60)
 NOTE_AFTER: Final = timedelta(minutes=10)
 MESSAGE: Final = (
     "The clock jumped ahead, from {} to {}: nothing is deleted by age until it is set right, or until "
-    "`sprag db trust-clock` says that it is right"
+    "`sprag db clock` says that it is right"
 )
 
 

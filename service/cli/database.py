@@ -119,8 +119,8 @@ def _opened(db: str | None, *, existing: bool = True) -> Iterator[Session]:
         session.close()
 
 
-@app.command("trust-clock")
-def trust_clock(db: Database = None) -> None:
+@app.command()
+def clock(db: Database = None) -> None:
     """Say that the clock of this machine is right, after it jumped ahead or the worker was away for long."""
     from service.storage.store import Store
 
