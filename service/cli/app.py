@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from service.cli import database, demo, doctor, extend, fit, local, pictures, processes, remote, schedule, token
+from service.cli import database, demo, doctor, extend, fit, local, pictures, processes, remote, schedule, settle, token
 from service.cli.console import CommandFailureError, ExitCode, TroubleError, say, write_text
 
 #: Set to anything to see where a fault of the program lies.
@@ -50,6 +50,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "run": local.run,
         "validate": local.validate,
         "preview": local.preview,
+        "settle": settle.settle,
         "trajectory": local.trajectory,
         "fit": fit.fit,
         "presets": local.presets,

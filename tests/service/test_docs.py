@@ -8,6 +8,7 @@ import pytest
 import typer
 
 from engine.machine_shaft.results import MACHINE_RESULTS
+from engine.vibration_drive.regimes import settled_infos
 from service.cli.app import app
 from service.presets import ABOUT, preset_names, preset_text
 from service.settings import table
@@ -106,7 +107,7 @@ def test_the_reference_lists_every_result(model: str) -> None:
 
 
 def test_results_that_the_pages_name_exist() -> None:
-    names = {info.name for info in (*kernels.result_infos("vibration-drive", 8), *MACHINE_RESULTS)}
+    names = {info.name for info in (*settled_infos(8), *MACHINE_RESULTS)}
     names |= {re.sub(r"\d", "N", name) for name in names}
     pattern = r"\b((?:shaft|torque|power|fraction|balance|reset|runup|clutches)\.(?!md\b)[a-z_]+(?:\.[a-z_]+)*)\b"
     paths = {entry.path for entry in kernels.parameter_catalogue("vibration-drive")}
