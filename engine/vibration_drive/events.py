@@ -8,7 +8,15 @@ from engine.taylor.batch import HARD, NONE, RESULT, SLOTS, STATUS, put, slot_sta
 from engine.taylor.roots import RECIPROCAL, first_root
 from engine.vibration_drive.automaton import CLUTCH_TARGET, Band
 from engine.vibration_drive.layout import Layout
-from engine.vibration_drive.locking import EDGE, acceleration, lock_share, lock_together
+from engine.vibration_drive.locking import (
+    EDGE,
+    acceleration,
+    lock_share,
+    others_in_contact,
+    settle_others,
+    share_at,
+    shared_acceleration,
+)
 from engine.vibration_drive.states import (
     BEYOND,
     ENGAGED,
@@ -42,6 +50,8 @@ Ints = NDArray[np.int64]
 
 #: Relative speed, against the pendulum's own motion, below which a start of interaction counts as a crossing of zero.
 _ROUNDING = 1e-12
+#: Angle in rad, and the same of speed over the excitation's rate, below which a motion about 0 is rounding.
+_STILL = 1e-14
 
 _BANDS = len(Band)
 
@@ -198,9 +208,12 @@ def _start(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> None:
     W[(base + lay.p_u) * lanes + lane] = 0.0
     state = ENGAGED
     if crossing and W[(base + lay.p_law) * lanes + lane] > 0.0:
-        if lock_together(W, Z, lay, lane, i, size):
-            return
-        share = lock_share(W, Z, lay, lane, i)
+        if others_in_contact(W, Z, lay, lane, i, size):
+            rate = shared_acceleration(W, Z, lay, lane, i, size)
+            share = share_at(W, lay, lane, i, rate)
+            settle_others(W, Z, lay, lane, i, size, rate)
+        else:
+            share = lock_share(W, Z, lay, lane, i)
         # At the edge the trend decides. At a step's start the series tell it: w'' has the sign of the torque's rate.
         bend = W[(base + lay.p_speed + 2) * lanes + lane] - W[(lay.speed + 2) * lanes + lane]
         if abs(share) <= EDGE and Z[lane, EVENT_SMOOTH] == 0 and bend > 0.0:
@@ -211,6 +224,7 @@ def _start(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> None:
         elif share <= 1.0 - EDGE:
             state = LOCKED
         elif share < 1.0 + EDGE:
+            Z[lane, SKIP_W + i] = 2
             Z[lane, SKIP_U + i] = 3
     if state != FREE:
         W[(base + lay.p_engagements) * lanes + lane] += 1.0
@@ -218,6 +232,23 @@ def _start(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> None:
     if Z[lane, LITERAL] == 1 and state == ENGAGED:
         # From beyond the data too, w has just risen: it must fall before it can rise again.
         watch_fall(W, lay, lane, i, True)
+
+
+@part
+def _at_rest(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> bool:
+    """Whether the motion of pendulum ``i`` is nothing but rounding about its equilibrium; then it ends.
+
+    Without horizontal vibration the upright position is an equilibrium. What rounding leaves there can have any size,
+    1e-40 rad or 0, and the guards of a clutch cannot tell such a pendulum from one that moves.
+    """
+    lanes = lay.lanes
+    base = lay.pendulums + i * lay.stride
+    phi, speed = (base + lay.p_phi) * lanes + lane, (base + lay.p_speed) * lanes + lane
+    still = abs(W[phi]) < _STILL and abs(W[speed]) * W[lay.inverse_rate * lanes + lane] < _STILL
+    if not still or Z[lane, i] == LOCKED or W[lay.acc_x * lanes + lane] != 0.0 or (W[phi] == 0.0 and W[speed] == 0.0):
+        return False
+    W[phi] = W[speed] = 0.0
+    return True
 
 
 @part
@@ -248,8 +279,12 @@ def transit(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
         return
     base = lay.pendulums + i * lay.stride
     source = Z[lane, i]
-    Z[lane, SKIP_W + i] = 0
-    Z[lane, SKIP_U + i] = 0
+    if source != target:
+        Z[lane, SKIP_W + i] = 0
+        Z[lane, SKIP_U + i] = 0
+    if _at_rest(W, Z, lay, lane, i):
+        # The guards are asked again now that w is what it would be without rounding.
+        return
     if target == START:
         _start(W, Z, lay, lane, i)
         return

@@ -7,7 +7,17 @@ from numpy.typing import NDArray
 
 from engine.jit import part
 from engine.vibration_drive.layout import Layout
-from engine.vibration_drive.states import ENGAGED, FREE, LOCKED, ROTATING, SHAFT_STATE, law, set_clutch
+from engine.vibration_drive.states import (
+    ENGAGED,
+    FREE,
+    LOCKED,
+    ROTATING,
+    SHAFT_STATE,
+    SKIP_U,
+    SKIP_W,
+    law,
+    set_clutch,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -81,43 +91,112 @@ def _touches(W: Floats, Z: Ints, lay: Layout, lane: int, j: int, size: float) ->
 
 
 @part
-def lock_together(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float) -> bool:
-    """Lock clutch ``i`` together with all others that touch at the same time, if the torques of all allow it.
+def _in_contact(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, j: int, size: float) -> bool:
+    """Whether what clutch ``j`` does is decided together with clutch ``i``, whose interaction starts."""
+    return bool(j == i or Z[lane, j] == LOCKED or _touches(W, Z, lay, lane, j, size))
 
-    Where two clutches each lock and release in turn, the motion slides on both surfaces at once; deciding one by one
-    would chatter for ever. The shared acceleration follows from locking all of them; every torque must come out between
-    0 and its c_1. Returns False, with nothing changed, if no other touches or the torques forbid it.
+
+@part
+def _excess(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float, push: float, rate: float) -> float:
+    """Torque that is left over if the shaft's acceleration is ``rate``; rises with it.
+
+    A clutch in contact then has the torque that keeps w = 0, but at least 0 and at most its c_1.
     """
     lanes = lay.lanes
-    others = 0
+    left = W[lay.inertia * lanes + lane] * rate - push
+    for j in range(lay.n):
+        if _in_contact(W, Z, lay, lane, i, j, size):
+            base = lay.pendulums + j * lay.stride
+            own = W[(base + lay.p_inertia) * lanes + lane]
+            torque = own * (acceleration(W, lay, lane, j) - rate)
+            left -= min(max(torque, 0.0), W[(base + lay.p_law) * lanes + lane])
+    return float(left)
+
+
+@part
+def shared_acceleration(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float) -> float:
+    """Acceleration of the shaft that is consistent with every clutch in contact when interaction of ``i`` starts.
+
+    Each of them opens (torque 0), locks (between) or winds up (c_1) as the shaft leaves it behind, keeps it or is left
+    behind: a linear complementarity problem. Its torques fall as the shaft's acceleration rises, so that acceleration
+    is the one root of a piecewise linear function, whose corners are where a clutch just opens or just winds up.
+    """
+    lanes = lay.lanes
     push = -W[lay.load * lanes + lane]
+    for j in range(lay.n):
+        if not _in_contact(W, Z, lay, lane, i, j, size) and Z[lane, j] >= ENGAGED:
+            base = lay.pendulums + j * lay.stride
+            push += law(W, base + lay.p_force, lay.coefficients, lanes, lane, W[(base + lay.p_u) * lanes + lane])
+    if Z[lane, SHAFT_STATE] != ROTATING and _excess(W, Z, lay, lane, i, size, push, 0.0) >= 0.0:
+        return 0.0
+    low, high = -math.inf, math.inf
+    for j in range(lay.n):
+        if _in_contact(W, Z, lay, lane, i, j, size):
+            base = lay.pendulums + j * lay.stride
+            opens = acceleration(W, lay, lane, j)
+            winds = opens - W[(base + lay.p_law) * lanes + lane] / W[(base + lay.p_inertia) * lanes + lane]
+            for corner in (winds, opens):
+                if _excess(W, Z, lay, lane, i, size, push, corner) <= 0.0:
+                    low = max(low, corner)
+                else:
+                    high = min(high, corner)
     inertia = W[lay.inertia * lanes + lane]
     for j in range(lay.n):
-        base = lay.pendulums + j * lay.stride
-        touching = j == i or (Z[lane, j] != LOCKED and _touches(W, Z, lay, lane, j, size))
-        if touching or Z[lane, j] == LOCKED:
-            others += 1 if touching and j != i else 0
-            moved = W[(base + lay.p_inertia) * lanes + lane]
-            inertia += moved
-            push += moved * acceleration(W, lay, lane, j)
-        elif Z[lane, j] >= ENGAGED:
-            push += law(W, base + lay.p_force, lay.coefficients, lanes, lane, W[(base + lay.p_u) * lanes + lane])
-    if others == 0:
-        return False
-    shared = push / inertia if Z[lane, SHAFT_STATE] == ROTATING or push > 0.0 else 0.0
+        if _in_contact(W, Z, lay, lane, i, j, size):
+            base = lay.pendulums + j * lay.stride
+            own = W[(base + lay.p_inertia) * lanes + lane]
+            first = W[(base + lay.p_law) * lanes + lane]
+            opens = acceleration(W, lay, lane, j)
+            if opens - first / own >= high:
+                push += first
+            elif opens > low:
+                inertia += own
+                push += own * opens
+    return float(push / inertia)
+
+
+@part
+def share_at(W: Floats, lay: Layout, lane: int, j: int, rate: float) -> float:
+    """Torque that keeps w = 0 at clutch ``j`` while the shaft's acceleration is ``rate``, as a share of its c_1."""
+    base = lay.pendulums + j * lay.stride
+    own = W[(base + lay.p_inertia) * lay.lanes + lane]
+    return float(own * (acceleration(W, lay, lane, j) - rate) / W[(base + lay.p_law) * lay.lanes + lane])
+
+
+@part
+def others_in_contact(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float) -> bool:
+    """Whether another clutch is locked, or at w = 0 and u = 0 too, when interaction of ``i`` starts."""
+    others = 0
     for j in range(lay.n):
-        base = lay.pendulums + j * lay.stride
-        if j == i or Z[lane, j] == LOCKED or _touches(W, Z, lay, lane, j, size):
-            torque = W[(base + lay.p_inertia) * lanes + lane] * (acceleration(W, lay, lane, j) - shared)
-            share = torque / W[(base + lay.p_law) * lanes + lane]
-            if not EDGE <= share <= 1.0 - EDGE:
-                return False
+        if j != i and _in_contact(W, Z, lay, lane, i, j, size):
+            others += 1
+    return others > 0
+
+
+@part
+def settle_others(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float, rate: float) -> None:
+    """Put every other clutch in contact into the state that goes with the shaft's acceleration ``rate``.
+
+    At the edge of two states a clutch keeps the one it has: its guards tell the trend.
+    """
+    lanes = lay.lanes
     for j in range(lay.n):
-        base = lay.pendulums + j * lay.stride
-        if Z[lane, j] != LOCKED and (j == i or _touches(W, Z, lay, lane, j, size)):
-            if Z[lane, j] == FREE:
-                W[(base + lay.p_engagements) * lanes + lane] += 1.0
-            W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
-            W[(base + lay.p_u) * lanes + lane] = 0.0
-            set_clutch(W, Z, lay, lane, j, LOCKED)
-    return True
+        if j == i or not _in_contact(W, Z, lay, lane, i, j, size):
+            continue
+        source = Z[lane, j]
+        share = share_at(W, lay, lane, j, rate)
+        state = FREE if share < 0.0 else (ENGAGED if share > 1.0 else LOCKED)
+        opening, winding = abs(share) < EDGE, abs(share - 1.0) < EDGE
+        if state == source or (opening and source != ENGAGED) or (winding and source != FREE):
+            continue
+        if winding:
+            state = ENGAGED
+            Z[lane, SKIP_U + j] = 3
+        elif opening:
+            state = FREE
+            Z[lane, SKIP_W + j] = 2
+        if source == FREE:
+            W[(lay.pendulums + j * lay.stride + lay.p_engagements) * lanes + lane] += 1.0
+        W[(lay.pendulums + j * lay.stride + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
+        W[(lay.pendulums + j * lay.stride + lay.p_u) * lanes + lane] = 0.0
+        set_clutch(W, Z, lay, lane, j, state)
