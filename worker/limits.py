@@ -64,6 +64,9 @@ WRITE_SECONDS: Final = 60.0
 #: Schedules that are kept.
 MAX_SCHEDULES: Final = 1_000
 
+#: Times its limit of processor time that a chunk may take by the clock on the wall: a crowded machine is slow.
+WALL_TIMES: Final = 10.0
+
 #: Seconds in which a kernel must be compiled: many times what the largest takes on a slow, busy machine.
 LOAD_SECONDS = 3600.0
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+
+_A = TypeVar("_A")
+_R = TypeVar("_R")
 
 #: Libraries that would start threads of their own; the pool has a process for each core already.
 _THREAD_VARIABLES = (
@@ -80,3 +84,15 @@ def limit_memory(more: int) -> None:
     status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
     taken = next(int(line.split()[1]) * 1024 for line in status.splitlines() if line.startswith("VmData:"))
     resource.setrlimit(resource.RLIMIT_DATA, (taken + more, taken + more))
+
+
+def within_processor_time(seconds: float, function: Callable[[_A], _R], argument: _A) -> _R:
+    """The value of ``function(argument)``; the process ends by SIGPROF where that takes more processor time (s).
+
+    The kernel counts and ends it, also in compiled code that never comes back. No limit where ``seconds`` is infinite.
+    """
+    signal.setitimer(signal.ITIMER_PROF, seconds if math.isfinite(seconds) else 0.0)
+    try:
+        return function(argument)
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)

@@ -65,6 +65,12 @@ def run(
     return result(task.first, task.count, kernels.Ending.DIVERGED if failing else kernels.OK)
 
 
+def spinning(task: ChunkTask) -> ChunkResult:
+    """Never comes back, and uses all the processor time it can get."""
+    while True:
+        pass
+
+
 def raising(task: ChunkTask) -> ChunkResult:
     """A fault of the program in every chunk."""
     raise ZeroDivisionError("no such thing")
@@ -167,6 +173,7 @@ def pool(
         compiled=compiled,
         prepare=prepare,
         load_timeout=load_timeout,
+        wall_timeout=chunk_timeout,
     )
 
 

@@ -28,6 +28,7 @@ from worker.executors.dask_jobs import Job, Waiting, Worker, refusals
 from worker.executors.dask_link import Link, value_of
 from worker.executors.dask_tasks import INTRODUCE, load_kernel, run_chunk, scheduler_address
 from worker.executors.process_pool import MAX_LOADS, SPARE_CHUNKS
+from worker.limits import WALL_TIMES
 from worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ class DaskExecutor:
         executor alone.
     processes : int
     chunk_timeout : float
-        Seconds after which a chunk that is being run ends with its worker.
+        Seconds of processor time after which a chunk ends with its worker; `WALL_TIMES` as many on the wall.
     run, load : functions
         What a worker does with a chunk and with a new kernel; importable by name. Other than the engine's in tests.
     expected : mapping, optional
@@ -93,7 +94,7 @@ class DaskExecutor:
         scheduler_seconds: float = SCHEDULER_SECONDS,
         renew: bool = False,
     ) -> None:
-        self._timeout = chunk_timeout
+        self._timeout, self._wall = chunk_timeout, WALL_TIMES * chunk_timeout
         self._run = run
         self._load = load
         self._expected = fingerprint.own() if expected is None else expected
@@ -229,7 +230,7 @@ class DaskExecutor:
             ended = []
             for worker in self._workers.values():
                 if (job := worker.job) and job.kind == "chunk":
-                    if now - job.began > self._longest:
+                    if now - job.began > self._wall + FROZEN_SECONDS:
                         self._worker_is_frozen(worker)
                         ended.append(worker.address)
                     elif job.dropped is not None and now - job.dropped > STOP_SECONDS:
@@ -238,10 +239,6 @@ class DaskExecutor:
             self._fill()
         for address in ended:
             self._link.end_worker(address)
-
-    @property
-    def _longest(self) -> float:
-        return self._timeout + FROZEN_SECONDS
 
     def _scheduler_is_gone(self, error: Exception) -> None:
         """Hand back what was on its way; somebody may start the scheduler again."""
@@ -312,7 +309,7 @@ class DaskExecutor:
             if chosen is not None:
                 self._waiting.remove(chosen)
                 job = Job("chunk", time.monotonic(), chosen.ticket)
-                self._begin(worker, job, chosen.key, run_chunk, self._run, chosen.task, self._timeout)
+                self._begin(worker, job, chosen.key, run_chunk, self._run, chosen.task, self._timeout, self._wall)
                 continue
             shape = next((s for item in self._waiting if (worker.host, s := item.task.shape) not in self._unable), None)
             if shape is None:

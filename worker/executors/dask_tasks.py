@@ -15,6 +15,7 @@ from distributed import Security
 from worker import fingerprint, kernels
 from worker.limits import LOAD_SECONDS
 from worker.ports import ExecutorError
+from worker.processes import within_processor_time
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -65,10 +66,10 @@ def _discard_once(token: str) -> None:
 
 
 def run_chunk(
-    run: Callable[[kernels.ChunkTask], kernels.ChunkResult], task: kernels.ChunkTask, seconds: float
+    run: Callable[[kernels.ChunkTask], kernels.ChunkResult], task: kernels.ChunkTask, seconds: float, wall: float
 ) -> kernels.ChunkResult:
-    """Run by a worker for each chunk."""
-    return _within(seconds, partial(run, task))
+    """Run by a worker for each chunk, for so many seconds of processor time and by the clock on the wall."""
+    return _within(wall, partial(within_processor_time, seconds, run, task))
 
 
 def _within(seconds: float, function: Callable[[], _T]) -> _T:

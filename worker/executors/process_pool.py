@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections import Counter
 from functools import partial
 from queue import Empty, SimpleQueue
@@ -11,9 +12,9 @@ from worker import fingerprint, kernels
 from worker.child_pool import ChildPool, JobStoppedError
 from worker.child_process import ProcessDiedError, ProcessStartError
 from worker.fingerprint import prepare_as
-from worker.limits import LOAD_SECONDS
+from worker.limits import LOAD_SECONDS, WALL_TIMES
 from worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
-from worker.processes import single_threaded_children
+from worker.processes import single_threaded_children, within_processor_time
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,7 +42,9 @@ class ProcessPoolExecutor:
     processes : int
         At least 1.
     chunk_timeout : float
-        Seconds after which a chunk that is being run is killed with its process.
+        Seconds of processor time after which a chunk that is being run is killed with its process.
+    wall_timeout : float, optional
+        The same by the clock on the wall, for what hangs without using any; default: `WALL_TIMES` as long.
     run, load, prepare : functions
         What a process does with a chunk, with a new kernel, and when it starts; importable by name. Other than the
         engine's in tests: its processes load the engine, and end where they are not of this process's fingerprint.
@@ -61,9 +64,11 @@ class ProcessPoolExecutor:
         compiled: Callable[[kernels.KernelShape], bool] = kernels.is_compiled,
         prepare: Callable[[], None] | None = None,
         load_timeout: float = LOAD_SECONDS,
+        wall_timeout: float | None = None,
     ) -> None:
         self._processes = processes
         self._timeout = chunk_timeout
+        self._wall = WALL_TIMES * chunk_timeout if wall_timeout is None else wall_timeout
         self._run = run
         self._load = load
         self._compiled = compiled
@@ -121,7 +126,9 @@ class ProcessPoolExecutor:
     def submit(self, ticket: int, study: Study, chunk: Chunk) -> None:
         """Start a chunk; returns at once."""
         task = kernels.chunk_task(study, chunk.first, chunk.count)
-        self._jobs[ticket] = job = self._pool.schedule(self._timeout, self._run, task)
+        self._jobs[ticket] = job = self._pool.schedule(
+            self._wall, within_processor_time, self._timeout, self._run, task
+        )
         job.future.add_done_callback(lambda done: self._ready.put(self._outcome(ticket, done)))
 
     def _outcome(self, ticket: int, future: Future[kernels.ChunkResult]) -> Outcome:
@@ -133,10 +140,12 @@ class ProcessPoolExecutor:
                 return Outcome(ticket, Fate.STOPPED, detail="stopped")
             case ProcessStartError():
                 return Outcome(ticket, Fate.STOPPED, detail=f"its process did not start ({error})")
+            case ProcessDiedError(exitcode=code) if code == -signal.SIGPROF:
+                return Outcome(ticket, Fate.TIMED_OUT, detail=f"killed after {self._timeout:g} s of processor time")
             case ProcessDiedError(exitcode=code):
                 return Outcome(ticket, Fate.CRASHED, detail=f"its process died (exit code {code})")
             case TimeoutError():
-                return Outcome(ticket, Fate.TIMED_OUT, detail=f"killed after {self._timeout:g} s")
+                return Outcome(ticket, Fate.TIMED_OUT, detail=f"killed after {self._wall:g} s")
         return Outcome(ticket, Fate.CRASHED, detail=f"{type(error).__name__}: {error}")
 
     def wait(self, timeout: float) -> list[Outcome]:
