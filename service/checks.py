@@ -13,13 +13,12 @@ from service.errors import to_bytes
 from service.extend import parse_extended
 from service.fits import fit_json, read_fit
 from service.intake import Submission, submission
-from service.plots import prepare_painting
 from service.preview import preview_json
 from service.schedules.fields import ScheduleFields, change_fields, read_fields
 from service.spec import load_spec, parse_spec
+from service.spec_shaft_check import compile_elsewhere
 from service.storage.store import Store
 from service.web.form_check import Checked, look_over
-from worker import kernels
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -30,9 +29,12 @@ if TYPE_CHECKING:
 
 
 def prepare() -> None:
-    """Have everything loaded, and compiled, that a first check or picture would wait for."""
-    prepare_painting()
-    kernels.load(kernels.KernelShape(kernels.MACHINE_SHAFT, 0, 0, 0.0))
+    """First thing in a process that checks: this module is loaded, and what is not compiled is left to others.
+
+    matplotlib and the machine shaft's kernels are loaded by the first who needs them: a study that is submitted right
+    after the start of the service need not wait for them.
+    """
+    compile_elsewhere()
 
 
 class Library:

@@ -132,14 +132,6 @@ def check_size(what: str, count: int, most: int) -> None:
         raise SelectionError([ErrorItem(message, parameter="format", allowed=f"<= {most} {what}")])
 
 
-def prepare_painting() -> None:
-    """Load what the first picture would wait for: matplotlib, and its list of fonts, which it makes once."""
-    import matplotlib.backends.backend_agg
-    import matplotlib.backends.backend_svg
-    import matplotlib.figure
-    import matplotlib.font_manager  # noqa: F401
-
-
 @contextmanager
 def painting() -> Iterator[None]:
     """The style of every picture. matplotlib keeps it in globals, so that a process draws one picture at a time."""

@@ -100,7 +100,7 @@ class Settings(BaseSettings):
         description="processes that check specs, fit clutches and draw; one token has all but one of them at most",
     )
     check_timeout: float = Field(
-        default=10.0,
+        default=20.0,
         gt=0.0,
         le=3_600.0,
         description="seconds after which the check of a spec, a fit or a picture is given up",

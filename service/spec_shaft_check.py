@@ -7,7 +7,15 @@ from functools import partial
 from typing import Any, Final
 
 from service.spec_messages import Report
-from worker.kernels import Ending, ExpressionError, InsufficientInertiaError, MachineError, machine_shaft
+from worker.kernels import (
+    Ending,
+    ExpressionError,
+    InsufficientInertiaError,
+    KernelShape,
+    MachineError,
+    is_compiled,
+    machine_shaft,
+)
 
 #: Where the fault of a machine that ends so is told.
 _POINTERS: Final[dict[Ending | None, str]] = {
@@ -17,6 +25,23 @@ _POINTERS: Final[dict[Ending | None, str]] = {
 }
 _PARTS: Final = ("mechanism", "drive", "operation")
 _NEUTRAL: Final[dict[str, dict[str, Any]]] = {"drive": {}, "mechanism": {"kind": "none"}, "operation": {}}
+
+
+class NotCompiledError(Exception):
+    """The kernel of ``shape`` is needed, and is compiled elsewhere: see `compile_elsewhere`."""
+
+    def __init__(self, shape: KernelShape) -> None:
+        super().__init__(shape)
+        self.shape = shape
+
+
+_compiles_here = True
+
+
+def compile_elsewhere() -> None:
+    """From now on checks in this process raise NotCompiledError rather than compile, which can take a minute."""
+    global _compiles_here  # noqa: PLW0603 - a habit of the whole process
+    _compiles_here = False
 
 
 def check_machine(
@@ -30,6 +55,9 @@ def check_machine(
     values : flat path -> SI number, all that the structure needs
     places : part -> JSON Pointer of its formula, its table, or all of it
     """
+    shape = machine_shaft.shape_of()
+    if not _compiles_here and not is_compiled(shape):
+        raise NotCompiledError(shape)
     before = report.found
     for part in _PARTS:
         # Alone but for the mechanism, which an operation needs, so that a fault is told where it is.

@@ -9,6 +9,7 @@ from fastapi import Depends, Request
 from starlette.requests import ClientDisconnect
 
 from service.access import OPEN
+from service.spec_shaft_check import NotCompiledError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
@@ -40,6 +41,13 @@ class Work:
 
     async def check(self, function: Callable[[*Args], R], *args: *Args) -> R:
         """The value of a function that reads, expands, fits or draws what users wrote."""
+        try:
+            return await self._check(function, *args)
+        except NotCompiledError as error:  # the first time on a machine
+            await self.load(error.shape)
+            return await self._check(function, *args)
+
+    async def _check(self, function: Callable[[*Args], R], *args: *Args) -> R:
         context = self._context
         return await self._attended(self._in_turn(context.check_shares, context.checker, function, *args))
 

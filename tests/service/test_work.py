@@ -172,3 +172,13 @@ def test_nothing_that_users_define_is_worked_on_in_the_service(
     assert isinstance(service.checker, InThread)
     monkeypatch.setattr(service.checker, "run", refuse)
     assert ask().status_code == 422
+
+
+def test_what_has_to_be_compiled_first_is_compiled_by_the_engines_process(
+    service: Service, portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    press = service.get("/presets/press")["spec"]
+    monkeypatch.setattr("service.spec_shaft_check._compiles_here", False)
+    monkeypatch.setattr("service.spec_shaft_check.is_compiled", lambda _shape: bool(service.computer.loads))
+    assert service.http.post(f"{API}/studies:preview", json=press).status_code == 200
+    assert service.computer.loads
