@@ -19,6 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 _FOLDERS = ("engine", "worker", "service", "migrations", "tests", "benchmarks")
 _FAULTS = "tests/acceptance/test_faults.py::"
+_SETTLED = "tests/engine/test_settled.py"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +51,8 @@ MUTANTS = (
     Mutant(
         "no IMMEDIATE transaction",
         "service/storage/session.py",
-        '"BEGIN IMMEDIATE"',
-        '"BEGIN"',
+        '"write": "BEGIN IMMEDIATE"',
+        '"write": "BEGIN"',
         (f"{_FAULTS}test_clients_do_not_hear_of_locks", "tests/contract/test_concurrency.py"),
     ),
     Mutant(
@@ -97,6 +98,34 @@ MUTANTS = (
         "    if free >= RESERVE_BYTES and not (capped and limit - size - log < RESERVE_BYTES):",
         "    if True:",
         ("tests/service/test_room.py",),
+    ),
+    Mutant(
+        "unstable orbits count as settled",
+        "engine/vibration_drive/search.py",
+        "            accepted = converged & (multiplier < STABLE) & (away < AWAY)",
+        "            accepted = converged & (away < AWAY)",
+        (_SETTLED,),
+    ),
+    Mutant(
+        "orbits with a multiplier up to 1.1 count as settled",
+        "engine/vibration_drive/search.py",
+        "STABLE = 1.0 - 1e-4",
+        "STABLE = 1.1",
+        (_SETTLED,),
+    ),
+    Mutant(
+        "states of clutches and shaft not compared",
+        "engine/vibration_drive/orbits.py",
+        "    if a[SHAFT] != b[SHAFT]:",
+        "    return True\n    if a[SHAFT] != b[SHAFT]:",
+        (_SETTLED,),
+    ),
+    Mutant(
+        "an order that is not the least",
+        "engine/vibration_drive/search.py",
+        "        again = np.flatnonzero(found.least < found.orders)",
+        "        again = np.flatnonzero(found.least > found.orders)",
+        (_SETTLED,),
     ),
 )
 

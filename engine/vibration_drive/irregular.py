@@ -9,6 +9,7 @@ from engine.vibration_drive import orbits
 from engine.vibration_drive.cases import with_lengths
 from engine.vibration_drive.characteristics import characteristics, combined
 from engine.vibration_drive.integration import integrate
+from engine.vibration_drive.newton import disturbed
 from engine.vibration_drive.regimes import Regime, means
 from engine.vibration_drive.results import result_infos
 from engine.vibration_drive.search import ROUND, Search
@@ -67,7 +68,7 @@ class Batches:
             return
         units = search.units(active)
         if number == self.count - _BESIDE:
-            self.beside[active] = orbits.disturbed(starts, np.ones_like(starts), units, _NEAR)
+            self.beside[active] = disturbed(starts, np.ones_like(starts), units, _NEAR)
         matrix = with_lengths(
             search.matrix[active], starts[:, BEGIN], np.full(len(active), float(ROUND)), windowed=False
         )
@@ -80,7 +81,7 @@ class Batches:
         if number > self.count - _BESIDE:
             self.grown[active] += grown
             self.over[active] += over
-        self.beside[active] = orbits.disturbed(search.starts[active], direction, units, _NEAR)
+        self.beside[active] = disturbed(search.starts[active], direction, units, _NEAR)
 
     def finish(self, active: Ints) -> Means:
         """Results of cases that went through every batch."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from engine.endings import ENDING_CODES, Ending
 from engine.run import Run, SettledRun
-from engine.vibration_drive import orbits
+from engine.vibration_drive import newton, orbits
 from engine.vibration_drive.cases import with_lengths
 from engine.vibration_drive.integration import Integration, integrate
 from engine.vibration_drive.kernel import Kernel
@@ -175,10 +175,10 @@ class Search:
             last = orders[where][disturbed] - 1
             moved, told = np.empty_like(own), np.empty((len(where), 4))
             ends = np.ascontiguousarray(done.strobes[np.arange(len(last)), last])
-            orbits.newton(own, ends, first, units[where], DISTURBANCE, self.steady_shaft, moved, told)
+            newton.step(own, ends, first, units[where], DISTURBANCE, self.steady_shaft, moved, told)
             away = np.empty(len(where))
             orbits.distances(moved, begun[where], units[where], away)
-            residual, size, multiplier = told[:, orbits.RESIDUAL], told[:, orbits.STEP], told[:, orbits.MULTIPLIER]
+            residual, size, multiplier = told[:, newton.RESIDUAL], told[:, newton.STEP], told[:, newton.MULTIPLIER]
             converged = (residual < RESIDUAL) & ((size < RESIDUAL) | (step >= _ENOUGH_STEPS))
             accepted = converged & (multiplier < STABLE) & (away < AWAY)
             least = np.empty(len(where), dtype=np.int64)
@@ -188,7 +188,7 @@ class Search:
                     cases[where], own, orders[where], multiplier.copy(), residual.copy(), done.sums[first[:-1]], least
                 ).take(accepted)
             )
-            fails = converged | (told[:, orbits.AGREES] == 0.0) | ~(size < 1.0) | ~(away < AWAY)
+            fails = converged | (told[:, newton.AGREES] == 0.0) | ~(size < 1.0) | ~(away < AWAY)
             fails |= (residual < _TELLING) & (multiplier > 1.0)
             self._failed(cases[where[fails & ~accepted]])
             go_on = ~(fails | accepted)
@@ -203,7 +203,7 @@ class Search:
         """Run the points, and those disturbed in each free column, once around: whose run, first runs, the runs."""
         rows = np.empty((len(cases) * (2 + 3 * self.kernel.LAYOUT.n), points.shape[1]))
         first = np.zeros(len(cases) + 1, dtype=np.int64)
-        count = orbits.disturb(points, units, DISTURBANCE, self.steady_shaft, rows, first)
+        count = newton.disturb(points, units, DISTURBANCE, self.steady_shaft, rows, first)
         of_row = np.repeat(np.arange(len(cases)), np.diff(first))
         self.spent[cases] += orders * np.diff(first)
         # Characteristics are wanted of the points' own runs only.
