@@ -85,7 +85,11 @@ class Settings(BaseSettings):
         default=0, ge=0, le=1_000_000, description="cases that one process takes at a time; 0: about a second of work"
     )
     chunk_timeout: float = Field(
-        default=600.0, gt=0.0, le=86_400.0, description="seconds after which a chunk that does not come back is killed"
+        default=600.0,
+        gt=0.0,
+        le=86_400.0,
+        description="seconds of processor time after which a chunk is killed; one that hangs without using any is killed "
+        "after ten times as long",
     )
     trajectory_timeout: float = Field(
         default=60.0,
