@@ -88,8 +88,8 @@ class Settings(BaseSettings):
         default=600.0,
         gt=0.0,
         le=86_400.0,
-        description="seconds of processor time after which a chunk is killed; one that hangs without using any is killed "
-        "after ten times as long",
+        description="seconds of processor time after which a chunk is killed; one that hangs without using any "
+        "is killed after ten times as long",
     )
     trajectory_timeout: float = Field(
         default=60.0,
