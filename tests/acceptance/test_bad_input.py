@@ -25,7 +25,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
 @pytest.mark.parametrize("name", WRONG)
 def test_wrong_specs_are_problem_documents(running: Service, name: str, address: str) -> None:
     text, named = WRONG[name]
-    answer = httpx.post(f"{running.address}/api/v1/{address}", content=text, headers=JSON)
+    answer = httpx.post(f"{running.address}/api/v1/{address}", content=text, headers=JSON, timeout=60)
     assert answer.status_code == 422
     assert answer.headers["content-type"] == "application/problem+json"
     problem = answer.json()
@@ -46,13 +46,13 @@ def test_wrong_specs_through_submit(running: Service, tmp_path: Path, name: str)
 
 def test_a_weak_spring_is_allowed_but_said(running: Service) -> None:
     text = changed("/base/pendulums/0/spring_rate", "1 N/m")
-    answer = httpx.post(f"{running.address}/api/v1/studies", content=text, headers=JSON)
+    answer = httpx.post(f"{running.address}/api/v1/studies", content=text, headers=JSON, timeout=60)
     assert answer.status_code == 202
     assert answer.json()["warnings"]
 
 
 def test_the_base_of_these_specs_is_itself_right(running: Service) -> None:
-    answer = httpx.post(f"{running.address}/api/v1/studies:preview", json=BASE)
+    answer = httpx.post(f"{running.address}/api/v1/studies:preview", json=BASE, timeout=60)
     assert answer.status_code == 200
     assert answer.json()["cases"] == 2
 

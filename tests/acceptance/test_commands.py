@@ -177,7 +177,9 @@ def test_a_run_kept_in_a_database_is_found_there(tmp_path: Path) -> None:
     copy.rename(folder / "sprag.sqlite3")
     with service(folder, "--processes", 1) as running:
         study = done.data["study"]
-        rows = httpx.get(f"{running.address}/api/v1/studies/{study}/results", params={"format": "json"}).json()["rows"]
+        rows = httpx.get(
+            f"{running.address}/api/v1/studies/{study}/results", params={"format": "json"}, timeout=60
+        ).json()["rows"]
     assert rows == done.data["rows"]
 
 
@@ -300,4 +302,4 @@ def test_the_demonstration(tmp_path: Path) -> None:
     speeds = again.data["curves"]["curves"][0]["y"]["shaft.speed.mean"]
     assert speeds[0] > 10 * speeds[-1] > 0
     with pytest.raises(httpx.ConnectError):
-        httpx.get(again.data["server"])
+        httpx.get(again.data["server"], timeout=60)

@@ -35,9 +35,9 @@ def submit_and_finish(running: Service) -> None:
     """A small study goes through."""
     spec = json.loads((EXAMPLES / "one_pendulum.json").read_text())
     spec["run"] = {"duration": "4 periods"}
-    answer = httpx.post(f"{running.address}/api/v1/studies", content=json.dumps(spec), headers=JSON)
+    answer = httpx.post(f"{running.address}/api/v1/studies", content=json.dumps(spec), headers=JSON, timeout=60)
     address = running.address + answer.headers["location"]
-    until(lambda: httpx.get(address).json()["state"] == "finished")
+    until(lambda: httpx.get(address, timeout=60).json()["state"] == "finished")
 
 
 def test_a_killed_worker_is_replaced_and_all_end_with_the_service(tmp_path: Path) -> None:
@@ -70,8 +70,10 @@ def test_nothing_outlives_a_killed_service(tmp_path: Path) -> None:
 def test_an_open_stream_does_not_hold_up_the_end(tmp_path: Path) -> None:
     with service(tmp_path, "--processes", 1) as running:
         spec = (EXAMPLES / "one_pendulum.json").read_bytes()
-        address = httpx.post(f"{running.address}/api/v1/studies", content=spec, headers=JSON).headers["location"]
-        assert httpx.post(f"{running.address}{address}:pause").json()["state"] == "paused"
+        address = httpx.post(f"{running.address}/api/v1/studies", content=spec, headers=JSON, timeout=60).headers[
+            "location"
+        ]
+        assert httpx.post(f"{running.address}{address}:pause", timeout=60).json()["state"] == "paused"
         with httpx.stream("GET", f"{running.address}{address}/events") as stream:
             lines = stream.iter_lines()
             assert any(line == "event: progress" for line in lines)

@@ -67,7 +67,7 @@ HEAD = b"GET /livez HTTP/1.1\r\nHost: localhost\r\n"
 def test_a_head_that_does_not_come_is_not_waited_for(service: Service, sent: bytes) -> None:
     with serving(service.app) as address, socket.create_connection(address) as connection:
         connection.sendall(sent)
-        assert httpx.get(f"http://localhost:{address[1]}/livez").status_code == 200
+        assert httpx.get(f"http://localhost:{address[1]}/livez", timeout=60).status_code == 200
         assert until_closed(connection) == b""
 
 
@@ -115,7 +115,7 @@ def test_a_long_answer_to_a_client_that_takes_it_is_not_cut() -> None:
         await send({"type": "http.response.body", "body": bytes(size)})
 
     with serving(long) as address:
-        assert len(httpx.get(f"http://localhost:{address[1]}/").content) == size
+        assert len(httpx.get(f"http://localhost:{address[1]}/", timeout=60).content) == size
 
 
 def test_streams_of_events_have_a_number_of_places(service: Service) -> None:
