@@ -6,6 +6,10 @@ from typing import Literal
 Unit = Literal["periods", "s"]
 Reset = Literal["contact", "literal"]
 
+#: The step budget: an ordinary case takes 16 steps a period. In seconds a run may have any frequency of the catalogue.
+_STEPS_PER_PERIOD, _LEAST_STEPS = 100, 5_000_000
+_MOST_FREQUENCY, _MOST_PERIODS = 1e5, 1e6
+
 
 @dataclass(frozen=True, slots=True)
 class Span:
@@ -33,7 +37,8 @@ class Run:
         Local relative error of a step, 1e-14 .. 1e-4.
     reset : {"contact", "literal"}
         Reading of equation (5) while torque is transmitted (MODEL.md A2).
-    max_steps, max_events_per_period : int
+    max_steps : int, optional
+    max_events_per_period : int
         Budgets that end a case as ``step_budget`` or ``chatter`` instead of letting it hang.
     """
 
@@ -41,8 +46,16 @@ class Run:
     window: tuple[Span, Span] | None = None
     tolerance: float = 1e-9
     reset: Reset = "contact"
-    max_steps: int = 5_000_000
+    max_steps: int | None = None
     max_events_per_period: int = 2_000
+
+    @property
+    def step_budget(self) -> int:
+        """Steps after which a case ends; by its default it follows the duration, and no case's depends on another."""
+        if self.max_steps is not None:
+            return self.max_steps
+        periods = self.duration.value * (1.0 if self.duration.unit == "periods" else _MOST_FREQUENCY)
+        return max(_LEAST_STEPS, int(_STEPS_PER_PERIOD * min(periods, _MOST_PERIODS)))
 
     def window_in_periods(self, frequency: float) -> tuple[float, float]:
         """Start and end of the window in excitation periods at ``frequency`` (Hz)."""

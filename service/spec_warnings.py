@@ -47,6 +47,13 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
         where = _pointer(study, "excitation.frequency")
         report.warn(f"{where}: below 0.1 Hz, which is slow for a vibration drive")
     pendulums = sum(path.startswith("pendulums.") and path.endswith(".mass") for path in study.base)
+    across, along = (any(_values(study, f"excitation.amplitude_{axis}")) for axis in "xy")
+    starts = [f"pendulums.{index}.initial_{name}" for index in range(pendulums) for name in ("angle", "speed")]
+    if along and not across and not any(any(_values(study, path)) for path in starts):
+        report.warn(
+            "/base/pendulums: with vibration along y alone a pendulum that starts upright without speed stays upright, "
+            "even at parametric resonance: nothing would move; give an initial_angle (say 0.01 rad) or an amplitude_x"
+        )
     for index in range(pendulums):
         _stability(report, study, index)
         _inertia(report, study, index)

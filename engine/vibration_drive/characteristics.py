@@ -213,7 +213,11 @@ def _balances(cases: _Cases, out: dict[str, Floats]) -> None:
     for i in range(cases.lay.n):
         fastest = np.maximum(cases.pendulum(i, "speed_max"), -cases.pendulum(i, "speed_min"))
         kinetic = kinetic + 0.5 * cases.parameter(i, 4) * fastest**2
-    size = np.max(np.abs([supplied, stored, lost, useful, kinetic]), axis=0)
+    # Of a motion that has died away nothing but rounding is left: it is judged against a swing of 3e-5 rad.
+    least = np.zeros_like(cases.period)
+    for i in range(cases.lay.n):
+        least = least + 1e-9 * cases.parameter(i, 4) * (2.0 * np.pi / cases.period) ** 2
+    size = np.max(np.abs([supplied, stored, lost, useful, kinetic, least]), axis=0)
     residual = supplied - stored - lost - useful - cases.shaft("energy_lost")
     out["balance.energy"] = np.where(size > 0.0, _ratio(np.abs(residual), size), np.where(np.isnan(size), np.nan, 0.0))
 

@@ -71,7 +71,7 @@ def integrate(
     done = kernel.integrate(
         kernel.RECORD, matrix, from_rest(cases, n) if starts is None else starts, recorded,
         run.tolerance, math.log2(run.tolerance), int(run.reset == "literal"),
-        run.max_steps, run.max_events_per_period,
+        run.step_budget, run.max_events_per_period,
         aligned_zeros(lay.rows * lay.lanes), np.zeros((lay.lanes, LANE_INTEGERS), dtype=np.int64),
         np.zeros(MAX_DEGREE + 1), work_stack(),
         blocks_for(listed, lay.order), np.zeros((listed, 3), dtype=np.int64),

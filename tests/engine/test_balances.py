@@ -160,3 +160,12 @@ def test_lost_energy_is_what_the_clutch_held_at_a_literal_reset() -> None:
 def test_a_machine_at_rest_has_balanced_books() -> None:
     row = one(drive(1, excitation__amplitude_x=0.0, excitation__amplitude_y=0.0), periods(4.0, 0.0, 4.0))
     assert row["balance.energy"] == row["balance.momentum"] == 0.0
+
+
+def test_a_motion_that_has_died_away_is_not_judged_against_nothing() -> None:
+    """Damped hard and not driven across, the drive keeps a motion of rounding; its balance is closed all the same."""
+    columns = drive(1, excitation__amplitude_x=0.0, excitation__amplitude_y=1e-4)
+    columns |= {"pendulums.0.initial_angle": 0.3, "pendulums.0.damping": 0.3}
+    angles = [Results(columns, periods(end, end - 2.0, end), 1) for end in (4.0, 6.0, 8.0, 12.0, 20.0, 60.0)]
+    assert angles[-1]["pendulums.0.angle.max"][0] < 1e-12
+    assert max(float(results["balance.energy"][0]) for results in angles) < 1e-6

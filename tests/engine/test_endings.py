@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from engine.endings import ENDING_CODES, Ending
-from engine.run import Run
+from engine.run import Run, Span
 from engine.vibration_drive.parameters import PARAMETERS
 from engine.vibration_drive.simulate import trajectory
 from tests.engine.drive import Columns, Results, batch_of, clutch, drive, one, pendulum, periods
@@ -130,3 +130,11 @@ def test_extreme_machines_end(pendulums: int, reset: Any, data: st.DataObject) -
             assert {name for name, value in row.items() if math.isnan(value)} <= MAY_BE_NULL
             rounding = 1e-12 * row["shaft.speed.max"]
             assert row["shaft.speed.max"] + rounding >= row["shaft.speed.mean"] >= row["shaft.speed.min"] - rounding
+
+
+def test_the_step_budget_follows_the_duration() -> None:
+    assert periods(60.0, 0.0, 60.0).step_budget == 5_000_000
+    assert periods(300_000.0, 0.0, 1.0).step_budget == 30_000_000
+    assert periods(1e6, 0.0, 1.0).step_budget == 100_000_000
+    assert Run(duration=Span(100.0, "s")).step_budget == 100_000_000
+    assert periods(1e6, 0.0, 1.0, max_steps=7).step_budget == 7

@@ -97,6 +97,15 @@ def test_slips_on_an_axis_and_not_in_what_it_replaces() -> None:
     )
 
 
+def test_a_start_that_vibration_along_y_never_leaves() -> None:
+    upright = {"/base/excitation/amplitude_x": 0, "/base/excitation/amplitude_y": 0.002}
+    (warning,) = warnings(upright)
+    assert "stays upright" in warning
+    assert "initial_angle" in warning
+    assert warnings(upright | {"/base/pendulums/0/initial_angle": 0.01}) == []
+    assert warnings(upright | {"/axes": [{"path": "pendulums.0.initial_angle", "values": [0, 0.01]}]}) == []
+
+
 def test_a_base_that_does_not_move() -> None:
     still = {"/base/excitation/amplitude_x": 0, "/base/excitation/amplitude_y": 0}
     assert warnings(still) == ["/base/excitation: both amplitudes are 0, so the base does not move"]
