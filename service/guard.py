@@ -26,10 +26,12 @@ SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 
 #: An empty style element: the script that draws pictures fills it rule by rule, which asks for no further permission.
 _EMPTY_STYLE: Final = "'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='"
+#: The style for maps of the world that the same script brings along: no page shows one, and refused it is an error.
+_MAP_STYLE: Final = "'sha256-ji27qzEtxXZW+7dun6UwjHXJ18e6WAin1VvNtkzIE/o='"
 
 SECURITY_HEADERS: Final = {
     "Content-Security-Policy": (
-        f"default-src 'self'; style-src 'self' {_EMPTY_STYLE}; img-src 'self' data:; object-src 'none'; "
+        f"default-src 'self'; style-src 'self' {_EMPTY_STYLE} {_MAP_STYLE}; img-src 'self' data:; object-src 'none'; "
         "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
     ),
     "X-Content-Type-Options": "nosniff",

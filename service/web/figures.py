@@ -145,7 +145,8 @@ def _panel_axes(panel: int, info: ResultInfo, row: tuple[int, int], column: tupl
 
 def _legend(drawn: Sequence[tuple[str, Curves]], lines: int) -> Figure:
     """Few lines are named above the panels, which then have the whole width; many beside them, as are families."""
-    title: Figure = {"text": _legend_title(drawn)}
+    # Beside the entries a title would take room that plotly does not count, and the last entries would be cut off.
+    title: Figure = {"text": _legend_title(drawn), "side": "top"}
     if lines > len(PALETTE) or _named_apart(drawn):
         return {"title": title, "tracegroupgap": 0}
     return {"title": title, "orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom", "tracegroupgap": 0}

@@ -23,11 +23,13 @@ from service.plots_shaft import draw_shaft
 from service.presets import preset_names
 from service.spec import parse_spec
 from service.spec_messages import SpecError
+from service.units import QuantityError, parse_quantity, split_quantity
 from service.web.form import form_page, look_over
 from service.web.form_check import message
 from service.web.form_spec import plain
 from service.web.shaft_figures import SAMPLES, machine_case, overridden
 from service.web.templates import fragment, number, page, spec_text, words
+from service.written import written_number
 from worker import kernels
 
 if TYPE_CHECKING:
@@ -70,18 +72,24 @@ class Slider:
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A machine with its numbers as an address gives them; ``faults`` by path where they cannot be taken."""
+    """A machine with its numbers as an address gives them; ``faults`` by path where they cannot be taken.
+
+    ``further`` are the numbers that have no slider, as they were given, by path. ``spec`` has every number as it was
+    given, wrong or not.
+    """
 
     name: str
     spec: dict[str, Any]
     study: Study
     sliders: list[Slider]
     faults: dict[str, list[str]]
+    further: dict[str, str]
 
     @property
     def query(self) -> str:
         """The same as parameters of an address."""
-        return urlencode([("machine", self.name), *((slider.path, slider.text) for slider in self.sliders)])
+        numbers = [*((slider.path, slider.text) for slider in self.sliders), *self.further.items()]
+        return urlencode([("machine", self.name), *numbers])
 
 
 @lru_cache(maxsize=1)
@@ -108,7 +116,17 @@ def setting(given: Mapping[str, str]) -> Setting:
             path = (item.pointer or "").removeprefix("/base/").replace("/", ".")
             faults.setdefault(path if path in own.base else "", []).append(message(item))
     sliders = [_slider(own, study, path, given.get(path, "")) for path in own.base if _limits(own, path)]
-    return Setting(name, overridden(spec, {} if faults else values), study, _in_order(sliders), faults)
+    further = {path: given[path].strip() for path in values if not _limits(own, path)}
+    return Setting(name, overridden(spec, values), study, _in_order(sliders), faults, further)
+
+
+def _value(text: str, unit: str, otherwise: float) -> float:
+    """The number (SI) that a text with or without a unit gives, also where the machine cannot be with it."""
+    try:
+        found = parse_quantity(text, unit) if split_quantity(text)[1] else written_number(text.strip())
+    except QuantityError:
+        return otherwise
+    return otherwise if found is None or not math.isfinite(found) else found
 
 
 def _limits(study: Study, path: str) -> tuple[float, float] | None:
@@ -134,7 +152,7 @@ def _slider(own: Study, study: Study, path: str, text: str) -> Slider:
         "" if entry is None else entry.symbol,
         "" if entry is None else entry.unit,
         "" if entry is None else entry.help,
-        study.base[path],
+        _value(text, "" if entry is None else entry.unit, study.base[path]),
         text.strip() or number_text(study.base[path]),
         low * first,
         high * first,

@@ -28,7 +28,9 @@ _LISTED: Final = 50
 _TYPES: Final = {"css": "text/css", "svg": "image/svg+xml", "js": "text/javascript"}
 #: The script that draws the pictures, as it lies in the package of that name.
 PLOTLY: Final = "plotly.min.js"
-_OWN: Final = frozenset({"sprag.css", "sprag.svg", "plots.js", "study.js", "form.js", "laboratory.js", "case.js"})
+_OWN: Final = frozenset(
+    {"sprag.css", "sprag.svg", "link.js", "list.js", "plots.js", "study.js", "form.js", "laboratory.js", "case.js"}
+)
 
 
 @router.get("/")

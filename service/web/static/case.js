@@ -12,16 +12,26 @@ const showMotion = async (address) => {
 if (motion) {
   const whole = motion.dataset.motion;
   let waiting = null, shown = whole;
+  const zoomTo = async (address) => {
+    motion.classList.add("stale");
+    try {
+      await showMotion(address);
+      motion.classList.remove("stale");
+    } catch (error) {
+      if (!(error instanceof sprag.LostError)) sprag.say(motion, error.message);
+    }
+  };
   const change = (address) => {
     clearTimeout(waiting);
     if (address === shown) return;
-    waiting = setTimeout(() => { shown = address; showMotion(address).catch(() => {}); }, 250);
+    waiting = setTimeout(() => { shown = address; zoomTo(address); }, 250);
   };
   document.addEventListener("DOMContentLoaded", async () => {
     try {
       await showMotion(whole);
     } catch (error) {
       sprag.say(motion, error.message);
+      if (error instanceof sprag.LostError) document.addEventListener("sprag:found", () => location.reload(), { once: true });
       return;
     }
     if (sprag.figures.get(motion)?.zoom) motion.on("plotly_relayout", (event) => {
@@ -33,5 +43,6 @@ if (motion) {
         change(url.pathname + url.search);
       } else if (event["xaxis.autorange"]) change(whole);
     });
+    document.addEventListener("sprag:found", () => { if (motion.classList.contains("stale")) zoomTo(shown); });
   });
 }

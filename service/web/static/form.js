@@ -4,22 +4,48 @@
 let form = document.getElementById("study-form");
 let waiting = null, latest = 0;
 const touched = new Set();
+let old = false; // the panel has costs of what was typed before; it is asked for anew when the connection is there again
 let whole = false; // after a look at everything, empty required fields are told of too
 
 const encoded = (extra = []) => new URLSearchParams([...new FormData(form), ...extra]);
 
 // What is typed goes with the button to the login, and comes back from there.
 const ended = () => {
+  old = false;
+  document.getElementById("panel").classList.remove("stale");
   document.getElementById("panel").innerHTML = '<p class="fault" role="alert">Your session has ended. '
     + '<button name="do" value="check" data-login>Log in</button> What you typed is kept.</p>';
 };
 
+const fail = (text) => {
+  const note = document.createElement("p");
+  note.className = "fault";
+  note.setAttribute("role", "alert");
+  note.textContent = `This could not be looked over: ${text}`;
+  const panel = document.getElementById("panel");
+  panel.classList.remove("stale");
+  panel.querySelector(".cost")?.remove();
+  panel.querySelector(".fault[role=alert]")?.remove();
+  panel.prepend(note);
+};
+
 const check = async () => {
-  const mine = ++latest;
-  const answer = await fetch(form.dataset.check, { method: "POST", body: encoded() });
-  if (answer.status === 401) { ended(); return; }
-  if (!answer.ok || mine !== latest) return;
-  const found = await answer.json();
+  const mine = ++latest, panel = document.getElementById("panel");
+  old = true;
+  panel.classList.add("stale"); // until it is that of what is typed now
+  let found = null;
+  try {
+    const answer = await sprag.fetch(form.dataset.check, { method: "POST", body: encoded() });
+    if (answer.status === 401) { ended(); return; }
+    found = await answer.json();
+    if (!answer.ok) throw new Error(found.detail);
+  } catch (error) {
+    if (mine === latest && !(error instanceof sprag.LostError)) fail(error.message);
+    return;
+  }
+  if (mine !== latest) return;
+  old = false;
+  panel.classList.remove("stale");
   for (const place of form.querySelectorAll(".wrong")) {
     const name = place.id.slice("wrong:".length);
     const field = document.getElementById(name);
@@ -30,7 +56,6 @@ const check = async () => {
     if (field) field.toggleAttribute("aria-invalid", messages.length > 0);
     if (field && messages.length) field.setAttribute("aria-invalid", "true");
   }
-  const panel = document.getElementById("panel");
   const open = [...panel.querySelectorAll("details")].map((part) => part.open);
   panel.innerHTML = found.panel;
   panel.querySelectorAll("details").forEach((part, index) => { part.open = Boolean(open[index]); });
@@ -51,11 +76,14 @@ const reshape = async (extra) => {
 const newShape = async (extra) => {
   clearTimeout(waiting);
   latest += 1;
-  const answer = await fetch(form.action, { method: "POST", body: encoded(extra), headers: { Accept: "text/html" } });
+  let answer = null;
+  try {
+    answer = await sprag.fetch(form.action, { method: "POST", body: encoded(extra), headers: { Accept: "text/html" } });
+  } catch (error) { return; } // the bar says so; what is typed stays
   if (answer.status === 401) { ended(); return; }
   const page = new DOMParser().parseFromString(await answer.text(), "text/html");
   const fresh = page.getElementById("study-form");
-  if (!fresh) return;
+  if (!fresh) { fail(page.querySelector("main p")?.textContent || `status ${answer.status}`); return; }
   const known = new Set([...form.elements].map((element) => element.id || element.value));
   form.replaceWith(document.adoptNode(fresh));
   form = fresh;
@@ -105,3 +133,4 @@ if (refused) {
   refused.scrollIntoView({ block: "center" });
 }
 listen();
+document.addEventListener("sprag:found", () => { if (old) check(); });

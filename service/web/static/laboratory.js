@@ -2,7 +2,7 @@
 "use strict";
 
 const lab = document.getElementById("lab"), plot = document.getElementById("lab-plot"), answer = document.getElementById("answer");
-let busy = false, again = false;
+let busy = false, again = false, old = false;
 
 const valueOf = (slider) => {
   const low = Number(slider.dataset.low), high = Number(slider.dataset.high), share = slider.value / 1000;
@@ -33,6 +33,7 @@ const ask = async () => {
     if (found.figure) await sprag.show(plot, found.figure);
   } catch (error) {
     plot.classList.add("stale");
+    old = true;
     answer.textContent = error.message;
   } finally {
     busy = false;
@@ -53,5 +54,11 @@ for (const slider of lab.querySelectorAll("input[type=range]")) {
     ask();
   });
 }
+for (const field of lab.querySelectorAll("[data-further]")) field.addEventListener("input", ask);
+// Another machine is shown as soon as it is chosen: never one beside the name of another.
+const machines = document.getElementById("machines");
+machines.addEventListener("change", () => machines.submit());
+window.addEventListener("pageshow", (event) => { if (event.persisted) machines.reset(); });
 document.querySelector("[data-print]").addEventListener("click", () => window.print());
 document.addEventListener("DOMContentLoaded", ask);
+document.addEventListener("sprag:found", () => { if (old) { old = false; ask(); } });

@@ -1,11 +1,26 @@
 // Draws every element that has data-figure: the server makes the figure, this gives it the colours of the page.
 "use strict";
 
-const sprag = { figures: new Map() };
+sprag.figures = new Map();
 
 sprag.colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-sprag.themed = (layout) => {
+// Widths of a picture (px) below which its panels stand one under the other, and its legend under them.
+const NARROW = 600, ENTRY = 110, LINE = 20;
+
+// What a narrow picture has in the place of the server's layout: beside the panels a legend would leave no room for them.
+sprag.fitted = (figure, width) => {
+  const layout = figure.layout, shown = figure.data.filter((trace) => trace.showlegend !== false).length;
+  if (width >= NARROW || !layout.showlegend) return layout;
+  const rows = Math.ceil(shown / Math.max(Math.floor(width / ENTRY), 1)) + 1;
+  const bottom = 70 + rows * LINE, margin = { ...layout.margin, t: 20, l: 60, b: bottom };
+  const height = layout.height - layout.margin.t - layout.margin.b + margin.t + bottom;
+  const legend = { ...layout.legend, orientation: "h", x: 0, xanchor: "left", y: 0, yref: "container", yanchor: "bottom" };
+  return { ...layout, height, margin, legend };
+};
+
+sprag.themed = (figure, width) => {
+  const layout = sprag.fitted(figure, width);
   const ink = sprag.colour("--ink"), line = sprag.colour("--line");
   const themed = {
     ...layout, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
@@ -22,8 +37,8 @@ sprag.themed = (layout) => {
 };
 
 sprag.config = {
-  responsive: true, displaylogo: false, showLink: false, showEditInChartStudio: false, plotlyServerURL: "",
-  modeBarButtonsToRemove: ["toImage", "select2d", "lasso2d", "sendDataToCloud"],
+  responsive: true, displaylogo: false, showLink: false, showSendToCloud: false, plotlyServerURL: "",
+  modeBarButtonsToRemove: ["toImage", "select2d", "lasso2d", "sendChartToCloud"],
 };
 
 sprag.say = (element, text) => {
@@ -31,13 +46,6 @@ sprag.say = (element, text) => {
   note.className = "failed";
   note.textContent = text;
   element.replaceChildren(note);
-};
-
-sprag.fetchJson = async (address, options) => {
-  const answer = await fetch(address, { headers: { Accept: "application/json" }, ...options });
-  const body = await answer.json().catch(() => ({ detail: "The service did not answer." }));
-  if (!answer.ok) throw new Error(body.detail || "The service did not answer.");
-  return body;
 };
 
 sprag.show = async (element, figure) => {
@@ -51,7 +59,7 @@ sprag.show = async (element, figure) => {
   const first = !sprag.figures.has(element);
   if (first) element.replaceChildren();
   sprag.figures.set(element, figure);
-  await Plotly.react(element, figure.data, sprag.themed(figure.layout), sprag.config);
+  await Plotly.react(element, figure.data, sprag.themed(figure, element.clientWidth), sprag.config);
   element.dataset.drawn = String(Number(element.dataset.drawn || 0) + 1);
   if (first && figure.cases && element.dataset.study) {
     element.on("plotly_click", (event) => {
@@ -63,8 +71,14 @@ sprag.show = async (element, figure) => {
 
 sprag.draw = async (element) => {
   try {
-    await sprag.show(element, await sprag.fetchJson(element.dataset.figure));
+    const address = element.clientWidth < NARROW ? element.dataset.figure.replace("columns=2", "columns=1") : element.dataset.figure;
+    await sprag.show(element, await sprag.fetchJson(address));
+    element.classList.remove("stale");
   } catch (error) {
+    if (error instanceof sprag.LostError) { // what is shown is old, until the connection is there again
+      element.classList.add("stale");
+      return;
+    }
     sprag.figures.delete(element);
     sprag.say(element, error.message);
   }
@@ -74,14 +88,16 @@ sprag.drawAll = (root) => Promise.all([...root.querySelectorAll("[data-figure]")
 
 // Paper is narrower than the window, and white.
 const PAPER = 690;
-window.addEventListener("beforeprint", () => {
-  for (const [element, figure] of sprag.figures) Plotly.react(element, figure.data, { ...sprag.themed(figure.layout), width: PAPER }, sprag.config);
-});
-window.addEventListener("afterprint", () => {
-  for (const [element, figure] of sprag.figures) Plotly.react(element, figure.data, sprag.themed(figure.layout), sprag.config);
-});
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-  for (const [element, figure] of sprag.figures) Plotly.react(element, figure.data, sprag.themed(figure.layout), sprag.config);
-});
+const redraw = (width) => {
+  for (const [element, figure] of sprag.figures) {
+    const layout = sprag.themed(figure, width || element.clientWidth);
+    Plotly.react(element, figure.data, width ? { ...layout, width } : layout, sprag.config);
+  }
+};
+window.addEventListener("beforeprint", () => redraw(PAPER));
+window.addEventListener("afterprint", () => redraw());
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraw());
+matchMedia(`(max-width: ${NARROW}px)`).addEventListener("change", () => redraw());
 
 document.addEventListener("DOMContentLoaded", () => sprag.drawAll(document));
+document.addEventListener("sprag:found", () => { for (const plot of document.querySelectorAll(".stale[data-figure]")) sprag.draw(plot); });

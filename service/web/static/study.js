@@ -1,30 +1,29 @@
 // Pages of a study: choices take effect at once, and a study that runs tells how far it is. Every part is the server's own.
 "use strict";
 
-const pageOf = async (address) => {
-  const answer = await fetch(address, { headers: { Accept: "text/html" } });
-  return new DOMParser().parseFromString(await answer.text(), "text/html");
-};
-
-const take = (page, selector) => {
-  const mine = document.querySelector(selector), theirs = page.querySelector(selector);
-  if (mine && theirs) mine.replaceWith(document.adoptNode(theirs));
-  return document.querySelector(selector);
-};
-
 // A form with data-swap: a change shows the new page's part, and puts its address into the window.
 for (const form of document.querySelectorAll("form[data-swap]")) {
-  let latest = 0;
-  form.addEventListener("change", async () => {
+  let latest = 0, asked = null;
+  const swap = async () => {
     const mine = ++latest;
     const chosen = new URLSearchParams([...new FormData(form)].filter(([, value]) => value !== ""));
-    const address = `${location.pathname}?${chosen}`;
-    const page = await pageOf(address);
+    const address = asked = `${location.pathname}?${chosen}`;
+    const old = document.querySelector(form.dataset.swap);
+    old.classList.add("stale"); // it is not what is chosen now
+    let page = null;
+    try {
+      page = await sprag.page(address);
+    } catch (error) {
+      if (mine === latest && !(error instanceof sprag.LostError)) { asked = null; sprag.say(old, error.message); old.classList.remove("stale"); }
+      return;
+    }
     if (mine !== latest) return;
+    asked = null;
     const focused = document.activeElement;
     const place = focused && focused.name ? [focused.name, focused.value] : null;
-    const part = take(page, form.dataset.swap);
-    if (!(focused && focused.closest && focused.closest("#held"))) take(page, "#held");
+    const part = sprag.take(page, form.dataset.swap);
+    part.classList.remove("stale");
+    if (!(focused && focused.closest && focused.closest("#held"))) sprag.take(page, "#held");
     const summary = form.querySelector("details.results summary"), fresh = page.querySelector("details.results summary");
     if (summary && fresh) summary.textContent = fresh.textContent;
     history.replaceState(null, "", address);
@@ -33,30 +32,38 @@ for (const form of document.querySelectorAll("form[data-swap]")) {
       if (again && again.focus) again.focus();
     }
     if (window.Plotly) await sprag.drawAll(part);
-  });
+  };
+  form.addEventListener("change", swap);
+  document.addEventListener("sprag:found", () => { if (asked) swap(); });
 }
 
 // A study that runs: each event of its progress brings the page's own words up to date, at most once a second.
 const running = document.querySelector("[data-events]");
 if (running) {
-  const source = new EventSource(running.dataset.events);
-  let timer = null, lastDrawn = 0;
-  const refresh = async (ended) => {
+  const address = running.dataset.events;
+  let source = null, timer = null, lastDrawn = 0, ended = false;
+  const refresh = async () => {
     timer = null;
-    const page = await pageOf(location.href);
-    for (const part of ["#head", "#progress", "#endings", "#particulars"]) {
-      const inside = document.querySelector(part);
-      if (inside && inside.contains(document.activeElement)) {
-        const index = [...inside.querySelectorAll("a,button")].indexOf(document.activeElement);
-        const fresh = take(page, part).querySelectorAll("a,button");
-        if (fresh[index]) fresh[index].focus();
-      } else take(page, part);
-    }
-    if (ended || Date.now() - lastDrawn > 3000) {
-      lastDrawn = Date.now();
-      for (const plot of document.querySelectorAll(".plot[data-live]")) if (window.Plotly) sprag.draw(plot);
-    }
+    const last = ended, here = location.href;
+    const page = await sprag.page(here).catch(() => null);
+    if (!page || here !== location.href) return;
+    for (const part of ["#head", "#progress", "#endings", "#particulars"]) sprag.take(page, part);
+    if (!last && Date.now() - lastDrawn < 3000) return;
+    lastDrawn = Date.now();
+    if (!document.querySelector(".stale")) sprag.take(page, "#cases");
+    for (const plot of document.querySelectorAll(".plot[data-figure]")) if (window.Plotly) sprag.draw(plot);
   };
-  source.addEventListener("progress", () => { timer = timer || setTimeout(refresh, 700, false); });
-  source.addEventListener("end", () => { source.close(); clearTimeout(timer); refresh(true); });
+  const listen = () => {
+    source = new EventSource(address);
+    source.addEventListener("progress", () => { timer = timer || setTimeout(refresh, 700); });
+    source.addEventListener("end", () => { ended = true; source.close(); clearTimeout(timer); refresh(); });
+    // A stream ends when the service does, or when something between cuts it: asking tells which.
+    source.addEventListener("error", () => { if (!ended) sprag.fetch("/livez", { cache: "no-store" }).catch(() => {}); });
+  };
+  document.addEventListener("sprag:found", () => {
+    if (!ended && source.readyState === EventSource.CLOSED) listen();
+    lastDrawn = 0;
+    refresh();
+  });
+  listen();
 }
