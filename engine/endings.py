@@ -60,12 +60,13 @@ _SENTENCES = {
     ),
     Ending.NEGATIVE_INERTIA: "The reduced inertia is not positive at every angle of the shaft.",
     Ending.MOTOR_STALLED: (
-        "The motor has no steady cycle with this load: the resistance stalls it. Choose a stronger motor or more "
-        "inertia."
+        "The motor has no steady cycle with this load: the resistance stalls it, or a load that drives overruns it. "
+        "Choose a stronger motor or more inertia, or turn the load's sign."
     ),
     Ending.QUADRATURE_NOT_REACHED: (
-        "A torque or the inertia changes too abruptly for its integral to be found to 1e-10: split the formula where "
-        "it jumps, or smooth the table; an inertia may not jump at all."
+        "A torque or the inertia changes too abruptly for its integral to be found to 1e-10: split a formula where it "
+        "jumps or widen its peaks, smooth a table, or take a linkage away from the position in which its links are all "
+        "but in line; an inertia may not jump at all."
     ),
 }
 

@@ -64,6 +64,10 @@ class Cam(Mechanism):
         """See Mechanism."""
         return values["start"], values["start"] + values["rise_angle"]
 
+    def return_stroke(self, values: Values) -> tuple[Floats, Floats]:
+        """See Mechanism; the fall. A dwell is no stroke."""
+        return values["start"] + values["rise_angle"] + values["dwell_angle"], values["fall_angle"]
+
     def breaks(self, values: Values) -> Sequence[Floats]:
         """See Mechanism."""
         top = values["start"] + values["rise_angle"]

@@ -93,6 +93,13 @@ class Mechanism(ABC):
         del values
         return ()
 
+    def return_stroke(self, values: Values) -> tuple[Floats, Floats] | tuple[None, None]:
+        """Angle at which the return stroke starts and how much it takes, in rad; None where it is all but the forward
+        stroke.
+        """
+        del values
+        return None, None
+
     def broken_rule(self, values: Values) -> str | None:
         """What the dimensions of a case that cannot be assembled break, as half a sentence; None where links are
         too short to reach each other.

@@ -59,6 +59,13 @@ class Stroke:
         """Whether the forward stroke is under way."""
         return np.asarray(np.mod(phi - self.start, _TURN) < self.end - self.start)
 
+    def backward(self, phi: Floats) -> NDArray[np.bool_]:
+        """Whether the return stroke is under way; in the dwells of a cam no stroke is."""
+        start, length = self.mechanism.return_stroke(self.values)
+        if start is None or length is None:
+            return ~self.forward(phi)
+        return np.asarray(np.mod(phi - start, _TURN) < length)
+
     def angles(self, fraction: Floats, *, forward: bool) -> Floats:
         """Angles at which a stroke has come to ``fraction`` (cases or 1, 1, n); NaN outside 0 .. 1."""
         low, high = (self.start, self.end) if forward else (self.end, self.start + _TURN)
@@ -164,8 +171,13 @@ class Operation:
             diagram = np.asarray(self._expression.evaluate(self._environment(phi))[0])
         else:
             diagram = self._steps(place, wraps=stroke is None)
-        if stroke is not None and choice.during != "both":
-            diagram = np.where(stroke.forward(phi) == (choice.during == "forward"), diagram, 0.0)
+        if stroke is not None:
+            acts = np.zeros(np.shape(phi), dtype=np.bool_)
+            if choice.during != "return":
+                acts = acts | stroke.forward(phi)
+            if choice.during != "forward":
+                acts = acts | stroke.backward(phi)
+            diagram = np.where(acts, diagram, 0.0)
         return np.asarray(diagram)
 
     def _steps(self, place: Floats, *, wraps: bool) -> Floats:

@@ -128,3 +128,17 @@ def test_inertia_from_a_table_is_that_of_the_mechanism() -> None:
     assert one(replace(spec, cycle=2), {"mean_speed": 10.0, "drive.inertia": 15.0})["irregularity"] == pytest.approx(
         got["irregularity"], rel=1e-12
     )
+
+
+@pytest.mark.parametrize(("during", "angle"), [("forward", 1.0), ("return", 1.2), ("both", 2.2)])
+def test_no_stroke_is_under_way_in_the_dwells_of_a_cam(during: During, angle: float) -> None:
+    """A constant torque does its work in the rise (1 rad) and the fall (1.2 rad), not in the dwells."""
+    spec = MachineSpec(
+        mechanism=MechanismChoice("cam"), operation=OperationChoice("torque", "constant", "stroke", during=during)
+    )
+    numbers = {
+        "mean_speed": 50.0, "drive.inertia": 5.0, "operation.value": 100.0, "mechanism.cam.start": 0.3,
+        "mechanism.cam.lift": 0.02, "mechanism.cam.rise_angle": 1.0, "mechanism.cam.dwell_angle": 0.8,
+        "mechanism.cam.fall_angle": 1.2, "mechanism.cam.follower_mass": 1.0,
+    }  # fmt: skip
+    assert one(spec, numbers)["work.resistance"] == pytest.approx(-100.0 * angle, rel=1e-12)
