@@ -174,7 +174,9 @@ class FourBar(Mechanism):
         crank = number_of(values, "crank")
         short = [name for name in ("frame", "coupler") if number_of(values, name) <= crank]
         if not short:
-            return None
+            sizes = sorted(number_of(values, name) for name in ("crank", "coupler", "rocker", "frame"))
+            folds = abs(sizes[0] + sizes[3] - sizes[1] - sizes[2]) <= 1e-9 * sizes[3]
+            return "all its links lie in one line there, and the rocker could go on either way" if folds else None
         told = " and ".join(f"the {name} ({number_of(values, name):.6g} m)" for name in short)
         return f"the crank ({crank:.6g} m) of a crank-rocker is shorter than {told}, here it is not"
 

@@ -187,3 +187,13 @@ def test_catalogues_are_sound() -> None:
     assert 0.0 < estimate_seconds(PRESS) < 0.1
     for ending in Ending:
         assert ending.sentence
+
+
+def test_a_parallelogram_is_told_that_it_folds() -> None:
+    spec = MachineSpec(mechanism=MechanismChoice("four_bar"))
+    lengths = {"crank": 0.1, "coupler": 0.3, "rocker": 0.1, "frame": 0.3}
+    numbers = {"mean_speed": 20.0, "drive.inertia": 5.0} | {
+        f"mechanism.four_bar.{name}": length for name, length in lengths.items()
+    }
+    with pytest.raises(AssemblyError, match="all its links lie in one line there"):
+        check(spec, numbers)
