@@ -189,7 +189,7 @@ class Search:
                 ).take(accepted)
             )
             fails = converged | (told[:, newton.AGREES] == 0.0) | ~(size < 1.0) | ~(away < AWAY)
-            fails |= (residual < _TELLING) & (multiplier > 1.0)
+            fails |= (residual < _TELLING) & (multiplier >= STABLE)
             self._failed(cases[where[fails & ~accepted]])
             go_on = ~(fails | accepted)
             all_points[where[go_on]] = moved[go_on]
