@@ -17,8 +17,8 @@ import numba
 import numpy as np
 
 from benchmarks.workloads import CASES, PERIODS, Timing, Workload, take_turns
+from engine.compile.lowering import GROUP
 from engine.run import Run, Span
-from engine.taylor.lowering import GROUP
 from engine.vibration_drive import simulate as module
 
 _LOOPS = 2000

@@ -23,10 +23,10 @@ import numpy as np
 from distributed import Client, LocalCluster
 
 from service.storage.store import Store
-from worker import kernels
+from worker import models
 from worker.chunking import Chunking
 from worker.executors.dask_tasks import introduce
-from worker.kernels import ChunkResult
+from worker.models import ChunkResult
 from worker.study import Axis, Study
 
 #: Bytes/s of the dispatcher's link: 10 Gbit/s.
@@ -56,7 +56,7 @@ def study_of(cases: int) -> Study:
 
 def made_up(first: int, count: int) -> ChunkResult:
     """A result whose numbers have all their digits."""
-    values = np.random.default_rng(first).random((count, len(kernels.result_infos("vibration-drive", 1))))
+    values = np.random.default_rng(first).random((count, len(models.result_infos("vibration-drive", 1))))
     return ChunkResult(first, ["ok"] * count, [""] * count, values)
 
 
@@ -102,7 +102,7 @@ def measured(url: str) -> Costs:
     chunk, case = line(*(dispatch_seconds(url, size) for size in sizes), sizes=sizes)
     weights = []
     for size in sizes:
-        task = kernels.chunk_task(study_of(size), 0, size)
+        task = models.chunk_task(study_of(size), 0, size)
         weights.append(float(len(pickle.dumps(task)) + len(pickle.dumps(made_up(0, size)))))
     bytes_chunk, bytes_case = line(*weights, sizes=sizes)
     return Costs(chunk, case, schedule_seconds(), bytes_chunk, bytes_case)

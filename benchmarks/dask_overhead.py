@@ -14,7 +14,7 @@ import time
 
 from benchmarks.overhead import example
 from service.settings import available_cores
-from worker import kernels
+from worker import models
 from worker.executors.dask import DaskExecutor
 from worker.executors.process_pool import ProcessPoolExecutor
 from worker.ports import Chunk, Executor, Fate
@@ -51,9 +51,9 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     options = parser.parse_args()
     study = example(20_000, 20.0)
-    kernels.warm_up(study)
+    models.warm_up(study)
     begin = time.perf_counter()
-    kernels.run_chunk(study, 0, 400)
+    models.run_chunk(study, 0, 400)
     size = max(1, round(400 * options.seconds / (time.perf_counter() - begin)))
     pool = ProcessPoolExecutor(options.processes, chunk_timeout=600.0)
     dask = DaskExecutor("", options.processes, chunk_timeout=600.0)

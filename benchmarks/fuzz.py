@@ -2,7 +2,7 @@
 
 ``python -m benchmarks.fuzz --examples 100``: a service of its own behind a real server on this machine, with a token,
 on a database with studies of made-up rows; motions are computed for real. The suite sends a few of the same requests
-(tests/service/test_fuzzing.py).
+(tests/service/http/test_fuzzing.py).
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from pathlib import Path
 import httpx
 from pydantic import SecretStr
 
-from service.app import chunking, create_app
+from service.http.app import chunking, create_app
 from service.settings import Settings
 from service.storage.store import Store
 from tests.service.conftest import InThread, Service
-from tests.service.fuzzing import fuzz, with_ids
-from tests.service.test_fuzzing import TOKEN, things
+from tests.service.http.fuzzing import fuzz, with_ids
+from tests.service.http.test_fuzzing import TOKEN, things
 from tests.serving import served
 
 

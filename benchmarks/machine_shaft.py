@@ -21,9 +21,9 @@ import numpy as np
 from engine.machine_shaft.simulate import estimate_seconds, simulate
 from engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
 from engine.machine_shaft.tables import Table
-from service.local import run_here
-from service.spec import parse_spec
-from worker import kernels
+from service.jobs.local import run_here
+from service.spec.document import parse_spec
+from worker import models
 
 PRESS = MachineSpec(
     mechanism=MechanismChoice("slider_crank"), operation=OperationChoice("force", "steps", steps=1), balance="constant"
@@ -107,9 +107,9 @@ def through_the_service(cases: int) -> None:
         "axes": [{"path": "drive.inertia", "linspace": ["5 kg*m^2", "50 kg*m^2", cases]}],
     }  # fmt: skip
     study = parse_spec(spec).study
-    kernels.run_chunk(study, 0, 100)
+    models.run_chunk(study, 0, 100)
     start = processor_seconds()
-    kernels.run_chunk(study, 0, cases)
+    models.run_chunk(study, 0, cases)
     alone = processor_seconds() - start
     start, wall = processor_seconds(), time.perf_counter()
     with run_here(spec, study, processes=1) as done:

@@ -87,7 +87,7 @@ MUTANTS = (
     ),
     Mutant(
         "children outlive their parent",
-        "worker/processes.py",
+        "worker/pool/processes.py",
         "    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, int(number), 0, 0, 0)\n",
         "    ctypes.CDLL(None, use_errno=True)\n",
         ("tests/acceptance/test_serve.py::test_nothing_outlives_a_killed_service",),
@@ -97,7 +97,7 @@ MUTANTS = (
         "service/storage/room.py",
         "    if free >= RESERVE_BYTES and not (capped and limit - size - log < RESERVE_BYTES):",
         "    if True:",
-        ("tests/service/test_room.py",),
+        ("tests/service/storage/test_room.py",),
     ),
     Mutant(
         "unstable orbits count as settled",

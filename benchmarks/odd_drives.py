@@ -13,8 +13,8 @@ from collections import Counter
 import numpy as np
 
 from engine.endings import Ending
-from tests.engine.drive import Results, batch_of, periods
 from tests.engine.odd_drives import odd_drive
+from tests.engine.vibration_drive.drive import Results, batch_of, periods
 
 BATCH = 200
 

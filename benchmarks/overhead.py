@@ -20,14 +20,14 @@ from pathlib import Path
 
 import psutil
 
-from service.dispatching import WorkerSettings, start_dispatcher_process
+from service.jobs.dispatching import WorkerSettings, start_dispatcher_process
 from service.presets import preset_text
 from service.settings import available_cores
-from service.spec import load_spec, parse_spec
+from service.spec.document import load_spec, parse_spec
 from service.storage.store import Store
-from worker import kernels
+from worker import models
 from worker.chunking import Chunking, spans
-from worker.processes import single_threaded_children
+from worker.pool.processes import single_threaded_children
 from worker.study import Axis, Study
 
 #: The times are those in the database; looking more often would only take a core from the pool.
@@ -46,13 +46,13 @@ def example(cases: int, periods: float) -> Study:
 
 
 def _compute(task: tuple[Study, int, int]) -> int:
-    return kernels.run_chunk(*task).count
+    return models.run_chunk(*task).count
 
 
 @contextmanager
 def warm_pool(study: Study, processes: int) -> Iterator[Pool]:
     """Processes that have the kernel loaded."""
-    with get_context("spawn").Pool(processes, kernels.warm_up, (study,)) as pool:
+    with get_context("spawn").Pool(processes, models.warm_up, (study,)) as pool:
         pool.map(_compute, [(study, 0, 16)] * processes * 4, chunksize=1)
         yield pool
 
@@ -85,7 +85,7 @@ def main() -> None:
     options = parser.parse_args()
     single_threaded_children()
     study = example(options.cases, options.periods)
-    kernels.warm_up(study)
+    models.warm_up(study)
     with tempfile.TemporaryDirectory() as folder:
         url = f"sqlite:///{Path(folder) / 'overhead.sqlite3'}"
         with Store.open(url, chunking=Chunking(0, options.processes)) as store:

@@ -21,12 +21,12 @@ from urllib.parse import urlencode
 import httpx
 import numpy as np
 
-from service.api.examples import SPEC
-from service.spec import parse_spec
+from service.http.api.examples import SPEC
+from service.spec.document import parse_spec
 from service.storage.store import Store
-from worker import kernels
+from worker import models
 from worker.chunking import Chunking
-from worker.kernels import ChunkResult
+from worker.models import ChunkResult
 
 _CURVE = 100_000
 #: One case in so many ends otherwise than ok.
@@ -37,7 +37,7 @@ def fill(store: Store, axes: list[dict[str, object]], name: str) -> str:
     """A finished study with made-up rows; its id."""
     parsed = parse_spec({**SPEC, "axes": axes, "name": name})
     record = store.create_study(parsed.spec, parsed.study)
-    infos = kernels.study_results(parsed.study)
+    infos = models.study_results(parsed.study)
     random = np.random.default_rng(1)
     epoch = store.take_over("benchmark")
     while chunks := store.open_chunks(record.number)[:50]:

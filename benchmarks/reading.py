@@ -25,13 +25,13 @@ from pathlib import Path
 import httpx
 import numpy as np
 
-from service.exports import FORMATS
 from service.presets import preset_text
-from service.spec import load_spec, parse_spec
+from service.results.exports import FORMATS
+from service.spec.document import load_spec, parse_spec
 from service.storage.store import Store
-from worker import kernels
+from worker import models
 from worker.chunking import Chunking
-from worker.kernels import ChunkResult
+from worker.models import ChunkResult
 from worker.study import Axis, Study
 
 #: Requests to each kind of answer before those that count.
@@ -55,7 +55,7 @@ def grid(cases: int) -> Study:
 
 def build(path: Path, study: Study) -> tuple[str, float]:
     """A finished study of random doubles in the database at ``path``: its id, and the seconds its commits took."""
-    infos = kernels.study_results(study)
+    infos = models.study_results(study)
     counts = [index for index, info in enumerate(infos) if info.kind == "count"]
     numbers = np.random.default_rng(3)
     seconds = 0.0
@@ -178,7 +178,7 @@ def main() -> None:
         study_id, seconds = build(path, study)
         size = os.path.getsize(path)
         print(
-            f"{study.cases:,} cases of {len(kernels.study_results(study))} results: {size / study.cases:.0f} bytes a "
+            f"{study.cases:,} cases of {len(models.study_results(study))} results: {size / study.cases:.0f} bytes a "
             f"case, committed at {study.cases / seconds:,.0f} cases/s"
         )
         with serving(path) as (address, pid), httpx.Client(base_url=address) as client:

@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from service.local import run_here
+from service.jobs.local import run_here
 from service.presets import preset_text
-from service.spec import load_spec, parse_spec
+from service.spec.document import load_spec, parse_spec
 from service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
 from service.storage.records import Progress
 from worker.order import order_of

@@ -10,13 +10,13 @@ from typing import Any
 
 import uvicorn
 
-from service.patience import PatientProtocol
+from service.http.timeouts import TimeoutProtocol
 
 
 @contextmanager
 def served(app: Any) -> Iterator[str]:
     """The address of a server of ``app`` in a thread, which has ended when the block is left."""
-    config = uvicorn.Config(app, port=0, http=PatientProtocol, ws="none", log_config=None, server_header=False)
+    config = uvicorn.Config(app, port=0, http=TimeoutProtocol, ws="none", log_config=None, server_header=False)
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run)
     thread.start()

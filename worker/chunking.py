@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from worker import kernels
+from worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -42,12 +42,12 @@ class Chunking:
         """Cases of one chunk of ``study``."""
         if self.cases:
             return chunk_cases(study.cases, 0.0, self.processes, fixed=self.cases)
-        seconds = kernels.estimate_seconds_per_case(study)
+        seconds = models.estimate_seconds_per_case(study)
         return chunk_cases(study.cases, seconds, self.processes, timeout=self.timeout)
 
     def warnings(self, study: Study) -> tuple[str, ...]:
         """What is to be said of ``study`` before it is run: that a case of it may never come to its end."""
-        seconds = kernels.estimate_seconds_per_case(study) * work_of(1)
+        seconds = models.estimate_seconds_per_case(study) * work_of(1)
         if seconds <= self.timeout:
             return ()
         return (

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, assert_never
 
-from worker.kernels import WorkerEnding
+from worker.models import WorkerEnding
 from worker.ports import Chunk, Fate
 
 if TYPE_CHECKING:

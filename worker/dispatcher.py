@@ -16,7 +16,7 @@ from worker.states import StudyState
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from worker.kernels import ChunkResult
+    from worker.models import ChunkResult
     from worker.ports import ActiveStudy, Clock, Executor, Known, News, Store
     from worker.study import Study
 

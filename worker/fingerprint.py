@@ -17,7 +17,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
 
-from worker import kernels
+from worker import models
 
 _SOURCES: Final = "engine sources"
 _FEATURES: Final = "processor features"
@@ -31,7 +31,7 @@ _NAMED: Final = 6
 
 
 def _sources() -> str:
-    return kernels.source_hash(kernels.engine_folder(), Path(kernels.__file__).parent)[:16]
+    return models.source_hash(models.engine_folder(), Path(models.__file__).parent)[:16]
 
 
 # Of the files as this process began to import them. An upgrade under a running process changes the files, not its code.
@@ -120,7 +120,7 @@ def _named(names: set[str]) -> str:
 def prepare_as(expected: str) -> None:
     """First thing a process of a pool does: load the engine. It ends where its fingerprint is not ``expected``."""
     _require(expected)
-    kernels.prepare()
+    models.prepare()
     _require(expected)  # the files may have changed while they were loaded
 
 

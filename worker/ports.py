@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from worker.kernels import ChunkResult
+    from worker.models import ChunkResult
     from worker.states import StudyState
     from worker.study import Study
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from worker import kernels
+from worker import models
 from worker.study import Axis
 
 if TYPE_CHECKING:
@@ -229,6 +229,6 @@ def taken(study: Study, cases: Cases) -> Study:
     return replace(study, axes=axes, combine="zip")
 
 
-def no_cases(study: Study) -> kernels.ChunkResult:
+def no_cases(study: Study) -> models.ChunkResult:
     """The result of running no case of ``study``."""
-    return kernels.ChunkResult(0, [], [], np.empty((0, len(kernels.study_results(study)))))
+    return models.ChunkResult(0, [], [], np.empty((0, len(models.study_results(study)))))

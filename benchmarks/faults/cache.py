@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.faults import harness
-from worker import kernels
+from worker import models
 
 
 def cache(folder: Path, *, cases: int, size: int = 64) -> dict[str, Any]:
@@ -20,7 +20,7 @@ def cache(folder: Path, *, cases: int, size: int = 64) -> dict[str, Any]:
     Every file of machine code keeps its first ``size`` bytes only.
     """
     made = harness.spec(cases, 4.0)
-    copy = own_cache(folder, made) / "kernels" / kernels.cache_folder().name
+    copy = own_cache(folder, made) / "kernels" / models.cache_folder().name
     damaged = _code(copy)
     assert damaged, "there is no machine code in the cache"
     for file in damaged:
@@ -41,7 +41,7 @@ def cache(folder: Path, *, cases: int, size: int = 64) -> dict[str, Any]:
 
 def own_cache(folder: Path, made: dict[str, Any]) -> Path:
     """A copy of the cache in ``folder`` that has the study's kernel; the path to set as SPRAG_KERNEL_CACHE."""
-    whole = kernels.cache_folder()
+    whole = models.cache_folder()
     copy = folder / "cache"
     shutil.copytree(whole, copy / "kernels" / whole.name)
     _warm_up(made, copy)
@@ -50,8 +50,8 @@ def own_cache(folder: Path, made: dict[str, Any]) -> Path:
 
 def _warm_up(made: dict[str, Any], cache: Path) -> None:
     """Compile the study's kernel into ``cache``. What was copied saves time, but belongs to other paths in part."""
-    program = "import json, sys; from benchmarks.faults import harness; from worker import kernels; "
-    program += "kernels.warm_up(harness.study_of(json.loads(sys.argv[1])))"
+    program = "import json, sys; from benchmarks.faults import harness; from worker import models; "
+    program += "models.warm_up(harness.study_of(json.loads(sys.argv[1])))"
     command = [sys.executable, "-c", program, json.dumps(made)]
     subprocess.run(command, env=harness.environment(SPRAG_KERNEL_CACHE=str(cache)), check=True)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.faults import harness
-from service.preview import estimated_bytes
+from service.jobs.preview import estimated_bytes
 from service.storage.room import RESERVE_BYTES
 
 _STATE = "SELECT state FROM studies WHERE id = ?"

@@ -19,10 +19,10 @@ import numpy as np
 import psutil
 
 from service.presets import preset_text
-from service.spec import load_spec, parse_spec
+from service.spec.document import load_spec, parse_spec
 from service.storage.session import sqlite_driver
 from service.storage.store import Store
-from worker import kernels
+from worker import models
 from worker.study import Study
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -206,7 +206,7 @@ def compare(
     """
     study = study_of(copy.deepcopy(dict(made)))
     endings = ["ok"] * study.cases
-    computed = [kernels.run_chunk(study, *part) for part in ranges or [(0, study.cases)]]
+    computed = [models.run_chunk(study, *part) for part in ranges or [(0, study.cases)]]
     for case, ending in (odd or {}).items():
         endings[case] = ending
     with Store.open(f"sqlite:///{database}") as store:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from engine.jit import compiled, part
+from engine.compile.jit import compiled, part
 from engine.machine_shaft import intervals as iv
 from engine.machine_shaft.expressions import Expression, Node
 from engine.machine_shaft.intervals import ORDERS

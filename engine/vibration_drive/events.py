@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.jit import inlined, part
+from engine.compile.jit import inlined, part
 from engine.taylor.batch import HARD, NONE, RESULT, SLOTS, STATUS, put, slot_start, take
 from engine.taylor.roots import RECIPROCAL, first_root
 from engine.vibration_drive.automaton import CLUTCH_TARGET, Band

@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.compile.jit import part
+from engine.compile.lowering import GROUP
 from engine.endings import ENDING_CODES, Ending
-from engine.jit import part
-from engine.taylor.lowering import GROUP
 from engine.taylor.roots import evaluate
 from engine.vibration_drive import states as ev
 from engine.vibration_drive.advance import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.jit import part
+from engine.compile.jit import part
 from engine.vibration_drive.layout import Layout
 from engine.vibration_drive.states import (
     ENGAGED,

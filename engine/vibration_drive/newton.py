@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.jit import compiled, part
+from engine.compile.jit import compiled, part
 from engine.vibration_drive.orbits import list_free, same_states, tie
 
 Floats = NDArray[np.float64]

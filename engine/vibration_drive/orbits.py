@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.jit import compiled, part
+from engine.compile.jit import compiled, part
 from engine.vibration_drive.automaton import Clutch, Shaft
 from engine.vibration_drive.strobes import (
     ANGLE,

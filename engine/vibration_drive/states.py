@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.jit import inlined, part
+from engine.compile.jit import inlined, part
 from engine.vibration_drive.automaton import CLUTCH_THRESHOLD, Band, Clutch, Shaft, Threshold
 from engine.vibration_drive.layout import Layout
 

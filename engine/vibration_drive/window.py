@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.jit import inlined, part
+from engine.compile.jit import inlined, part
 from engine.taylor.batch import HARD, KNOWN, RESULT, SLOTS, STATUS, slot_start, take
 from engine.taylor.roots import RECIPROCAL, evaluate, largest
 from engine.vibration_drive.automaton import Clutch

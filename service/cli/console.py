@@ -15,7 +15,7 @@ from dataclasses import asdict
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
-from service.spec_messages import Problem
+from service.spec.report import Problem
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -142,7 +142,7 @@ def cell_text(cell: object) -> str:
 
 def ending_lines(endings: Mapping[str, int]) -> Iterator[str]:
     """A line for each ending but ok: how many cases ended so, and what it means."""
-    from worker.kernels import ENDING_SENTENCES, OK
+    from worker.models import ENDING_SENTENCES, OK
 
     for name, count in endings.items():
         if name != OK:

@@ -96,8 +96,8 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
 def _show(client: ServiceClient, picture: Path, as_json: bool) -> dict[str, Any]:
     """Submit the study, follow it, show its curve and write the picture; the study at its end."""
     from service.presets import preset_text
-    from service.spec_text import load_spec
-    from worker.kernels import cache_folder
+    from service.spec.text import load_spec
+    from worker.models import cache_folder
 
     _, text = preset_text(PRESET)
     spec = load_spec(text, "json")
@@ -121,7 +121,7 @@ def _show(client: ServiceClient, picture: Path, as_json: bool) -> dict[str, Any]
 
 def _show_curve(curves: dict[str, Any]) -> None:
     """The mechanical characteristic as a table, the mean speed also as a bar."""
-    from worker.kernels import OK
+    from worker.models import OK
 
     (drawn,) = curves["curves"]
     columns = [[None if value is None else f"{value:.4g}" for value in drawn["y"][name]] for name, _ in _TABLE]

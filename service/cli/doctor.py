@@ -19,7 +19,7 @@ import typer
 from service.cli.console import TroubleError, WrongInputError, console, write_json, write_text
 from service.cli.options import Database, JsonFlag
 from service.cli.settings import read_settings
-from service.spec_messages import Problem
+from service.spec.report import Problem
 from worker.limits import MAX_TOLERANCE, MIN_TOLERANCE
 
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sqlalchemy", "fastapi", "uvicorn")
@@ -79,7 +79,7 @@ def doctor(
 
 
 def _show_kernel(shape: dict[str, Any], as_json: bool) -> None:
-    from worker.kernels import MAX_COEFFICIENTS, MAX_PENDULUMS, kernel_source
+    from worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, kernel_source
 
     for name, most in (("pendulums", MAX_PENDULUMS), ("coefficients", MAX_COEFFICIENTS)):
         if shape[name] > most:
@@ -150,8 +150,8 @@ def _database(url: str, file: Path | None) -> tuple[bool, str]:
 
 def _rights(file: Path) -> tuple[bool, str]:
     """Whether the database and its backups are private; earlier versions created them readable by everybody."""
+    from service.jobs.maintenance import backups
     from service.storage.private_files import readable_by_others
-    from service.upkeep import backups
 
     folder = read_settings().backup_folder
     copies = [path for _, path in backups(Path(folder).expanduser())] if folder else []
@@ -163,7 +163,7 @@ def _rights(file: Path) -> tuple[bool, str]:
 
 
 def _clock(url: str, file: Path | None) -> tuple[bool, str]:
-    from service.clock_watch import clock_problem
+    from service.storage.clock_watch import clock_problem
     from service.storage.store import Store
 
     now = f"it is {datetime.now(UTC).isoformat(timespec='seconds')}"
@@ -181,7 +181,7 @@ def _disk(location: Path) -> tuple[bool, str]:
 
 
 def _backups() -> tuple[bool, str]:
-    from service.upkeep import backups
+    from service.jobs.maintenance import backups
 
     folder = read_settings().backup_folder
     if not folder:
@@ -194,7 +194,7 @@ def _backups() -> tuple[bool, str]:
 
 
 def _cache() -> tuple[bool, str]:
-    from worker.kernels import cache_folder, cache_is_wanted
+    from worker.models import cache_folder, cache_is_wanted
 
     folder = cache_folder()
     folder.mkdir(parents=True, exist_ok=True)
@@ -206,7 +206,7 @@ def _cache() -> tuple[bool, str]:
 
 
 def _known_values() -> tuple[bool, str]:
-    from service.self_test import check_known_values
+    from service.jobs.self_check import check_known_values
 
     wrong, largest = check_known_values()
     if wrong:

@@ -11,8 +11,8 @@ from service.cli.console import WrongInputError, say
 from service.cli.files import decode, read_bytes
 from service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, WaitTimeout
 from service.cli.remote import connection, exit_as, follow, show_study
-from service.spec_messages import Problem
-from service.written import written_number
+from service.spec.numbers import parse_number
+from service.spec.report import Problem
 from worker.limits import MAX_BODY_BYTES
 
 
@@ -72,5 +72,5 @@ def _addition(axes: list[str], points: str | None) -> dict[str, Any]:
 
 
 def _value(text: str) -> float | str:
-    number = written_number(text)
+    number = parse_number(text)
     return text if number is None else number

@@ -27,18 +27,18 @@ from service.cli.files import output, read_study, to_file
 from service.cli.options import ChunkCases, FinishBy, Fresh, JsonFlag, OutputFile, PointsFile, Processes, SpecFile
 from service.cli.remote import TableFormat, table_format
 from service.cli.settings import read_settings
-from service.spec_messages import Problem
+from service.spec.report import Problem
 from worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from service.exports import Format
-    from service.local import LocalRun
-    from service.report import ReportFormat
+    from service.jobs.local import LocalRun
+    from service.results.exports import Format
+    from service.results.report import ReportFormat
     from service.settings import Settings
-    from service.spec import ParsedSpec
-    from worker.kernels import Trajectory
+    from service.spec.document import ParsedSpec
+    from worker.models import Trajectory
     from worker.study import Study
 
 
@@ -94,7 +94,7 @@ def preview(
     as_json: JsonFlag = False,
 ) -> None:
     """Tell what a study would be: number of cases, time, size, first cases. Nothing is run."""
-    from service.preview import preview_json
+    from service.jobs.preview import preview_json
     from worker.chunking import Chunking
 
     finish = _finish(finish_by)
@@ -153,7 +153,7 @@ def trajectory(
     as_json: JsonFlag = False,
 ) -> None:
     """Write the instantaneous values of one case: angles, speeds, torques, powers, states."""
-    from worker.kernels import ENDING_SENTENCES, OK
+    from worker.models import ENDING_SENTENCES, OK
 
     study = read_study(spec).study
     with output(file) as write:
@@ -178,16 +178,16 @@ def _is_json(form: ValueFormat | None, file: str | None, as_json: bool) -> bool:
 
 
 def _trajectory(study: Study, case: int, start: str | None, end: str | None, points: int) -> Trajectory:
-    from service.errors import ApiError
-    from service.trajectories import span
-    from worker.kernels import run_trajectory
+    from service.faults import FaultError
+    from service.results.trajectories import span
+    from worker.models import run_trajectory
 
     if case >= study.cases:
         problem = Problem("--case", "there is no such case", case, allowed=f"0 .. {study.cases - 1}")
         raise WrongInputError("an option is wrong", problems=[problem])
     try:
         first, last = span(study, case, start, end)
-    except ApiError as error:
+    except FaultError as error:
         problems = [
             Problem(f"--{item.parameter}", item.message, item.value, allowed=item.allowed) for item in error.errors
         ]
@@ -196,8 +196,8 @@ def _trajectory(study: Study, case: int, start: str | None, end: str | None, poi
 
 
 def _trajectory_bytes(made: Trajectory, study: Study, case: int, as_json: bool) -> bytes:
-    from service.errors import to_bytes
-    from service.trajectories import trajectory_csv, trajectory_json
+    from service.json_text import to_bytes
+    from service.results.trajectories import trajectory_csv, trajectory_json
 
     if not as_json:
         return trajectory_csv(made)
@@ -212,7 +212,7 @@ def presets(
 ) -> None:
     """List the studies that come with the program, or print the spec of one."""
     from service.presets import ABOUT, preset_names, preset_text
-    from service.spec_messages import did_you_mean
+    from service.spec.report import did_you_mean
 
     names = preset_names()
     if name is None:
@@ -247,8 +247,8 @@ def run(
     as_json: JsonFlag = False,
 ) -> None:
     """Run a study here, without a service: rows or a report to standard output or FILE, progress on standard error."""
-    from service.local import run_here
-    from service.unaffected import Unaffected
+    from service.jobs.local import run_here
+    from service.results.unaffected import Unaffected
 
     finish = _finish(finish_by)
     parsed = read_study(spec, points)
@@ -297,7 +297,7 @@ def run(
 @contextmanager
 def _telling_what_is_kept() -> Iterator[None]:
     """Tell after Ctrl-C what became of the study, and how to go on with it."""
-    from service.local import RunInterruptedError
+    from service.jobs.local import RunInterruptedError
 
     try:
         yield
@@ -312,7 +312,7 @@ def _telling_what_is_kept() -> Iterator[None]:
 
 def _finish(text: str | None) -> datetime | None:
     """The deadline that an option names; WrongInputError when it cannot be kept."""
-    from service.finish import ALLOWED, FinishError, finish_at
+    from service.schedules.deadline import ALLOWED, FinishError, finish_at
 
     try:
         return None if text is None else finish_at(text, datetime.now(UTC))
@@ -323,7 +323,7 @@ def _finish(text: str | None) -> datetime | None:
 
 def _pool_size(study: Study, settings: Settings, asked: int | None) -> int:
     """Processes to run on; 0, which is this process itself, where starting a pool would take longer than the study."""
-    from worker.kernels import estimate_seconds_per_case
+    from worker.models import estimate_seconds_per_case
 
     if asked is None and study.cases * estimate_seconds_per_case(study) < _NO_POOL_SECONDS:
         return 0
@@ -332,10 +332,10 @@ def _pool_size(study: Study, settings: Settings, asked: int | None) -> int:
 
 def _rows(done: LocalRun, study: Study, form: Format | ReportFormat) -> Iterator[bytes]:
     """The rows of a finished study as the service exports them, or its report."""
-    from service.exports import Source, export
-    from service.report import write_report
-    from service.report.content import report_of
-    from worker.kernels import study_results
+    from service.results.exports import Source, export
+    from service.results.report import write_report
+    from service.results.report.content import report_of
+    from worker.models import study_results
 
     record = done.record
     if form == "html" or form == "pdf":  # noqa: PLR1714 - so that the types are told apart

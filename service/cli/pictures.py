@@ -11,7 +11,7 @@ from service.cli.console import WrongInputError, cell_text, say, show_table, wri
 from service.cli.files import write_pieces
 from service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
 from service.cli.remote import connection
-from service.spec_messages import Problem
+from service.spec.report import Problem
 
 HeldAt = Annotated[
     list[str] | None, typer.Option("--at", metavar="PATH=VALUE", help="Value at which another axis is held.")
@@ -141,7 +141,7 @@ def _show_effects(result: dict[str, Any]) -> None:
 
 def show_curves(found: dict[str, Any]) -> None:
     """One table for each curve: the axis, then every result against it."""
-    from worker.kernels import OK
+    from worker.models import OK
 
     x = found["x"]
     columns = [(_heading(x["path"], x["unit"]), True)]

@@ -26,8 +26,8 @@ def serve(
     as_json: JsonFlag = False,
 ) -> None:
     """Start the service and its worker; Ctrl-C ends both. With --json the address comes on standard output."""
-    from service.serve import AddressError
-    from service.serve import serve as run_service
+    from service.http.server import AddressError
+    from service.http.server import serve as run_service
     from service.settings import UnsafeSettingsError
 
     settings = read_settings(host=host, port=port, database=db, processes=processes, chunk_cases=chunk)
@@ -57,7 +57,7 @@ def worker(
 ) -> None:
     """Run the studies of a database without a service; Ctrl-C ends it."""
     from service import logs
-    from service.dispatching import run_dispatcher, stop_on_signals, worker_settings
+    from service.jobs.dispatching import run_dispatcher, stop_on_signals, worker_settings
 
     settings = read_settings(database=db, processes=processes)
     logs.configure(settings.log_format, requests=False)

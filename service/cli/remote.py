@@ -35,14 +35,14 @@ from service.cli.options import (
     Token,
     WaitTimeout,
 )
-from service.spec_messages import Problem
+from service.spec.report import Problem
 from worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
 from worker.states import TERMINAL, StudyState
 
 if TYPE_CHECKING:
     from service.client import Query, RefusedError, ServiceClient
-    from service.exports import Format
-    from service.report import ReportFormat
+    from service.results.exports import Format
+    from service.results.report import ReportFormat
 
 #: A parameter with its sign, as the service's messages write it: "by=", "at=shaft.load=0.2".
 _PARAMETER_IN_TEXT = re.compile(r"(?<![\w.-])(x|y|by|at)=(?=(\w?))")
@@ -54,7 +54,7 @@ PriorityOption = Annotated[
 
 
 class TableFormat(StrEnum):
-    """Formats of a whole study: case rows as `service.exports` writes them, and documents as `service.report` does."""
+    """Formats of a whole study: case rows (`service.results.exports`) and documents (`service.results.report`)."""
 
     CSV = "csv"
     JSON = "json"
@@ -203,7 +203,7 @@ def show_study(study: dict[str, Any], as_json: bool) -> None:
         write_json(study)
         return
     print(study["id"])
-    from worker.kernels import OK
+    from worker.models import OK
 
     progress = study["progress"]
     endings = ", ".join(f"{count} {name}" for name, count in progress.get("endings", {}).items() if name != OK)
@@ -318,7 +318,7 @@ def export(
     as_json: JsonFlag = False,
 ) -> None:
     """Write all case rows of a study, or a report of it, to a file or to standard output."""
-    from service.exports import Format
+    from service.results.exports import Format
 
     chosen = table_format(form, file, as_json)
     with connection(server, token) as client:
@@ -333,8 +333,8 @@ def export(
 
 def table_format(form: TableFormat | None, file: str | None, as_json: bool) -> Format | ReportFormat:
     """The format that was asked for: by name, by the ending of the file's name, or by ``--json``; csv otherwise."""
-    from service.exports import FORMATS, format_of
-    from service.report import REPORT_FORMATS
+    from service.results.exports import FORMATS, format_of
+    from service.results.report import REPORT_FORMATS
 
     if form is not None:
         return next(known for known in (*FORMATS, *REPORT_FORMATS) if known == form.value)

@@ -10,7 +10,7 @@ from service.cli.console import WrongInputError, say, show_table, write_json
 from service.cli.files import read_spec
 from service.cli.options import DEFAULT_SERVER, Fresh, JsonFlag, Server, SpecFile, Token
 from service.cli.remote import PriorityOption, connection
-from service.spec_messages import Problem
+from service.spec.report import Problem
 from worker.limits import MAX_PRIORITY
 
 if TYPE_CHECKING:

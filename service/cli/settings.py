@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from service.cli.console import WrongInputError
-from service.spec_messages import Problem, shorten
+from service.spec.report import Problem, shorten
 
 if TYPE_CHECKING:
     from service.settings import Settings

@@ -14,11 +14,11 @@ import typer
 from service.cli.console import ExitCode, WrongInputError, progress_bar, say, show_table, write_json
 from service.cli.files import output, read_study, to_file
 from service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
-from service.spec_messages import Problem
-from worker.kernels.settled import MAX_PERIODS, MIN_PERIODS
+from service.spec.report import Problem
+from worker.models.settled import MAX_PERIODS, MIN_PERIODS
 
 if TYPE_CHECKING:
-    from worker.kernels.settled import SettledCases
+    from worker.models.settled import SettledCases
     from worker.study import Study
 
 #: Cases that are settled side by side: enough to fill the engine, few enough to show progress.
@@ -39,7 +39,7 @@ def settle(
     as_json: JsonFlag = False,
 ) -> None:
     """Find the settled motion of cases: its regime, order, stability and characteristics."""
-    from worker.kernels import OK
+    from worker.models import OK
 
     study = read_study(spec, points).study
     cases = _chosen(study, case)
@@ -62,7 +62,7 @@ def settle(
 
 def _chosen(study: Study, asked: list[int] | None) -> list[int]:
     """The cases to be settled; WrongInputError where the model or a number is wrong."""
-    from worker.kernels.settled import can_settle
+    from worker.models.settled import can_settle
 
     if not can_settle(study):
         problem = Problem("/model", "has no motion that settles", study.model, allowed="vibration-drive")
@@ -80,7 +80,7 @@ def _chosen(study: Study, asked: list[int] | None) -> list[int]:
 
 
 def _settled(study: Study, cases: list[int], at_most: int) -> list[SettledCases]:
-    from worker.kernels.settled import settle_cases
+    from worker.models.settled import settle_cases
 
     parts = []
     with progress_bar(study.name or "study") as update:
@@ -123,8 +123,8 @@ def _csv(study: Study, parts: list[SettledCases]) -> bytes:
 
 def _show(part: SettledCases) -> None:
     """One case as a table for people, without what it has no value of."""
-    from worker.kernels import ENDING_SENTENCES, OK
-    from worker.kernels.settled import REGIME_SENTENCES
+    from worker.models import ENDING_SENTENCES, OK
+    from worker.models.settled import REGIME_SENTENCES
 
     meaning = REGIME_SENTENCES[part.regimes[0]] if part.endings[0] == OK else ENDING_SENTENCES[part.endings[0]]
     values = zip(part.infos, part.values[0].tolist(), strict=True)

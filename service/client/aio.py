@@ -26,7 +26,7 @@ from service.client.queries import (
     spec_of,
 )
 from service.client.study import DEFAULT_SERVER
-from service.client.waiting import Waiting, is_event
+from service.client.waiting import Waiting
 from service.client.wire import (
     API,
     EVENTS_TIMEOUT,
@@ -34,6 +34,7 @@ from service.client.wire import (
     Query,
     connection_options,
     document,
+    is_event,
     reason,
     refusal,
     require_finite,
@@ -219,7 +220,7 @@ class AsyncStudy:
         return grid_of(await self.download("netcdf"))
 
     async def download(self, form: str) -> bytes:
-        """All rows in a format of `service.exports`, or the report as "html" or "pdf"."""
+        """All rows in a format of `service.results.exports`, or the report as "html" or "pdf"."""
         return await self._client.read(*self._rows(form))
 
     async def export(self, file: str | PathLike[str], form: str | None = None) -> Path:

@@ -10,7 +10,6 @@ from typing import Any
 import httpx
 
 from service.client.errors import UnreachableError
-from service.client.waiting import is_event
 from service.client.wire import (
     API,
     EVENTS_TIMEOUT,
@@ -18,6 +17,7 @@ from service.client.wire import (
     Query,
     connection_options,
     document,
+    is_event,
     reason,
     refusal,
     require_finite,

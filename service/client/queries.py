@@ -75,7 +75,7 @@ def finish_text(when: str | datetime) -> str:
 
 def form_of(path: Path) -> str:
     """The format that the ending of a file's name tells; ValueError when it tells none."""
-    from service.exports import format_of
+    from service.formats import format_of
 
     ending = path.suffix[1:].lower()
     form = ending if ending in ("html", "pdf") else format_of(path.name)

@@ -165,7 +165,7 @@ class Study:
         return grid_of(self.download("netcdf"))
 
     def download(self, form: str) -> bytes:
-        """All rows in a format of `service.exports`, or the report as "html" or "pdf"."""
+        """All rows in a format of `service.results.exports`, or the report as "html" or "pdf"."""
         return b"".join(self._pieces(form))
 
     def export(self, file: str | PathLike[str], form: str | None = None) -> Path:

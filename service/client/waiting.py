@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from service.client.errors import RefusedError, ServiceError, StudyTimeoutError, UnreachableError
+from service.client.wire import SILENCE
 from worker.states import TERMINAL
 
 if TYPE_CHECKING:
@@ -24,8 +25,6 @@ ENDED: Final = frozenset(state.value for state in TERMINAL)
 POLLS: Final = (0.1, 0.2, 0.3, 0.5, 1.0)
 #: Seconds between two tries while the service does not answer.
 TRIES: Final = (0.5, 1.0, 2.0, 5.0)
-#: Seconds without a byte after which a stream of events is given up; the service sends one every 15 s.
-SILENCE: Final = 30.0
 #: Statuses of a service that starts, ends or is too busy, and of a proxy in front of one.
 _TRANSIENT: Final = frozenset({429, 502, 503, 504})
 
@@ -141,8 +140,3 @@ def _looks(client: ServiceClient, study_id: str, waiting: Waiting) -> Iterator[d
         if not waiting.listens():
             return
     waiting.listened()
-
-
-def is_event(line: str) -> bool:
-    """Whether a line of a stream of events is an event's data, or the sign of life between events."""
-    return line.startswith(("data:", ":"))

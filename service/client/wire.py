@@ -11,8 +11,9 @@ from urllib.parse import quote
 import httpx
 
 from service.client.errors import RefusedError, ServiceError, UnreachableError
-from service.client.waiting import SILENCE
 
+#: Seconds without a byte after which a stream of events is given up; the service sends one every 15 s.
+SILENCE: Final = 30.0
 API: Final = "/api/v1"
 #: Seconds to wait for an answer; curves of a large study are read from disk first.
 TIMEOUT: Final = httpx.Timeout(60.0, connect=10.0)
@@ -107,3 +108,8 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+def is_event(line: str) -> bool:
+    """Whether a line of a stream of events is an event's data, or the sign of life between events."""
+    return line.startswith(("data:", ":"))

@@ -13,8 +13,8 @@ from service.storage.order import Orders
 from service.storage.part import MAX_INTEGER
 from service.storage.records import CaseColumns, CaseRow, RowBlock
 from service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
-from worker import kernels
-from worker.kernels import WorkerEnding
+from worker import models
+from worker.models import WorkerEnding
 from worker.states import StudyState
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class _Rows:
 
     number: int
     table: sa.Table
-    infos: tuple[kernels.ResultInfo, ...]
+    infos: tuple[models.ResultInfo, ...]
     cases: int
     cancelled: bool
 
@@ -48,7 +48,7 @@ class Cases(Orders):
         return _Rows(
             row.number,
             results_table(row.model, row.pendulums),
-            kernels.result_infos(row.model, row.pendulums),
+            models.result_infos(row.model, row.pendulums),
             row.cases,
             row.state == StudyState.CANCELLED.value,
         )
@@ -171,7 +171,7 @@ def conditions(column: sa.ColumnElement[Any], cases: NDArray[np.int64]) -> Itera
         yield column.in_(cases[start : start + CASES_AT_ONCE].tolist())
 
 
-def _block(infos: tuple[kernels.ResultInfo, ...], found: Sequence[Sequence[Any]]) -> RowBlock:
+def _block(infos: tuple[models.ResultInfo, ...], found: Sequence[Sequence[Any]]) -> RowBlock:
     if not found:
         return RowBlock(infos, np.empty(0, dtype=np.int64), [], [], np.empty((0, len(infos))))
     values = np.array([row[3:] for row in found], dtype=np.float64)

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
 from service.storage.private_files import create_private
-from worker.process_table import start_time
+from worker.pool.process_table import start_time
 
 if TYPE_CHECKING:
-    from service.storage.session import Session
+    pass
 
 
 #: Seconds for a killed process to be gone.
@@ -38,11 +38,6 @@ class OneHolder(Protocol):
 
     def release(self) -> None:
         """Give the lock up."""
-
-
-def lock_of(session: Session, owner: str) -> OneHolder:
-    """The dispatcher's lock of a database: a file beside an SQLite file, an advisory lock of a server."""
-    return session.server_lock(owner) if session.on_server else DispatcherLock(session.path)
 
 
 class DispatcherLock:

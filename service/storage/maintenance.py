@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import sqlalchemy as sa
 
-from service.leftovers import mark, sweep
+from service.stale_files import mark, sweep
 from service.storage.errors import DatabaseError, SchemaError
 from service.storage.private_files import create_private, sync_folder
 from service.storage.records import CheckReport

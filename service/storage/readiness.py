@@ -6,7 +6,7 @@ from contextlib import suppress
 from threading import Lock
 from typing import TYPE_CHECKING, Final
 
-from service.clock_watch import clock_problem
+from service.storage.clock_watch import clock_problem
 from service.storage.errors import DatabaseError
 from service.storage.part import SILENT_SECONDS
 from worker.ports import StoreError

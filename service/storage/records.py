@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import sqlalchemy as sa
     from numpy.typing import NDArray
 
-    from worker.kernels import ResultInfo
+    from worker.models import ResultInfo
     from worker.order import Coverage
 
 

@@ -13,7 +13,7 @@ from service.storage.errors import NothingToRetry
 from service.storage.order import Orders
 from service.storage.records import StudyRecord, record_of
 from service.storage.tables import CHUNKS, ENDINGS, RECORD_COLUMNS, STUDIES, results_table
-from worker import kernels
+from worker import models
 from worker.chunking import MAX_CHUNKS
 from worker.states import StudyEvent, StudyState, follow
 
@@ -78,7 +78,7 @@ def _nothing(endings: Collection[str] | None) -> str:
 def _failed(connection: sa.Connection, number: int, endings: Collection[str] | None) -> dict[str, int]:
     """Cases of each ending that are to be run again."""
     c = ENDINGS.c
-    found = connection.execute(sa.select(c.ending, c.cases).where(c.study == number, c.ending != kernels.OK)).all()
+    found = connection.execute(sa.select(c.ending, c.cases).where(c.study == number, c.ending != models.OK)).all()
     return {ending: cases for ending, cases in found if cases and (endings is None or ending in endings)}
 
 

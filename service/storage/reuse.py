@@ -14,8 +14,8 @@ import sqlalchemy as sa
 from service.storage.cases import conditions
 from service.storage.order import Orders
 from service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, results_table
-from worker import fingerprint, kernels
-from worker.kernels import WorkerEnding
+from worker import fingerprint, models
+from worker.models import WorkerEnding
 from worker.order import order_of
 from worker.ports import Known
 from worker.reuse import Wanted, kin_hash, shared_cases, span
@@ -72,7 +72,7 @@ class Reuse(Orders):
     def reusable(self, study: Study) -> int:
         """How many cases of a study that is not submitted yet would not have to be run."""
         with self.session.read() as connection:
-            found = _find(connection, self._spans, study, kin_hash(study, kernels.ENGINE_VERSION), 0)
+            found = _find(connection, self._spans, study, kin_hash(study, models.ENGINE_VERSION), 0)
         return 0 if found is None else found.cases.size
 
     def known(self, study: Study, chunk: Chunk) -> Known | None:

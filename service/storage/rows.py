@@ -10,23 +10,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from service.storage.tables import KEY_COLUMNS, results_table
-from worker import kernels
+from worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from worker.kernels import ChunkResult
+    from worker.models import ChunkResult
 
 
 @lru_cache(maxsize=64)
 def target(model: str, pendulums: int) -> tuple[str, tuple[str, ...]]:
     """A results table and its columns in the order of `tuples`."""
-    names = (*KEY_COLUMNS, *(info.column for info in kernels.result_infos(model, pendulums)))
+    names = (*KEY_COLUMNS, *(info.column for info in models.result_infos(model, pendulums)))
     return results_table(model, pendulums).name, names
 
 
 def tuples(
-    study: int, numbers: Sequence[int], result: ChunkResult, infos: Sequence[kernels.ResultInfo]
+    study: int, numbers: Sequence[int], result: ChunkResult, infos: Sequence[models.ResultInfo]
 ) -> list[tuple[Any, ...]]:
     """Rows for `target`, of the cases with those numbers: NaN and infinities become NULL, counts whole numbers."""
     columns: list[list[Any]] = []

@@ -17,6 +17,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import URL, make_url
 
 from service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError, EndingError
+from service.storage.lock import DispatcherLock
 from service.storage.private_files import PRIVATE_FOLDER_MODE, create_private
 from worker.ports import StoreError
 
@@ -377,3 +378,8 @@ def _begin(connection: sa.Connection) -> None:
     # a writer once another process has written in between, so writers take the lock at once.
     if statement := connection.get_execution_options().get(_BEGIN):
         connection.exec_driver_sql(statement)
+
+
+def lock_of(session: Session, owner: str) -> OneHolder:
+    """The dispatcher's lock of a database: a file beside an SQLite file, an advisory lock of a server."""
+    return session.server_lock(owner) if session.on_server else DispatcherLock(session.path)

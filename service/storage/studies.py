@@ -29,7 +29,7 @@ from service.storage.tables import (
     STUDIES,
     WAITS_FOR_WINDOW,
 )
-from worker import kernels
+from worker import models
 from worker.chunking import Chunking, spans
 from worker.reuse import kin_hash
 from worker.states import TERMINAL, StudyEvent, StudyState
@@ -55,7 +55,7 @@ class Studies(Orders):
         self.chunking = chunking
         self._studies: OrderedDict[str, Study] = OrderedDict()
         self._lock = Lock()
-        #: Set when a study is deleted, for `service.housekeeping`.
+        #: Set when a study is deleted, for `service.jobs.housekeeping`.
         self.deleted = Event()
 
     def create_study(
@@ -331,15 +331,15 @@ def study_row(
     return {
         "name": study.name,
         "model": study.model,
-        "pendulums": kernels.pendulums(study),
+        "pendulums": models.pendulums(study),
         "cases": study.cases,
         "chunk_cases": chunking.cases_of(study),
-        "engine_version": kernels.ENGINE_VERSION,
-        "physics_hash": study.physics_hash(kernels.ENGINE_VERSION),
+        "engine_version": models.ENGINE_VERSION,
+        "physics_hash": study.physics_hash(models.ENGINE_VERSION),
         "spec": json.dumps(spec, allow_nan=False),
         "study": json.dumps(study.to_json(), allow_nan=False),
         "warnings": json.dumps(list(warnings)),
-        "kin_hash": kin_hash(study, kernels.ENGINE_VERSION),
+        "kin_hash": kin_hash(study, models.ENGINE_VERSION),
     }
 
 

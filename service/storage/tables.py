@@ -4,7 +4,7 @@ from functools import cache
 
 import sqlalchemy as sa
 
-from worker import kernels
+from worker import models
 
 #: Revision of the schema below; the last file in migrations/versions.
 HEAD_REVISION = "0011"
@@ -145,7 +145,7 @@ def results_table(model: str, pendulums: int) -> sa.Table:
         return METADATA.tables[name]
     results = (
         sa.Column(info.column, sa.Integer if info.kind == "count" else sa.Double)
-        for info in kernels.result_infos(model, pendulums)
+        for info in models.result_infos(model, pendulums)
     )
     return sa.Table(
         name,
@@ -161,7 +161,7 @@ def results_table(model: str, pendulums: int) -> sa.Table:
 
 def all_tables() -> sa.MetaData:
     """The metadata with the results tables of every model and shape in it."""
-    for model in kernels.models():
-        for pendulums in kernels.result_shapes(model):
+    for model in models.model_names():
+        for pendulums in models.result_shapes(model):
             results_table(model, pendulums)
     return METADATA

@@ -22,8 +22,8 @@ from service.storage.tables import (
     STUDIES,
     WAITS_FOR_ROOM,
 )
-from worker import kernels
-from worker.kernels import ChunkResult
+from worker import models
+from worker.models import ChunkResult
 from worker.ports import ActiveStudy, Chunk
 from worker.states import TERMINAL, StudyEvent, StudyState
 from worker.study import Study
@@ -217,7 +217,7 @@ class Work(Reuse):
         numbers = (self._cases(chunk, connection) if known is None else known.missing).tolist()
         if result.count:
             with without_collector():
-                rows = tuples(chunk.study, numbers, result, kernels.result_infos(model, pendulums))
+                rows = tuples(chunk.study, numbers, result, models.result_infos(model, pendulums))
                 self.session.insert_rows(connection, *target(model, pendulums), rows)
         endings = Counter(result.endings)
         if known is not None and known.cases.size:
@@ -239,7 +239,7 @@ class Work(Reuse):
             .where(STUDIES.c.number == chunk.study)
             .values(
                 done=STUDIES.c.done + chunk.count,
-                ok=STUDIES.c.ok + endings[kernels.OK],
+                ok=STUDIES.c.ok + endings[models.OK],
                 reused=STUDIES.c.reused + (0 if known is None else known.cases.size),
                 revision=STUDIES.c.revision + 1,
             )
@@ -282,7 +282,7 @@ class Work(Reuse):
             model, pendulums = connection.execute(
                 sa.select(STUDIES.c.model, STUDIES.c.pendulums).where(STUDIES.c.number == chunk.study)
             ).one()
-            nothing = np.full((chunk.count, len(kernels.result_infos(model, pendulums))), np.nan)
+            nothing = np.full((chunk.count, len(models.result_infos(model, pendulums))), np.nan)
             result = ChunkResult(chunk.first, [ending] * chunk.count, [""] * chunk.count, nothing)
             self._store(connection, chunk, result, detail)
 
@@ -375,7 +375,7 @@ def _why_failed(connection: sa.Connection, number: int, cases: int) -> str:
     ending = connection.execute(
         sa.select(ENDINGS.c.ending).where(ENDINGS.c.study == number).order_by(ENDINGS.c.cases.desc()).limit(1)
     ).scalar_one()
-    sentence = kernels.ENDING_SENTENCES.get(ending, "")
+    sentence = models.ENDING_SENTENCES.get(ending, "")
     return f"none of the {cases} cases ended ok; most of them: {ending}. {sentence}"
 
 

@@ -17,7 +17,7 @@ import sys
 import numpy as np
 from engine.run import Run
 from engine.vibration_drive.simulate import simulate
-from tests.engine.drive import batch_of, drive, periods
+from tests.engine.vibration_drive.drive import batch_of, drive, periods
 
 loads = np.linspace(0.0, 0.4, 40)
 batch = simulate(batch_of([drive(1, shaft__load=load) for load in loads]), periods(12.0, 8.0, 12.0), cases=40)

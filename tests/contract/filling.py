@@ -5,7 +5,7 @@ from __future__ import annotations
 from service.storage.records import StudyRecord
 from service.storage.store import Store
 from tests.worker import fakes
-from worker import kernels
+from worker import models
 
 SPEC = {"sprag": 1, "name": "Füllung", "axes": [{"path": "shaft.load", "values": ["0.1 N*m"]}]}
 
@@ -14,7 +14,7 @@ def create(store: Store, cases: int = 25, name: str = "a study", **options: str)
     return store.create_study(SPEC, fakes.study(cases, name), **options)
 
 
-def finish(store: Store, record: StudyRecord, ending: str = kernels.OK) -> int:
+def finish(store: Store, record: StudyRecord, ending: str = models.OK) -> int:
     """Run a study to its end; gives the epoch."""
     epoch = store.take_over("test")
     for chunk in store.open_chunks(record.number):

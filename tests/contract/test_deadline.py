@@ -13,9 +13,9 @@ from service.storage.errors import NothingToRetry
 from service.storage.records import InTime, StudyRecord
 from service.storage.store import Store
 from tests.worker import fakes
-from worker import kernels
+from worker import models
 from worker.chunking import Chunking
-from worker.kernels import ChunkResult
+from worker.models import ChunkResult
 from worker.ports import Chunk
 from worker.states import StudyState
 from worker.study import Axis, Study
@@ -214,7 +214,7 @@ def test_whether_it_will_be_in_time_follows_from_the_interval(store: Store, cloc
         assert store.claim(epoch, [chunk]) == [chunk]
         clock.seconds += 10.0
         known = store.known(store.study(record.id), chunk)
-        store.commit(epoch, chunk, ChunkResult(0, [kernels.OK] * 2, [""] * 2, fakes.values(0, 2)), known)
+        store.commit(epoch, chunk, ChunkResult(0, [models.OK] * 2, [""] * 2, fakes.values(0, 2)), known)
     progress = store.progress(record.id)
     assert progress.seconds_left is not None
     low, high = progress.seconds_left

@@ -15,9 +15,9 @@ from service.storage.records import StudyRecord
 from service.storage.store import Store
 from tests import postgres
 from tests.worker import fakes
-from worker import kernels
+from worker import models
 from worker.chunking import Chunking
-from worker.kernels import ChunkResult
+from worker.models import ChunkResult
 from worker.ports import Chunk
 from worker.states import StudyState, TransitionError
 
@@ -131,7 +131,7 @@ def test_a_study_that_has_not_ended_or_was_cancelled_is_not_run_again(store: Sto
 
 
 def test_nothing_to_run_again_is_said(store: Store) -> None:
-    record = made(store, [kernels.OK] * 3)
+    record = made(store, [models.OK] * 3)
     with pytest.raises(NothingToRetry, match="every case of the study ended ok"):
         store.retry_study(record.id)
     failed = made(store, ["diverged"] * 3)

@@ -12,7 +12,7 @@ from service.storage.errors import IdempotencyConflict, PageTokenError, StudyBus
 from service.storage.store import Store
 from tests.contract.filling import SPEC, create, finish
 from tests.worker import fakes
-from worker import kernels
+from worker import models
 from worker.ports import Chunk
 from worker.states import StudyState, TransitionError
 
@@ -27,7 +27,7 @@ def test_a_study_comes_back_as_it_was_given(store: Store) -> None:
     assert (record.chunk_cases, record.pendulums, record.model) == (10, 1, "vibration-drive")
     assert record.warnings == ("odd, but allowed",)
     assert record.created_at.tzinfo is not None
-    assert record.physics_hash == study.physics_hash(kernels.ENGINE_VERSION)
+    assert record.physics_hash == study.physics_hash(models.ENGINE_VERSION)
     assert store.open_chunks(record.number) == [Chunk(1, 0, 10), Chunk(1, 10, 10), Chunk(1, 20, 5)]
 
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from tests.engine.drive import Columns, clutch
+from tests.engine.vibration_drive.drive import Columns, clutch
 
 
 def odd_drive(rng: np.random.Generator, pendulums: int) -> Columns:

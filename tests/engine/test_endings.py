@@ -14,7 +14,7 @@ from engine.endings import ENDING_CODES, Ending
 from engine.run import Run, Span
 from engine.vibration_drive.parameters import PARAMETERS
 from engine.vibration_drive.simulate import trajectory
-from tests.engine.drive import Columns, Results, batch_of, clutch, drive, one, pendulum, periods
+from tests.engine.vibration_drive.drive import Columns, Results, batch_of, clutch, drive, one, pendulum, periods
 
 RUN = periods(6.0, 3.0, 6.0)
 

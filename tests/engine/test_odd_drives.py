@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from engine.endings import Ending
-from tests.engine.drive import Columns, Results, batch_of, clutch, one, pendulum, periods
 from tests.engine.odd_drives import odd_drive
-from tests.engine.reference_automaton import Drive
+from tests.engine.vibration_drive.drive import Columns, Results, batch_of, clutch, one, pendulum, periods
+from tests.engine.vibration_drive.reference_automaton import Drive
 
 
 @pytest.mark.parametrize("reset", ["contact", "literal"])

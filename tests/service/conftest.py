@@ -14,12 +14,12 @@ import pytest
 from anyio.from_thread import BlockingPortal, start_blocking_portal
 from fastapi import FastAPI
 
-from service.api.examples import SPEC
-from service.app import chunking, create_app
+from service.http.api.examples import SPEC
+from service.http.app import chunking, create_app
 from service.settings import Settings
 from service.storage.store import Store
-from worker import kernels
-from worker.kernels import ChunkResult, KernelShape
+from worker import models
+from worker.models import ChunkResult, KernelShape
 from worker.study import Study
 
 API = "/api/v1"
@@ -106,14 +106,14 @@ class Service:
 
 def made_up(study: Study) -> ChunkResult:
     """Results of every case, random doubles of many sizes; every fifth case failed, every fourth has a flag."""
-    infos = kernels.study_results(study)
+    infos = models.study_results(study)
     random = np.random.default_rng(7)
     values = random.normal(size=(study.cases, len(infos))) * 10.0 ** random.integers(-12, 12, (study.cases, len(infos)))
     for column, info in enumerate(infos):
         if info.kind == "count":
             values[:, column] = np.arange(study.cases) + column
     endings = ["chatter" if case % 5 == 4 else "ok" for case in range(study.cases)]
-    flags = [kernels.WINDUP_OUT_OF_DATA if case % 4 == 3 else "" for case in range(study.cases)]
+    flags = [models.WINDUP_OUT_OF_DATA if case % 4 == 3 else "" for case in range(study.cases)]
     values[[ending != "ok" for ending in endings]] = np.nan
     return ChunkResult(0, endings, flags, values)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from service.spec import ParsedSpec, Problem, SpecError, parse_spec
+from service.spec.document import ParsedSpec, Problem, SpecError, parse_spec
 
 #: The example of the spec's own documentation.
 SPEC: dict[str, Any] = {

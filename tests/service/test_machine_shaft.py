@@ -16,12 +16,12 @@ import pytest
 from engine.machine_shaft.simulate import simulate
 from engine.machine_shaft.spec import MachineSpec
 from engine.machine_shaft.trajectory import trajectory
-from service.api import models as m
-from service.local import run_here
-from service.spec import format_of, load_spec, parse_spec
+from service.http.api import models as m
+from service.jobs.local import run_here
+from service.spec.document import format_of, load_spec, parse_spec
 from service.storage.store import Store
-from tests.service.test_spec_shaft import PRESS, changed
-from worker import kernels
+from tests.service.spec.machine.test_shaft import PRESS, changed
+from worker import models
 from worker.executors.inline import InlineExecutor
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ STRUCTURE = MachineSpec.from_json(
         "operation": {"quantity": "force", "form": "steps", "steps": 1},
     }
 )
-RESULTS = [info.name for info in kernels.result_infos("machine-shaft", 0)]
+RESULTS = [info.name for info in models.result_infos("machine-shaft", 0)]
 
 
 @pytest.fixture
@@ -57,7 +57,7 @@ def filled(service: Service) -> tuple[Service, str]:
     study, number = service.store.study(study_id), service.store.get_study(study_id).number
     epoch = service.store.take_over("test")
     for chunk in service.store.claim(epoch, service.store.open_chunks(number)):
-        assert service.store.commit(epoch, chunk, kernels.run_chunk(study, chunk.first, chunk.count))
+        assert service.store.commit(epoch, chunk, models.run_chunk(study, chunk.first, chunk.count))
     service.store.settle(epoch, number)
     return service, study_id
 
@@ -180,7 +180,7 @@ def test_run_and_preview(service: Service, examples: Path) -> None:
     preview = service.http.post("/api/v1/studies:preview", json=PRESS).json()
     m.Preview.model_validate(preview)
     assert (preview["cases"], preview["shape"], preview["results"]) == (52, [4, 13], len(RESULTS))
-    assert 0.0 < preview["estimated_seconds"] < 5.0 + kernels.estimate_compile_seconds(parsed.study)
+    assert 0.0 < preview["estimated_seconds"] < 5.0 + models.estimate_compile_seconds(parsed.study)
 
 
 def test_rows_of_another_structure_are_not_reused(tmp_path: Path) -> None:
@@ -191,7 +191,7 @@ def test_rows_of_another_structure_are_not_reused(tmp_path: Path) -> None:
         record = store.create_study(first.spec, first.study)
         epoch = store.take_over("test")
         for chunk in store.claim(epoch, store.open_chunks(record.number)):
-            store.commit(epoch, chunk, kernels.run_chunk(first.study, chunk.first, chunk.count))
+            store.commit(epoch, chunk, models.run_chunk(first.study, chunk.first, chunk.count))
         assert store.reusable(first.study) == first.study.cases
         assert store.reusable(second.study) == 0
 

@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from service.presets import ABOUT, preset_names, preset_text
-from service.spec import format_of, load_spec, parse_spec
-from worker import kernels
+from service.spec.document import format_of, load_spec, parse_spec
+from worker import models
 from worker.study import Axis, Study
 
 MACHINES = [name for name in preset_names() if "machine-shaft" in preset_text(name)[1]]
@@ -23,8 +23,8 @@ def run(name: str) -> tuple[Study, list[str], dict[str, NDArray[np.float64]]]:
     parsed = parse_spec(load_spec(text, format_of(file)))
     study = parsed.study
     assert parsed.warnings == ()
-    result = kernels.run_chunk(study, 0, study.cases)
-    names = [info.name for info in kernels.study_results(study)]
+    result = models.run_chunk(study, 0, study.cases)
+    names = [info.name for info in models.study_results(study)]
     return study, result.endings, {n: result.values[:, k].reshape(study.shape) for k, n in enumerate(names)}
 
 
@@ -52,13 +52,13 @@ def test_any_number_varies_alone_and_in_batches(name: str) -> None:
     file, text = preset_text(name)
     spec: Any = load_spec(text, format_of(file))
     base = parse_spec(spec | {"axes": []}).study
-    for path, parameter in kernels.parameters_of(base).items():
+    for path, parameter in models.parameters_of(base).items():
         value = base.base.get(path, 0.5)
         values = [v for v in (0.97 * value, value, 1.02 * value + 1e-3) if parameter.accepts(v)]
         study = replace(base, axes=(Axis((path,), tuple(dict.fromkeys(values))),))
-        batch = kernels.run_chunk(study, 0, study.cases)
+        batch = models.run_chunk(study, 0, study.cases)
         for case in range(study.cases):
-            alone = kernels.run_chunk(study, case, 1)
+            alone = models.run_chunk(study, case, 1)
             assert alone.endings == batch.endings[case : case + 1]
             np.testing.assert_array_equal(alone.values[0], batch.values[case])
 

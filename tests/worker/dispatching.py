@@ -12,7 +12,7 @@ from worker.dispatcher import (
     Dispatcher,
 )
 from worker.executors.inline import InlineExecutor
-from worker.kernels import ChunkResult, ChunkTask
+from worker.models import ChunkResult, ChunkTask
 from worker.ports import Executor, Outcome
 from worker.states import StudyState
 

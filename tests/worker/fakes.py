@@ -11,9 +11,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from worker import kernels
+from worker import models
 from worker.executors.process_pool import ProcessPoolExecutor
-from worker.kernels import ChunkResult, ChunkTask, KernelShape
+from worker.models import ChunkResult, ChunkTask, KernelShape
 from worker.study import Axis, Study
 
 BASE = {
@@ -33,7 +33,7 @@ BASE = {
     "clutch.coefficients.1": 200.0,
 }
 RUN = {"duration": [3.0, "periods"], "window": None, "tolerance": 1e-9, "reset": "contact"}
-RESULTS = len(kernels.result_infos("vibration-drive", 1))
+RESULTS = len(models.result_infos("vibration-drive", 1))
 
 
 def study(cases: int, name: str = "a study", tolerance: float = 1e-9) -> Study:
@@ -48,7 +48,7 @@ def values(first: int, count: int) -> NDArray[np.float64]:
     return np.ascontiguousarray(cases * 1000.0 + np.arange(RESULTS))
 
 
-def result(first: int, count: int, ending: str = kernels.OK) -> ChunkResult:
+def result(first: int, count: int, ending: str = models.OK) -> ChunkResult:
     """The result of a chunk whose cases all end in the same way."""
     return ChunkResult(first, [ending] * count, [""] * count, values(first, count))
 
@@ -62,7 +62,7 @@ def run(
             os.kill(os.getpid(), signal.SIGKILL)
         if case in hang:
             signal.pause()
-    return result(task.first, task.count, kernels.Ending.DIVERGED if failing else kernels.OK)
+    return result(task.first, task.count, models.Ending.DIVERGED if failing else models.OK)
 
 
 def spinning(task: ChunkTask) -> ChunkResult:
@@ -88,7 +88,7 @@ _in_hand = False
 def load_damaged(shape: KernelShape) -> None:
     """Take the kernel in hand, damaged or not."""
     global _in_hand  # noqa: PLW0603 - as compiled code stays in a process
-    _in_hand = _in_hand or (kernels.cache_folder() / DAMAGED).exists()
+    _in_hand = _in_hand or (models.cache_folder() / DAMAGED).exists()
 
 
 def load_or_die(shape: KernelShape) -> None:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.worker.fakes import BASE, RUN
-from worker import kernels
+from worker import models
 from worker.reuse import Wanted, kin_hash, shared_cases, span, taken
 from worker.study import Axis, Study
 
@@ -76,7 +76,7 @@ def test_a_study_of_chosen_cases_has_their_parameters(study: Study, data: st.Dat
     cases = data.draw(st.lists(st.integers(0, study.cases - 1), min_size=1, unique=True))
     part = taken(study, np.array(cases))
     assert [parameters(part, index) for index in range(part.cases)] == [parameters(study, case) for case in cases]
-    assert kernels.shape_of(part) == kernels.shape_of(study)
+    assert models.shape_of(part) == models.shape_of(study)
 
 
 def test_large_grids_share_what_they_share() -> None:

@@ -23,7 +23,7 @@ import dask
 from distributed import LocalCluster
 from distributed.scheduler import KilledWorker
 
-from worker import fingerprint, kernels
+from worker import fingerprint, models
 from worker.executors.dask_jobs import Job, Waiting, Worker, refusals
 from worker.executors.dask_link import Link, value_of
 from worker.executors.dask_tasks import INTRODUCE, load_kernel, run_chunk, scheduler_address
@@ -88,8 +88,8 @@ class DaskExecutor:
         processes: int,
         *,
         chunk_timeout: float,
-        run: Callable[[kernels.ChunkTask], kernels.ChunkResult] = kernels.run_task,
-        load: Callable[[kernels.KernelShape], None] = kernels.load,
+        run: Callable[[models.ChunkTask], models.ChunkResult] = models.run_task,
+        load: Callable[[models.KernelShape], None] = models.load,
         expected: Mapping[str, str] | None = None,
         scheduler_seconds: float = SCHEDULER_SECONDS,
         renew: bool = False,
@@ -106,10 +106,10 @@ class DaskExecutor:
         #: For each such text a host throws its compiled kernels away once: every host, and those where workers died.
         self._renew = uuid4().hex if renew else ""
         self._discards: dict[str, str] = {}
-        self._failed_loads: Counter[tuple[str, kernels.KernelShape]] = Counter()
+        self._failed_loads: Counter[tuple[str, models.KernelShape]] = Counter()
         #: Hosts that cannot have a kernel, and kernels that none can have, with the reason.
-        self._unable: set[tuple[str, kernels.KernelShape]] = set()
-        self._broken: dict[kernels.KernelShape, str] = {}
+        self._unable: set[tuple[str, models.KernelShape]] = set()
+        self._broken: dict[models.KernelShape, str] = {}
         self._outcomes: SimpleQueue[Outcome | None] = SimpleQueue()
         self._next_look = 0.0
         self._gone_since: float | None = None
@@ -145,7 +145,7 @@ class DaskExecutor:
 
     def ready(self, study: Study) -> bool:
         """Whether some worker has loaded the kernel of ``study``; lets one begin to where none has."""
-        shape = kernels.shape_of(study)
+        shape = models.shape_of(study)
         self._look()
         with self._lock:
             if reason := self._broken.pop(shape, None):
@@ -162,7 +162,7 @@ class DaskExecutor:
 
     def submit(self, ticket: int, study: Study, chunk: Chunk) -> None:
         """Give the chunk to the next worker that is free; returns at once."""
-        task = kernels.chunk_task(study, chunk.first, chunk.count)
+        task = models.chunk_task(study, chunk.first, chunk.count)
         key = f"sprag-{chunk.study}-{chunk.first}-{chunk.count}-{chunk.failures}-{self._name}-{ticket}"
         with self._lock:
             self._waiting.append(Waiting(ticket, key, task))
@@ -286,7 +286,7 @@ class DaskExecutor:
         elif job.kind == "introduce":
             _LOG.error("The worker %s was gone before it told its fingerprint.", worker.address)
 
-    def _died_of(self, host: str, shape: kernels.KernelShape) -> None:
+    def _died_of(self, host: str, shape: models.KernelShape) -> None:
         """A worker died while it loaded a kernel: at the second time the one on its host's disk may be damaged."""
         if any(other.host == host and shape in other.shapes for other in self._workers.values()):
             return
@@ -295,7 +295,7 @@ class DaskExecutor:
             self._discards[host] = uuid4().hex
         self._load_failed(host, shape, "the worker that compiled its kernel died", MAX_LOADS + 1)
 
-    def _loads(self, worker: Worker, shape: kernels.KernelShape) -> bool:
+    def _loads(self, worker: Worker, shape: models.KernelShape) -> bool:
         return worker.job is not None and worker.job.kind == "load" and worker.job.shape == shape
 
     def _fill(self) -> None:
@@ -318,7 +318,7 @@ class DaskExecutor:
             if any(shape in other.shapes for other in fellows) or not any(self._loads(o, shape) for o in fellows):
                 self._begin_load(worker, shape)
 
-    def _begin_load(self, worker: Worker, shape: kernels.KernelShape) -> None:
+    def _begin_load(self, worker: Worker, shape: models.KernelShape) -> None:
         key = f"sprag-load-{self._name}-{uuid4().hex}"
         discard = self._discards.get(worker.host, "")
         self._begin(worker, Job("load", time.monotonic(), shape=shape), key, load_kernel, self._load, shape, discard)
@@ -363,7 +363,7 @@ class DaskExecutor:
             worker.usable = True
             self._outcomes.put(None)
 
-    def _loaded(self, worker: Worker, shape: kernels.KernelShape, error: BaseException | None) -> None:
+    def _loaded(self, worker: Worker, shape: models.KernelShape, error: BaseException | None) -> None:
         if error is None:
             worker.shapes.add(shape)
             self._failed_loads.pop((worker.host, shape), None)
@@ -371,7 +371,7 @@ class DaskExecutor:
         elif not isinstance(error, CancelledError):
             self._load_failed(worker.host, shape, f"its kernel cannot be compiled ({type(error).__name__}: {error})", 1)
 
-    def _load_failed(self, host: str, shape: kernels.KernelShape, reason: str, allowed: int) -> None:
+    def _load_failed(self, host: str, shape: models.KernelShape, reason: str, allowed: int) -> None:
         """A host is asked for a kernel no more when it failed too often; when no other can have it, its chunks fail."""
         place = (host, shape)
         self._failed_loads[place] += 1

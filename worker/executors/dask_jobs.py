@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
     from distributed import Future
 
-    from worker import kernels
+    from worker import models
 
 
 @dataclass(eq=False, slots=True)
@@ -23,7 +23,7 @@ class Job:
     kind: Literal["introduce", "load", "chunk"]
     began: float
     ticket: int = 0
-    shape: kernels.KernelShape | None = None
+    shape: models.KernelShape | None = None
     future: Future[Any] | None = None
     dropped: float | None = None
 
@@ -39,7 +39,7 @@ class Worker:
     host: str
     usable: bool = False
     refusal: str = ""
-    shapes: set[kernels.KernelShape] = field(default_factory=set)
+    shapes: set[models.KernelShape] = field(default_factory=set)
     job: Job | None = None
 
 
@@ -49,7 +49,7 @@ class Waiting:
 
     ticket: int
     key: str
-    task: kernels.ChunkTask
+    task: models.ChunkTask
 
 
 def refusals(workers: Iterable[Worker]) -> str:

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from distributed import Security
 
-from worker import fingerprint, kernels
+from worker import fingerprint, models
 from worker.limits import LOAD_SECONDS
+from worker.pool.processes import within_processor_time
 from worker.ports import ExecutorError
-from worker.processes import within_processor_time
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,7 +25,7 @@ _T = TypeVar("_T")
 #: Seconds in which a nanny has to end a worker.
 END_SECONDS: Final = 20.0
 #: Kernels that this process, which is a worker, has in hand.
-_loaded: set[kernels.KernelShape] = set()
+_loaded: set[models.KernelShape] = set()
 
 #: Calls `introduce`, as an expression for ``eval``. A function is imported as soon as a message with it comes in; a
 #: worker that cannot import Sprag would end for that, be started again for ever, and never say why.
@@ -41,11 +41,11 @@ def introduce(discard: str) -> dict[str, str]:
     _discard_once(discard)
     if discard and _loaded:
         os._exit(0)
-    kernels.prepare()
+    models.prepare()
     return fingerprint.collect()
 
 
-def load_kernel(load: Callable[[kernels.KernelShape], None], shape: kernels.KernelShape, discard: str) -> None:
+def load_kernel(load: Callable[[models.KernelShape], None], shape: models.KernelShape, discard: str) -> None:
     """Run by each worker before its first chunk of a shape; ``discard`` as in `introduce`."""
     _discard_once(discard)
     _loaded.add(shape)
@@ -55,19 +55,19 @@ def load_kernel(load: Callable[[kernels.KernelShape], None], shape: kernels.Kern
 def _discard_once(token: str) -> None:
     if not token:
         return
-    folder = kernels.cache_folder()
+    folder = models.cache_folder()
     with suppress(OSError), folder.with_name(f"{folder.name}.discarded").open("a+", encoding="ascii") as note:
         fcntl.flock(note, fcntl.LOCK_EX)
         note.seek(0)
         if note.read() != token:
-            kernels.discard_compiled()
+            models.discard_compiled()
             note.truncate(0)
             note.write(token)
 
 
 def run_chunk(
-    run: Callable[[kernels.ChunkTask], kernels.ChunkResult], task: kernels.ChunkTask, seconds: float, wall: float
-) -> kernels.ChunkResult:
+    run: Callable[[models.ChunkTask], models.ChunkResult], task: models.ChunkTask, seconds: float, wall: float
+) -> models.ChunkResult:
     """Run by a worker for each chunk, for so many seconds of processor time and by the clock on the wall."""
     return _within(wall, partial(within_processor_time, seconds, run, task))
 

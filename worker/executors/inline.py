@@ -6,7 +6,7 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING
 
-from worker import kernels
+from worker import models
 from worker.ports import Chunk, Fate, Outcome
 
 if TYPE_CHECKING:
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 class InlineExecutor:
     """An `Executor` without processes. A chunk cannot be stopped or timed out once it runs."""
 
-    def __init__(self, run: Callable[[kernels.ChunkTask], kernels.ChunkResult] = kernels.run_task) -> None:
+    def __init__(self, run: Callable[[models.ChunkTask], models.ChunkResult] = models.run_task) -> None:
         self._run = run
-        self._waiting: deque[tuple[int, kernels.ChunkTask]] = deque()
+        self._waiting: deque[tuple[int, models.ChunkTask]] = deque()
         self._stopped: list[Outcome] = []
 
     @property
@@ -39,7 +39,7 @@ class InlineExecutor:
 
     def submit(self, ticket: int, study: Study, chunk: Chunk) -> None:
         """Note the chunk; `wait` runs it."""
-        self._waiting.append((ticket, kernels.chunk_task(study, chunk.first, chunk.count)))
+        self._waiting.append((ticket, models.chunk_task(study, chunk.first, chunk.count)))
 
     def wait(self, timeout: float) -> list[Outcome]:
         """Run the oldest chunk to its end, however long it takes."""

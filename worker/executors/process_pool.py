@@ -8,19 +8,19 @@ from functools import partial
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
-from worker import fingerprint, kernels
-from worker.child_pool import ChildPool, JobStoppedError
-from worker.child_process import ProcessDiedError, ProcessStartError
+from worker import fingerprint, models
 from worker.fingerprint import prepare_as
 from worker.limits import LOAD_SECONDS, WALL_TIMES
+from worker.pool.child_pool import ChildPool, JobStoppedError
+from worker.pool.child_process import ProcessDiedError, ProcessStartError
+from worker.pool.processes import single_threaded_children, within_processor_time
 from worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
-from worker.processes import single_threaded_children, within_processor_time
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from concurrent.futures import Future
 
-    from worker.child_pool import Job
+    from worker.pool.child_pool import Job
     from worker.study import Study
 
 #: Chunks beyond one for each process, so that a process that is through finds the next one waiting.
@@ -59,9 +59,9 @@ class ProcessPoolExecutor:
         processes: int,
         *,
         chunk_timeout: float,
-        run: Callable[[kernels.ChunkTask], kernels.ChunkResult] = kernels.run_task,
-        load: Callable[[kernels.KernelShape], None] = kernels.load,
-        compiled: Callable[[kernels.KernelShape], bool] = kernels.is_compiled,
+        run: Callable[[models.ChunkTask], models.ChunkResult] = models.run_task,
+        load: Callable[[models.KernelShape], None] = models.load,
+        compiled: Callable[[models.KernelShape], bool] = models.is_compiled,
         prepare: Callable[[], None] | None = None,
         load_timeout: float = LOAD_SECONDS,
         wall_timeout: float | None = None,
@@ -73,10 +73,10 @@ class ProcessPoolExecutor:
         self._load = load
         self._compiled = compiled
         self._load_timeout = load_timeout
-        self._jobs: dict[int, Job[kernels.ChunkResult]] = {}
-        self._loaded: set[kernels.KernelShape] = set()
-        self._loading: dict[kernels.KernelShape, Job[None]] = {}
-        self._failed_loads: Counter[kernels.KernelShape] = Counter()
+        self._jobs: dict[int, Job[models.ChunkResult]] = {}
+        self._loaded: set[models.KernelShape] = set()
+        self._loading: dict[models.KernelShape, Job[None]] = {}
+        self._failed_loads: Counter[models.KernelShape] = Counter()
         self._ready: SimpleQueue[Outcome | None] = SimpleQueue()
         single_threaded_children()
         self._pool = ChildPool(processes, prepare or partial(prepare_as, fingerprint.digest()))
@@ -93,7 +93,7 @@ class ProcessPoolExecutor:
 
     def ready(self, study: Study) -> bool:
         """Whether the kernel of ``study`` is loaded; begins to load it where it is not."""
-        shape = kernels.shape_of(study)
+        shape = models.shape_of(study)
         loading = self._loading.get(shape)
         if loading is not None and loading.future.done():
             del self._loading[shape]
@@ -105,7 +105,7 @@ class ProcessPoolExecutor:
             begun.future.add_done_callback(lambda _: self._ready.put(None))
         return False
 
-    def _take_load(self, shape: kernels.KernelShape, loading: Future[None]) -> None:
+    def _take_load(self, shape: models.KernelShape, loading: Future[None]) -> None:
         """Note a kernel that is there; raise KernelError when it failed too often."""
         error = loading.exception()
         if error is None:
@@ -125,13 +125,13 @@ class ProcessPoolExecutor:
 
     def submit(self, ticket: int, study: Study, chunk: Chunk) -> None:
         """Start a chunk; returns at once."""
-        task = kernels.chunk_task(study, chunk.first, chunk.count)
+        task = models.chunk_task(study, chunk.first, chunk.count)
         self._jobs[ticket] = job = self._pool.schedule(
             self._wall, within_processor_time, self._timeout, self._run, task
         )
         job.future.add_done_callback(lambda done: self._ready.put(self._outcome(ticket, done)))
 
-    def _outcome(self, ticket: int, future: Future[kernels.ChunkResult]) -> Outcome:
+    def _outcome(self, ticket: int, future: Future[models.ChunkResult]) -> Outcome:
         error = JobStoppedError() if future.cancelled() else future.exception()
         match error:
             case None:

@@ -1,0 +1,1 @@
+"""From Python to machine code: the door to numba, whole programs, lane loops, the cache."""

@@ -1,0 +1,147 @@
+"""Cases of a study: pages, one case, and its instantaneous values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from fastapi import APIRouter, Depends, Query, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from service.faults import parameter_error, shown
+from service.http.api import models as m
+from service.http.api.document import files, format_query, one_of, problems
+from service.http.context import CaseNumber, Ctx, StudyId, study_with
+from service.http.requests import strict_query
+from service.http.respond import choose_format, json_response
+from service.http.views import study_address
+from service.http.work import Attended
+from service.results import trajectories
+from service.results.exports import MEDIA_TYPES, Format, row_json, rows_json
+from service.storage.records import CaseRow
+from worker import models
+from worker.limits import MAX_PAGE_SIZE, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
+from worker.models.codes import PENDING
+
+if TYPE_CHECKING:
+    from worker.study import Study
+
+router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
+
+_CASE_PROBLEMS = ("invalid-parameter", "study-not-found", "case-not-found")
+
+
+@router.get("", response_model=m.CasePage, responses=problems("invalid-parameter", "study-not-found"))
+def list_cases(
+    context: Ctx,
+    study_id: StudyId,
+    page_size: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="most cases on the page")] = 100,
+    page_token: Annotated[
+        str | None,
+        Query(description="`next_page_token` of the page before", json_schema_extra={"pattern": "^[0-9]{1,18}$"}),
+    ] = None,
+    ending: Annotated[
+        str | None,
+        Query(
+            description="only cases with this ending",
+            examples=["ok"],
+            json_schema_extra=one_of(map(str, models.ENDING_SENTENCES)),
+        ),
+    ] = None,
+) -> Response:
+    """Finished cases, in order of their numbers; of a cancelled study also those that were never run."""
+    if ending is not None and ending not in models.ENDING_SENTENCES:
+        raise parameter_error("ending", "there is no such ending", shown(ending), ", ".join(models.ENDING_SENTENCES))
+    after = _after(page_token)
+    # One more than the page, which tells whether there is another.
+    block = context.store.case_page(study_id, after_case=after, limit=page_size + 1, ending=ending)
+    rows = list(rows_json(context.store.study(study_id), block))
+    token = str(rows[page_size - 1]["case"]) if len(rows) > page_size else None
+    return json_response({"cases": rows[:page_size], "next_page_token": token})
+
+
+def _after(page_token: str | None) -> int:
+    if page_token is None:
+        return -1
+    if not (page_token.isascii() and page_token.isdigit() and len(page_token) < 19):
+        raise parameter_error(
+            "page_token", "not a token of this list", shown(page_token), "`next_page_token` of a page"
+        )
+    return int(page_token)
+
+
+@router.get("/{case:case}", response_model=m.CaseDetail, responses=problems(*_CASE_PROBLEMS))
+def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
+    """One case; its ending is `pending` while it has not been run."""
+    study = study_with(context, study_id, case)
+    row = context.store.case_row(study_id, case)
+    parameters = study.case_parameters(case)
+    if row is None:
+        names = [info.name for info in models.study_results(study)]
+        row = CaseRow(case, PENDING, (), dict.fromkeys(names))
+    own = f"{study_address(study_id)}/cases/{case}"
+    return json_response(
+        {
+            **row_json(row, parameters),
+            "ending_meaning": models.ENDING_SENTENCES.get(row.ending, "The case has not been run yet."),
+            "flag_meanings": {flag: models.FLAG_SENTENCES.get(flag, "") for flag in row.flags},
+            "links": {"self": own, "study": study_address(study_id), "trajectory": f"{own}/trajectory"},
+        }
+    )
+
+
+@router.get(
+    "/{case:case}/trajectory",
+    response_model=m.Trajectory | m.AngleTable,
+    responses={
+        **files("Instantaneous values, as JSON or CSV.", (MEDIA_TYPES["json"], MEDIA_TYPES["csv"])),
+        **problems(*_CASE_PROBLEMS, "not-acceptable", "not-computed", "timed-out", "too-many-requests", "unavailable"),
+    },
+)
+async def get_trajectory(
+    context: Ctx,
+    work: Attended,
+    request: Request,
+    study_id: StudyId,
+    case: CaseNumber,
+    start: Annotated[
+        str | None,
+        Query(
+            alias="from",
+            description="first time, in s or with a unit (s, periods), or angle, in rad or with a unit; by default 0",
+            examples=["0"],
+        ),
+    ] = None,
+    end: Annotated[
+        str | None,
+        Query(
+            alias="to",
+            description="last time or angle, likewise; by default the end of the run, or cycle",
+            examples=["2.5 periods"],
+        ),
+    ] = None,
+    points: Annotated[
+        int,
+        Query(
+            ge=MIN_TRAJECTORY_POINTS,
+            le=MAX_TRAJECTORY_POINTS,
+            description="equally spaced times or angles",
+            examples=[50],
+        ),
+    ] = 1000,
+    form: Annotated[str | None, format_query(("json", "csv"))] = None,
+) -> Response:
+    """Every variable, torque, power and state of one case over time (or the angle). The case is run again for it."""
+    chosen = choose_format(request, form, {"json": MEDIA_TYPES["json"], "csv": MEDIA_TYPES["csv"]})
+    written: Format = "csv" if chosen == "csv" else "json"
+
+    def find() -> tuple[Study, tuple[float, float]]:
+        study = study_with(context, study_id, case)
+        return study, trajectories.span(study, case, start, end)
+
+    study, (first, last) = await run_in_threadpool(find)
+    await work.load(models.shape_of(study))
+    content = await work.compute(trajectories.trajectory_file, study, case, first, last, points, written)
+    name = f'attachment; filename="{study_id}-case-{case}.csv"'
+    headers = {"Content-Disposition": name} if written == "csv" else {}
+    return Response(content, media_type=MEDIA_TYPES[written], headers=headers)

@@ -1,0 +1,101 @@
+"""What there is: models with their parameters, results and endings; studies that come with the program."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Path, Request
+
+from service.http.api import models as m
+from service.http.api.document import not_modified as documented_304
+from service.http.api.document import problems
+from service.http.problems import ApiError
+from service.http.requests import strict_query
+from service.http.respond import entity_tag, json_response, not_modified, tagged
+from service.http.views import preset_of
+from service.presets import preset_names
+from worker import models
+
+router = APIRouter(tags=["models"], dependencies=[Depends(strict_query)])
+
+ModelName = Annotated[str, Path(description="name of the model", examples=["vibration-drive"])]
+PresetName = Annotated[str, Path(description="name of the preset", examples=["one_pendulum"])]
+
+
+@router.get("/models", response_model=m.ModelList, responses=problems("invalid-parameter") | documented_304())
+def list_models(request: Request) -> Any:
+    """Every model with its parameters, results and endings."""
+    return _answer(request, {"models": [_model(name) for name in models.model_names()]})
+
+
+@router.get(
+    "/models/{name}", response_model=m.Model, responses=problems("not-found", "invalid-parameter") | documented_304()
+)
+def get_model(request: Request, name: ModelName) -> Any:
+    """One model with its parameters, results and endings."""
+    if name not in models.model_names():
+        raise ApiError("not-found", f"There is no such model; there is: {', '.join(models.model_names())}.")
+    return _answer(request, _model(name))
+
+
+@router.get("/presets", response_model=m.PresetList, responses=problems("invalid-parameter") | documented_304())
+def list_presets(request: Request) -> Any:
+    """Studies that come with the program, each with its whole spec, to be submitted as they are or changed."""
+    return _answer(request, {"presets": [preset_of(name) for name in preset_names()]})
+
+
+@router.get(
+    "/presets/{name}", response_model=m.Preset, responses=problems("not-found", "invalid-parameter") | documented_304()
+)
+def get_preset(request: Request, name: PresetName) -> Any:
+    """One study that comes with the program."""
+    if name not in preset_names():
+        raise ApiError("not-found", f"There is no such preset; there are: {', '.join(preset_names())}.")
+    return _answer(request, preset_of(name))
+
+
+def _answer(request: Request, data: dict[str, Any]) -> Any:
+    response = json_response(data)
+    tag = entity_tag(bytes(response.body).hex())
+    return not_modified(request, tag) or tagged(response, tag)
+
+
+def _model(name: str) -> dict[str, Any]:
+    return {
+        "name": name,
+        "engine_version": models.ENGINE_VERSION,
+        "parameters": [_parameter(entry) for entry in models.parameter_catalogue(name)],
+        "results": [
+            {
+                # One pendulum stands for all.
+                "name": re.sub(r"^pendulums\.0\.", "pendulums.N.", info.name),
+                "unit": info.unit,
+                "kind": info.kind,
+                "description": info.description,
+            }
+            for info in models.result_infos(name, 1)
+        ],
+        "endings": models.endings_of(name),
+        "flags": models.flags_of(name),
+    }
+
+
+def _parameter(entry: models.Parameter) -> dict[str, Any]:
+    return {
+        "path": entry.path,
+        "symbol": entry.symbol,
+        "unit": entry.unit,
+        "low": _finite(entry.low),
+        "low_open": entry.low_open,
+        "high": _finite(entry.high),
+        "required": entry.default is None,
+        "default": _finite(entry.default),
+        "range": entry.range_text(),
+        "help": entry.help,
+    }
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None

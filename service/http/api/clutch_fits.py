@@ -1,0 +1,59 @@
+"""POST /clutch-fits: a clutch law from measured data, with its report."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Depends
+from starlette.responses import Response
+
+from service.http.api import examples
+from service.http.api import models as m
+from service.http.api.document import body, problems
+from service.http.problems import ApiError
+from service.http.requests import Body, read_body, strict_query
+from service.http.respond import JSON
+from service.http.work import CHECK_PROBLEMS, Attended
+from service.jobs import checks
+from service.spec.report import SpecError, spec_items
+from worker import models
+
+router = APIRouter(tags=["clutch"], dependencies=[Depends(strict_query)])
+
+_QUANTITY: Final = {"anyOf": [{"type": "number"}, {"type": "string", "minLength": 1}]}
+SCHEMA: Final[dict[str, Any]] = {
+    "type": "object",
+    "description": "Measured data of a clutch and how well it is to be fitted; numbers in SI or texts with a unit.",
+    "required": ["data", "accuracy"],
+    "additionalProperties": False,
+    "properties": {
+        "data": {
+            "type": "array",
+            "description": "rows of angle (rad) and torque (N*m)",
+            "minItems": 2,
+            "items": {"type": "array", "minItems": 2, "maxItems": 2, "items": _QUANTITY},
+        },
+        "accuracy": {**_QUANTITY, "description": "largest residual accepted (N*m)"},
+        "max_degree": {"type": "integer", "minimum": 1, "maximum": models.MAX_COEFFICIENTS - 1, "default": 7},
+        "through_origin": {"type": "boolean", "default": True, "description": "no torque at zero windup (c_1 = 0)"},
+        "angles_include_backlash": {"type": "boolean", "default": False},
+        "backlash": {**_QUANTITY, "description": "lost motion to be taken off the angles (rad)", "default": 0},
+    },
+}
+
+
+@router.post(
+    "/clutch-fits",
+    response_model=m.ClutchFitReport,
+    responses=problems(
+        "invalid-parameter", "invalid-body", "body-too-large", "unsupported-media-type", *CHECK_PROBLEMS
+    ),
+    openapi_extra=body({"six rows": examples.CLUTCH_FIT}, {"$ref": "#/components/schemas/ClutchFitRequest"}),
+)
+async def fit_clutch(work: Attended, received: Annotated[Body, Depends(read_body)]) -> Response:
+    """Fit the polynomial of lowest degree that reaches the accuracy, and report how well it fits."""
+    try:
+        report = await work.check(checks.clutch_fit, received.content, received.format)
+    except SpecError as error:
+        raise ApiError("invalid-body", str(error), spec_items(error.problems)) from error
+    return Response(report, media_type=JSON)

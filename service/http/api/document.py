@@ -1,0 +1,131 @@
+"""What OpenAPI says about bodies, problems and security, in one way for every operation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from http import HTTPStatus
+from typing import Any, Final
+
+from fastapi import FastAPI, Query
+from fastapi.openapi.utils import get_openapi
+
+from service.faults import ErrorItem
+from service.http.api.links import add_links
+from service.http.problems import PROBLEM_MEDIA_TYPE, PROBLEM_TYPES, Problem, ProblemType, problem_json
+from service.http.views import API_PREFIX
+
+_METRICS: Final = "/metrics"
+_SCHEMAS: Final = "#/components/schemas/"
+#: Problems that any operation of the API may answer with.
+_EVERYWHERE: Final = ("unauthorized", "too-many-attempts", "wrong-host", "internal", "unavailable")
+_UNSAFE: Final = ("cross-site", "read-only", "too-slow")
+
+_TEXT: Final = {"type": "string"}
+_TAG: Final = {"ETag": {"description": "entity tag of the version", "required": True, "schema": _TEXT}}
+
+Responses = dict[int | str, dict[str, Any]]
+
+
+def problems(*slugs: str) -> Responses:
+    """Documentation of the problems an operation may answer with, by status, each with an example."""
+    by_status: dict[int, list[ProblemType]] = {}
+    for slug in slugs:
+        kind = PROBLEM_TYPES[slug]
+        by_status.setdefault(kind.status, []).append(kind)
+    return {status: _problem_response(status, kinds) for status, kinds in sorted(by_status.items())}
+
+
+def _problem_response(status: int, kinds: Iterable[ProblemType]) -> dict[str, Any]:
+    examples = {
+        kind.slug: {"summary": kind.title, "value": problem_json(kind, kind.help, _EXAMPLE_ERRORS.get(kind.slug, ()))}
+        for kind in kinds
+    }
+    content = {"schema": {"$ref": _SCHEMAS + "Problem"}, "examples": examples}
+    return {"description": HTTPStatus(status).phrase, "content": {PROBLEM_MEDIA_TYPE: content}}
+
+
+_EXAMPLE_ERRORS: Final = {
+    "invalid-spec": (
+        ErrorItem("is out of range", "/base/pendulums/0/inertia", value=-0.001, allowed="> 0 kg*m^2", unit="kg*m^2"),
+    ),
+    "invalid-body": (ErrorItem("is missing", "/accuracy", allowed="> 0 N*m", unit="N*m"),),
+    "invalid-parameter": (ErrorItem("must be at most 1000", None, "page_size", 5000, "1 .. 1000"),),
+    "invalid-selection": (
+        ErrorItem("the axis has no such value", None, "at", "shaft.load=0.7", "0.02, 0.1, 0.3", "N*m"),
+    ),
+}
+
+
+def body(examples: dict[str, Any], schema: dict[str, Any], toml: str | None = None) -> dict[str, Any]:
+    """``openapi_extra`` for an operation that reads its own body; ``examples`` are whole JSON bodies by name."""
+    named = {name: {"summary": name, "value": value} for name, value in examples.items()}
+    content: dict[str, Any] = {"application/json": {"schema": schema, "examples": named}}
+    if toml is not None:
+        content["application/toml"] = {"schema": {"type": "string"}, "examples": {"TOML": {"value": toml}}}
+    return {"requestBody": {"required": True, "content": content}}
+
+
+def files(description: str, media_types: Iterable[str]) -> Responses:
+    """Documentation of an answer 200 that is a file in one of several formats."""
+    return {200: {"description": description, "content": {media.partition(";")[0]: {} for media in media_types}}}
+
+
+def not_modified() -> Responses:
+    """Documentation of the answer to a conditional request."""
+    return {304: {"description": "The version named by If-None-Match is still the right one.", "headers": _TAG}}
+
+
+def located(status: int) -> Responses:
+    """Documentation of the answer that tells where the new thing is."""
+    return {status: {"headers": {"Location": {"description": "its address", "required": True, "schema": _TEXT}}}}
+
+
+def one_of(names: Iterable[str]) -> dict[str, Any]:
+    """``json_schema_extra`` of a text that takes these values only, which generated clients go on taking as a text."""
+    return {"pattern": f"^({'|'.join(names)})$"}
+
+
+def format_query(names: Iterable[str], example: str = "json") -> Any:
+    """The query parameter that chooses one of several formats of the answer."""
+    known = list(map(str, names))
+    description = f"format of the answer, else that of `Accept`: {', '.join(known)}"
+    return Query(alias="format", description=description, examples=[example], json_schema_extra=one_of(known))
+
+
+def build_openapi(app: FastAPI, extra_schemas: dict[str, Any]) -> dict[str, Any]:
+    """The OpenAPI 3.1 document of ``app``; ``extra_schemas`` are components that its bodies refer to."""
+    document = get_openapi(
+        title=app.title,
+        version=app.version,
+        openapi_version="3.1.0",
+        summary=app.summary,
+        description=app.description,
+        routes=app.routes,
+        tags=app.openapi_tags,
+    )
+    schemas = document.setdefault("components", {}).setdefault("schemas", {})
+    problem = Problem.model_json_schema(ref_template=_SCHEMAS + "{model}")
+    schemas.update(problem.pop("$defs"))
+    schemas["Problem"] = problem
+    schemas.update(extra_schemas)
+    document["components"]["securitySchemes"] = {
+        "bearer": {"type": "http", "scheme": "bearer", "description": "needed when the service has a token"}
+    }
+    for path, operations in document["paths"].items():
+        for method, operation in operations.items():
+            if path.startswith(API_PREFIX) or path == _METRICS:
+                operation["security"] = [{"bearer": []}, {}]
+            if path.startswith(API_PREFIX):
+                everywhere = problems(*_EVERYWHERE, *(_UNSAFE if method in ("post", "patch", "delete") else ()))
+                for status, response in everywhere.items():
+                    _merge(operation["responses"], str(status), response)
+    add_links(document)
+    return document
+
+
+def _merge(responses: dict[str, Any], status: str, response: dict[str, Any]) -> None:
+    if status not in responses:
+        responses[status] = response
+        return
+    examples = responses[status]["content"][PROBLEM_MEDIA_TYPE]["examples"]
+    examples.update(response["content"][PROBLEM_MEDIA_TYPE]["examples"])

@@ -1,0 +1,101 @@
+"""GET /studies/{id}/events: the progress of a study as it goes, as server-sent events."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import AsyncIterator
+from typing import Annotated, Final
+
+import anyio
+from fastapi import APIRouter, Depends, Header
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response, StreamingResponse
+from starlette.types import Receive, Scope, Send
+
+from service.http import views
+from service.http.api.document import files, problems
+from service.http.context import Context, Ctx, StudyId
+from service.http.problems import ApiError
+from service.http.requests import strict_query
+from service.json_text import to_bytes
+from service.storage.errors import StoreError
+from service.storage.records import Progress, StudyRecord
+
+router = APIRouter(tags=["studies"], dependencies=[Depends(strict_query)])
+
+_MEDIA_TYPE: Final = "text/event-stream"
+#: Seconds between two looks at the study, and of silence after which a comment keeps the connection open.
+LOOK_SECONDS = 0.5
+_SILENCE_SECONDS: Final = 15.0
+#: Milliseconds after which a browser that lost the connection comes again.
+_RETRY: Final = 2000
+
+LastEventId = Annotated[
+    str | None, Header(alias="Last-Event-ID", max_length=40, description="id of the last event that was received")
+]
+
+
+@router.get(
+    "/studies/{study_id:study}/events",
+    response_class=StreamingResponse,
+    responses={
+        **files("Events `progress`, and `end` as the last one.", [_MEDIA_TYPE]),
+        204: {"description": "The study has ended and the client knows it: it need not come again."},
+        **problems("invalid-parameter", "study-not-found"),
+    },
+)
+async def get_events(context: Ctx, study_id: StudyId, last_event_id: LastEventId = None) -> Response:
+    """The progress of a study as it goes. Each event tells the whole state, so that a missed one is no loss."""
+    record = await run_in_threadpool(context.store.get_study, study_id)
+    if record.state.terminal and last_event_id == str(record.revision):
+        return Response(status_code=204)
+    if not context.streams.take():
+        raise ApiError(
+            "unavailable", f"{context.streams.most} streams of events are open already.", headers={"Retry-After": "10"}
+        )
+    return _Stream(context, study_id, last_event_id)
+
+
+class _Stream(StreamingResponse):
+    """The stream, which gives its place back however it ends."""
+
+    def __init__(self, context: Context, study_id: str, last: str | None) -> None:
+        super().__init__(_events(context, study_id, last), media_type=_MEDIA_TYPE)
+        self._places = context.streams
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send it."""
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            self._places.leave()
+
+
+async def _events(context: Context, study_id: str, last: str | None) -> AsyncIterator[bytes]:
+    yield b"retry: %d\n\n" % _RETRY
+    spoke = time.monotonic()
+    while not context.ending.is_set():
+        try:
+            record, progress = await run_in_threadpool(context.store.look, study_id)
+        except StoreError:
+            return  # deleted, or the database is in trouble: a client that comes again is told which
+        if str(record.revision) != last:
+            last, spoke = str(record.revision), time.monotonic()
+            yield _event(record, progress)
+        if record.state.terminal:
+            return
+        if time.monotonic() - spoke > _SILENCE_SECONDS:
+            spoke = time.monotonic()
+            yield b":\n\n"
+        await anyio.sleep(LOOK_SECONDS)
+
+
+def _event(record: StudyRecord, progress: Progress) -> bytes:
+    kind = b"end" if record.state.terminal else b"progress"
+    data = {
+        "id": record.id,
+        "state": record.state.value,
+        "reason": record.reason,
+        "progress": views.progress_json(progress),
+    }
+    return b"id: %d\nevent: %s\ndata: %s\n\n" % (record.revision, kind, to_bytes(data))

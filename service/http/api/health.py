@@ -1,0 +1,48 @@
+"""Whether the service is up (livez) and able to work (readyz); open to everybody, so they tell nothing else."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+from fastapi import APIRouter, Depends, Request
+from starlette.responses import Response
+
+from service.http.api.document import files, problems
+from service.http.api.models import Health
+from service.http.metrics import CONTENT_TYPE, Metrics
+from service.http.problems import ApiError
+from service.http.requests import strict_query
+from service.http.respond import json_response
+from service.storage.readiness import Readiness
+
+router = APIRouter(tags=["health"], dependencies=[Depends(strict_query)])
+
+
+@router.get("/livez", response_model=Health, responses=problems("invalid-parameter"))
+async def livez() -> Any:
+    """Whether the process answers."""
+    return json_response({"status": "ok"})
+
+
+@router.get("/readyz", response_model=Health, responses=problems("invalid-parameter", "unavailable"))
+def readyz(request: Request) -> Any:
+    """Whether studies can be submitted, read and run: database, its schema, file and write lock, the worker."""
+    readiness = cast("Readiness", request.app.state.readiness)
+    if found := readiness.problems():
+        raise ApiError("unavailable", " ".join(found), headers={"Retry-After": "5"})
+    warnings = readiness.warnings()
+    return json_response({"status": "ok", **({"warnings": list(warnings)} if warnings else {})})
+
+
+@router.get(
+    "/metrics",
+    response_class=Response,
+    responses={
+        **files("The metrics, in the text format of Prometheus.", ["text/plain"]),
+        **problems("invalid-parameter", "unauthorized", "unavailable"),
+    },
+)
+def metrics(request: Request) -> Response:
+    """What the service measures, for Prometheus: queue, cases, endings, requests, waits for the database."""
+    found = cast("Metrics", request.app.state.metrics)
+    return Response(found.text(), headers={"Content-Type": CONTENT_TYPE})

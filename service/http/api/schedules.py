@@ -1,0 +1,163 @@
+"""Schedules: studies that are submitted by themselves, once or again and again."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Depends, Path
+from starlette.concurrency import run_in_threadpool
+from starlette.convertors import register_url_convertor
+from starlette.responses import Response
+
+from service.http.api import examples
+from service.http.api import schedule_models as m
+from service.http.api.document import body, located, problems
+from service.http.context import ID_PATTERN, Context, Ctx, StudyIdConvertor
+from service.http.problems import ApiError
+from service.http.requests import Body, read_body, strict_query
+from service.http.respond import json_response
+from service.http.schedule_views import detail, schedule_address, summary
+from service.http.work import CHECK_PROBLEMS, Attended, Work
+from service.jobs import checks
+from service.schedules.deadline import ALLOWED_OF_RUNS
+from service.schedules.fields import ScheduleFields
+from service.spec.report import SpecError, spec_items
+from worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
+
+router = APIRouter(tags=["schedules"], dependencies=[Depends(strict_query)])
+
+_PROBLEMS: Final = ("invalid-parameter", "invalid-body", "body-too-large", "unsupported-media-type")
+_TIME_OF_DAY: Final = {"type": "string", "pattern": "^([01]?[0-9]|2[0-3]):[0-5][0-9]$"}
+_FIELDS: Final[dict[str, Any]] = {
+    "name": {
+        "type": ["string", "null"],
+        "minLength": 1,
+        "maxLength": MAX_NAME_LENGTH,
+        "description": "name of its studies; else the spec's own",
+    },
+    "spec": {"$ref": "#/components/schemas/Spec"},
+    "cron": {
+        "type": ["string", "null"],
+        "description": "again and again: minute, hour, day of the month, month, day of the week, in `zone`",
+    },
+    "at": {
+        "type": ["string", "null"],
+        "description": "once: a time to come, in `zone` unless it carries its own offset",
+    },
+    "zone": {"type": "string", "default": "UTC", "description": "name of the time zone"},
+    "window": {
+        "type": ["array", "null"],
+        "minItems": 2,
+        "maxItems": 2,
+        "items": _TIME_OF_DAY,
+        "description": "its studies run between these times of day, in `zone`, and are held outside",
+    },
+    "priority": {"type": "integer", "minimum": -MAX_PRIORITY, "maximum": MAX_PRIORITY, "default": 0},
+    "fresh": {"type": "boolean", "default": False, "description": "run every case, also those that studies have"},
+    "finish_by": {
+        "type": ["string", "null"],
+        "maxLength": 80,
+        "description": f"each run goes coarse to fine and is held then: {ALLOWED_OF_RUNS}",
+    },
+    "enabled": {"type": "boolean", "default": True},
+}
+SCHEMA: Final[dict[str, Any]] = {
+    "type": "object",
+    "description": "A study and when it is to run; either `cron` or `at`.",
+    "required": ["spec"],
+    "additionalProperties": False,
+    "properties": _FIELDS,
+}
+CHANGE_SCHEMA: Final[dict[str, Any]] = {
+    "type": "object",
+    "description": "The fields of a schedule that are to change.",
+    "additionalProperties": False,
+    "properties": _FIELDS,
+}
+EXAMPLE: Final[dict[str, Any]] = {
+    "name": "Every working night",
+    "cron": "0 22 * * 1-5",
+    "zone": "Europe/Berlin",
+    "window": ["22:00", "06:00"],
+    "finish_by": "06:00",
+    "spec": examples.SPEC,
+}
+
+
+class ScheduleIdConvertor(StudyIdConvertor):
+    """Part of an address that can be the id of a schedule."""
+
+
+register_url_convertor("schedule", ScheduleIdConvertor())
+
+ScheduleId = Annotated[
+    str, Path(description="id of the schedule", pattern=ID_PATTERN, examples=["sc_0123456789abcdef"])
+]
+Fields = Annotated[Body, Depends(read_body)]
+
+
+@router.post(
+    "/schedules",
+    status_code=201,
+    response_model=m.ScheduleDetail,
+    responses=located(201) | problems(*_PROBLEMS, *CHECK_PROBLEMS, "wrong-state"),
+    openapi_extra=body({"every working night": EXAMPLE}, {"$ref": "#/components/schemas/ScheduleRequest"}),
+)
+async def create_schedule(context: Ctx, work: Attended, received: Fields) -> Response:
+    """Keep a schedule: its study is submitted whenever it is due. Due times that were missed are made up for once."""
+    fields = await _fields(context, work, received, None)
+    record = await run_in_threadpool(context.store.create_schedule, fields)
+    return json_response(detail(record, ()), 201, {"Location": schedule_address(record.id)})
+
+
+async def _fields(context: Context, work: Work, received: Body, old: ScheduleFields | None) -> ScheduleFields:
+    try:
+        return await work.check(checks.schedule_body, received.content, received.format, context.store.clock.now(), old)
+    except SpecError as error:
+        raise ApiError("invalid-body", str(error), spec_items(error.problems)) from error
+
+
+@router.get("/schedules", response_model=m.ScheduleList, responses=problems("invalid-parameter"))
+def list_schedules(context: Ctx) -> Response:
+    """Every schedule with its last and its next run, newest first."""
+    return json_response({"schedules": [summary(record) for record in context.store.list_schedules()]})
+
+
+@router.get(
+    "/schedules/{schedule_id:schedule}",
+    response_model=m.ScheduleDetail,
+    responses=problems("invalid-parameter", "schedule-not-found"),
+)
+def get_schedule(context: Ctx, schedule_id: ScheduleId) -> Response:
+    """A schedule with its spec and its latest runs."""
+    return json_response(detail(context.store.get_schedule(schedule_id), context.store.schedule_runs(schedule_id)))
+
+
+@router.patch(
+    "/schedules/{schedule_id:schedule}",
+    response_model=m.ScheduleDetail,
+    responses=problems(*_PROBLEMS, *CHECK_PROBLEMS, "schedule-not-found"),
+    openapi_extra=body({"disabled": {"enabled": False}}, {"$ref": "#/components/schemas/ScheduleChange"}),
+)
+async def change_schedule(context: Ctx, work: Attended, schedule_id: ScheduleId, received: Fields) -> Response:
+    """Change some fields of a schedule; the others stay. It begins anew: nothing missed is made up for."""
+    record = await run_in_threadpool(context.store.get_schedule, schedule_id)
+    fields = await _fields(context, work, received, record.fields)
+
+    def change() -> dict[str, Any]:
+        changed = context.store.change_schedule(schedule_id, fields)
+        return detail(changed, context.store.schedule_runs(schedule_id))
+
+    return json_response(await run_in_threadpool(change))
+
+
+@router.delete(
+    "/schedules/{schedule_id:schedule}",
+    status_code=204,
+    response_class=Response,
+    responses=problems("invalid-parameter", "schedule-not-found"),
+)
+def delete_schedule(context: Ctx, schedule_id: ScheduleId) -> Response:
+    """Delete a schedule. Studies that came of it stay."""
+    context.store.delete_schedule(schedule_id)
+    return Response(status_code=204)

@@ -1,0 +1,265 @@
+"""Studies: submit, preview, list, look at, hold, cancel, delete."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Header, Query, Request
+from pydantic import Field
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from service.faults import parameter_error
+from service.http import views
+from service.http.api import examples
+from service.http.api import models as m
+from service.http.api.document import body, located, one_of, problems
+from service.http.api.document import not_modified as documented_304
+from service.http.context import Context, Ctx, StudyId
+from service.http.requests import Body, read_body, strict_query
+from service.http.respond import JSON, entity_tag, json_response, not_modified, tagged
+from service.http.work import CHECK_PROBLEMS, Attended
+from service.jobs import checks
+from service.jobs.submission import Submission, take_in
+from service.schedules.deadline import ALLOWED, FinishError, finish_at
+from worker.limits import MAX_PAGE_SIZE, MAX_PRIORITY
+from worker.models import ENDING_SENTENCES, OK, WorkerEnding
+from worker.states import StudyState
+
+router = APIRouter(tags=["studies"], dependencies=[Depends(strict_query)])
+
+_SPEC_BODY = body({"a grid of two axes": examples.SPEC}, {"$ref": "#/components/schemas/Spec"}, toml=examples.SPEC_TOML)
+_FAILED = [str(name) for name in ENDING_SENTENCES if name not in {OK, WorkerEnding.CANCELLED}]
+_BODY_PROBLEMS = ("invalid-parameter", "invalid-spec", "body-too-large", "unsupported-media-type")
+
+SpecBody = Annotated[Body, Depends(read_body)]
+
+
+def _key(example: str) -> Any:
+    return Header(
+        alias="Idempotency-Key",
+        min_length=1,
+        max_length=200,
+        pattern=r"^[!-~]+$",
+        description="the same key with the same body and parameters submits the study once, however often it is sent",
+        examples=[example],
+    )
+
+
+IdempotencyKey = Annotated[str | None, _key("0b6e9a52-feeder")]
+ExtensionKey = Annotated[str | None, _key("0b6e9a52-further")]
+Priority = Annotated[
+    int,
+    Query(
+        ge=-MAX_PRIORITY,
+        le=MAX_PRIORITY,
+        description="of the studies that wait, those of the highest priority go first",
+        examples=[10],
+    ),
+]
+FinishBy = Annotated[
+    str | None,
+    Query(
+        max_length=80,
+        description=f"the study is run coarse to fine and held at this time, whatever is done then: {ALLOWED}",
+        examples=["8 h"],
+    ),
+]
+
+
+def _finish(context: Context, text: str | None) -> datetime | None:
+    """The deadline that the parameter `finish_by` names; ApiError when it cannot be kept."""
+    if text is None:
+        return None
+    try:
+        return finish_at(text, context.store.clock.now())
+    except FinishError as error:
+        raise parameter_error("finish_by", str(error), text, ALLOWED) from None
+
+
+@router.post(
+    "/studies",
+    status_code=202,
+    response_model=m.StudySummary,
+    responses=located(202)
+    | problems(*_BODY_PROBLEMS, *CHECK_PROBLEMS, "idempotency-conflict", "storage-full", "queue-full"),
+    openapi_extra=_SPEC_BODY,
+)
+async def create_study(
+    context: Ctx,
+    work: Attended,
+    received: SpecBody,
+    idempotency_key: IdempotencyKey = None,
+    priority: Priority = 0,
+    fresh: Annotated[bool, Query(description="run every case, also those that other studies have already")] = False,
+    finish_by: FinishBy = None,
+) -> Response:
+    """Submit a study. Rows that other studies have are taken.
+
+    Its cases are run in the order of their numbers; with `finish_by` coarse to fine, each pass a complete coarser grid,
+    so that whatever is done then makes whole curves.
+    """
+    finish, now = _finish(context, finish_by), context.store.clock.now()
+    given = _given(priority=priority, fresh=fresh, finish_by=finish_by)
+    made = await work.check(
+        checks.new_study, context.library, received.content, received.format, fresh, finish, now, given
+    )
+    return await run_in_threadpool(_take_in, context, made, idempotency_key, priority)
+
+
+def _given(**options: object) -> dict[str, object]:
+    """The parameters of a request beside its body, as the client wrote them, without those left out."""
+    return {name: value for name, value in options.items() if value}
+
+
+def _take_in(context: Context, made: Submission, idempotency_key: str | None, priority: int) -> Response:
+    record = take_in(context.store, made, idempotency_key, priority)
+    return json_response(views.summary(record), 202, {"Location": views.study_address(record.id)})
+
+
+@router.post(
+    "/studies:preview",
+    response_model=m.Preview,
+    responses=problems(*_BODY_PROBLEMS, *CHECK_PROBLEMS),
+    openapi_extra=_SPEC_BODY,
+)
+async def preview_study(context: Ctx, work: Attended, received: SpecBody, finish_by: FinishBy = None) -> Response:
+    """What a study would be: cases, time, size, warnings and fitted clutch laws. Nothing is submitted."""
+    finish, now = _finish(context, finish_by), context.store.clock.now()
+    text = await work.check(checks.preview, context.library, received.content, received.format, finish, now)
+    return Response(text, media_type=JSON)
+
+
+@router.get("/studies", response_model=m.StudyPage, responses=problems("invalid-parameter"))
+def list_studies(
+    context: Ctx,
+    page_size: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="most studies on the page")] = 50,
+    page_token: Annotated[
+        str | None, Query(min_length=1, max_length=200, description="`next_page_token` of the page before")
+    ] = None,
+    state: Annotated[StudyState | None, Query(description="only studies in this state", examples=["finished"])] = None,
+) -> Response:
+    """Studies, newest first."""
+    page = context.store.list_studies(page_size=page_size, page_token=page_token, state=state)
+    return json_response(
+        {"studies": [views.summary(record) for record in page.studies], "next_page_token": page.next_token}
+    )
+
+
+@router.get(
+    "/studies/{study_id:study}",
+    response_model=m.StudyDetail,
+    responses=problems("invalid-parameter", "study-not-found") | documented_304(),
+)
+def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
+    """A study: its state, how far it is, how long it will take, and its spec."""
+    record, progress = context.store.look(study_id)
+    tag = entity_tag(record.id, record.revision)
+    if record.state.terminal and (unchanged := not_modified(request, tag)):
+        return unchanged
+    study = context.store.study(study_id)
+    data = views.detail(record, progress, study, context.store.spec(study_id))
+    data["warnings"] += context.unaffected.of(context.store, record)
+    response = json_response(data)
+    # While it runs, the time left changes with no change of the study.
+    return tagged(response, tag) if record.state.terminal else response
+
+
+@router.delete(
+    "/studies/{study_id:study}",
+    status_code=204,
+    response_class=Response,
+    responses=problems("invalid-parameter", "study-not-found", "wrong-state"),
+)
+def delete_study(context: Ctx, study_id: StudyId) -> Response:
+    """Delete a study that has ended, or whose time was over, with all its results."""
+    context.store.delete_study(study_id)
+    return Response(status_code=204)
+
+
+def _verb(name: str, sentence: str) -> None:
+    def act(context: Ctx, study_id: StudyId) -> Response:
+        wish = {
+            "cancel": context.store.cancel_study,
+            "pause": context.store.pause_study,
+            "resume": context.store.resume_study,
+        }[name]
+        return json_response(views.summary(wish(study_id)), 202)
+
+    router.post(
+        f"/studies/{{study_id:study}}:{name}",
+        status_code=202,
+        name=f"{name}_study",
+        description=sentence,
+        response_model=m.StudySummary,
+        responses=problems("invalid-parameter", "study-not-found", "wrong-state"),
+    )(act)
+
+
+_verb("cancel", "Stop a study for good: the cases that are done are kept, the others are not run.")
+_verb("pause", "Hold a study: no new cases are started until it is resumed.")
+_verb("resume", "Go on with a study that is held; a deadline that has passed does not count any more.")
+
+
+@router.post(
+    "/studies/{study_id:study}:retry",
+    status_code=202,
+    response_model=m.StudySummary,
+    responses=problems("invalid-parameter", "study-not-found", "wrong-state"),
+)
+def retry_study(
+    context: Ctx,
+    study_id: StudyId,
+    ending: Annotated[
+        list[Annotated[str, Field(json_schema_extra=one_of(_FAILED))]] | None,
+        Query(description="only cases that ended so; may be given again", examples=[["chatter"]]),
+    ] = None,
+) -> Response:
+    """Run the cases of an ended study that did not end ok again, and no others."""
+    for name in ending or ():
+        if name not in _FAILED:
+            raise parameter_error("ending", "no ending of a failed case", name, ", ".join(_FAILED))
+    return json_response(views.summary(context.store.retry_study(study_id, ending)), 202)
+
+
+@router.post(
+    "/studies/{study_id:study}:extend",
+    status_code=202,
+    response_model=m.StudySummary,
+    responses=located(202)
+    | problems(
+        *_BODY_PROBLEMS, *CHECK_PROBLEMS, "study-not-found", "idempotency-conflict", "storage-full", "queue-full"
+    ),
+    openapi_extra=body(
+        {"further loads": examples.EXTENSION_AXES, "further cases": examples.EXTENSION_CASES},
+        {"$ref": "#/components/schemas/Extension"},
+    ),
+)
+async def extend_study(
+    context: Ctx,
+    work: Attended,
+    study_id: StudyId,
+    received: SpecBody,
+    idempotency_key: ExtensionKey = None,
+    priority: Priority = 0,
+    finish_by: FinishBy = None,
+) -> Response:
+    """Submit a study with more values on the axes of an old one, or more cases; only what is new is run."""
+    finish, now = _finish(context, finish_by), context.store.clock.now()
+    given = _given(priority=priority, finish_by=finish_by)
+    made = await work.check(
+        checks.extended_study, context.library, study_id, received.content, received.format, finish, now, given
+    )
+    return await run_in_threadpool(_take_in, context, made, idempotency_key, priority)
+
+
+@router.post(
+    "/studies/{study_id:study}:prioritize",
+    status_code=202,
+    response_model=m.StudySummary,
+    responses=problems("invalid-parameter", "study-not-found", "wrong-state"),
+)
+def prioritize_study(context: Ctx, study_id: StudyId, priority: Priority) -> Response:
+    """Give a study that has not ended another priority."""
+    return json_response(views.summary(context.store.prioritize_study(study_id, priority)), 202)

@@ -1,0 +1,194 @@
+"""The HTTP application: API, pages, errors, and the guard around them all."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.metadata import version
+from typing import Any
+
+from fastapi import APIRouter, FastAPI
+from starlette.concurrency import run_in_threadpool
+from starlette.types import ASGIApp
+
+from service.http import handlers
+from service.http.access import Access
+from service.http.api import cases, catalogues, clutch_fits, curves, events, health, schedules, sensitivity, studies
+from service.http.api.document import build_openapi
+from service.http.computer import Computes, Limits, ProcessComputer
+from service.http.context import Context
+from service.http.drain import Drain
+from service.http.guard import Guard
+from service.http.metrics import Metrics
+from service.http.shares import Shares
+from service.http.views import API_PREFIX
+from service.http.web import case, compare, laboratory, login, pages, results, study, table
+from service.http.web import schedules as schedule_pages
+from service.http.web.form import page as form
+from service.jobs import checks
+from service.jobs.housekeeping import Housekeeping
+from service.logs import Noted, RequestLog
+from service.settings import Settings, UnsafeSettingsError
+from service.spec.schema.axes import extension_schema
+from service.spec.schema.document import spec_schema
+from service.storage.readiness import Readiness
+from service.storage.store import Store
+from worker.chunking import Chunking
+from worker.limits import COMPUTATION_BYTES, MAX_CHECKS, MAX_CHECKS_EACH, MAX_COMPUTATIONS
+
+DESCRIPTION = """\
+Design studies of vibration drives with freewheel clutches and of main shafts of machines:
+a study spec in, curves of mechanical characteristics out.
+
+Numbers are SI (frequencies in Hz, angles in rad); in a spec a text carries its own unit, such as `"1500 rpm"`.
+What could not be computed is `null`, never 0. Every error is a problem document (RFC 9457).
+"""
+
+TAGS = [
+    {"name": "studies", "description": "Submit, preview, follow and cancel studies."},
+    {"name": "results", "description": "Curves, maps and all rows of a study."},
+    {"name": "cases", "description": "Single cases and their instantaneous values."},
+    {"name": "schedules", "description": "Studies that are submitted by themselves."},
+    {"name": "clutch", "description": "Clutch laws from measured data."},
+    {"name": "models", "description": "Parameters, results and endings; studies to start from."},
+    {"name": "health", "description": "Whether the service is up."},
+]
+
+
+class Application(FastAPI):
+    """FastAPI whose outermost layer, outside even its own error pages, is the guard."""
+
+    def __init__(self, settings: Settings, access: Access, metrics: Metrics, **options: Any) -> None:
+        super().__init__(**options)
+        self._settings = settings
+        self._access = access
+        self._metrics = metrics
+        self.drain: Drain | None = None
+
+    def build_middleware_stack(self) -> ASGIApp:
+        """The framework's layers inside the guard."""
+        guarded = Guard(Noted(super().build_middleware_stack()), self._settings, self._access)
+        self.drain = Drain(RequestLog(guarded, self._metrics.answered))
+        return self.drain
+
+    def openapi(self) -> dict[str, Any]:
+        """The OpenAPI document, made once."""
+        if self.openapi_schema is None:
+            schemas = {
+                "Spec": spec_schema(),
+                "Extension": extension_schema(),
+                "ClutchFitRequest": clutch_fits.SCHEMA,
+                "ScheduleRequest": schedules.SCHEMA,
+                "ScheduleChange": schedules.CHANGE_SCHEMA,
+            }
+            self.openapi_schema = build_openapi(self, schemas)
+        return self.openapi_schema
+
+
+def create_app(
+    settings: Settings | None = None,
+    *,
+    store: Store | None = None,
+    computer: Computes | None = None,
+    checker: Computes | None = None,
+) -> FastAPI:
+    """The application for ``settings`` (by default from the environment).
+
+    A store, a computer or a checker that is handed in stays open when the application ends. Raises UnsafeSettingsError
+    for an address that others can reach without a token, and DatabaseError when the database cannot be used.
+    """
+    settings = settings or Settings()
+    own_store = store is None
+    used_store = store or _sound_store(settings)
+    try:
+        settings.require_safe(stored=any(token.revoked_at is None for token in used_store.tokens()))
+    except UnsafeSettingsError:
+        if own_store:
+            used_store.close()
+        raise
+    access = Access(settings, used_store)
+    used_computer, used_checker = computer or _computer(settings), checker or _checker(settings)
+
+    @asynccontextmanager
+    async def lifespan(running: FastAPI) -> AsyncIterator[None]:
+        if isinstance(used_checker, ProcessComputer) and checker is None:
+            used_checker.start()
+        housekeeping = Housekeeping(used_store)
+        housekeeping.start()
+        yield
+        if isinstance(running, Application) and running.drain is not None:
+            await running.drain.idle()
+        await run_in_threadpool(housekeeping.stop)
+        if computer is None:
+            used_computer.close()
+        if checker is None:
+            used_checker.close()
+        if own_store:
+            used_store.close()
+
+    metrics = Metrics(used_store)
+    app = Application(
+        settings,
+        access,
+        metrics,
+        title="Sprag",
+        summary="Parameter studies of vibration drives with freewheel clutches and of machine shafts",
+        description=DESCRIPTION,
+        version=version("sprag"),
+        openapi_tags=TAGS,
+        openapi_url=None,
+        docs_url=None,
+        redoc_url=None,
+        redirect_slashes=False,
+        lifespan=lifespan,
+        generate_unique_id_function=lambda route: route.name,
+    )
+    app.state.access = access
+    app.state.metrics = metrics
+    app.state.readiness = Readiness(used_store)
+    app.state.context = Context(
+        settings,
+        used_store,
+        used_computer,
+        used_checker,
+        checks.Library(used_store),
+        check_shares=Shares(max(settings.check_processes - 1, 1), MAX_CHECKS_EACH),
+    )
+    api = APIRouter(prefix=API_PREFIX)
+    for module in (studies, events, curves, sensitivity, cases, clutch_fits, schedules, catalogues):
+        api.include_router(module.router)
+    app.include_router(api)
+    app.include_router(health.router)
+    for page in (pages, form, study, results, table, case, compare, laboratory, schedule_pages, login):
+        app.include_router(page.router)
+    handlers.install(app)
+    return app
+
+
+def _computer(settings: Settings) -> ProcessComputer:
+    limits = Limits(
+        settings.trajectory_timeout, COMPUTATION_BYTES, MAX_COMPUTATIONS, setting="SPRAG_TRAJECTORY_TIMEOUT"
+    )
+    return ProcessComputer(limits)
+
+
+def _checker(settings: Settings) -> ProcessComputer:
+    limits = Limits(
+        settings.check_timeout, settings.check_memory * 2**20, MAX_CHECKS, "too-costly", "SPRAG_CHECK_TIMEOUT"
+    )
+    return ProcessComputer(limits, settings.check_processes, checks.prepare)
+
+
+def _sound_store(settings: Settings) -> Store:
+    store = Store.open(settings.database_url, chunking=chunking(settings))
+    try:
+        store.require_sound()
+    except BaseException:
+        store.close()
+        raise
+    return store
+
+
+def chunking(settings: Settings) -> Chunking:
+    """How studies are cut into chunks under ``settings``."""
+    return Chunking(settings.chunk_cases, settings.pool_processes, settings.chunk_timeout)

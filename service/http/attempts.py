@@ -1,0 +1,155 @@
+"""Attempts to come in with a token that is not valid: told in the log, answered ever more slowly, limited in number.
+
+Delays hold up refusals only: a valid token is let in at once, unless several refusals of its address wait; so guessing
+does not get faster with more connections. Guessers at many addresses shut nobody else out.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import logging
+import time
+from collections import OrderedDict
+from collections.abc import Awaitable, Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Final
+
+import anyio
+from starlette.datastructures import Headers
+from starlette.types import Scope
+
+from service.http.problems import ApiError
+
+_LOG = logging.getLogger("sprag.access")
+
+#: Seconds before the first refusal of an address; twice as many before each further one, up to the longest.
+FIRST_SECONDS: Final = 0.25
+LONGEST_SECONDS: Final = 4.0
+#: Seconds without a failed attempt after which an address begins anew.
+FORGET_SECONDS: Final = 900.0
+#: Refusals of one address that wait; further attempts from there are refused at once, whatever their token.
+MOST_WAITING: Final = 4
+#: Refusals that wait in all, as each keeps a connection; further ones do not wait.
+MOST_WAITING_IN_ALL: Final = 64
+#: Addresses that are remembered: the latest ones.
+_MOST_ADDRESSES: Final = 10_000
+#: Bits of an IPv6 address that tell networks apart; one client has all addresses of its network.
+_NETWORK_BITS: Final = 64
+_UNKNOWN: Final = "an unknown address"
+
+Network = ipaddress.IPv4Network | ipaddress.IPv6Network
+
+
+@dataclass(slots=True)
+class _History:
+    failures: int = 0
+    latest: float = 0.0
+    waiting: int = 0
+
+
+class Attempts:
+    """Failed attempts by address. For one event loop.
+
+    Parameters
+    ----------
+    trusted : networks of proxies whose X-Forwarded-For is believed
+    sleep, clock : functions
+        Wait for so many seconds; seconds that have passed since any moment. Others than the system's in tests.
+    """
+
+    def __init__(
+        self,
+        trusted: Iterable[Network] = (),
+        sleep: Callable[[float], Awaitable[None]] = anyio.sleep,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._trusted = tuple(trusted)
+        self._sleep = sleep
+        self._clock = clock
+        self._histories: OrderedDict[str, _History] = OrderedDict()
+        self._waiting = 0
+
+    def address_of(self, scope: Scope) -> str:
+        """Address of the client: the connection's, or that which a trusted proxy tells."""
+        client = scope.get("client")
+        address = str(client[0]) if client else _UNKNOWN
+        # The last entry is the nearest proxy's own word; each further one is believed only if a trusted proxy told it.
+        told = ",".join(Headers(scope=scope).getlist("x-forwarded-for")).split(",")
+        for entry in reversed(told):
+            if not self._is_trusted(address) or _parsed(entry.strip()) is None:
+                break
+            address = str(_parsed(entry.strip()))
+        return address
+
+    def _is_trusted(self, address: str) -> bool:
+        parsed = _parsed(address)
+        return parsed is not None and any(parsed in network for network in self._trusted)
+
+    def admit(self, scope: Scope) -> None:
+        """Raise ApiError when too many refusals of the client's address wait already."""
+        history = self._histories.get(_network(self.address_of(scope)))
+        if history is not None and history.waiting >= MOST_WAITING:
+            raise _too_many()
+
+    async def failed(self, scope: Scope, place: str) -> None:
+        """Note that a token was not valid at ``place``, and wait before it is told.
+
+        Raises ApiError at once where too many refusals wait already.
+        """
+        address = self.address_of(scope)
+        # The words and their order are those of the filter for fail2ban in the documentation.
+        _LOG.warning("Failed login from %s: %s", address, place)
+        history, now = self._history(_network(address)), self._clock()
+        history.failures = 1 if now - history.latest > FORGET_SECONDS else history.failures + 1
+        history.latest = now
+        if self._waiting >= MOST_WAITING_IN_ALL:
+            raise _too_many()
+        with self._in_line(history):
+            await self._sleep(min(FIRST_SECONDS * 2.0 ** min(history.failures - 1, 30), LONGEST_SECONDS))
+
+    def _history(self, network: str) -> _History:
+        history = self._histories.setdefault(network, _History())
+        self._histories.move_to_end(network)
+        while len(self._histories) > _MOST_ADDRESSES:
+            self._histories.popitem(last=False)
+        return history
+
+    @contextmanager
+    def _in_line(self, history: _History) -> Iterator[None]:
+        history.waiting += 1
+        self._waiting += 1
+        try:
+            yield
+        finally:
+            history.waiting -= 1
+            self._waiting -= 1
+
+
+def _too_many() -> ApiError:
+    return ApiError(
+        "too-many-attempts",
+        "Too many attempts with tokens that are not valid.",
+        headers={"Retry-After": str(int(LONGEST_SECONDS))},
+    )
+
+
+def _parsed(address: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
+    """The address without port and zone; None when it is none. An IPv4 address in IPv6's clothes is an IPv4 address."""
+    text = address.removeprefix("[").partition("]")[0] if address.startswith("[") else address
+    host, colon, port = text.partition(":")
+    if colon and ":" not in port and port.isdigit():
+        text = host
+    try:
+        parsed = ipaddress.ip_address(text.partition("%")[0])
+    except ValueError:
+        return None
+    return getattr(parsed, "ipv4_mapped", None) or parsed
+
+
+def _network(address: str) -> str:
+    """What counts as one client: an IPv4 address, or a network of IPv6."""
+    parsed = _parsed(address)
+    if isinstance(parsed, ipaddress.IPv6Address):
+        return str(ipaddress.ip_network((parsed, _NETWORK_BITS), strict=False))
+    return address

@@ -1,0 +1,170 @@
+"""Computations for the service, in processes of their own: they neither hold up answers nor take them down."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from typing import Protocol, TypeVar, TypeVarTuple
+
+from service.http.problems import ApiError
+from worker import models
+from worker.limits import LOAD_SECONDS
+from worker.pool.child_pool import ChildPool, Job, JobStoppedError
+from worker.pool.child_process import ProcessDiedError, ProcessStartError
+from worker.pool.processes import limit_memory, single_threaded_children
+
+Args = TypeVarTuple("Args")
+R = TypeVar("R")
+
+#: Computations that may wait for the process; more are refused at once rather than late.
+MAX_WAITING = 8
+_LATER = {"Retry-After": "5"}
+_ENDING = "The service is ending: what was asked for was not done."
+
+
+class Computes(Protocol):
+    """Runs functions of the engine for the service."""
+
+    async def run(self, function: Callable[[*Args], R], *args: *Args) -> R:
+        """The function's value; ApiError when it takes too long or its process dies."""
+
+    async def load(self, shape: models.KernelShape) -> None:
+        """Have a kernel ready, however long it takes to compile; ApiError when that fails."""
+
+    def close(self) -> None:
+        """Leave no process behind."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What each computation may take, and what is said of one that takes more.
+
+    Attributes
+    ----------
+    seconds : float
+        Time after which it is killed.
+    memory : int
+        Bytes that it may take beyond what its process has at the start.
+    waiting : int
+        Computations that may be there at once; more are refused at once rather than late.
+    problem : str
+        Key of the problem that its client is told of.
+    setting : str
+        Name of the setting of the time, where there is one.
+    """
+
+    seconds: float
+    memory: int
+    waiting: int = MAX_WAITING
+    problem: str = "timed-out"
+    setting: str = ""
+
+
+class ProcessComputer:
+    """Spawned processes, started with the first computation or by `start`.
+
+    Parameters
+    ----------
+    limits : Limits
+        Of each computation.
+    processes : int
+        How many there are side by side.
+    prepare, load : functions
+        What a process does first, and what compiles a kernel into the cache on disk or loads it; importable by name.
+    """
+
+    def __init__(
+        self,
+        limits: Limits,
+        processes: int = 1,
+        prepare: Callable[[], None] = models.prepare,
+        load: Callable[[models.KernelShape], None] = models.load,
+    ) -> None:
+        self._limits = limits
+        self._processes = processes
+        self._prepare = partial(_prepare, prepare, limits.memory)
+        self._load = load
+        self._loads: dict[models.KernelShape, Job[None]] = {}
+        self._pool: ChildPool | None = None
+        self._waiting = 0
+        self._closed = False
+        self._lock = threading.Lock()
+
+    def start(self) -> None:
+        """Have the processes ready before they are needed. The calling thread has to outlive them."""
+        with self._lock:
+            self._started()
+
+    async def run(self, function: Callable[[*Args], R], *args: *Args) -> R:
+        """The function's value. Function, arguments and value must be picklable."""
+        with self._turn(self._limits.seconds):
+            job = self._schedule(self._limits.seconds, function, *args)
+            try:
+                return await asyncio.wrap_future(job.future)
+            except asyncio.CancelledError:
+                task = asyncio.current_task()
+                if task is not None and not task.cancelling():  # it was `close` that cancelled what waited
+                    raise JobStoppedError from None
+                job.stop()  # nobody waits for it any more
+                raise
+
+    async def load(self, shape: models.KernelShape) -> None:
+        """Have a kernel ready. The compilation goes on when its request is gone, so that the next one finds it."""
+        with self._turn(LOAD_SECONDS):
+            loading = self._loads.get(shape)
+            if loading is None or (loading.future.done() and loading.future.exception() is not None):
+                loading = self._loads[shape] = self._schedule(LOAD_SECONDS, self._load, shape)
+            await asyncio.shield(asyncio.wrap_future(loading.future))
+
+    @contextmanager
+    def _turn(self, timeout: float) -> Iterator[None]:
+        """One of the computations that may wait; what goes wrong with it becomes an ApiError."""
+        if self._waiting >= self._limits.waiting:
+            raise ApiError("unavailable", "Too many computations are waiting already.", headers=_LATER)
+        self._waiting += 1
+        named = f", the limit of {self._limits.setting}" if self._limits.setting else ""
+        try:
+            yield
+        except TimeoutError as error:
+            detail = f"The computation did not end within {timeout:g} s{named}."
+            raise ApiError(self._limits.problem, detail) from error
+        except MemoryError as error:
+            detail = f"The computation needs more memory than the {self._limits.memory // 2**20} MiB that it may take."
+            raise ApiError(self._limits.problem, detail) from error
+        except ProcessDiedError as error:
+            raise ApiError("not-computed", "The process that ran the computation died.") from error
+        except ProcessStartError as error:
+            raise ApiError("unavailable", "The process for computations cannot be started.", headers=_LATER) from error
+        except JobStoppedError as error:
+            raise ApiError("unavailable", _ENDING, headers=_LATER) from error
+        finally:
+            self._waiting -= 1
+
+    def _schedule(self, timeout: float, function: Callable[[*Args], R], *args: *Args) -> Job[R]:
+        with self._lock:
+            return self._started().schedule(timeout, function, *args)
+
+    def _started(self) -> ChildPool:
+        if self._closed:
+            raise JobStoppedError
+        if self._pool is None:
+            single_threaded_children()
+            self._pool = ChildPool(self._processes, self._prepare)
+        return self._pool
+
+    def close(self) -> None:
+        """End the processes, whatever they are doing; what waits is told that the service ends."""
+        with self._lock:
+            pool, self._pool, self._closed = self._pool, None, True
+        if pool is not None:
+            pool.close()
+
+
+def _prepare(prepare: Callable[[], None], memory: int) -> None:
+    """First thing that a process does."""
+    prepare()
+    limit_memory(memory)

@@ -1,0 +1,122 @@
+"""What the operations work with: settings, store and computer of the running service."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from threading import Event
+from typing import TYPE_CHECKING, Annotated, Final, cast
+
+from fastapi import Depends, Path, Request
+from starlette.convertors import Convertor, register_url_convertor
+
+from service.http.computer import Computes
+from service.http.problems import ApiError
+from service.http.shares import Shares
+from service.jobs.checks import Library
+from service.results.unaffected import Unaffected
+from service.settings import Settings
+from service.storage.store import Store
+from worker.limits import MAX_CASES, MAX_CHECKS_EACH, MAX_COMPUTATIONS_EACH, MAX_STREAMS
+
+if TYPE_CHECKING:
+    from worker.study import Study
+
+CaseNumber = Annotated[
+    int,
+    Path(
+        ge=0,
+        description="number of the case, from 0",
+        examples=[0],
+        json_schema_extra={"maximum": MAX_CASES - 1},
+    ),
+]
+
+
+class Places:
+    """A number of places; who finds none is sent away. For one event loop."""
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        self.taken = 0
+
+    def take(self) -> bool:
+        """Take a place; False when there is none."""
+        if self.taken >= self.most:
+            return False
+        self.taken += 1
+        return True
+
+    def leave(self) -> None:
+        """Give the place back."""
+        self.taken -= 1
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """Settings, store and computer of one service; ``ending`` is set when the service is about to end.
+
+    ``checker`` runs what reads, expands, fits or draws what users wrote, and ``library`` is the store for it; requests
+    use it and the computer through `service.http.work`, which keeps to the shares of each token. ``unaffected`` tells
+    of parameters that change nothing; ``streams`` are the places for streams of events.
+    """
+
+    settings: Settings
+    store: Store
+    computer: Computes
+    checker: Computes
+    library: Library
+    ending: Event = field(default_factory=Event)
+    streams: Places = field(default_factory=lambda: Places(MAX_STREAMS))
+    unaffected: Unaffected = field(default_factory=Unaffected)
+    compute_shares: Shares = field(default_factory=lambda: Shares(1, MAX_COMPUTATIONS_EACH))
+    check_shares: Shares = field(default_factory=lambda: Shares(1, MAX_CHECKS_EACH))
+
+    def cut(self) -> None:
+        """End what is being computed and let no write begin: what waits is told so. Takes as long as killing does."""
+        self.store.session.refuse_writes()
+        for computer in (self.checker, self.computer):
+            computer.close()
+
+
+#: What an id can be; without a colon, which begins a verb.
+ID_PATTERN: Final = "^[A-Za-z0-9_-]{1,64}$"
+
+
+class StudyIdConvertor(Convertor[str]):
+    """Part of an address that can be the id of a study; without a colon, which begins a verb."""
+
+    regex = ID_PATTERN.strip("^$")
+
+    def convert(self, value: str) -> str:
+        """The id as it stands in the address."""
+        return value
+
+    def to_string(self, value: str) -> str:
+        """The id as it stands in the address."""
+        return value
+
+
+class CaseConvertor(StudyIdConvertor):
+    """Part of an address that can be the number of a case: not longer than any number of a case is."""
+
+    regex = "[0-9]{1,12}"
+
+
+register_url_convertor("study", StudyIdConvertor())
+register_url_convertor("case", CaseConvertor())
+
+
+async def _context(request: Request) -> Context:
+    return cast("Context", request.app.state.context)
+
+
+Ctx = Annotated[Context, Depends(_context)]
+StudyId = Annotated[str, Path(description="id of the study", pattern=ID_PATTERN, examples=["st_0123456789abcdef"])]
+
+
+def study_with(context: Context, study_id: str, case: int) -> Study:
+    """The study, when it has that case; ApiError else."""
+    study = context.store.study(study_id)
+    if case >= study.cases:
+        raise ApiError("case-not-found", f"The cases of this study are 0 .. {study.cases - 1}.")
+    return study

@@ -1,0 +1,210 @@
+"""The outermost layer of the service: who may send what. Nothing behind it runs for a request that it refuses."""
+
+import re
+from typing import Final
+
+import anyio
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import ClientDisconnect, Request, cookie_parser
+from starlette.responses import Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.http.access import ASKING, OPEN, Access, Grant
+from service.http.problems import ApiError, problem_response
+from service.http.web.problem_page import problem_page
+from service.http.web.way_in import LOGIN_PATH, way_in
+from service.settings import Settings
+from service.storage.errors import StoreError
+from service.storage.tokens import TokenScope
+from worker.limits import BODY_SECONDS, MAX_BODY_BYTES
+
+#: What anybody may ask for, token or not: whether the service is up, and the way in.
+OPEN_PATHS: Final = frozenset({"/livez", "/readyz", LOGIN_PATH, "/static/sprag.css", "/static/sprag.svg"})
+#: Requests that change nothing, whatever their method says.
+_LOOKING: Final = frozenset({"/api/v1/studies:preview", "/api/v1/clutch-fits", "/new/check", LOGIN_PATH, "/logout"})
+SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
+
+#: An empty style element: the script that draws pictures fills it rule by rule, which asks for no further permission.
+_EMPTY_STYLE: Final = "'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='"
+#: The style for maps of the world that the same script brings along: no page shows one, and refused it is an error.
+_MAP_STYLE: Final = "'sha256-ji27qzEtxXZW+7dun6UwjHXJ18e6WAin1VvNtkzIE/o='"
+
+SECURITY_HEADERS: Final = {
+    "Content-Security-Policy": (
+        f"default-src 'self'; style-src 'self' {_EMPTY_STYLE} {_MAP_STYLE}; img-src 'self' data:; object-src 'none'; "
+        "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+    ),
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-cache",
+}
+
+
+class Guard:
+    """ASGI application around the service: host allow-list, cross-site requests, token, body size, security headers.
+
+    Parameters
+    ----------
+    app : ASGI application behind the guard
+    settings : Settings
+        `host_names`; by default also those of ``access``.
+    access : Access, optional
+        Knows the tokens.
+    """
+
+    def __init__(self, app: ASGIApp, settings: Settings, access: Access | None = None) -> None:
+        self._app = app
+        self._hosts = settings.host_names
+        self._access = access or Access(settings)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        if scope["type"] != "http":  # there are no web sockets here
+            await send({"type": "websocket.close", "code": 1008})
+            return
+        try:
+            await self._check(scope)
+        except ApiError as error:
+            answer = await self._refusal(Request(scope, _limited(receive)), error)
+            await answer(scope, receive, _with_headers(send))
+            return
+        if scope["method"] == "HEAD":
+            # Whatever can be read can be asked for its headers; the server itself sends no body then.
+            scope = {**scope, "method": "GET"}
+        asking = ASKING.set(scope["sprag.grant"])
+        try:
+            await self._app(scope, _limited(receive), _with_headers(send))
+        finally:
+            ASKING.reset(asking)
+
+    async def _refusal(self, request: Request, error: ApiError) -> Response:
+        """The answer to a request that was refused: for pages, the login where that helps."""
+        try:
+            answer = await way_in(request, error, self._access)
+        except ApiError as unreadable:
+            answer, error = None, unreadable
+        except ClientDisconnect:
+            answer = None
+        return answer or problem_page(request, error) or problem_response(error)
+
+    async def _check(self, scope: Scope) -> None:
+        headers = Headers(scope=scope)
+        hosts = headers.getlist("host")
+        if len(hosts) != 1 or _host_name(hosts[0]) not in self._hosts:
+            detail = "This service does not answer under the name the request is addressed to"
+            raise ApiError("wrong-host", f"{detail}; SPRAG_ALLOWED_HOSTS adds names.")
+        if scope["method"] not in SAFE_METHODS and _is_cross_site(headers):
+            raise ApiError("cross-site", "A page of another site may not change anything here.")
+        scope["sprag.grant"] = await self._grant(scope, headers)
+        if "\n" in scope["path"]:
+            # The patterns of the routes end in "$", which a line feed at the very end would slip past.
+            raise ApiError("not-found", "There is nothing at this address: it has a line feed in it.")
+        length = headers.get("content-length", "0")
+        if not (length.isascii() and length.isdigit()):
+            raise ApiError("bad-request", "Content-Length is no number.")
+        if len(length) > 18 or int(length) > MAX_BODY_BYTES:
+            raise body_too_large()
+
+    async def _grant(self, scope: Scope, headers: Headers) -> Grant | None:
+        """Who asks; ApiError where nobody may who has no token, or only a lesser one."""
+        opened, safe = scope["path"] in OPEN_PATHS, scope["method"] in SAFE_METHODS
+        try:
+            await self._access.refresh()
+        except StoreError as error:
+            if opened and scope["path"] != LOGIN_PATH:
+                return None
+            raise ApiError("unavailable", f"The tokens cannot be read: {error}.") from error
+        if not self._access.needed:
+            return OPEN
+        sent = headers.getlist("authorization")
+        if sent:
+            self._access.attempts.admit(scope)
+        grant = self._access.of_header(sent[0]) if len(sent) == 1 else None
+        if sent and grant is None:
+            await self._access.attempts.failed(scope, "header Authorization")
+        if not sent:
+            grant = self._access.of_cookies(cookie_parser(headers.get("cookie", "")))
+            if grant is not None and not safe and not _names_its_site(headers):
+                raise ApiError("cross-site", "A browser says for which page it asks; this request does not.")
+        if opened:
+            return grant
+        if grant is None:
+            # Another challenge would make a browser ask for a password by itself, and drop the page it was to send.
+            headers_of_answer = {"WWW-Authenticate": "Bearer"}
+            raise ApiError("unauthorized", "This request carries no valid token.", headers=headers_of_answer)
+        if grant.scope is not TokenScope.WRITE and not safe and scope["path"] not in _LOOKING:
+            scope["sprag.grant"] = grant  # the login says whose token it is
+            raise ApiError("read-only", f"Token {grant.name or grant.id} is read-only.")
+        return grant
+
+
+def body_too_large() -> ApiError:
+    """The error for a body beyond the limit."""
+    return ApiError(
+        "body-too-large", f"The body may have {MAX_BODY_BYTES} bytes at most.", headers={"Connection": "close"}
+    )
+
+
+def _names_its_site(headers: Headers) -> bool:
+    """Whether the request says for which page it is sent; then `_is_cross_site` has let it pass."""
+    return "sec-fetch-site" in headers or "origin" in headers
+
+
+_HOST: Final = re.compile(r"(\[[0-9a-f:.%]+\]|[^:@/\[\]]+)(:[0-9]{0,5})?")
+
+
+def _host_name(host: str) -> str:
+    """The name in a Host header, lower case, without its port; "" when it is no host and port."""
+    found = _HOST.fullmatch(host.strip().lower())
+    return "" if found is None else found[1]
+
+
+def _is_cross_site(headers: Headers) -> bool:
+    """Whether a browser sent the request for a page of another origin; programs send neither of these headers."""
+    site = headers.get("sec-fetch-site")
+    if site is not None and site not in ("same-origin", "none"):
+        return True
+    origin = headers.get("origin")
+    # Only the authority is compared: behind a proxy that ends TLS the scheme seen here is not the browser's.
+    return origin is not None and origin.lower().partition("://")[2] != headers.get("host", "").lower()
+
+
+def _limited(receive: Receive) -> Receive:
+    """``receive`` that raises 413 as soon as more than the limit has come in, and 408 when it comes too slowly."""
+    total, more, until = 0, True, None
+
+    async def limited() -> Message:
+        nonlocal total, more, until
+        if not more:  # what comes now is the end of the connection, however late
+            return await receive()
+        until = until or anyio.current_time() + BODY_SECONDS
+        with anyio.move_on_after(until - anyio.current_time()) as scope:
+            message = await receive()
+        if scope.cancelled_caught:
+            raise ApiError(
+                "too-slow", f"The body did not come in within {BODY_SECONDS:g} s.", headers={"Connection": "close"}
+            )
+        more = message["type"] == "http.request" and message.get("more_body", False)
+        total += len(message.get("body", b""))
+        if total > MAX_BODY_BYTES:
+            raise body_too_large()
+        return message
+
+    return limited
+
+
+def _with_headers(send: Send) -> Send:
+    """``send`` that adds the security headers where the response has none of its own."""
+
+    async def wrapped(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            for name, value in SECURITY_HEADERS.items():
+                headers.setdefault(name, value)
+        await send(message)
+
+    return wrapped

@@ -1,0 +1,163 @@
+"""From whatever is raised while a request is answered to the one shape of error."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable
+from typing import Any, cast
+
+from fastapi import FastAPI
+from fastapi.exceptions import RequestValidationError
+from fastapi.routing import iter_route_contexts
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import Response
+
+from service.faults import ErrorItem, FaultError, parameter_error, shown
+from service.http.problems import ApiError, api_error, problem_response
+from service.http.web.problem_page import problem_page
+from service.results.selection import SelectionError
+from service.spec.report import SpecError, spec_items
+from service.storage import errors as storage
+from worker.states import TransitionError
+
+_log = logging.getLogger("sprag.service")
+
+_LATER = {"Retry-After": "5"}
+#: What the patterns of texts mean, for people.
+_PATTERNS = {r"^[!-~]+$": "printable ASCII characters without blanks"}
+
+#: Fault of the store -> kind of problem; the first that matches, so the special ones come first.
+_STORE_PROBLEMS: tuple[tuple[type[storage.StoreError], str], ...] = (
+    (storage.StudyNotFound, "study-not-found"),
+    (storage.ScheduleNotFound, "schedule-not-found"),
+    (storage.TooManySchedules, "wrong-state"),
+    (storage.IdempotencyConflict, "idempotency-conflict"),
+    (storage.StudyBusy, "wrong-state"),
+    (storage.StudyEnded, "wrong-state"),
+    (storage.NothingToRetry, "wrong-state"),
+    (storage.DatabaseFullError, "storage-full"),
+    (storage.StoreError, "unavailable"),
+)
+
+
+def as_api_error(error: Exception) -> ApiError | None:
+    """What a client is told about an exception; None when it is a fault of the program."""
+    if isinstance(error, FaultError):
+        return api_error(error)
+    if isinstance(error, SpecError):
+        return ApiError("invalid-spec", str(error), spec_items(error.problems))
+    if isinstance(error, SelectionError):
+        return ApiError("invalid-selection", str(error), error.errors)
+    if isinstance(error, TransitionError):
+        return ApiError("wrong-state", _sentence(error))
+    if isinstance(error, storage.PageTokenError):
+        return api_error(parameter_error("page_token", str(error), allowed="`next_page_token` of a page"))
+    if isinstance(error, storage.StoreError):
+        kind = next(problem for fault, problem in _STORE_PROBLEMS if isinstance(error, fault))
+        return ApiError(kind, _sentence(error), headers=_LATER if kind == "unavailable" else None)
+    return None
+
+
+def _answer(request: Request, error: ApiError) -> Response:
+    """The error as a page for a browser, as a problem document for everybody else."""
+    return problem_page(request, error) or problem_response(error)
+
+
+def _sentence(error: Exception) -> str:
+    text = str(error)
+    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+
+
+def _known(request: Request, error: Exception) -> Response:
+    found = as_api_error(error)
+    assert found is not None
+    if found.type.status >= 500:
+        _log.warning("%s %s: %s", request.method, request.url.path, found.detail)
+    return _answer(request, found)
+
+
+def _unknown(request: Request, error: Exception) -> Response:
+    _log.error("%s %s failed", request.method, request.url.path, exc_info=error)
+    # The framework passes the fault on to the server, which then ends the connection; the client has to know.
+    detail = "The service failed to answer; the fault is in its log."
+    return _answer(request, ApiError("internal", detail, headers={"Connection": "close"}))
+
+
+def _http(request: Request, error: Exception) -> Response:
+    raised = cast("HTTPException", error)
+    if raised.status_code == 404:
+        return _answer(request, ApiError("not-found", f"There is nothing at {shown(request.url.path)}."))
+    if raised.status_code == 405:
+        methods = ", ".join(sorted(_methods_at(request.app, request.url.path)))
+        detail = f"{request.method} is not possible here; possible: {methods}."
+        return _answer(request, ApiError("method-not-allowed", detail, headers={"Allow": methods}))
+    if raised.status_code < 500:
+        return _answer(request, ApiError("bad-request", str(raised.detail)))
+    return _unknown(request, error)
+
+
+def _left(request: Request, _: Exception) -> Response:
+    """For the log and the metrics only: nobody is there any more to read it."""
+    return _answer(request, ApiError("bad-request", "The connection ended before the request was whole."))
+
+
+def _methods_at(app: FastAPI, path: str) -> set[str]:
+    """Every method that some route takes at ``path``; the framework itself names those of one route only."""
+    found: set[str] = set()
+    for route in iter_route_contexts(app.routes):
+        pattern = getattr(route, "path_regex", None)
+        if pattern is not None and pattern.match(path):
+            found |= route.methods or set()
+    return found | {"HEAD"} if "GET" in found else found
+
+
+def _invalid(request: Request, error: Exception) -> Response:
+    raised = cast("RequestValidationError", error)
+    items = tuple(_parameter_item(fault) for fault in raised.errors())
+    detail = "; ".join(f"{item.parameter}: {item.message}" for item in items)
+    return _answer(request, ApiError("invalid-parameter", detail, items))
+
+
+def _parameter_item(fault: dict[str, Any]) -> ErrorItem:
+    _place, *name = fault["loc"]
+    bounds = fault.get("ctx", {})
+    value = fault.get("input")
+    message = str(fault["msg"]).removeprefix("Value error, ")
+    if "pattern" in bounds:
+        message = "has characters that are not allowed here"
+    return ErrorItem(
+        message[:1].lower() + message[1:],
+        parameter=str(name[0]) if name else _place,
+        value=shown(value) if isinstance(value, str) else None,
+        allowed=_allowed(bounds),
+    )
+
+
+def _allowed(bounds: dict[str, Any]) -> str | None:
+    signs = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<", "expected": "one of"}
+    parts = [f"{signs[name]} {value}" for name, value in bounds.items() if name in signs]
+    if "pattern" in bounds:
+        parts.append(_PATTERNS.get(bounds["pattern"], f"a text like {bounds['pattern']}"))
+    return " and ".join(parts) or None
+
+
+def install(app: FastAPI) -> None:
+    """Give ``app`` its error handlers."""
+    handled: Iterable[tuple[type[Exception], Callable[[Request, Exception], Response]]] = (
+        *((kind, _known) for kind in (FaultError, SpecError, SelectionError, TransitionError, storage.StoreError)),
+        (ClientDisconnect, _left),
+        (HTTPException, _http),
+        (RequestValidationError, _invalid),
+        (Exception, _unknown),
+    )
+    for kind, handler in handled:
+        app.add_exception_handler(kind, _asynchronous(handler))
+
+
+def _asynchronous(handler: Callable[[Request, Exception], Response]) -> Any:
+    # Plain functions would be sent to a thread; these only build a small document.
+    async def handle(request: Request, error: Exception) -> Response:
+        return handler(request, error)
+
+    return handle

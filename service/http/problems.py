@@ -1,0 +1,148 @@
+"""The one shape of every error of the HTTP interface: RFC 9457 problem documents, their types and their catalogue."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.responses import Response
+
+from service.faults import ErrorItem, FaultError
+from service.json_text import to_bytes
+
+PROBLEM_MEDIA_TYPE = "application/problem+json"
+PROBLEM_PATH = "/problems/"
+
+
+@dataclass(frozen=True, slots=True)
+class ProblemType:
+    """A kind of problem: the last part of its type URI, status, title, and a sentence that explains it."""
+
+    slug: str
+    status: int
+    title: str
+    help: str
+
+    @property
+    def uri(self) -> str:
+        """The type as a relative reference; it is stable, and a page of the service."""
+        return PROBLEM_PATH + self.slug
+
+
+def _catalogue(*types: ProblemType) -> dict[str, ProblemType]:
+    return {item.slug: item for item in types}
+
+
+_FIELDS_HELP = "`errors` lists every fault: where it is, what was given, what is allowed."
+_P = ProblemType
+PROBLEM_TYPES: dict[str, ProblemType] = _catalogue(
+    _P("invalid-spec", 422, "The study spec is not valid", _FIELDS_HELP),
+    _P("invalid-body", 422, "The request body is not valid", _FIELDS_HELP),
+    _P("invalid-parameter", 422, "A request parameter is not valid", "`errors` names each and what it may be."),
+    _P("invalid-selection", 422, "The cases asked for cannot be drawn", "A curve needs a value for every axis."),
+    _P("idempotency-conflict", 422, "The Idempotency-Key was used with another body", "A new study needs a new key."),
+    _P("study-not-found", 404, "There is no such study", "It never existed or was deleted."),
+    _P("schedule-not-found", 404, "There is no such schedule", "It never existed or was deleted."),
+    _P("case-not-found", 404, "There is no such case in the study", "Cases are numbered from 0."),
+    _P("not-found", 404, "There is nothing at this address", "The addresses of the interface are listed at /docs."),
+    _P("method-not-allowed", 405, "This address does not take this method", "The header Allow lists those it takes."),
+    _P("not-acceptable", 406, "No format that Accept allows", "`detail` names the media types that there are."),
+    _P("wrong-state", 409, "The state of the study does not allow this", "Look at the state of the study first."),
+    _P("not-computed", 409, "The case cannot be computed", "Its run takes down the process that computes it."),
+    _P("body-too-large", 413, "The request body is too large", "A study is a small document: give axes as ranges."),
+    _P("unsupported-media-type", 415, "The content type is not taken here", "Send the type that `detail` names."),
+    _P("bad-request", 400, "The request cannot be read", "It breaks HTTP's own rules."),
+    _P(
+        "unauthorized",
+        401,
+        "A valid token is needed",
+        "Send `Authorization: Bearer <token>`; browsers: /login.",
+    ),
+    _P("read-only", 403, "This token only allows to look", "A token of scope `write` is needed to change anything."),
+    _P("too-slow", 408, "The request came in too slowly", "Send the whole body at once."),
+    _P("cross-site", 403, "Requests from other sites are refused", "A browser sent it for a page of another site."),
+    _P("wrong-host", 421, "The request is addressed to another host", "SPRAG_ALLOWED_HOSTS allows further names."),
+    _P(
+        "too-many-attempts",
+        429,
+        "Too many attempts with invalid tokens",
+        "Wait as long as the header Retry-After says.",
+    ),
+    _P("too-costly", 422, "This takes too much time or memory", "Ask for a smaller study, formula or picture."),
+    _P("too-many-requests", 429, "Too many requests of one token at once", "Wait as long as Retry-After says."),
+    _P("queue-full", 429, "Too many studies wait", "Wait until some have ended, or cancel some."),
+    _P("internal", 500, "The service failed", "This is a fault of the program; the server's log has the details."),
+    _P("unavailable", 503, "The service cannot do this now", "Try again later; `sprag doctor` looks for the cause."),
+    _P("storage-full", 507, "There is no room for this", "Make room on the disk, or delete studies."),
+    _P("timed-out", 504, "The computation took too long", "Ask for a shorter part of the run."),
+)
+
+
+class ApiError(FaultError):
+    """A fault as HTTP tells it.
+
+    Attributes
+    ----------
+    headers : mapping
+        Headers that the answer must have.
+    """
+
+    def __init__(
+        self, code: str, detail: str, errors: Iterable[ErrorItem] = (), headers: Mapping[str, str] | None = None
+    ) -> None:
+        super().__init__(code, detail, errors)
+        self.headers = dict(headers or {})
+
+    @property
+    def type(self) -> ProblemType:
+        """The catalogue's entry."""
+        return PROBLEM_TYPES[self.code]
+
+
+def api_error(fault: FaultError) -> ApiError:
+    """The fault with what HTTP adds to it."""
+    if isinstance(fault, ApiError):
+        return fault
+    headers = {} if fault.retry_after is None else {"Retry-After": str(fault.retry_after)}
+    return ApiError(fault.code, fault.detail, fault.errors, headers)
+
+
+def problem_json(kind: ProblemType, detail: str, errors: Iterable[ErrorItem] = ()) -> dict[str, Any]:
+    """A problem document as JSON data."""
+    document: dict[str, Any] = {"type": kind.uri, "title": kind.title, "status": kind.status, "detail": detail}
+    items = [item.to_json() for item in errors]
+    if items:
+        document["errors"] = items
+    return document
+
+
+def problem_response(error: ApiError) -> Response:
+    """The HTTP response for ``error``."""
+    body = to_bytes(problem_json(error.type, error.detail, error.errors))
+    headers = {"Cache-Control": "no-store", **error.headers}
+    return Response(body, status_code=error.type.status, media_type=PROBLEM_MEDIA_TYPE, headers=headers)
+
+
+class ErrorItemModel(BaseModel):
+    """One fault of a request."""
+
+    pointer: str | None = Field(default=None, description="JSON Pointer to the faulty place in the body")
+    parameter: str | None = Field(default=None, description="name of the faulty parameter, where it is not in the body")
+    message: str = Field(description="what is wrong, as a sentence")
+    value: Any = Field(default=None, description="what was received, shortened")
+    allowed: str | None = Field(default=None, description="what is allowed: a range, or the possible values")
+    unit: str | None = Field(default=None, description="SI unit of the value")
+
+
+class Problem(BaseModel):
+    """Problem document (RFC 9457)."""
+
+    model_config = ConfigDict(extra="allow")
+
+    type: str = Field(description="kind of problem: a stable reference, and a page that explains it")
+    title: str
+    status: int
+    detail: str = Field(description="what went wrong this time")
+    errors: list[ErrorItemModel] | None = Field(
+        default=None, description="every fault found, where there can be several"
+    )

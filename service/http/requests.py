@@ -1,0 +1,75 @@
+"""How a request is read: bodies without loss through the spec's strict reader, and no query parameter passed over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from fastapi import Request
+from fastapi.dependencies.models import Dependant
+
+from service.faults import ErrorItem, shown
+from service.http.problems import ApiError
+from service.spec.report import did_you_mean
+
+BodyFormat = Literal["json", "toml"]
+_FORMATS: dict[str, BodyFormat] = {"application/json": "json", "application/toml": "toml"}
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A request body as it came in, within the limit that the guard sets."""
+
+    content: bytes
+    format: BodyFormat
+
+
+async def read_body(request: Request) -> Body:
+    """The body of ``request``, JSON or TOML by its content type; ApiError 415 for any other."""
+    declared = request.headers.get("content-type", "")
+    media_type, _, parameters = declared.partition(";")
+    form = _FORMATS.get(media_type.strip().lower())
+    charset = parameters.partition("charset=")[2].partition(";")[0].strip(' "').lower()
+    if form is None or charset not in ("", "utf-8", "utf8"):
+        allowed = " or ".join(_FORMATS)
+        item = ErrorItem("not a content type taken here", None, "Content-Type", shown(declared), f"{allowed}, in UTF-8")
+        raise ApiError(
+            "unsupported-media-type",
+            f"The body must be {allowed}, in UTF-8.",
+            (item,),
+            headers={"Accept": ", ".join(_FORMATS)},
+        )
+    return Body(await request.body(), form)
+
+
+async def strict_query(request: Request) -> None:
+    """Refuse query parameters that the operation does not have, or has once only: a misspelled one is no default.
+
+    A header that the operation reads, such as an Idempotency-Key, is refused when it is there twice.
+    """
+    dependant = request.scope["route"].dependant
+    known = _query_parameters(dependant)
+    faults = []
+    for name in (field.alias for field in dependant.header_params):
+        values = request.headers.getlist(name)
+        if len(values) > 1:
+            faults.append(ErrorItem("given more than once", None, name, shown(values[1]), "one value"))
+    for name in request.query_params:
+        values = request.query_params.getlist(name)
+        if name not in known:
+            allowed = ", ".join(known) or "no query parameter"
+            message = f"unknown query parameter{did_you_mean(name, known)}"
+            faults.append(ErrorItem(message, None, shown(name), shown(values[0]), allowed))
+        elif len(values) > 1 and not known[name]:
+            faults.append(ErrorItem("given more than once", None, name, shown(values[1]), "one value"))
+    if faults:
+        detail = "; ".join(f"{item.parameter}: {item.message}" for item in faults)
+        raise ApiError("invalid-parameter", detail, tuple(faults))
+
+
+def _query_parameters(dependant: Dependant) -> dict[str, bool]:
+    """Names of the query parameters of an operation, and whether each may be repeated."""
+    known = {field.alias: "list" in str(field.field_info.annotation) for field in dependant.query_params}
+    for inner in dependant.dependencies:
+        known |= _query_parameters(inner)
+    return known

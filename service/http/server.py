@@ -1,0 +1,250 @@
+"""`sprag serve`: the HTTP service, and beside it a dispatcher as a child process that is started again if it dies."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from types import FrameType
+from typing import Protocol
+
+import psutil
+import uvicorn
+
+from service import logs
+from service.http.app import create_app
+from service.http.timeouts import TimeoutProtocol
+from service.jobs.dispatching import start_dispatcher_process, worker_settings
+from service.settings import Settings
+from worker.limits import MAX_CONNECTIONS
+
+_LOG = logging.getLogger("sprag.service")
+
+#: Seconds that requests under way are given when the service ends; then those that were cut off, to be answered; then
+#: the dispatcher for its chunks. After the last the process ends, whatever is left of it.
+_GRACE_SECONDS = 5.0
+_ANSWER_SECONDS = 3
+_STOP_SECONDS = 15.0
+_LAST_SECONDS = 30.0
+#: Seconds before a dead dispatcher is started again: doubled each time, back to the first after a long life.
+_FIRST_DELAY = 0.5
+_LONGEST_DELAY = 10.0
+_LONG_LIFE = 10.0
+
+
+class AddressError(Exception):
+    """The service cannot listen on its address; the message is one plain sentence."""
+
+
+class Child(Protocol):
+    """What the supervisor needs of a process."""
+
+    @property
+    def exitcode(self) -> int | None:
+        """None while it lives."""
+
+    def join(self, timeout: float | None = None) -> None:
+        """Wait for its end."""
+
+    def terminate(self) -> None:
+        """Ask it to end."""
+
+    def kill(self) -> None:
+        """End it."""
+
+
+class Supervisor(threading.Thread):
+    """Keeps one child process alive.
+
+    The child is started by this thread, which lives as long as it is wanted: on Linux a child that is to die with its
+    parent dies with the very thread that started it.
+
+    Parameters
+    ----------
+    start : function
+        Starts the child.
+    delays : (first, longest)
+        Seconds before it is started again.
+    leaving : Event
+        Set when everything is about to end: a child that ends then has only got the same signal.
+    """
+
+    def __init__(
+        self,
+        start: Callable[[], Child],
+        delays: tuple[float, float] = (_FIRST_DELAY, _LONGEST_DELAY),
+        leaving: threading.Event | None = None,
+    ) -> None:
+        super().__init__(name="sprag-supervisor", daemon=True)
+        self._start_child = start
+        self._first, self._longest = delays
+        self._ending = threading.Event()
+        self._leaving = leaving or self._ending
+        self._child: Child | None = None
+
+    def run(self) -> None:
+        """Start the child, and again whenever it has died, until `stop`."""
+        delay = self._first
+        while not self._ending.is_set():
+            born = time.monotonic()
+            self._child = child = self._start_child()
+            while child.exitcode is None and not self._ending.is_set():
+                child.join(0.2)
+            if self._ending.is_set():
+                break
+            delay = self._first if time.monotonic() - born > _LONG_LIFE else delay
+            # The signal that ended it may be on its way to this process too.
+            if self._leaving.wait(self._first) or self._ending.is_set():
+                break
+            _LOG.error("The worker ended (exit code %s); it is started again.", child.exitcode)
+            self._ending.wait(delay - self._first)
+            delay = min(2.0 * delay, self._longest)
+        self._end_child()
+
+    def _end_child(self) -> None:
+        child = self._child
+        if child is None or child.exitcode is not None:
+            return
+        child.terminate()
+        child.join(_STOP_SECONDS)
+        if child.exitcode is None:
+            _LOG.error("The worker does not end; it is killed.")
+            child.kill()
+            child.join()
+
+    def stop(self) -> None:
+        """End the child and this thread; returns when both are gone."""
+        self._ending.set()
+        self.join()
+
+
+class Server(uvicorn.Server):
+    """A server that tells the application when it is about to end, so that open streams end too.
+
+    Parameters
+    ----------
+    config : uvicorn.Config
+    ending : Event
+        Set by the first signal.
+    cut : function
+        Called when the grace of the requests is over, in a thread: has them come to an answer.
+    give_up : function
+        Called when the service has not ended long after the signal.
+    """
+
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        ending: threading.Event,
+        cut: Callable[[], None],
+        give_up: Callable[[], None],
+    ) -> None:
+        super().__init__(config)
+        self._told = ending
+        self._cut = cut
+        self._last = threading.Timer(_LAST_SECONDS, give_up)
+        self._last.daemon = True
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """A signal asks for the end."""
+        if not self._told.is_set():
+            self._told.set()
+            self._last.start()
+        super().handle_exit(sig, frame)
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Let requests end by themselves, then have them ended."""
+        loop = asyncio.get_running_loop()
+        cutting = loop.call_later(_GRACE_SECONDS, lambda: loop.run_in_executor(None, self._cut))
+        try:
+            await super().shutdown(sockets)
+        finally:
+            cutting.cancel()
+
+
+def _give_up() -> None:
+    """End this process and all that it started, now."""
+    _LOG.critical("The service has not ended %g s after it was asked to; it is ended now.", _LAST_SECONDS)
+    for child in psutil.Process().children(recursive=True):
+        with suppress(psutil.Error):
+            child.kill()
+    os._exit(1)
+
+
+def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) -> None:
+    """Serve until SIGINT or SIGTERM; service and dispatcher have ended when this returns.
+
+    ``announce`` is called with the address once it is listened on (by default a line of the log tells it). Raises
+    UnsafeSettingsError, DatabaseError and AddressError, each with one sentence, before anything is started.
+    """
+    logs.configure(settings.log_format, requests=settings.log_requests)
+    app = create_app(settings)  # makes the database ready before the dispatcher looks for it
+    listener = _listen(settings)
+    address = _address(settings, listener)
+    config = uvicorn.Config(
+        app,
+        log_config=None,
+        log_level=logging.WARNING,
+        access_log=False,
+        http=TimeoutProtocol,
+        ws="none",
+        limit_concurrency=MAX_CONNECTIONS,
+        server_header=False,
+        proxy_headers=False,
+        timeout_graceful_shutdown=int(_GRACE_SECONDS) + _ANSWER_SECONDS,
+        lifespan="on",
+    )
+    supervisor = Supervisor(
+        lambda: start_dispatcher_process(worker_settings(settings)), leaving=app.state.context.ending
+    )
+    with listener, _outlived_signals():
+        supervisor.start()
+        try:
+            (announce or _say)(address)
+            with suppress(KeyboardInterrupt):
+                context = app.state.context
+                Server(config, context.ending, context.cut, _give_up).run(sockets=[listener])
+        finally:
+            supervisor.stop()
+
+
+def _say(address: str) -> None:
+    _LOG.info("Sprag serves at %s (Ctrl-C ends it).", address)
+
+
+def _listen(settings: Settings) -> socket.socket:
+    host = settings.host.strip("[]")
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        listener = socket.create_server((host, settings.port), family=family, backlog=2048)
+    except (OSError, OverflowError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise AddressError(f"The service cannot listen on {settings.host} port {settings.port}: {reason}.") from error
+    # Connections inherit it. Without it the body of a small answer waits 40 ms for the client's word on its head.
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return listener
+
+
+def _address(settings: Settings, listener: socket.socket) -> str:
+    host = settings.host.strip("[]")
+    port = listener.getsockname()[1]
+    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+
+
+@contextmanager
+def _outlived_signals() -> Iterator[None]:
+    """Make SIGTERM end the server and not this process, which the server would send it to again at its own end."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, lambda _number, _frame: None)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -1,0 +1,48 @@
+"""How much of something each owner may have at once, so that none of them can take all of it."""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING
+
+from service.http.problems import ApiError
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator
+
+
+class _Share:
+    """What one owner has: how many are there, and the right to be at work."""
+
+    def __init__(self, at_work: int) -> None:
+        self.taken = 0
+        self.turns = asyncio.Semaphore(at_work)
+
+
+class Shares:
+    """Lets each owner have ``at_work`` things done at once, and ``each`` in all with those that wait.
+
+    For one event loop. Nothing is kept of an owner that has nothing done.
+    """
+
+    def __init__(self, at_work: int, each: int) -> None:
+        self._at_work = at_work
+        self._each = each
+        self._owners: dict[str, _Share] = {}
+
+    @asynccontextmanager
+    async def take(self, owner: str) -> AsyncIterator[None]:
+        """Wait for one's turn; ApiError at once when the owner has too many already."""
+        share = self._owners.setdefault(owner, _Share(self._at_work))
+        if share.taken >= self._each:
+            detail = f"{self._each} requests of this token are being worked on, as many as one may have at once."
+            raise ApiError("too-many-requests", detail, headers={"Retry-After": "5"})
+        share.taken += 1
+        try:
+            async with share.turns:
+                yield
+        finally:
+            share.taken -= 1
+            if not share.taken:
+                del self._owners[owner]

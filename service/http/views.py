@@ -1,0 +1,98 @@
+"""Studies and cases as the interface shows them: plain data from the store's records."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Final
+
+from service.http.respond import timestamp
+from service.presets import ABOUT, preset_text
+from service.spec.catalogue import axes_json
+from service.spec.document import format_of, load_spec, parse_spec
+
+if TYPE_CHECKING:
+    from service.storage.records import Progress, StudyRecord
+    from worker.study import Study
+
+API_PREFIX: Final = "/api/v1"
+
+
+def study_address(study_id: str) -> str:
+    """Address of a study in the API."""
+    return f"{API_PREFIX}/studies/{study_id}"
+
+
+def study_links(study_id: str) -> dict[str, str]:
+    """Addresses of what belongs to a study."""
+    own = study_address(study_id)
+    parts = {name: f"{own}/{name}" for name in ("cases", "results", "curves", "map", "sensitivity", "report", "events")}
+    return {"self": own, **parts, "cancel": f"{own}:cancel", "page": f"/studies/{study_id}"}
+
+
+def summary(record: StudyRecord) -> dict[str, Any]:
+    """A study without its spec."""
+    return {
+        "id": record.id,
+        "name": record.name,
+        "model": record.model,
+        "state": record.state.value,
+        "state_meaning": record.state.sentence,
+        "reason": record.reason,
+        "cases": record.cases,
+        "progress": {"total": record.cases, "done": record.done, "ok": record.ok},
+        "reused": record.reused,
+        "warnings": list(record.warnings),
+        "priority": record.priority,
+        "created_at": timestamp(record.created_at),
+        "started_at": timestamp(record.started_at),
+        "finished_at": timestamp(record.finished_at),
+        "finish_by": timestamp(record.finish_by),
+        "time_over": record.time_over,
+        "engine_version": record.engine_version,
+        "links": study_links(record.id),
+    }
+
+
+def progress_json(progress: Progress) -> dict[str, Any]:
+    """How far a study is, how fast, and how long it will take."""
+    left, covered = progress.seconds_left, progress.covered
+    return {
+        "total": progress.total,
+        "done": progress.done,
+        "ok": progress.ok,
+        "endings": progress.endings,
+        "rate": progress.rate,
+        "seconds_left": None if left is None else {"low": left[0], "high": left[1]},
+        "in_time": None if progress.in_time is None else progress.in_time.value,
+        "done_by_then": progress.done_by_then,
+        "passes": None if covered is None else asdict(covered),
+    }
+
+
+def detail(record: StudyRecord, progress: Progress, study: Study, spec: dict[str, Any]) -> dict[str, Any]:
+    """A study with everything; ``record`` and ``progress`` are of one moment (`Store.look`)."""
+    return {
+        **summary(record),
+        "progress": progress_json(progress),
+        "combine": study.combine,
+        "axes": axes_json(study),
+        "physics_hash": record.physics_hash,
+        "spec": spec,
+    }
+
+
+@lru_cache
+def preset_of(name: str) -> dict[str, Any]:
+    """A study that comes with the program, with its spec and what it shows; KeyError when there is none so named."""
+    file, text = preset_text(name)
+    spec = parse_spec(load_spec(text, format_of(file)))
+    return {
+        "name": name,
+        "title": spec.study.name,
+        "model": spec.study.model,
+        "shows": ABOUT[name].shows,
+        "values": ABOUT[name].values,
+        "cases": spec.study.cases,
+        "spec": spec.spec,
+    }

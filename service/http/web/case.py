@@ -1,0 +1,149 @@
+"""The page of one case: its parameters, ending and results, and its motion over time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from service.faults import FaultError
+from service.http.context import CaseNumber, Context, Ctx, StudyId, study_with
+from service.http.drawing import picture
+from service.http.respond import entity_tag, json_response, not_modified, tagged
+from service.http.web.figures.motion import SAMPLES, motion_figures
+from service.http.web.study import study_frame
+from service.http.web.templates import page
+from service.http.work import Attended
+from service.results import trajectories
+from service.results.defaults import characteristic_names
+from service.results.pictures.motion import draw_motion
+from service.results.pictures.shaft import draw_shaft
+from service.results.selection import axis_name
+from service.spec.catalogue import unit_of
+from worker import models
+from worker.models.codes import PENDING
+
+if TYPE_CHECKING:
+    from worker.study import Study
+
+router = APIRouter(include_in_schema=False)
+
+#: Periods of the motion that are shown first, at the end of the evaluated window.
+_FIRST_PERIODS = 4
+
+Begin = Annotated[str, Query(alias="from", max_length=80)]
+End = Annotated[str, Query(alias="to", max_length=80)]
+
+
+def _span(study: Study, case: int, begin: str, end: str) -> tuple[float, float]:
+    """First and last time (s) that are shown: as asked for, else the last periods of the window."""
+    if begin.strip() or end.strip():
+        return trajectories.span(study, case, begin.strip() or None, end.strip() or None)
+    extent = models.extent(study, case)
+    if extent.along == "angle":
+        return 0.0, extent.end
+    window, last = study.run.get("window"), extent.end
+    if window:
+        last = min(window[1][0] * (extent.period if window[1][1] == "periods" else 1.0), extent.end)
+    return max(last - _FIRST_PERIODS * extent.period, 0.0), last
+
+
+@router.get("/studies/{study_id:study}/cases/{case:case}")
+def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = "") -> Response:
+    """One case."""
+    study = study_with(context, study_id, case)
+    row = context.store.case_row(study_id, case)
+    faults: tuple[Any, ...] = ()
+    span = None
+    try:
+        span = _span(study, case, begin, end)
+    except FaultError as error:
+        faults = error.errors
+    query = urlencode([("from", repr(span[0])), ("to", repr(span[1]))]) if span else ""
+    own = f"/studies/{study_id}/cases/{case}"
+    infos = models.study_results(study)
+    extent = models.extent(study, case)
+    return page(
+        "case.html",
+        status=422 if faults else 200,
+        **study_frame(context, study_id),
+        tab="/cases",
+        case=case,
+        row=row,
+        ending=PENDING if row is None else row.ending,
+        sentence="The case has not been run yet." if row is None else models.ENDING_SENTENCES.get(row.ending, ""),
+        flags=[(flag, models.FLAG_SENTENCES.get(flag, "")) for flag in (() if row is None else row.flags)],
+        parameters=[
+            (
+                axis_name(study, axis.paths[0]),
+                study.case_parameters(case)[axis.paths[0]],
+                unit_of(study, axis.paths[0]),
+            )
+            for axis in study.axes
+        ],
+        infos=infos,
+        main=[info for info in infos if info.name in characteristic_names(infos)],
+        faults=faults,
+        span=span,
+        begin=begin,
+        end=end,
+        extent=extent,
+        figures=f"{own}/motion?{query}",
+        picture=f"{own}/motion.svg?{query}",
+        file=f"/api/v1{own}/trajectory?{query}&points={SAMPLES}&format=csv",
+        last=study.cases - 1,
+    )
+
+
+async def _asked(
+    context: Context, request: Request, study_id: str, case: int, span: tuple[str, str]
+) -> tuple[Study, tuple[float, float], str, Response | None]:
+    def find() -> tuple[Study, tuple[float, float]]:
+        study = study_with(context, study_id, case)
+        return study, _span(study, case, *span)
+
+    study, times = await run_in_threadpool(find)
+    # A case is what its study says, and studies never change.
+    tag = entity_tag(study_id, request.url.path, request.url.query, models.ENGINE_VERSION)
+    return study, times, tag, not_modified(request, tag)
+
+
+@router.get("/studies/{study_id:study}/cases/{case:case}/motion")
+async def motion(
+    context: Ctx,
+    work: Attended,
+    request: Request,
+    study_id: StudyId,
+    case: CaseNumber,
+    begin: Begin = "",
+    end: End = "",
+) -> Response:
+    """The figures of a motion."""
+    study, times, tag, unchanged = await _asked(context, request, study_id, case, (begin, end))
+    if unchanged:
+        return unchanged
+    await work.load(models.shape_of(study))
+    return tagged(json_response(await work.compute(motion_figures, study, case, *times)), tag)
+
+
+@router.get("/studies/{study_id:study}/cases/{case:case}/motion.svg")
+async def motion_picture(
+    context: Ctx,
+    work: Attended,
+    request: Request,
+    study_id: StudyId,
+    case: CaseNumber,
+    begin: Begin = "",
+    end: End = "",
+) -> Response:
+    """The motion as one picture, for pages without JavaScript."""
+    study, times, tag, unchanged = await _asked(context, request, study_id, case, (begin, end))
+    if unchanged:
+        return unchanged
+    await work.load(models.shape_of(study))
+    made = await work.compute(models.run_trajectory, study, case, *times, SAMPLES // 3)
+    paint = draw_shaft if made.along == "angle" else draw_motion
+    return tagged(await picture(paint, "svg", made, f"{study.name}, case {case}").response(work), tag)

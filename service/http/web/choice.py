@@ -1,0 +1,101 @@
+"""What a page is to draw, from its address: every choice stands there, and what is not chosen has a good default."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from service.faults import ErrorItem
+from service.results.curves import CurveQuery
+from service.results.defaults import characteristic_names, main_query, usual_value
+from service.results.selection import SelectionError
+
+if TYPE_CHECKING:
+    from starlette.datastructures import QueryParams
+
+    from worker.models import ResultInfo
+    from worker.study import Axis, Study
+
+
+@dataclass(frozen=True, slots=True)
+class MapQuery:
+    """What a map shows: one result over two axes, the others held."""
+
+    x: str
+    y: str
+    z: str
+    at: tuple[tuple[str, str], ...]
+
+
+def characteristic(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
+    """The mechanical characteristic: speed, torque, power and efficiency along the study's main axis."""
+    main = main_query(study, infos)
+    if main is None:
+        return None
+    return CurveQuery(main.x, characteristic_names(infos), main.by, main.at)
+
+
+def curve_query(study: Study, infos: Sequence[ResultInfo], given: QueryParams) -> CurveQuery | None:
+    """The curves that an address asks for; None for a study in which nothing varies.
+
+    Axes that it leaves open are held at their usual value. What it asks for wrongly is left for `select` to refuse.
+    """
+    main = main_query(study, infos)
+    if main is None:
+        return None
+    x = given.get("x") or main.x
+    y = tuple(name for name in given.getlist("y") if name) or main.y
+    by = tuple(path for path in given.getlist("by") if path) if given.get("x") else main.by
+    by = tuple(path for path in by if not _same_axis(study, path, x))
+    return CurveQuery(x, y, by, held(study, given.getlist("at"), (x, *by)))
+
+
+def map_query(study: Study, infos: Sequence[ResultInfo], given: QueryParams) -> MapQuery | None:
+    """The map that an address asks for; None where there are no two axes to draw it over."""
+    varying = [axis for axis in study.axes if len(axis) > 1]
+    main = main_query(study, infos)
+    if main is None or study.combine != "grid" or len(varying) < 2:
+        return None
+    x = given.get("x") or main.x
+    others = [axis.paths[0] for axis in varying if not _same_axis(study, axis.paths[0], x)]
+    y = given.get("y") or (main.by[0] if main.by and main.by[0] != x else others[0])
+    if _same_axis(study, y, x):
+        y = others[0]
+    return MapQuery(x, y, given.get("z") or main.y[0], held(study, given.getlist("at"), (x, y)))
+
+
+def held(study: Study, given: Sequence[str], drawn: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    """The pairs ``path=value`` of the axes that are not drawn: as given, the others at their usual value (a grid)."""
+    pairs: dict[str, str] = {}
+    for item in given:
+        path, equals, value = item.partition("=")
+        if not item or any(_same_axis(study, path, name) for name in drawn):
+            continue
+        if not equals or not value.strip():
+            raise SelectionError([ErrorItem("must be path=value", parameter="at", value=item[:80])])
+        pairs[path.strip()] = value.strip()
+    if study.combine == "grid":
+        for axis in study.axes:
+            open_axis = len(axis) > 1 and not any(path in axis.paths for path in (*drawn, *pairs))
+            if open_axis:
+                pairs[axis.paths[0]] = repr(usual_value(study, axis))
+    return tuple(pairs.items())
+
+
+def pairs_of(query: CurveQuery | MapQuery) -> list[tuple[str, str]]:
+    """The same as parameters of an address."""
+    at = [("at", f"{path}={value}") for path, value in query.at]
+    if isinstance(query, MapQuery):
+        return [("x", query.x), ("y", query.y), ("z", query.z), *at]
+    return [("x", query.x), *(("y", name) for name in query.y), *(("by", path) for path in query.by), *at]
+
+
+def varying_axes(study: Study) -> list[Axis]:
+    """The axes with more than one value."""
+    return [axis for axis in study.axes if len(axis) > 1]
+
+
+def _same_axis(study: Study, first: str, second: str) -> bool:
+    position = study.axis_of(first)
+    return first == second or (position is not None and position == study.axis_of(second))

@@ -1,0 +1,191 @@
+"""Two or more studies overlaid: the same curves of each, over an axis that all of them have."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from service.faults import ErrorItem
+from service.http import views
+from service.http.context import Context, Ctx
+from service.http.drawing import Drawing, picture
+from service.http.respond import entity_tag, json_response, not_modified, tagged
+from service.http.web.choice import held, varying_axes
+from service.http.web.figures.curves import curves_figure
+from service.http.web.study import fixed_choices
+from service.http.web.templates import page
+from service.http.work import Attended
+from service.results.curves import CurveQuery, Curves, draw, select
+from service.results.defaults import main_query
+from service.results.pictures.compare import draw_compare
+from service.results.selection import SelectionError
+from service.spec.catalogue import unit_of
+from worker import models
+
+if TYPE_CHECKING:
+    from starlette.datastructures import QueryParams
+
+    from service.storage.records import StudyRecord
+    from worker.models import ResultInfo
+    from worker.study import Study
+
+router = APIRouter(include_in_schema=False)
+
+_MOST: Final = 8
+_LISTED: Final = 50
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """What is compared: the studies, what all of them have in common, and what is chosen of it."""
+
+    records: list[StudyRecord]
+    studies: list[Study]
+    axes: list[str]
+    results: list[ResultInfo]
+    x: str
+    y: tuple[str, ...]
+    by: tuple[str, ...]
+    at: tuple[str, ...]
+
+    def label(self, position: int) -> str:
+        """Name of a study in legends; with its id where another one has the same name."""
+        record = self.records[position]
+        names = [other.name for other in self.records]
+        return record.name if names.count(record.name) == 1 else f"{record.name} ({record.id})"
+
+    def query(self, position: int) -> CurveQuery:
+        """The curves of one study: axes that it alone has are held at its usual value."""
+        study = self.studies[position]
+        given = [item for item in self.at if study.axis_of(item.partition("=")[0]) is not None]
+        return CurveQuery(self.x, self.y, self.by, held(study, given, (self.x, *self.by)))
+
+    def pairs(self) -> list[tuple[str, str]]:
+        """The same as parameters of an address."""
+        chosen = [("x", self.x), *(("y", name) for name in self.y), *(("by", path) for path in self.by)]
+        return [*(("study", record.id) for record in self.records), *chosen, *(("at", item) for item in self.at)]
+
+
+def comparison(context: Context, given: QueryParams) -> Comparison:
+    """What an address compares; SelectionError where the studies have nothing in common, StudyNotFound for others."""
+    ids = list(dict.fromkeys(name for name in given.getlist("study") if name))[:_MOST]
+    records = [context.store.get_study(study_id) for study_id in ids]
+    studies = [context.store.study(study_id) for study_id in ids]
+    axes = [axis.paths[0] for axis in varying_axes(studies[0])]
+    axes = [
+        path
+        for path in axes
+        if all((i := study.axis_of(path)) is not None and len(study.axes[i]) > 1 for study in studies)
+    ]
+    if not axes:
+        message = "these studies have no varying parameter in common, so that nothing can be drawn against it"
+        raise SelectionError([ErrorItem(message, parameter="study")])
+    known = [{info.name for info in models.study_results(study)} for study in studies]
+    results = [info for info in models.study_results(studies[0]) if all(info.name in names for names in known)]
+    main = main_query(studies[0], models.study_results(studies[0]))
+    x = given.get("x") or (main.x if main and main.x in axes else axes[0])
+    names = {info.name for info in results}
+    y = (
+        tuple(name for name in given.getlist("y") if name)
+        or tuple(n for n in (main.y if main else ()) if n in names)[:1]
+    )
+    by = tuple(path for path in given.getlist("by") if path and path != x)
+    at = tuple(item for item in given.getlist("at") if item.partition("=")[2].strip())
+    return Comparison(records, studies, axes, results, x, y or (results[0].name,), by, at)
+
+
+def drawn(context: Context, chosen: Comparison) -> list[tuple[str, Curves]]:
+    """The curves of every study; SelectionError names the study at fault."""
+    found = []
+    for position, (record, study) in enumerate(zip(chosen.records, chosen.studies, strict=True)):
+        try:
+            selection = select(study, models.study_results(study), chosen.query(position))
+        except SelectionError as error:
+            faults = [
+                ErrorItem(
+                    f"{chosen.label(position)}: {item.message}",
+                    None,
+                    item.parameter,
+                    item.value,
+                    item.allowed,
+                    item.unit,
+                )
+                for item in error.errors
+            ]
+            raise SelectionError(faults) from error
+        found.append((chosen.label(position), draw(selection, partial(context.store.rows_for_cases, record.id))))
+    return found
+
+
+@router.get("/compare")
+def compare_page(context: Ctx, request: Request) -> Response:
+    """Studies to choose from, and the curves of the chosen ones."""
+    given = request.query_params
+    faults: tuple[Any, ...] = ()
+    chosen: Comparison | None = None
+    held_at: list[tuple[str, ...]] = []
+    if given.get("study"):
+        try:
+            chosen = comparison(context, given)
+            for position, study in enumerate(chosen.studies):
+                held_at.append(select(study, models.study_results(study), chosen.query(position)).held)
+        except SelectionError as error:
+            faults = error.errors
+    query = "" if chosen is None else urlencode(chosen.pairs())
+    return page(
+        "compare.html",
+        status=422 if faults else 200,
+        chosen=chosen,
+        ids=given.getlist("study"),
+        faults=faults,
+        listed=[views.summary(record) for record in context.store.list_studies(page_size=_LISTED).studies],
+        units={} if chosen is None else {path: unit_of(chosen.studies[0], path) for path in chosen.axes},
+        held=held_at,
+        fixed=[] if chosen is None else _fixed(chosen),
+        figure=f"/compare/figure?{query}",
+        picture=f"/compare/picture.svg?{query}",
+    )
+
+
+def _fixed(chosen: Comparison) -> list[dict[str, Any]]:
+    """Axes that all studies have and that are not drawn, with the first study's values to choose from."""
+    given = tuple((item.partition("=")[0], item.partition("=")[2]) for item in chosen.at)
+    choices = fixed_choices(chosen.studies[0], (chosen.x, *chosen.by), given)
+    return [choice for choice in choices if choice["path"] in chosen.axes]
+
+
+def _tag(context: Context, request: Request) -> str:
+    ids = request.query_params.getlist("study")[:_MOST]
+    revisions = [context.store.get_study(study_id).revision for study_id in ids]
+    return entity_tag(request.url.path, request.url.query, revisions)
+
+
+@router.get("/compare/figure")
+def compare_figure(context: Ctx, request: Request) -> Response:
+    """The figure of a comparison."""
+    tag = _tag(context, request)
+    if unchanged := not_modified(request, tag):
+        return unchanged
+    return tagged(json_response(curves_figure(drawn(context, comparison(context, request.query_params)))), tag)
+
+
+@router.get("/compare/picture.svg")
+async def compare_picture(context: Ctx, work: Attended, request: Request) -> Response:
+    """The same as a picture, for pages without JavaScript."""
+
+    def look() -> tuple[str, Response | Drawing, bool]:
+        tag = _tag(context, request)
+        unchanged = not_modified(request, tag)
+        if unchanged is not None:
+            return tag, unchanged, True
+        return tag, picture(draw_compare, "svg", drawn(context, comparison(context, request.query_params))), False
+
+    tag, made, unchanged = await run_in_threadpool(look)
+    response = await made.response(work) if isinstance(made, Drawing) else made
+    return response if unchanged else tagged(response, tag)

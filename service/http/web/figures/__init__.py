@@ -1,0 +1,1 @@
+"""Figures that plotly draws in the browser: curves, motions, shafts, clutch fits."""

@@ -1,0 +1,98 @@
+"""A clutch fit as a picture inside the page: measured points, fitted law, and below them the residuals."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from service.results.wording import number
+from service.spec.units import parse_quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from worker.models import ClutchFit
+
+WIDTH: Final = 560
+_LEFT, _RIGHT, _TOP, _LAW, _GAP, _REST = 64.0, 12.0, 10.0, 190.0, 26.0, 80.0
+_LINE_POINTS: Final = 120
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """A tick: where it is in the picture, and what is written at it."""
+
+    at: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class FitChart:
+    """Geometry of the picture, in its own units; the template draws it."""
+
+    width: float
+    height: float
+    left: float
+    right: float
+    law: tuple[float, float]
+    rest: tuple[float, float]
+    points: list[tuple[float, float]]
+    line: str
+    residuals: list[tuple[float, float]]
+    zero: float
+    band: tuple[float, float]
+    x_ticks: list[Tick]
+    law_ticks: list[Tick]
+    rest_ticks: list[Tick]
+
+
+def fit_chart(fit: ClutchFit, clutch: Mapping[str, Any], backlash: float) -> FitChart:
+    """The picture of ``fit`` for a clutch of a spec; ``backlash`` (rad) is what the fit took off the angles."""
+    rows = np.array([[parse_quantity(a, "rad"), parse_quantity(t, "N*m")] for a, t in clutch["data"]])
+    offset = backlash if clutch.get("angles_include_backlash") else 0.0
+    windup, torque = np.maximum(rows[:, 0] - offset, 0.0), rows[:, 1]
+    u = np.linspace(0.0, fit.windup_limit, _LINE_POINTS)
+    law = np.polynomial.polynomial.polyval(u, fit.coefficients)
+    low, high = min(float(torque.min()), float(law.min()), 0.0), max(float(torque.max()), float(law.max()))
+    most = max(fit.max_residual, fit.accuracy) * 1.15
+    right, law_end = WIDTH - _RIGHT, _TOP + _LAW
+    rest = (law_end + _GAP, law_end + _GAP + _REST)
+
+    def x(value: float) -> float:
+        return _LEFT + (right - _LEFT) * value / fit.windup_limit
+
+    def y(value: float) -> float:
+        return law_end - _LAW * (value - low) / ((high - low) or 1.0)
+
+    def r(value: float) -> float:
+        return (rest[0] + rest[1]) / 2.0 - value / most * _REST / 2.0
+
+    return FitChart(
+        WIDTH,
+        rest[1] + 44.0,
+        _LEFT,
+        right,
+        (_TOP, law_end),
+        rest,
+        [(round(x(a), 1), round(y(t), 1)) for a, t in zip(windup.tolist(), torque.tolist(), strict=True)],
+        " ".join(f"{x(a):.1f},{y(t):.1f}" for a, t in zip(u.tolist(), law.tolist(), strict=True)),
+        [(round(x(a), 1), round(r(v), 1)) for a, v in zip(windup.tolist(), fit.residuals, strict=True)],
+        round(r(0.0), 1),
+        (round(r(fit.accuracy), 1), round(r(-fit.accuracy), 1)),
+        [Tick(x(value), number(value, 4)) for value in _round_steps(0.0, fit.windup_limit)],
+        [Tick(y(value), number(value, 4)) for value in _round_steps(low, high)],
+        [Tick(r(value), number(value, 3)) for value in (fit.accuracy, 0.0, -fit.accuracy)],
+    )
+
+
+def _round_steps(low: float, high: float, wanted: int = 5) -> Sequence[float]:
+    """Round numbers from ``low`` to ``high``, about ``wanted`` of them."""
+    if not high > low:
+        return [low]
+    rough = (high - low) / wanted
+    size = 10.0 ** math.floor(math.log10(rough))
+    step = next(size * factor for factor in (1.0, 2.0, 5.0, 10.0) if size * factor >= rough)
+    return [index * step for index in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)]

@@ -1,0 +1,211 @@
+"""What a filled form amounts to: its spec, what is wrong beside which field, what it would cost, its clutch fits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlencode
+
+from service.faults import ErrorItem
+from service.http.web.figures.fit import FitChart, fit_chart
+from service.http.web.form.spec import Faults, clutch_pointers, field_of, pendulums_of, spec_of
+from service.jobs.preview import preview_json
+from service.results.fits import fit_json
+from service.results.wording import unit_text
+from service.schedules.deadline import ALLOWED, FinishError, finish_at
+from service.spec.document import ParsedSpec, SpecError, load_spec, parse_spec
+from service.spec.machine.clutch import read_clutch
+from service.spec.measured import MeasuredDataError, parse_measured
+from service.spec.report import Report, spec_items
+from service.spec.units import QuantityError, parse_quantity
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+    from worker.chunking import Chunking
+    from worker.study import Study
+
+    Known = Callable[[Study], int]
+
+
+@dataclass(slots=True)
+class Checked:
+    """A filled form, looked over.
+
+    ``faults`` has the messages by field ("" for those of no field); ``preview`` is None while there are any. ``fits``
+    has the report and the picture of each clutch that could be fitted, whatever else is wrong; ``notes`` what was taken
+    for granted in measured data. ``finish`` is the deadline, which is no part of the spec.
+    """
+
+    spec: dict[str, Any]
+    parsed: ParsedSpec | None = None
+    faults: Faults = field(default_factory=dict)
+    preview: dict[str, Any] | None = None
+    fits: dict[str, tuple[dict[str, Any], FitChart]] = field(default_factory=dict)
+    finish: datetime | None = None
+    finish_text: str = ""
+    notes: list[str] = field(default_factory=list)
+    empty: frozenset[str] = frozenset()
+
+    @property
+    def query(self) -> str:
+        """What an address carries beside the spec."""
+        return "" if self.finish is None else "?" + urlencode({"finish_by": self.finish_text})
+
+    @property
+    def missing(self) -> int:
+        """Number of required fields that are still empty; beside them it is said once they were left."""
+        return sum(name in self.empty for name in self.faults)
+
+    @property
+    def attention(self) -> int:
+        """Number of messages beside fields that are filled in."""
+        return sum(len(texts) for name, texts in self.faults.items() if name and name not in self.empty)
+
+
+def _none_known(_study: Study) -> int:
+    return 0
+
+
+def look_over(values: Mapping[str, str], chunking: Chunking, known: Known, now: datetime) -> Checked:
+    """Look a form over, field by field or as text, with its deadline; ``known`` as for `check_form`."""
+    text, finish, fault = values.get("finish_by", "").strip(), None, ""
+    try:
+        finish = finish_at(text, now) if text else None
+    except FinishError as error:
+        fault = f"{error}; allowed: {ALLOWED}"
+    left = None if finish is None else (finish - now).total_seconds()
+    if "/text" in values:
+        checked = check_text(values["/text"], values.get("format", "json"), chunking, known, left)
+    else:
+        checked = check_form(values, chunking, known, left)
+    checked.finish, checked.finish_text = finish, text
+    if fault:
+        checked.faults["finish_by"], checked.parsed, checked.preview = [fault], None, None
+    return checked
+
+
+def check_form(
+    values: Mapping[str, str], chunking: Chunking, known: Known = _none_known, left: float | None = None
+) -> Checked:
+    """Look a filled form over.
+
+    ``known`` tells how many cases of a study need not be run; ``left`` are the seconds until its deadline.
+    """
+    spec, faults = spec_of(values)
+    found = Checked(spec, faults=faults, empty=frozenset(name for name, text in values.items() if not text.strip()))
+    try:
+        found.parsed = parse_spec(spec)
+    except SpecError as error:
+        for item in spec_items(error.problems):
+            name = field_of(item.pointer or "", values)
+            # Data that could not be read were told of already, line by line.
+            if not (name in faults and name.endswith("/data")):
+                found.faults.setdefault(name, []).append(message(item))
+    if found.faults:
+        found.parsed = None
+    if found.parsed is not None:
+        found.preview = preview_json(found.parsed, chunking, known(found.parsed.study), left)
+    for pointer in clutch_pointers(values):
+        if values.get(f"{pointer}/kind") == "data":
+            found.notes += _assumed(values.get(f"{pointer}/data", ""))
+            _fit(found, pointer, values)
+    return found
+
+
+def _assumed(text: str) -> list[str]:
+    """What is taken for granted of pasted data; nothing of such as cannot be read, which is told elsewhere."""
+    try:
+        return [f"Measured data: {note}." for note in parse_measured(text, parse_quantity).warnings]
+    except MeasuredDataError:
+        return []
+
+
+def check_text(
+    text: str, form: str, chunking: Chunking, known: Known = _none_known, left: float | None = None
+) -> Checked:
+    """Look a spec over that is given as text, JSON or TOML; ``known`` and ``left`` as for `check_form`."""
+    found = Checked({})
+    try:
+        loaded = load_spec(text, "toml" if form == "toml" else "json")
+        found.parsed = parse_spec(loaded)
+    except SpecError as error:
+        places = [(problem.pointer or "the spec", item) for problem, item in _with_items(error)]
+        found.faults["/text"] = [f"{pointer}: {message(item)}" for pointer, item in places]
+        return found
+    found.spec = found.parsed.spec
+    found.preview = preview_json(found.parsed, chunking, known(found.parsed.study), left)
+    return found
+
+
+def _with_items(error: SpecError) -> list[tuple[Any, ErrorItem]]:
+    return list(zip(error.problems, spec_items(error.problems), strict=True))
+
+
+def message(item: ErrorItem) -> str:
+    """A fault as a sentence beside its field."""
+    parts = [item.message]
+    if item.value is not None and not isinstance(item.value, list | dict):
+        parts.append(f"got {plainly(item.value)}")
+    if item.allowed:
+        parts.append(f"allowed: {unit_text(item.allowed)}")
+    elif item.unit and item.unit != "1":
+        parts.append(f"in {unit_text(item.unit)}")
+    return "; ".join(parts)
+
+
+def plainly(value: object) -> object:
+    """A value as a person would have written it: a whole number without decimals."""
+    return int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 1e15 else value
+
+
+def backlashes(spec: Mapping[str, Any], pointer: str) -> list[float]:
+    """Backlash (rad) of every pendulum that has the clutch at ``pointer``, as far as they can be read."""
+    pendulums = spec["base"].get("pendulums", [])
+    own = pointer.split("/")
+    chosen = [pendulums[int(own[3])]] if len(own) > 4 else pendulums
+    found = []
+    for item in chosen:
+        try:
+            found.append(parse_quantity(item.get("backlash", 0.0), "rad"))
+        except QuantityError:
+            continue
+    return found
+
+
+def clutch_at(spec: Mapping[str, Any], pointer: str) -> dict[str, Any]:
+    """The clutch at a JSON Pointer of a spec."""
+    parts = pointer.split("/")
+    base = spec["base"]
+    found: dict[str, Any] = base["clutch"] if len(parts) == 3 else base["pendulums"][int(parts[3])]["clutch"]
+    return found
+
+
+def _fit(found: Checked, pointer: str, values: Mapping[str, str]) -> None:
+    clutch = clutch_at(found.spec, pointer)
+    if not clutch.get("data") or "accuracy" not in clutch or pendulums_of(values) < 1:
+        return
+    known = backlashes(found.spec, pointer)
+    read = read_clutch(Report(), pointer, clutch, pointer.removeprefix("/base/").replace("/", ".") + ".", known)
+    if read is not None and read.fit is not None:
+        found.fits[pointer] = (fit_json(read.fit), fit_chart(read.fit, clutch, known[0] if known else 0.0))
+
+
+def has_measured_clutch(spec: Mapping[str, Any]) -> bool:
+    """Whether any clutch of a spec is given as measured data."""
+    base = spec.get("base", {})
+    pendulums = base.get("pendulums")
+    clutches = [base.get("clutch"), *(item.get("clutch") for item in pendulums or () if isinstance(item, dict))]
+    return any(isinstance(clutch, dict) and "data" in clutch for clutch in clutches)
+
+
+def fits_of(spec: dict[str, Any]) -> dict[str, tuple[dict[str, Any], FitChart]]:
+    """Report and picture of each clutch law that the spec gives as measured data, by their JSON Pointers."""
+    # The fit is not stored: it follows from the spec, to the last bit.
+    found = {}
+    alone = {key: value for key, value in spec.items() if key in ("sprag", "model", "name", "base", "run")}
+    for pointer, fit in parse_spec(alone).fits.items():
+        known = backlashes(spec, pointer)
+        found[pointer] = (fit_json(fit), fit_chart(fit, clutch_at(spec, pointer), known[0] if known else 0.0))
+    return found

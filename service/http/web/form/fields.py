@@ -1,0 +1,124 @@
+"""The fields of the form for a new study, made from the model's catalogue: names, letters, units, ranges, help.
+
+A field is called by the JSON Pointer of what it gives in the spec, so that what is wrong with the spec is told beside
+the field that it comes from.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from service.results.wording import number, words
+from service.spec.fields import placed
+from service.spec.units import example
+from worker import models
+from worker.models import Parameter
+
+#: The model that the form describes field by field; others are given as text.
+FORM_MODEL: Final = "vibration-drive"
+_SECTIONS: Final = {"excitation": "Vibration of the base", "shaft": "Output shaft", "gravity": "Surroundings"}
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One field: ``name`` is its JSON Pointer, ``mark`` what it is called in the sketch ("" where it is not in it)."""
+
+    name: str
+    label: str
+    symbol: str
+    mark: str
+    unit: str
+    help: str
+    range: str
+    required: bool
+    default: str
+    example: str
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """Fields that belong together."""
+
+    title: str
+    pointer: str
+    fields: tuple[Field, ...]
+
+
+def sections() -> list[Section]:
+    """The sections beside those of the pendulums and the clutch."""
+    catalogue = models.parameter_catalogue(FORM_MODEL)
+    found = []
+    for name, title in _SECTIONS.items():
+        entries = [entry for entry in catalogue if entry.path.split(".")[0] == name]
+        found.append(Section(title, f"/base/{name}", tuple(_field(entry, entry.path) for entry in entries)))
+    return found
+
+
+def pendulum(index: int) -> Section:
+    """The section of one pendulum."""
+    entries = [entry for entry in models.parameter_catalogue(FORM_MODEL) if entry.path.startswith("pendulums.N.")]
+    fields = tuple(_field(entry, entry.path.replace(".N.", f".{index}.")) for entry in entries)
+    return Section(f"Pendulum {index}", f"/base/pendulums/{index}", fields)
+
+
+def _field(entry: Parameter, path: str) -> Field:
+    text = example(entry.unit).split('"')
+    return Field(
+        name="/base/" + path.replace(".", "/"),
+        label=words(path.rsplit(".", maxsplit=1)[-1]),
+        symbol=entry.symbol,
+        mark=path.rsplit(".", maxsplit=1)[-1],
+        unit=entry.unit,
+        help=entry.help,
+        range=range_words(entry),
+        required=entry.default is None,
+        default="" if entry.default is None else number(entry.default, 8),
+        example=text[1] if len(text) > 1 else "",
+    )
+
+
+def range_words(entry: Parameter) -> str:
+    """The allowed range in few words: ``0 … 10 m``, ``above 0 Hz, at most 100 000 Hz``; "" where everything is."""
+    unit = "" if entry.unit == "1" else f" {entry.unit}"
+    low, high = (number(bound, 8) for bound in (entry.low, entry.high))
+    if math.isinf(entry.low) or math.isinf(entry.high):
+        if math.isinf(entry.low):
+            return "" if math.isinf(entry.high) else f"at most {high}{unit}"
+        return f"{'above' if entry.low_open else 'at least'} {low}{unit}"
+    return f"above {low}, at most {high}{unit}" if entry.low_open else f"{low} … {high}{unit}"
+
+
+@dataclass(frozen=True, slots=True)
+class PathChoice:
+    """A parameter that an axis can vary: its path, and how it is called with its unit."""
+
+    path: str
+    label: str
+    unit: str
+
+
+def path_choices(pendulums: int, coefficients: dict[str, int]) -> list[tuple[str, list[PathChoice]]]:
+    """What an axis can vary, group by group.
+
+    Parameters
+    ----------
+    pendulums : number of pendulums
+    coefficients : prefix of a clutch law's paths ("clutch.", "pendulums.0.clutch.") -> number of its coefficients
+    """
+    groups: dict[str, list[PathChoice]] = {}
+    for entry in models.parameter_catalogue(FORM_MODEL):
+        if entry.path.startswith("clutch."):
+            continue
+        for index in range(pendulums if ".N." in entry.path else 1):
+            path = entry.path.replace(".N.", f".{index}.")
+            group = words(path.rpartition(".")[0]) or "Surroundings"
+            groups.setdefault(group, []).append(PathChoice(path, words(path), entry.unit))
+    for prefix, count in coefficients.items():
+        for index in range(count):
+            path = f"{prefix}coefficients.{index}"
+            entry = placed(models.CLUTCH_COEFFICIENT, path)
+            choice = PathChoice(path, f"{words(prefix.rstrip('.'))} coefficient c{index + 1}", entry.unit)
+            groups.setdefault(words(prefix.rstrip(".")), []).append(choice)
+    return list(groups.items())

@@ -1,0 +1,233 @@
+"""The form for a new study: an example, a clone or empty fields; looked over while it is filled in; submitted."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import secrets
+from collections.abc import Mapping
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Query, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import RedirectResponse, Response
+
+from service.faults import FaultError
+from service.http.context import Context, Ctx
+from service.http.problems import ApiError, api_error
+from service.http.respond import json_response
+from service.http.views import preset_of
+from service.http.web.form import study_check
+from service.http.web.form.check import Checked
+from service.http.web.form.fields import FORM_MODEL, path_choices, pendulum, sections
+from service.http.web.form.spec import (
+    Values,
+    axes_of,
+    clutch_pointers,
+    pendulums_of,
+    spec_of,
+    values_of,
+    with_clutch_defaults,
+)
+from service.http.web.form.values import Form
+from service.http.web.templates import fragment, page, spec_text
+from service.http.work import Attended, Work
+from service.jobs.submission import Submission, take_in
+from service.presets import preset_names
+from worker import models
+from worker.limits import MAX_AXES
+from worker.models import MAX_PENDULUMS
+
+router = APIRouter(include_in_schema=False)
+
+#: What an empty form begins with.
+_EMPTY: Final[Values] = {
+    "pendulums": "1",
+    "axes": "1",
+    "/combine": "grid",
+    "/run/duration": "60 periods",
+    "/run/tolerance": "1e-9",
+    "/run/reset": "contact",
+    "/base/clutch/kind": "law",
+    "/axes/0/way": "linspace",
+}
+
+
+@router.get("/new")
+async def new_study(
+    context: Ctx,
+    work: Attended,
+    request: Request,
+    preset: Annotated[str | None, Query(max_length=80)] = None,
+    clone: Annotated[str | None, Query(max_length=80)] = None,
+    mode: Annotated[str, Query(max_length=10)] = "form",
+) -> Response:
+    """The form, empty or filled in from an example or from another study."""
+    spec = await run_in_threadpool(_start, context, preset, clone)
+    if spec is None:
+        values = {"/text": "", "format": "json"} if mode == "text" else with_clutch_defaults(dict(_EMPTY))
+        return form_page(request, values, None)
+    try:
+        values = values_of(spec)
+    except ValueError:
+        mode = "text"
+    if mode == "text":
+        values = {"/text": spec_text(spec), "format": "json"}
+    if clone is not None and "/name" in values:
+        values["/name"] = f"{values['/name']} (copy)"
+    checked = await look_over(context, work, values)
+    return await run_in_threadpool(form_page, request, values, checked)
+
+
+def _start(context: Context, preset: str | None, clone: str | None) -> dict[str, Any] | None:
+    if clone is not None:
+        return context.store.spec(clone)
+    if preset is None:
+        return None
+    if preset not in preset_names():
+        raise ApiError("not-found", f"There is no such example; there are: {', '.join(preset_names())}.")
+    found: dict[str, Any] = preset_of(preset)["spec"]
+    return found
+
+
+@router.post("/new")
+async def send_form(context: Ctx, work: Attended, request: Request, values: Form) -> Response:
+    """What the pressed button asks for: look the form over, change its shape, or submit the study."""
+    wanted = values.pop("do", "check")
+    share_clutches(values)
+    if wanted == "submit":
+        checked, made = await work.check(study_check.form_study, context.library, values, context.store.clock.now())
+        return await run_in_threadpool(_submit, context, request, values, checked, made)
+    reshape(values, wanted)
+    checked = await look_over(context, work, values)
+    return await run_in_threadpool(form_page, request, values, checked)
+
+
+def _submit(context: Context, request: Request, values: Values, checked: Checked, made: Submission | None) -> Response:
+    if made is None:
+        return form_page(request, values, checked, status=422)
+    # Sent twice, by a second click, the same form is one study; changed and sent again it is another.
+    text = json.dumps([checked.spec, values.get("finish_by", "")], sort_keys=True)
+    key = f"form-{values.get('key', '')[:64]}-{hashlib.sha256(text.encode()).hexdigest()[:32]}"
+    key = "".join(character for character in key if "!" <= character <= "~")
+    try:
+        record = take_in(context.store, made, key)
+    except FaultError as error:
+        checked.faults.setdefault("", []).append(error.detail)
+        return form_page(request, values, checked, status=api_error(error).type.status)
+    return RedirectResponse(f"/studies/{record.id}", status_code=303)
+
+
+@router.post("/new/check")
+async def check(context: Ctx, work: Attended, request: Request, values: Form) -> Response:
+    """The live preview: what is wrong by field, and the panel that tells cases, time, size, warnings and fits."""
+    checked = await look_over(context, work, values)
+
+    def answer() -> dict[str, Any]:
+        return {
+            "faults": checked.faults,
+            "panel": fragment("_form_panel.html", checked=checked, address=_address(request)),
+            "fits": {
+                pointer: fragment("_form_fit.html", fit=fit, chart=chart, pointer="")
+                for pointer, (fit, chart) in checked.fits.items()
+            },
+        }
+
+    return json_response(await run_in_threadpool(answer))
+
+
+async def look_over(context: Context, work: Work, values: Mapping[str, str]) -> Checked:
+    """A form, field by field or as text, looked over."""
+    return await work.check(study_check.form, context.library, values, context.store.clock.now())
+
+
+def reshape(values: Values, wanted: str) -> None:
+    """Add or take away a pendulum or an axis, as the pressed button says; what is filled in stays."""
+    action, _, index = wanted.partition(" ")
+    if action == "add-pendulum":
+        count = pendulums_of(values)
+        if count < MAX_PENDULUMS:
+            _copy(values, f"/base/pendulums/{count - 1}/", f"/base/pendulums/{count}/")
+        values["pendulums"] = str(min(count + 1, MAX_PENDULUMS))
+    elif action == "drop-pendulum":
+        count = pendulums_of(values)
+        _drop(values, f"/base/pendulums/{count - 1}/")
+        values["pendulums"] = str(max(count - 1, 1))
+    elif action == "add-axis":
+        values[f"/axes/{axes_of(values)}/way"] = "linspace"
+        values["axes"] = str(min(axes_of(values) + 1, MAX_AXES))
+    elif action == "drop-axis" and index.isdigit() and int(index) < axes_of(values):
+        for number in range(int(index), axes_of(values)):
+            _drop(values, f"/axes/{number}/")
+            _copy(values, f"/axes/{number + 1}/", f"/axes/{number}/")
+        values["axes"] = str(axes_of(values) - 1)
+
+
+def share_clutches(values: Values) -> None:
+    """Own laws begin as the common one, and the common one as the first's: what is filled in is not lost on the way."""
+    common, first = "/base/clutch/", "/base/pendulums/0/clutch/"
+    own = values.get("clutches") == "own"
+    if own and f"{common}kind" in values:
+        for index in range(pendulums_of(values)):
+            _copy(values, common, f"/base/pendulums/{index}/clutch/")
+        _drop(values, common)
+    elif not own and f"{common}kind" not in values and f"{first}kind" in values:
+        _copy(values, first, common)
+        for index in range(pendulums_of(values)):
+            _drop(values, f"/base/pendulums/{index}/clutch/")
+
+
+def _copy(values: Values, source: str, target: str) -> None:
+    values |= {
+        target + name.removeprefix(source): text for name, text in list(values.items()) if name.startswith(source)
+    }
+
+
+def _drop(values: Values, prefix: str) -> None:
+    for name in [name for name in values if name.startswith(prefix)]:
+        del values[name]
+
+
+def form_page(request: Request, values: Values, checked: Checked | None, status: int = 200) -> Response:
+    """The page with the form filled in with ``values``; ``checked`` is None while nothing is to be said about them."""
+    text_mode = "/text" in values
+    laws = {} if text_mode else {pointer: _coefficients(values, pointer) for pointer in clutch_pointers(values)}
+    prefixes = {pointer.removeprefix("/base/").replace("/", ".") + ".": count for pointer, count in laws.items()}
+    return page(
+        "new_text.html" if text_mode else "new.html",
+        status=status,
+        values=values,
+        faults={} if checked is None else checked.faults,
+        checked=checked or Checked({}),
+        begun=checked is not None,
+        address=_address(request),
+        key=values.get("key") or secrets.token_hex(8),
+        sections=sections(),
+        pendulums=[pendulum(index) for index in range(0 if text_mode else pendulums_of(values))],
+        most_pendulums=MAX_PENDULUMS,
+        most_axes=MAX_AXES,
+        clutches=list(laws),
+        axes=range(0 if text_mode else axes_of(values)),
+        choices=[] if text_mode else path_choices(pendulums_of(values), prefixes),
+        presets=[preset for preset in map(preset_of, preset_names()) if text_mode or _fits_form(preset)],
+        most_coefficients=models.MAX_COEFFICIENTS,
+    )
+
+
+def _fits_form(preset: Mapping[str, Any]) -> bool:
+    return bool(preset["spec"]["model"] == FORM_MODEL)
+
+
+def _coefficients(values: Values, pointer: str) -> int:
+    """Number of coefficients that an axis can vary: none of a law that is fitted."""
+    if values.get(f"{pointer}/kind", "law") != "law":
+        return 0
+    found = spec_of({**values, "axes": "0"})[0]["base"]
+    parts = pointer.split("/")
+    clutch = found["clutch"] if len(parts) == 3 else found["pendulums"][int(parts[3])]["clutch"]
+    return len(clutch.get("coefficients", ()))
+
+
+def _address(request: Request) -> str:
+    """The service's own address as the browser wrote it."""
+    return f"{request.url.scheme}://{request.headers.get('host', request.url.netloc)}"

@@ -1,0 +1,262 @@
+"""Between the form's fields and the study spec, both ways. What a field means is left to the spec's own reader."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any, Final
+
+from service.http.web.form.fields import FORM_MODEL, pendulum, sections
+from service.spec.measured import MeasuredDataError, parse_measured
+from service.spec.report import Problem
+from service.spec.units import QuantityError, parse_quantity
+from worker.limits import MAX_AXES
+from worker.models import MAX_PENDULUMS
+
+Values = dict[str, str]
+Faults = dict[str, list[str]]
+
+_NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
+_WHOLE: Final = re.compile(r"[+-]?[0-9]{1,18}")
+#: Between the values of a list: a comma only before a blank, so that a decimal comma is told and not taken for one.
+_BETWEEN: Final = re.compile(r"[;\n]|,\s")
+#: Fields of an axis for each way of giving its values.
+WAYS: Final = {
+    "values": ("values",),
+    "linspace": ("from", "to", "count"),
+    "geomspace": ("from", "to", "count"),
+    "range": ("from", "to", "step"),
+}
+_FIELDS: Final = frozenset({"sprag", "model", "name", "base", "run", "axes", "combine"})
+
+
+def pendulums_of(values: Mapping[str, str]) -> int:
+    """How many pendulums the form has."""
+    text = values.get("pendulums", "1")
+    return min(max(int(text) if _WHOLE.fullmatch(text) else 1, 1), MAX_PENDULUMS)
+
+
+def axes_of(values: Mapping[str, str]) -> int:
+    """How many axes the form has."""
+    text = values.get("axes", "0")
+    return min(max(int(text) if _WHOLE.fullmatch(text) else 0, 0), MAX_AXES)
+
+
+def clutch_pointers(values: Mapping[str, str]) -> list[str]:
+    """Where the form's clutches stand: one for all pendulums, or one in each."""
+    if values.get("clutches") == "own":
+        return [f"/base/pendulums/{index}/clutch" for index in range(pendulums_of(values))]
+    return ["/base/clutch"]
+
+
+def spec_of(values: Mapping[str, str]) -> tuple[dict[str, Any], Faults]:
+    """The spec that a filled form means, and what of it cannot even be written as one, by field."""
+    faults: Faults = {}
+    base: dict[str, Any] = {}
+    for section in sections():
+        name = section.pointer.rsplit("/", maxsplit=1)[-1]
+        if [field.name for field in section.fields] == [section.pointer]:
+            base |= _given(values, section.pointer, name)
+        else:
+            base[name] = _object(values, section.pointer, [field.name for field in section.fields])
+    base["pendulums"] = [
+        _object(values, f"/base/pendulums/{index}", [field.name for field in pendulum(index).fields])
+        for index in range(pendulums_of(values))
+    ]
+    for pointer in clutch_pointers(values):
+        clutch = _clutch(values, pointer, faults)
+        if pointer == "/base/clutch":
+            base["clutch"] = clutch
+        else:
+            base["pendulums"][int(pointer.split("/")[3])]["clutch"] = clutch
+    spec: dict[str, Any] = {"sprag": 1, "model": FORM_MODEL, **_given(values, "/name", "name"), "base": base}
+    if "name" in spec:
+        spec["name"] = values["/name"].strip()
+    spec["run"] = _run(values)
+    axes = [_axis(values, index) for index in range(axes_of(values))]
+    spec["axes"] = [axis for axis in axes if axis is not None]
+    spec["combine"] = values.get("/combine", "grid")
+    return spec, faults
+
+
+def plain(text: str) -> Any:
+    """A field's text as the spec takes it: a number where it is one, else the text with its unit."""
+    text = text.strip()
+    if _WHOLE.fullmatch(text):
+        return int(text)
+    return float(text) if _NUMBER.fullmatch(text) else text
+
+
+def _given(values: Mapping[str, str], name: str, key: str) -> dict[str, Any]:
+    text = values.get(name, "").strip()
+    return {key: plain(text)} if text else {}
+
+
+def _object(values: Mapping[str, str], pointer: str, names: list[str]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name in names:
+        found |= _given(values, name, name.removeprefix(f"{pointer}/"))
+    return found
+
+
+def _list(text: str) -> list[Any]:
+    return [plain(item) for item in _BETWEEN.split(text) if item.strip()]
+
+
+def _clutch(values: Mapping[str, str], pointer: str, faults: Faults) -> dict[str, Any]:
+    if values.get(f"{pointer}/kind", "law") != "data":
+        coefficients = values.get(f"{pointer}/coefficients", "")
+        # Blanks part numbers as well, where no unit stands among them.
+        if re.fullmatch(r"[-+0-9.eE\s]+", coefficients):
+            coefficients = "; ".join(coefficients.split())
+        return {
+            **({"coefficients": _list(coefficients)} if coefficients.strip() else {}),
+            **_given(values, f"{pointer}/windup_limit", "windup_limit"),
+        }
+    found: dict[str, Any] = {"data": None}
+    text = values.get(f"{pointer}/data", "")
+    if text.strip():
+        try:
+            measured = parse_measured(text, parse_quantity)
+            found["data"] = measured.rows.tolist()
+        except MeasuredDataError as error:
+            faults[f"{pointer}/data"] = [_told(problem) for problem in error.problems]
+    found |= _given(values, f"{pointer}/accuracy", "accuracy") | _given(values, f"{pointer}/max_degree", "max_degree")
+    # A box that is not ticked is not sent, so that both are always said.
+    found["through_origin"] = values.get(f"{pointer}/through_origin") == "on"
+    found["angles_include_backlash"] = values.get(f"{pointer}/angles_include_backlash") == "on"
+    return found
+
+
+def _told(problem: Problem) -> str:
+    """A problem of measured data as a sentence: the line, what is wrong, what stands there, what may."""
+    parts = [f"{problem.pointer}: {problem.message}", *([] if problem.value is None else [f"got {problem.value}"])]
+    return "; ".join([*parts, *([f"allowed: {problem.allowed}"] if problem.allowed else [])])
+
+
+def _run(values: Mapping[str, str]) -> dict[str, Any]:
+    run = _object(values, "/run", ["/run/duration", "/run/tolerance"])
+    window = [plain(values.get(f"/run/window/{index}", "")) for index in (0, 1)]
+    if any(window):
+        run["window"] = window
+    if values.get("/run/reset", "contact") != "contact":
+        run["reset"] = values["/run/reset"]
+    return run
+
+
+def _axis(values: Mapping[str, str], index: int) -> dict[str, Any] | None:
+    """One axis; None for one in which nothing is filled in."""
+    pointer = f"/axes/{index}"
+    paths = [values.get(f"{pointer}/path", "").strip()]
+    paths += [path.strip() for path in re.split(r"[;,\s]+", values.get(f"{pointer}/tied", "")) if path.strip()]
+    paths = [path for path in paths if path]
+    way = values.get(f"{pointer}/way", "values")
+    names = WAYS.get(way, ("values",))
+    texts = [values.get(f"{pointer}/{name}", "").strip() for name in names]
+    if not paths and not any(texts):
+        return None
+    axis: dict[str, Any] = {"path": (paths[0] if len(paths) == 1 else paths) if paths else None}
+    axis[way] = _list(texts[0]) if way == "values" else [plain(text) for text in texts]
+    return axis
+
+
+def field_of(pointer: str, values: Mapping[str, str]) -> str:
+    """The field beside which a fault at ``pointer`` of the spec is told; "" for the whole form."""
+    match = re.fullmatch(r"/axes/(\d+)(?:/(.*))?", pointer)
+    if match:
+        # Axes that are not filled in are not in the spec.
+        filled = [index for index in range(axes_of(values)) if _axis(values, index) is not None]
+        index = filled[int(match[1])] if int(match[1]) < len(filled) else int(match[1])
+        rest = match[2] or "path"
+        way, _, item = rest.partition("/")
+        names = WAYS.get(way)
+        if names is None:
+            return f"/axes/{index}/path"
+        inside = item if item.isdigit() and int(item) < len(names) else "0"
+        return f"/axes/{index}/{names[0] if way == 'values' else names[int(inside)]}"
+    for pattern in (r"(.*/clutch/(?:data|coefficients))(?:/.*)?", r"(/base/[a-z]+/[a-z_]+)/[a-z_]+"):
+        found = re.fullmatch(pattern, pointer)
+        if found and "pendulums" not in found[1].split("/")[-1]:
+            return found[1]
+    if re.fullmatch(r"(.*/clutch)", pointer):
+        return f"{pointer}/coefficients" if values.get(f"{pointer}/kind", "law") == "law" else f"{pointer}/data"
+    return "/run/window/0" if pointer == "/run/window" else pointer
+
+
+def values_of(spec: Mapping[str, Any]) -> Values:
+    """The form filled in as ``spec`` says; raises ValueError where the form cannot show it."""
+    if spec.get("model") != FORM_MODEL:
+        raise ValueError("the form describes another model")
+    if not set(spec) <= _FIELDS or spec.get("combine", "grid") not in ("grid", "zip"):
+        raise ValueError("the form has no fields for all of this spec")
+    if not all(isinstance(axis, Mapping) and _plain_axis(axis) for axis in spec.get("axes", ())):
+        raise ValueError("the form has no fields for all of these axes")
+    values: Values = {"/name": str(spec.get("name", "")), "/combine": str(spec.get("combine", "grid"))}
+    base: Mapping[str, Any] = spec["base"]
+    for key, content in base.items():
+        if key == "clutch":
+            values |= _clutch_values("/base/clutch", content)
+        elif key == "pendulums":
+            values["pendulums"] = str(len(content))
+            for index, item in enumerate(content):
+                if "clutch" in item:
+                    values["clutches"] = "own"
+                    values |= _clutch_values(f"/base/pendulums/{index}/clutch", item["clutch"])
+                values |= {f"/base/pendulums/{index}/{k}": _text(v) for k, v in item.items() if k != "clutch"}
+        elif isinstance(content, Mapping):
+            values |= {f"/base/{key}/{name}": _text(value) for name, value in content.items()}
+        else:
+            values[f"/base/{key}"] = _text(content)
+    for key, content in spec.get("run", {}).items():
+        if key == "window":
+            values |= {f"/run/window/{index}": _text(item) for index, item in enumerate(content)}
+        else:
+            values[f"/run/{key}"] = _text(content)
+    values["axes"] = str(len(spec.get("axes", ())))
+    for index, axis in enumerate(spec.get("axes", ())):
+        values |= _axis_values(f"/axes/{index}", axis)
+    return values
+
+
+def with_clutch_defaults(values: Values) -> Values:
+    """The values, with the box ticked of each clutch that the spec has ticked where nothing is said."""
+    return values | {f"{pointer}/through_origin": "on" for pointer in clutch_pointers(values)}
+
+
+def _plain_axis(axis: Mapping[str, Any]) -> bool:
+    """Whether an axis gives its values in one of the form's ways."""
+    return any(set(axis) == {"path", way} for way in WAYS)
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else re.sub(r"e([-+])0+", r"e\1", repr(value))
+
+
+def _clutch_values(pointer: str, clutch: Mapping[str, Any]) -> Values:
+    if "data" not in clutch:
+        found = {f"{pointer}/kind": "law", f"{pointer}/coefficients": "; ".join(map(_text, clutch["coefficients"]))}
+        # Ticked for when measured data take the place of the coefficients, as the spec has it.
+        found[f"{pointer}/through_origin"] = "on"
+        return found | {f"{pointer}/windup_limit": _text(clutch[key]) for key in ("windup_limit",) if key in clutch}
+    rows = [f"{_si(angle, 'rad')!r}\t{_si(torque, 'N*m')!r}" for angle, torque in clutch["data"]]
+    found = {f"{pointer}/kind": "data", f"{pointer}/data": "\n".join(["angle_rad\ttorque_Nm", *rows])}
+    found |= {f"{pointer}/{key}": _text(clutch[key]) for key in ("accuracy", "max_degree") if key in clutch}
+    flags = {"through_origin": clutch.get("through_origin", True)}
+    flags["angles_include_backlash"] = clutch.get("angles_include_backlash", False)
+    return found | {f"{pointer}/{name}": "on" for name, ticked in flags.items() if ticked}
+
+
+def _si(value: Any, unit: str) -> float:
+    try:
+        return parse_quantity(value, unit)
+    except QuantityError as error:
+        raise ValueError(str(error)) from error
+
+
+def _axis_values(pointer: str, axis: Mapping[str, Any]) -> Values:
+    paths = axis["path"] if isinstance(axis["path"], list) else [axis["path"]]
+    way = next(name for name in WAYS if name in axis)
+    found = {f"{pointer}/path": paths[0], f"{pointer}/tied": ", ".join(paths[1:]), f"{pointer}/way": way}
+    if way == "values":
+        return found | {f"{pointer}/values": "; ".join(map(_text, axis[way]))}
+    return found | {f"{pointer}/{name}": _text(item) for name, item in zip(WAYS[way], axis[way], strict=True)}

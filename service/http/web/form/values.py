@@ -1,0 +1,29 @@
+"""The fields of a form as a browser sends them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+from urllib.parse import parse_qsl
+
+from fastapi import Depends, Request
+
+from service.http.problems import ApiError
+from service.http.web.form.spec import Values
+
+_FORM_TYPE: Final = "application/x-www-form-urlencoded"
+#: Fields of a form, at most.
+_MOST_FIELDS: Final = 2000
+
+
+async def read_form(request: Request) -> Values:
+    """The fields; of a name that is sent twice, the last one. Raises ApiError."""
+    if request.headers.get("content-type", "").partition(";")[0].strip().lower() != _FORM_TYPE:
+        raise ApiError("unsupported-media-type", f"A form is sent as {_FORM_TYPE}.")
+    try:
+        text = (await request.body()).decode("utf-8")
+        return dict(parse_qsl(text, keep_blank_values=True, max_num_fields=_MOST_FIELDS))
+    except ValueError as error:
+        raise ApiError("bad-request", "The form cannot be read.") from error
+
+
+Form = Annotated[Values, Depends(read_form)]

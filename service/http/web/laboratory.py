@@ -1,0 +1,260 @@
+"""The machine-shaft laboratory: a machine's motion over a cycle, redrawn at once while its numbers are changed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from service.http.context import Ctx
+from service.http.drawing import picture
+from service.http.problems import ApiError
+from service.http.respond import json_response
+from service.http.views import preset_of
+from service.http.web.figures.shaft import SAMPLES, machine_case, overridden
+from service.http.web.form.check import message
+from service.http.web.form.page import form_page, look_over
+from service.http.web.form.spec import plain
+from service.http.web.templates import fragment, page, spec_text
+from service.http.work import Attended, Work
+from service.presets import preset_names
+from service.results.pictures.shaft import draw_shaft
+from service.results.wording import number, words
+from service.spec.catalogue import parameter_of
+from service.spec.document import parse_spec
+from service.spec.numbers import parse_number
+from service.spec.report import SpecError, spec_items
+from service.spec.units import QuantityError, parse_quantity, split_quantity
+from worker import models
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from worker.study import Study
+
+router = APIRouter(include_in_schema=False)
+
+#: Numbers besides the masses that have a slider, and how far it goes: (factor down, factor up) of the machine's own.
+_SLIDERS: Final = {"drive.inertia": (0.05, 20.0), "mean_speed": (0.25, 4.0), "operation.scale": (0.0, 3.0)}
+_MASSES: Final = (0.0, 4.0)
+#: Results that are told beside the picture.
+_TOLD: Final = (
+    "irregularity", "omega.mean", "omega.max", "omega.angle_at_max", "omega.min", "omega.angle_at_min",
+    "energy.fluctuation", "energy.mean", "drive_torque.mean", "power.mean", "acceleration.max",
+    "s1.amplitude", "s2.amplitude", "s3.amplitude", "s4.amplitude", "required_inertia",
+)  # fmt: skip
+#: The questions of the course, each a study: word, and what it varies.
+QUESTIONS: Final = {"inertia": "the drive's inertia", "masses": "the masses", "load": "the operation's load"}
+_QUESTION_VALUES: Final = 25
+_QUESTION: Final = "question_"
+
+
+@dataclass(frozen=True, slots=True)
+class Slider:
+    """One number that can be changed: its value as given, and the range of its slider (SI)."""
+
+    path: str
+    label: str
+    symbol: str
+    unit: str
+    help: str
+    value: float
+    text: str
+    low: float
+    high: float
+    logarithmic: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A machine with its numbers as an address gives them; ``faults`` by path where they cannot be taken.
+
+    ``further`` are the numbers that have no slider, as they were given, by path. ``spec`` has every number as it was
+    given, wrong or not.
+    """
+
+    name: str
+    spec: dict[str, Any]
+    study: Study
+    sliders: list[Slider]
+    faults: dict[str, list[str]]
+    further: dict[str, str]
+
+    @property
+    def query(self) -> str:
+        """The same as parameters of an address."""
+        numbers = [*((slider.path, slider.text) for slider in self.sliders), *self.further.items()]
+        return urlencode([("machine", self.name), *numbers])
+
+
+@lru_cache(maxsize=1)
+def machines() -> tuple[str, ...]:
+    """Names of the machines that come with the program; those of the course's questions are among them already."""
+    shafts = (name for name in preset_names() if preset_of(name)["spec"]["model"] == models.MACHINE_SHAFT)
+    return tuple(name for name in shafts if not name.startswith(_QUESTION))
+
+
+def setting(given: Mapping[str, str]) -> Setting:
+    """What an address sets; ApiError for a machine that there is not."""
+    name = given.get("machine") or next(iter(machines()), "")
+    if name not in machines():
+        raise ApiError("not-found", f"There is no such machine; there are: {', '.join(machines()) or 'none'}.")
+    spec: dict[str, Any] = preset_of(name)["spec"]
+    own = parse_spec(overridden(spec, {})).study
+    values = {path: plain(given[path]) for path in own.base if given.get(path, "").strip()}
+    faults: dict[str, list[str]] = {}
+    try:
+        study = parse_spec(overridden(spec, values)).study
+    except SpecError as error:
+        study = own
+        for item in spec_items(error.problems):
+            path = (item.pointer or "").removeprefix("/base/").replace("/", ".")
+            faults.setdefault(path if path in own.base else "", []).append(message(item))
+    sliders = [_slider(own, study, path, given.get(path, "")) for path in own.base if _limits(own, path)]
+    further = {path: given[path].strip() for path in values if not _limits(own, path)}
+    return Setting(name, overridden(spec, values), study, _in_order(sliders), faults, further)
+
+
+def _value(text: str, unit: str, otherwise: float) -> float:
+    """The number (SI) that a text with or without a unit gives, also where the machine cannot be with it."""
+    try:
+        found = parse_quantity(text, unit) if split_quantity(text)[1] else parse_number(text.strip())
+    except QuantityError:
+        return otherwise
+    return otherwise if found is None or not math.isfinite(found) else found
+
+
+def _limits(study: Study, path: str) -> tuple[float, float] | None:
+    if path in _SLIDERS:
+        return _SLIDERS[path]
+    entry = parameter_of(study, path)
+    massive = path.startswith("mechanism.") and entry is not None and entry.unit == "kg"
+    return _MASSES if massive and study.base[path] > 0.0 else None
+
+
+def _in_order(sliders: list[Slider]) -> list[Slider]:
+    order = list(_SLIDERS)
+    return sorted(sliders, key=lambda slider: (slider.path not in order, slider.path))
+
+
+def _slider(own: Study, study: Study, path: str, text: str) -> Slider:
+    low, high = _limits(own, path) or (0.0, 1.0)
+    entry = parameter_of(own, path)
+    first = own.base[path]
+    return Slider(
+        path,
+        "Load, as a multiple of the diagram" if path == "operation.scale" else words(path.rsplit(".", 1)[-1]),
+        "" if entry is None else entry.symbol,
+        "" if entry is None else entry.unit,
+        "" if entry is None else entry.help,
+        _value(text, "" if entry is None else entry.unit, study.base[path]),
+        text.strip() or number_text(study.base[path]),
+        low * first,
+        high * first,
+        low > 0.0,
+    )
+
+
+def number_text(value: float) -> str:
+    """A number as a field shows it."""
+    return f"{value:.6g}"
+
+
+@router.get("/laboratory")
+async def laboratory(work: Attended, request: Request) -> Response:
+    """The laboratory."""
+    chosen = await work.check(setting, dict(request.query_params))
+    # Compiling takes seconds, once: the page is shown at once, and its script waits for the numbers.
+    ready = models.is_compiled(models.shape_of(chosen.study))
+    case = await _case(work, chosen) if ready and not chosen.faults else None
+    return page(
+        "laboratory.html",
+        status=422 if chosen.faults else 200,
+        chosen=chosen,
+        machines=[preset_of(name) for name in machines()],
+        position=position,
+        answer=_told(chosen, case),
+        picture=f"/laboratory/picture.svg?{chosen.query}",
+        figure=f"/laboratory/figure?{chosen.query}",
+    )
+
+
+def position(slider: Slider) -> float:
+    """Where a slider stands, 0 to 1000."""
+    span = slider.high - slider.low
+    if slider.logarithmic:
+        value = max(slider.value, slider.low)
+        return 1000.0 * math.log(value / slider.low) / math.log(slider.high / slider.low)
+    return 1000.0 * (slider.value - slider.low) / span if span else 0.0
+
+
+async def _case(work: Work, chosen: Setting) -> dict[str, Any]:
+    await work.load(models.shape_of(chosen.study))
+    return await work.compute(machine_case, chosen.study)
+
+
+def _told(chosen: Setting, case: dict[str, Any] | None) -> str:
+    infos = {info.name: info for info in models.study_results(chosen.study)}
+    return fragment(
+        "_laboratory_answer.html",
+        chosen=chosen,
+        case=case,
+        told=[] if case is None else [(infos[name], case["results"][name]) for name in _TOLD if name in infos],
+        sentence="" if case is None else models.ENDING_SENTENCES.get(case["ending"], ""),
+        questions=QUESTIONS,
+    )
+
+
+@router.get("/laboratory/figure")
+async def laboratory_figure(work: Attended, request: Request) -> Response:
+    """Picture and numbers of a setting, for the sliders."""
+    chosen = await work.check(setting, dict(request.query_params))
+    case = None if chosen.faults else await _case(work, chosen)
+    return json_response(
+        {
+            "figure": None if case is None else case["figure"],
+            "answer": _told(chosen, case),
+            "faults": chosen.faults,
+            "values": {slider.path: number(slider.value) for slider in chosen.sliders},
+        }
+    )
+
+
+@router.get("/laboratory/picture.svg")
+async def laboratory_picture(work: Attended, request: Request) -> Response:
+    """The motion as one picture, for pages without JavaScript."""
+    chosen = await work.check(setting, dict(request.query_params))
+    if chosen.faults:
+        raise ApiError("invalid-spec", "; ".join(text for texts in chosen.faults.values() for text in texts))
+    await work.load(models.shape_of(chosen.study))
+    end = models.extent(chosen.study, 0).end
+    made = await work.compute(models.run_trajectory, chosen.study, 0, 0.0, end, SAMPLES // 4)
+    return await picture(draw_shaft, "svg", made, chosen.study.name).response(work)
+
+
+@router.get("/laboratory/study")
+async def laboratory_study(context: Ctx, work: Attended, request: Request, question: str = "inertia") -> Response:
+    """One of the course's questions about the machine as it is set, as a study to be looked over and submitted."""
+    chosen = await work.check(setting, dict(request.query_params))
+    if question not in QUESTIONS:
+        raise ApiError("not-found", f"There is no such question; there are: {', '.join(QUESTIONS)}.")
+    paths = {
+        "inertia": [s.path for s in chosen.sliders if s.path == "drive.inertia"],
+        "masses": [s.path for s in chosen.sliders if s.unit == "kg" and s.path.startswith("mechanism.")],
+        "load": [s.path for s in chosen.sliders if s.path == "operation.scale"],
+    }[question]
+    axes = []
+    for path in paths[:1] if question != "masses" else paths:
+        slider = next(s for s in chosen.sliders if s.path == path)
+        way = "geomspace" if slider.logarithmic else "linspace"
+        count = _QUESTION_VALUES if len(paths) == 1 or question != "masses" else 9
+        axes.append({"path": path, way: [float(number_text(slider.low)), float(number_text(slider.high)), count]})
+    spec = {**chosen.spec, "name": f"{chosen.study.name}: irregularity against {QUESTIONS[question]}", "axes": axes}
+    values = {"/text": spec_text(spec), "format": "json"}
+    return await run_in_threadpool(form_page, request, values, await look_over(context, work, values))

@@ -1,0 +1,64 @@
+"""Logging in with a token, which gives a browser a cookie, and logging out."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request
+from starlette.responses import RedirectResponse, Response
+
+from service.http.access import COOKIE, SESSION_SECONDS
+from service.http.problems import ApiError
+from service.http.web.form.values import Form
+from service.http.web.way_in import LOGIN_PATH, access_of, kept_form, kept_page, login_page, within
+from service.storage.tokens import TokenScope
+
+router = APIRouter(include_in_schema=False)
+
+
+@router.get(LOGIN_PATH)
+async def login(request: Request, next: str = "/") -> Response:
+    """The form for the token, or who is logged in."""
+    return login_page(request, access_of(request), next)
+
+
+@router.post(LOGIN_PATH)
+async def log_in(request: Request, values: Form) -> Response:
+    """The token is taken, and the browser sent where it wanted to go; or the form is shown again."""
+    wanted, kept = values.get("next", "/"), kept_form(values)
+    access = access_of(request)
+    try:
+        access.attempts.admit(request.scope)
+        grant = access.of_token(values.get("token", "").strip().encode("utf-8", "replace"))
+        if grant is None:
+            await access.attempts.failed(request.scope, "page /login")
+            return login_page(request, access, wanted, fault="This is no valid token.", status=401, kept=kept)
+    except ApiError as error:
+        response = login_page(request, access, wanted, fault=error.detail, status=error.type.status, kept=kept)
+        response.headers.update(error.headers)
+        return response
+    if kept is not None and grant.scope is not TokenScope.WRITE:
+        fault = f"Token {grant.name or grant.id} is read-only: it cannot send the form. Use another one."
+        return login_page(request, access, wanted, fault=fault, status=403, kept=kept)
+    answer = RedirectResponse(within(wanted), 303) if kept is None else kept_page(grant, wanted, kept)
+    answer.set_cookie(
+        COOKIE,
+        await access.log_in(grant),
+        max_age=SESSION_SECONDS,
+        httponly=True,
+        samesite="lax",
+        secure=_is_secure(request),
+    )
+    return answer
+
+
+@router.post("/logout")
+async def log_out(request: Request) -> Response:
+    """The session is ended, here and wherever its cookie was copied to."""
+    await access_of(request).log_out(request.cookies)
+    response = RedirectResponse(LOGIN_PATH, status_code=303)
+    response.delete_cookie(COOKIE, httponly=True, samesite="lax", secure=_is_secure(request))
+    return response
+
+
+def _is_secure(request: Request) -> bool:
+    """Whether the browser speaks TLS, with us or with a proxy before us."""
+    return "https" in (request.url.scheme, request.headers.get("x-forwarded-proto", ""))

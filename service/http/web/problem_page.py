@@ -1,0 +1,26 @@
+"""Errors as pages, for people who follow an address in a browser."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from service.http.web.templates import page
+
+if TYPE_CHECKING:
+    from starlette.requests import Request
+    from starlette.responses import Response
+
+    from service.http.problems import ApiError
+
+_API = "/api/"
+
+
+def problem_page(request: Request, error: ApiError) -> Response | None:
+    """The page that tells ``error``; None for programs, which get the problem document."""
+    if request.url.path.startswith(_API) or "text/html" not in request.headers.get("accept", ""):
+        return None
+    response = page(
+        "error.html", status=error.type.status, problem=error.type, detail=error.detail, faults=error.errors
+    )
+    response.headers.update({"Cache-Control": "no-store", **error.headers})
+    return response

@@ -1,0 +1,155 @@
+"""Curves and maps of a study as pages, every choice in the address; and the figures that these pages draw."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any, Final
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request
+from starlette.responses import RedirectResponse, Response
+
+from service.http import views
+from service.http.context import Context, Ctx, StudyId
+from service.http.respond import entity_tag, json_response, not_modified, tagged
+from service.http.web.choice import MapQuery, curve_query, map_query, pairs_of, varying_axes
+from service.http.web.figures.curves import curves_figure, map_figure
+from service.http.web.study import fixed_choices, study_frame
+from service.http.web.templates import page
+from service.results.curves import CurveQuery, draw, draw_map, select
+from service.results.pictures import curves as pictures
+from service.results.selection import SelectionError
+from service.spec.catalogue import unit_of
+from worker import models
+
+if TYPE_CHECKING:
+    from worker.study import Study
+
+router = APIRouter(include_in_schema=False)
+
+#: Kinds of map: word on the control.
+KINDS: Final = {"heatmap": "Colours", "contour": "Lines of equal value"}
+
+
+@router.get("/studies/{study_id:study}/curves")
+def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
+    """Results against an axis, the family and the values held chosen by the reader."""
+    study = context.store.study(study_id)
+    infos = models.study_results(study)
+    faults: tuple[Any, ...] = ()
+    query: CurveQuery | None = None
+    values = 0
+    held: tuple[str, ...] = ()
+    try:
+        query = curve_query(study, infos, request.query_params)
+        if query is None:
+            return RedirectResponse(f"/studies/{study_id}", status_code=303)
+        selection = select(study, infos, query)
+        held = selection.held
+        values = sum(line.cases.size for line in selection.lines) * len(selection.results)
+    except SelectionError as error:
+        faults = error.errors
+    shown = query or curve_query(study, infos, type(request.query_params)())
+    assert shown is not None
+    pairs = pairs_of(shown)
+    return page(
+        "curves.html",
+        status=422 if faults else 200,
+        **study_frame(context, study_id),
+        tab="/curves",
+        query=shown,
+        faults=faults,
+        axes=_axis_choices(study),
+        results=infos,
+        fixed=fixed_choices(study, (shown.x, *shown.by), shown.at),
+        figure=f"/studies/{study_id}/figures/curves?{urlencode(pairs)}",
+        files=f"{views.study_address(study_id)}/curves?{urlencode(pairs)}",
+        pictured=values <= pictures.MAX_PICTURE_POINTS,
+        held=held,
+    )
+
+
+@router.get("/studies/{study_id:study}/map")
+def map_page(
+    context: Ctx, request: Request, study_id: StudyId, kind: Annotated[str, Query(max_length=20)] = "heatmap"
+) -> Response:
+    """One result over two axes."""
+    study = context.store.study(study_id)
+    infos = models.study_results(study)
+    faults: tuple[Any, ...] = ()
+    query: MapQuery | None = None
+    held: tuple[str, ...] = ()
+    try:
+        query = map_query(study, infos, request.query_params)
+        if query is None:
+            return RedirectResponse(f"/studies/{study_id}", status_code=303)
+        held = select(study, infos, CurveQuery(query.x, (query.z,), (query.y,), query.at)).held
+    except SelectionError as error:
+        faults = error.errors
+    shown = query or map_query(study, infos, type(request.query_params)())
+    assert shown is not None
+    pairs = pairs_of(shown)
+    kind = kind if kind in KINDS else "heatmap"
+    return page(
+        "map.html",
+        status=422 if faults else 200,
+        **study_frame(context, study_id),
+        tab="/map",
+        query=shown,
+        kind=kind,
+        kinds=KINDS,
+        faults=faults,
+        axes=_axis_choices(study),
+        results=infos,
+        fixed=fixed_choices(study, (shown.x, shown.y), shown.at),
+        figure=f"/studies/{study_id}/figures/map?{urlencode([*pairs, ('kind', kind)])}",
+        files=f"{views.study_address(study_id)}/map?{urlencode(pairs)}",
+        held=held,
+    )
+
+
+def _axis_choices(study: Study) -> list[dict[str, Any]]:
+    return [
+        {"path": axis.paths[0], "paths": axis.paths, "unit": unit_of(study, axis.paths[0]), "values": len(axis)}
+        for axis in varying_axes(study)
+    ]
+
+
+@router.get("/studies/{study_id:study}/figures/curves")
+def curves_of(
+    context: Ctx, request: Request, study_id: StudyId, columns: Annotated[int, Query(ge=1, le=2)] = 1
+) -> Response:
+    """The figure of curves: as many points as the eye can tell apart, highest and lowest ones always among them."""
+
+    def make(study: Study) -> dict[str, Any]:
+        infos = models.study_results(study)
+        query = curve_query(study, infos, request.query_params)
+        if query is None:
+            return {"data": [], "layout": {}}
+        fetch = partial(context.store.rows_for_cases, study_id)
+        return curves_figure([("", draw(select(study, infos, query), fetch))], columns)
+
+    return _figure(context, request, study_id, make)
+
+
+@router.get("/studies/{study_id:study}/figures/map")
+def map_of(context: Ctx, request: Request, study_id: StudyId, kind: str = "heatmap") -> Response:
+    """The figure of a map."""
+
+    def make(study: Study) -> dict[str, Any]:
+        infos = models.study_results(study)
+        query = map_query(study, infos, request.query_params)
+        if query is None:
+            return {"data": [], "layout": {}}
+        fetch = partial(context.store.rows_for_cases, study_id)
+        return map_figure(draw_map(study, infos, query.x, query.y, query.z, query.at, fetch), kind == "contour")
+
+    return _figure(context, request, study_id, make)
+
+
+def _figure(context: Context, request: Request, study_id: str, make: Any) -> Response:
+    record = context.store.get_study(study_id)
+    tag = entity_tag(record.id, record.revision, request.url.path, request.url.query)
+    if unchanged := not_modified(request, tag):
+        return unchanged
+    return tagged(json_response(make(context.store.study(study_id))), tag)

@@ -1,0 +1,190 @@
+"""The pages of schedules: all of them with their last and next run, and the form to keep or change one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Annotated, Any, Final
+from zoneinfo import ZoneInfo
+
+from fastapi import APIRouter, Query
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import RedirectResponse, Response
+
+from service.http.context import Context, Ctx
+from service.http.problems import ApiError
+from service.http.schedule_views import summary
+from service.http.views import preset_of
+from service.http.web.form.spec import Values
+from service.http.web.form.values import Form
+from service.http.web.templates import page
+from service.http.work import Attended, Work
+from service.jobs import checks
+from service.presets import preset_names
+from service.schedules.fields import ScheduleFields, change_fields
+from service.schedules.times import zones
+from service.spec.report import SpecError
+from service.storage.errors import StudyNotFound, TooManySchedules
+from worker.limits import MAX_PRIORITY
+
+router = APIRouter(include_in_schema=False)
+
+_WHOLE: Final = re.compile(r"-?[0-9]{1,8}")
+#: Studies that are offered as what is to be run.
+_OFFERED: Final = 50
+_EMPTY: Final[Values] = {"when": "cron", "cron": "0 22 * * 1-5", "zone": "UTC", "priority": "0"}
+#: Field of the form by the first part of the JSON Pointer that a fault has.
+_FIELD_OF: Final = {"window": "window_begin", "spec": "source"}
+
+
+@router.get("/schedules")
+def schedules(context: Ctx) -> Response:
+    """Every schedule, newest first."""
+    found = [summary(record) for record in context.store.list_schedules()]
+    return page("schedules.html", schedules=found)
+
+
+@router.get("/schedules/new")
+def new_schedule(context: Ctx, study: Annotated[str | None, Query(max_length=80)] = None) -> Response:
+    """The form, empty, or for a study."""
+    values = dict(_EMPTY)
+    if study is not None:
+        context.store.get_study(study)
+        values["source"] = f"study {study}"
+    return _form(context, values, {})
+
+
+@router.post("/schedules/new")
+async def keep_schedule(context: Ctx, work: Attended, values: Form) -> Response:
+    """The form filled in: the schedule is kept, or the form is shown again with what is wrong."""
+    return await _save(context, work, values, None)
+
+
+@router.get("/schedules/{schedule_id:schedule}")
+def edit_schedule(context: Ctx, schedule_id: str) -> Response:
+    """The form with the fields of a schedule."""
+    record = context.store.get_schedule(schedule_id)
+    return _form(context, _values_of(record.fields), {}, schedule_id)
+
+
+@router.post("/schedules/{schedule_id:schedule}")
+async def change_schedule(context: Ctx, work: Attended, schedule_id: str, values: Form) -> Response:
+    """The form of a schedule filled in."""
+    return await _save(context, work, values, schedule_id)
+
+
+@router.post("/schedules/{schedule_id:schedule}/{verb}")
+def act(context: Ctx, schedule_id: str, verb: str) -> Response:
+    """A button of the list."""
+    if verb == "delete":
+        context.store.delete_schedule(schedule_id)
+    elif verb in ("enable", "disable"):
+        record = context.store.get_schedule(schedule_id)
+        fields = change_fields(record.fields, {"enabled": verb == "enable"}, context.store.clock.now())
+        context.store.change_schedule(schedule_id, fields)
+    else:
+        raise ApiError("not-found", "There is no such thing to do with a schedule.")
+    return RedirectResponse("/schedules", status_code=303)
+
+
+async def _save(context: Context, work: Work, values: Values, schedule_id: str | None) -> Response:
+    now = context.store.clock.now()
+    faults: dict[str, list[str]] = {}
+    try:
+        data, old = await run_in_threadpool(_asked, context, values, schedule_id)
+        fields = await work.check(checks.schedule_fields, data, now, old)
+        if schedule_id is None:
+            await run_in_threadpool(context.store.create_schedule, fields)
+        else:
+            await run_in_threadpool(context.store.change_schedule, schedule_id, fields)
+    except SpecError as error:
+        for problem in error.problems:
+            first = problem.pointer.split("/")[1] if problem.pointer else ""
+            sentence = f"{problem.message}; allowed: {problem.allowed}" if problem.allowed else problem.message
+            faults.setdefault(_FIELD_OF.get(first, first), []).append(sentence)
+    except (StudyNotFound, TooManySchedules) as error:
+        faults["source"] = [str(error)]
+    if faults:
+        return await run_in_threadpool(_form, context, values, faults, schedule_id, status=422)
+    return RedirectResponse("/schedules", status_code=303)
+
+
+def _asked(context: Context, values: Values, schedule_id: str | None) -> tuple[dict[str, Any], ScheduleFields | None]:
+    """What a filled-in form asks for, and the schedule that it changes."""
+    data = _data_of(context, values)
+    if schedule_id is None:
+        return data, None
+    old = context.store.get_schedule(schedule_id).fields
+    if data.get("at") == _values_of(old)["at"] and data.get("zone") == old.timing.zone:
+        del data["at"]  # as it was: it may have passed
+    return data, old
+
+
+def _data_of(context: Context, values: Mapping[str, str]) -> dict[str, Any]:
+    """The fields of a schedule that a filled-in form means."""
+    begin, end = values.get("window_begin", "").strip(), values.get("window_end", "").strip()
+    priority = values.get("priority", "").strip() or "0"
+    data: dict[str, Any] = {
+        "name": values.get("name", "").strip() or None,
+        "zone": values.get("zone", "").strip(),
+        "window": [begin, end] if begin or end else None,
+        "priority": int(priority) if _WHOLE.fullmatch(priority) else priority,
+        "fresh": "fresh" in values,
+        "finish_by": values.get("finish_by", "").strip() or None,
+    }
+    when = "at" if values.get("when") == "at" else "cron"
+    data[when] = values.get(when, "").strip() or None
+    kind, _, name = values.get("source", "").partition(" ")
+    if kind == "study":
+        data["spec"] = context.store.spec(name)
+    elif kind == "preset" and name in preset_names():
+        data["spec"] = preset_of(name)["spec"]
+    return data
+
+
+def _values_of(fields: ScheduleFields) -> Values:
+    at = fields.timing.at
+    window = fields.window
+    return {
+        "name": fields.name,
+        "when": "cron" if at is None else "at",
+        "cron": fields.timing.cron or "",
+        "at": "" if at is None else f"{at.astimezone(ZoneInfo(fields.timing.zone)):%Y-%m-%dT%H:%M}",
+        "zone": fields.timing.zone,
+        "window_begin": "" if window is None else f"{window.begin:%H:%M}",
+        "window_end": "" if window is None else f"{window.end:%H:%M}",
+        "priority": str(fields.priority),
+        "finish_by": fields.finish_by or "",
+        **({"fresh": "on"} if fields.fresh else {}),
+    }
+
+
+def _form(
+    context: Context,
+    values: Mapping[str, str],
+    faults: Mapping[str, list[str]],
+    schedule_id: str | None = None,
+    status: int = 200,
+) -> Response:
+    studies = list(context.store.list_studies(page_size=_OFFERED).studies)
+    kind, _, chosen = values.get("source", "").partition(" ")
+    if kind == "study" and chosen not in [study.id for study in studies]:
+        studies += _known(context, chosen)
+    return page(
+        "schedule.html",
+        status=status,
+        values=values,
+        faults=faults,
+        schedule_id=schedule_id,
+        studies=studies,
+        presets=[preset_of(name) for name in preset_names()],
+        zones=sorted(zones()),
+        most_priority=MAX_PRIORITY,
+    )
+
+
+def _known(context: Context, study_id: str) -> list[Any]:
+    try:
+        return [context.store.get_study(study_id)]
+    except StudyNotFound:
+        return []

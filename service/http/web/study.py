@@ -1,0 +1,201 @@
+"""The page of one study: how far it is, its mechanical characteristic, what went in; and what can be done with it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import urlencode
+
+import numpy as np
+from fastapi import APIRouter
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import RedirectResponse, Response
+
+from service.http import views
+from service.http.context import Context, Ctx, StudyId
+from service.http.problems import ApiError
+from service.http.respond import timestamp
+from service.http.web.choice import characteristic, map_query, pairs_of
+from service.http.web.form.check import fits_of, has_measured_clutch
+from service.http.web.templates import page
+from service.http.work import Attended
+from service.results import exports
+from service.results.curves import select
+from service.results.defaults import caption, drawn_numbers
+from service.results.exports.inputs import inputs as every_input
+from service.results.exports.inputs import run_inputs
+from service.results.pictures import curves as pictures
+from service.results.selection import SelectionError
+from service.spec.catalogue import parameter_of, unit_of
+from service.spec.numbers import parse_number
+from worker import models
+from worker.states import TRANSITIONS, StudyEvent, StudyState
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from starlette.datastructures import QueryParams
+
+    from service.http.web.figures.fit import FitChart
+    from service.results.curves import CurveQuery
+    from worker.study import Study
+
+router = APIRouter(include_in_schema=False)
+
+#: What a person can do with a study: word on the button, and whether it ends something for good.
+VERBS: Final = {"pause": "Pause", "resume": "Resume", "cancel": "Cancel the rest", "retry": "Run failed cases again"}
+_EVENTS: Final = {
+    "pause": StudyEvent.PAUSE,
+    "resume": StudyEvent.RESUME,
+    "cancel": StudyEvent.CANCEL,
+    "retry": StudyEvent.RETRY,
+}
+
+
+def study_frame(context: Context, study_id: str) -> dict[str, Any]:
+    """What every page about a study shows: the study as the interface tells it, its verbs, the pages beside it."""
+    (record, progress), study = context.store.look(study_id), context.store.study(study_id)
+    shown = views.detail(record, progress, study, context.store.spec(study_id))
+    varies = any(len(axis) > 1 for axis in study.axes)
+    mapped = study.combine == "grid" and sum(len(axis) > 1 for axis in study.axes) > 1
+    tabs = [("", "Overview"), *([("/curves", "Curves")] if varies else []), *([("/map", "Map")] if mapped else [])]
+    return {
+        "study": shown,
+        "live": not StudyState(shown["state"]).terminal,
+        "verbs": {verb: VERBS[verb] for verb in _verbs(StudyState(shown["state"]), record.ok < record.done)},
+        "tabs": [*tabs, ("/cases", "Cases")],
+        "endings": models.ENDING_SENTENCES,
+        "formats": list(exports.MEDIA_TYPES),
+        "now": timestamp(datetime.now(UTC)),
+    }
+
+
+def _verbs(state: StudyState, some_failed: bool) -> list[str]:
+    possible = [verb for verb, event in _EVENTS.items() if (state, event) in TRANSITIONS]
+    return [verb for verb in possible if verb != "retry" or some_failed]
+
+
+@router.get("/studies/{study_id:study}")
+async def study_page(context: Ctx, work: Attended, study_id: StudyId) -> Response:
+    """One study: how far it is, its mechanical characteristic, its inputs."""
+    spec = await run_in_threadpool(context.store.spec, study_id)
+    fits = await work.check(fits_of, spec) if has_measured_clutch(spec) else {}
+    return await run_in_threadpool(_study_page, context, study_id, fits)
+
+
+def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[dict[str, Any], FitChart]]) -> Response:
+    study = context.store.study(study_id)
+    frame = study_frame(context, study_id)
+    query = _with_rows(context, study, study_id, characteristic(study, models.study_results(study)))
+    first = context.store.case_row(study_id, 0) if query is None else None
+    too_many = query is not None and drawn_numbers(study, query) > pictures.MAX_PICTURE_POINTS
+    address = views.study_address(study_id)
+    pairs = [] if query is None else pairs_of(query)
+    return page(
+        "study.html",
+        **frame,
+        tab="",
+        caption=None if query is None else caption(study, query),
+        figure=None if query is None else f"/studies/{study_id}/figures/curves?{urlencode([*pairs, ('columns', '2')])}",
+        picture=None if query is None or too_many else f"{address}/curves?{urlencode([*pairs, ('format', 'svg')])}",
+        curves=f"/studies/{study_id}/curves?{urlencode(pairs)}",
+        only_row=None if first is None else first.results.items(),
+        units={info.name: info.unit for info in models.study_results(study)},
+        inputs=inputs(study, frame["study"]["spec"]),
+        run=run_inputs(study, frame["study"]["spec"]),
+        fits=fits,
+    )
+
+
+def _with_rows(context: Context, study: Study, study_id: str, query: CurveQuery | None) -> CurveQuery | None:
+    """The same curves, with the axes that are not drawn held where cases are done, should none be where they were."""
+    if query is None or not query.at or StudyState(context.store.get_study(study_id).state) is StudyState.FINISHED:
+        return query
+    try:
+        cases = [line.cases for line in select(study, models.study_results(study), query).lines]
+    except SelectionError:
+        return query
+    found = context.store.rows_for_cases(study_id, np.concatenate(cases), ())
+    done = context.store.case_rows(study_id, limit=1).cases
+    if not {None, models.WorkerEnding.CANCELLED}.issuperset(found.endings) or not len(done):
+        return query
+    values = study.case_parameters(int(done[0]))
+    return replace(query, at=tuple((path, repr(values[path])) for path, _ in query.at))
+
+
+def inputs(study: Study, spec: Mapping[str, Any]) -> list[tuple[str, list[dict[str, Any]]]]:
+    """Every parameter of the base by its section, with letter, value, unit and where it is from."""
+    sections: dict[str, list[dict[str, Any]]] = {}
+    for item in every_input(study, spec):
+        entry = parameter_of(study, item.path)
+        section, _, name = item.path.rpartition(".")
+        symbol = f"c_{int(name) + 1}" if name.isdigit() else "" if entry is None else entry.symbol
+        sections.setdefault(section, []).append({"name": name, "symbol": symbol, "item": item})
+    return [(section or "in general", rows) for section, rows in sections.items()]
+
+
+@router.get("/studies/{study_id:study}/delete")
+def delete_page(context: Ctx, study_id: StudyId) -> Response:
+    """The question whether a study is to be deleted, and what goes with it."""
+    record = context.store.get_study(study_id)
+    return page("delete.html", study=views.summary(record), ended=record.over)
+
+
+@router.post("/studies/{study_id:study}/delete")
+def delete(context: Ctx, study_id: StudyId) -> Response:
+    """The answer: the study is deleted, and the list of those that are left is shown."""
+    context.store.delete_study(study_id)
+    return RedirectResponse("/", status_code=303)
+
+
+@router.post("/studies/{study_id:study}/{verb}")
+def act(context: Ctx, study_id: StudyId, verb: str) -> Response:
+    """A button of the page: the wish is written down, and the page shown again."""
+    wishes = {
+        "pause": context.store.pause_study,
+        "resume": context.store.resume_study,
+        "cancel": context.store.cancel_study,
+        "retry": context.store.retry_study,
+    }
+    if verb not in wishes:
+        raise ApiError("not-found", "There is no such thing to do with a study.")
+    wishes[verb](study_id)
+    return RedirectResponse(f"/studies/{study_id}", status_code=303)
+
+
+def fixed_choices(study: Study, drawn: tuple[str, ...], at: tuple[tuple[str, str], ...]) -> list[dict[str, Any]]:
+    """For each axis that a picture holds: its values to choose from, and the one that is chosen."""
+    chosen = dict(at)
+    found = []
+    for axis in study.axes:
+        if len(axis) < 2 or any(path in axis.paths for path in drawn):
+            continue
+        path = next((path for path in axis.paths if path in chosen), axis.paths[0])
+        unit = unit_of(study, axis.paths[0])
+        text = chosen.get(path)
+        found.append(
+            {
+                "path": axis.paths[0],
+                "paths": axis.paths,
+                "unit": unit,
+                "values": [] if len(axis) > _MOST_CHOICES else sorted(set(axis.values)),
+                "chosen": text,
+                "number": _plain(text),
+            }
+        )
+    return found
+
+
+#: Values of an axis that a list to choose from may have; of more, the value is written.
+_MOST_CHOICES: Final = 200
+
+
+def _plain(text: str | None) -> float | None:
+    return None if text is None else parse_number(text)
+
+
+def map_address(study: Study, given: QueryParams, study_id: str) -> str | None:
+    """Address of the map that the choices of ``given`` lead to; None where there is none."""
+    query = map_query(study, models.study_results(study), given)
+    return None if query is None else f"/studies/{study_id}/map?{urlencode(pairs_of(query))}"

@@ -1,0 +1,141 @@
+"""The cases of a study as a table that can be sorted and filtered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Final
+from urllib.parse import urlencode
+
+import numpy as np
+from fastapi import APIRouter, Query, Request
+from starlette.responses import Response
+
+from service.faults import ErrorItem
+from service.http.context import Context, Ctx, StudyId
+from service.http.web.study import fixed_choices, study_frame
+from service.http.web.templates import page
+from service.results.selection import SelectionError, locate_axes
+from service.spec.catalogue import result_of, unit_of
+from worker import models
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from service.storage.records import CaseRow
+    from worker.study import Study
+
+router = APIRouter(include_in_schema=False)
+
+_ROWS: Final = 50
+#: Cases that are read to be sorted; of more, a value has to be held first.
+MOST_SORTED: Final = 20_000
+_USUAL: Final = ("shaft.speed.mean", "shaft.irregularity", "torque.mean", "power.useful.mean", "efficiency")
+
+
+@dataclass(frozen=True, slots=True)
+class TablePage:
+    """Rows of one page of the table: the cases in order, where the next page begins, and how many match (if known)."""
+
+    rows: list[CaseRow]
+    more: int | None
+    matching: int | None
+
+
+@router.get("/studies/{study_id:study}/cases")
+def cases_page(
+    context: Ctx,
+    request: Request,
+    study_id: StudyId,
+    sort: Annotated[str, Query(max_length=80)] = "",
+    ending: Annotated[str, Query(max_length=40)] = "",
+    after: Annotated[int, Query(ge=0, le=10**12)] = 0,
+) -> Response:
+    """Cases with the results that were chosen, sorted and filtered."""
+    study = context.store.study(study_id)
+    infos = models.study_results(study)
+    given = request.query_params
+    names = [name for name in given.getlist("col") if result_of(infos, name)]
+    names = names or [name for name in _USUAL if result_of(infos, name)] or [info.name for info in infos[:5]]
+    at = tuple(
+        (path.strip(), value.strip())
+        for path, equals, value in (item.partition("=") for item in given.getlist("at"))
+        if equals and value.strip()
+    )
+    faults: tuple[Any, ...] = ()
+    found = TablePage([], None, 0)
+    try:
+        found = _page(context, study_id, study, (sort, ending, at, after))
+    except SelectionError as error:
+        faults = error.errors
+    kept = [("ending", ending), *(("at", f"{path}={value}") for path, value in at), *(("col", n) for n in names)]
+    return page(
+        "cases.html",
+        status=422 if faults else 200,
+        **study_frame(context, study_id),
+        tab="/cases",
+        rows=[(row, study.case_parameters(row.case)) for row in found.rows],
+        found=found,
+        faults=faults,
+        paths=[axis.paths[0] for axis in study.axes],
+        shown=[info for name in names if (info := result_of(infos, name))],
+        results=infos,
+        fixed=fixed_choices(study, (), at),
+        sort=sort,
+        ending=ending,
+        flags=models.FLAG_SENTENCES,
+        sortable=study.cases <= MOST_SORTED or bool(at),
+        most_sorted=MOST_SORTED,
+        units_of=lambda path: unit_of(study, path),
+        address=lambda **more: f"/studies/{study_id}/cases?" + urlencode([*kept, *more.items()]),
+        first=after,
+    )
+
+
+def _page(
+    context: Context, study_id: str, study: Study, wanted: tuple[str, str, tuple[tuple[str, str], ...], int]
+) -> TablePage:
+    sort, ending, at, after = wanted
+    if ending and ending not in models.ENDING_SENTENCES:
+        raise SelectionError([ErrorItem("there is no such ending", parameter="ending", value=ending)])
+    if not sort and not at:
+        block = context.store.case_page(study_id, after_case=after - 1, limit=_ROWS + 1, ending=ending or None)
+        rows = list(block.rows())
+        more = rows[_ROWS].case if len(rows) > _ROWS else None
+        return TablePage(rows[:_ROWS], more, None)
+    order = _ordered(context, study_id, study, sort, ending, at)
+    part = order[after : after + _ROWS].tolist()
+    found = [context.store.case_row(study_id, case) for case in part]
+    more = after + _ROWS if after + _ROWS < order.size else None
+    return TablePage([row for row in found if row is not None], more, int(order.size))
+
+
+def _ordered(
+    context: Context, study_id: str, study: Study, sort: str, ending: str, at: tuple[tuple[str, str], ...]
+) -> NDArray[np.int64]:
+    """Numbers of the finished cases that match, in the order of the table."""
+    fixed = {study.axes[i].paths[0]: study.axes[i].values[index] for i, (_, index) in locate_axes(study, at).items()}
+    cases = study.cases_at(fixed)
+    if cases.size > MOST_SORTED:
+        message = f"{cases.size:,} cases are too many to sort; hold further axes at a value, or take all results"
+        raise SelectionError([ErrorItem(message, parameter="sort", allowed=f"<= {MOST_SORTED:,} cases")])
+    name = sort.removeprefix("-")
+    by_result = result_of(models.study_results(study), name) is not None
+    columns = context.store.rows_for_cases(study_id, cases, [name] if by_result else [])
+    finished = np.array([bool(found) and (not ending or found == ending) for found in columns.endings], dtype=np.bool_)
+    if by_result:
+        keys = columns.values[name]
+    elif study.axis_of(name) is not None:
+        keys = study.columns(cases)[name]
+    elif name in ("", "case"):
+        keys = cases.astype(np.float64)
+    elif name == "ending":
+        keys = np.unique(np.array([found or "" for found in columns.endings]), return_inverse=True)[1].astype(
+            np.float64
+        )
+    else:
+        raise SelectionError([ErrorItem("there is no such column", parameter="sort", value=name)])
+    cases, keys = cases[finished], np.asarray(keys, dtype=np.float64)[finished]
+    # What could not be computed stands last, whichever way the rest goes.
+    missing = np.isnan(keys)
+    order = np.argsort(-keys if sort.startswith("-") else keys, kind="stable")
+    return np.concatenate([cases[order][~missing[order]], cases[order][missing[order]]])

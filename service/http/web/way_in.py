@@ -1,0 +1,121 @@
+"""The page where a browser logs in, and the way back from it: to an address, or with a form that was not taken.
+
+A form that is sent when its session has ended, or with a token that only allows to look, is not lost: the login keeps
+its fields, and sends them where they were to go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final, cast
+from urllib.parse import quote, urlsplit
+
+from starlette.responses import RedirectResponse
+
+from service.http.access import COOKIE, Access, Grant
+from service.http.web.form.values import read_form
+from service.http.web.templates import page
+
+if TYPE_CHECKING:
+    from starlette.requests import Request
+    from starlette.responses import Response
+
+    from service.http.problems import ApiError
+    from service.http.web.form.spec import Values
+
+LOGIN_PATH: Final = "/login"
+#: Field of the login that says that a form is to be sent afterwards, and what the names of its fields begin with.
+KEPT: Final = "kept"
+KEPT_PREFIX: Final = "kept "
+_API: Final = "/api/"
+#: Longest address that the answer to the login repeats.
+_LONGEST: Final = 4000
+#: What can be mended by logging in, and what the login says of it where a form was sent.
+_MENDED: Final = frozenset({"unauthorized", "read-only"})
+
+
+def access_of(request: Request) -> Access:
+    """Who knows the tokens."""
+    return cast("Access", request.app.state.access)
+
+
+async def way_in(request: Request, error: ApiError, access: Access) -> Response | None:
+    """The way to the login for a page's request that was refused with ``error``; None where logging in helps nobody.
+
+    Raises ApiError when the form that was sent cannot be read.
+    """
+    if error.code not in _MENDED or request.url.path.startswith(_API):
+        return None
+    if "text/html" not in request.headers.get("accept", ""):
+        return None
+    query = request.url.query
+    wanted = request.url.path + (f"?{query}" if query else "")
+    if request.method == "POST":
+        kept = await read_form(request)
+        fault = "" if error.code == "unauthorized" else error.detail
+        response = login_page(request, access, wanted, fault=fault, status=error.type.status, kept=kept)
+        response.headers.update(error.headers)
+        return response
+    if request.method == "GET" and error.code == "unauthorized":
+        return RedirectResponse(f"{LOGIN_PATH}?next={quote(wanted, safe='/')}", 303, {"Cache-Control": "no-store"})
+    return None
+
+
+def login_page(
+    request: Request,
+    access: Access,
+    wanted: str,
+    *,
+    fault: str = "",
+    status: int = 200,
+    kept: Mapping[str, str] | None = None,
+) -> Response:
+    """The form for the token, with the way to the address ``wanted`` and the form ``kept`` for it, if there is one."""
+    return _private(
+        "login.html",
+        status=status,
+        needed=access.needed,
+        grant=cast("Grant | None", request.scope.get("sprag.grant")),
+        session=COOKIE in request.cookies,
+        next=within(wanted),
+        fault=fault,
+        kept=kept,
+        prefix=KEPT_PREFIX,
+    )
+
+
+def kept_form(values: Values) -> Values | None:
+    """The fields of the form that a login keeps; None where it keeps none."""
+    if KEPT not in values:
+        return None
+    return {name.removeprefix(KEPT_PREFIX): text for name, text in values.items() if name.startswith(KEPT_PREFIX)}
+
+
+def kept_page(grant: Grant, wanted: str, kept: Mapping[str, str]) -> Response:
+    """The page after a login that sends the form ``kept`` to where it was to go."""
+    return _private("kept.html", grant=grant, action=within(wanted), kept=kept)
+
+
+def within(address: str) -> str:
+    """``address`` if it leads to a page of this service, else the first page: nobody is sent elsewhere after login.
+
+    One too long for the cookie's answer to repeat is the first page too, rather than a way in that is barred.
+    """
+    try:
+        parts = urlsplit(address)
+    except ValueError:
+        return "/"
+    plain = (
+        len(address) <= _LONGEST
+        and address.isascii()
+        and address.isprintable()
+        and "\\" not in address
+        and not address.startswith("//")
+    )
+    return address if plain and address.startswith("/") and not parts.scheme and not parts.netloc else "/"
+
+
+def _private(template: str, status: int = 200, **values: Any) -> Response:
+    response = page(template, status=status, **values)
+    response.headers["Cache-Control"] = "no-store"
+    return response

@@ -1,0 +1,92 @@
+"""What a request has done in other processes: ended when its client leaves, and within the share of its token."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING, Annotated, Final, TypeVar, TypeVarTuple, cast
+
+from fastapi import Depends, Request
+from starlette.requests import ClientDisconnect
+
+from service.http.access import OPEN
+from service.spec.machine.shaft_check import NotCompiledError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Coroutine
+    from typing import Any
+
+    from service.http.access import Grant
+    from service.http.computer import Computes
+    from service.http.context import Context
+    from service.http.shares import Shares
+    from worker.models import KernelShape
+
+#: What can become of anything that is checked, whatever it is.
+CHECK_PROBLEMS: Final = ("too-costly", "not-computed", "too-many-requests", "unavailable")
+
+Args = TypeVarTuple("Args")
+R = TypeVar("R")
+
+
+class Work:
+    """The door of one request to the processes that do what users define.
+
+    Every method raises ApiError when there is too much to do, when a limit of time or memory is reached, and
+    ClientDisconnect when the client is gone.
+    """
+
+    def __init__(self, request: Request) -> None:
+        self._request = request
+        self._context = cast("Context", request.app.state.context)
+
+    async def check(self, function: Callable[[*Args], R], *args: *Args) -> R:
+        """The value of a function that reads, expands, fits or draws what users wrote."""
+        try:
+            return await self._check(function, *args)
+        except NotCompiledError as error:  # the first time on a machine
+            await self.load(error.shape)
+            return await self._check(function, *args)
+
+    async def _check(self, function: Callable[[*Args], R], *args: *Args) -> R:
+        context = self._context
+        return await self._attended(self._in_turn(context.check_shares, context.checker, function, *args))
+
+    async def compute(self, function: Callable[[*Args], R], *args: *Args) -> R:
+        """The value of a function of the engine."""
+        context = self._context
+        return await self._attended(self._in_turn(context.compute_shares, context.computer, function, *args))
+
+    async def load(self, shape: KernelShape) -> None:
+        """Have a kernel ready; its compilation goes on when the client is gone."""
+        await self._attended(self._context.computer.load(shape))
+
+    async def _in_turn(self, shares: Shares, computer: Computes, function: Callable[[*Args], R], *args: *Args) -> R:
+        grant = cast("Grant | None", self._request.scope.get("sprag.grant")) or OPEN
+        async with shares.take(grant.id):
+            return await computer.run(function, *args)
+
+    async def _attended(self, work: Coroutine[Any, Any, R]) -> R:
+        """The value of ``work``, which is cancelled when the client is gone."""
+        doing, leaving = asyncio.ensure_future(work), asyncio.ensure_future(self._left())
+        try:
+            await asyncio.wait((doing, leaving), return_when=asyncio.FIRST_COMPLETED)
+            if doing.done():
+                return doing.result()
+            leaving.result()
+            raise ClientDisconnect
+        finally:
+            for task in (doing, leaving):
+                task.cancel()
+            await asyncio.gather(doing, leaving, return_exceptions=True)
+
+    async def _left(self) -> None:
+        """Wait until the client is gone."""
+        while (await self._request.receive())["type"] != "http.disconnect":
+            pass
+
+
+async def _work(request: Request) -> Work:
+    return Work(request)
+
+
+Attended = Annotated[Work, Depends(_work)]

@@ -1,0 +1,1 @@
+"""Work on studies: submission, preview, the dispatcher, schedules, maintenance."""

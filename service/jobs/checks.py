@@ -1,0 +1,106 @@
+"""What users define, read and worked out: functions for the processes that check, which can be ended at any time.
+
+Their answers are small, or bytes that are ready to be sent or stored: the service that asks has to stay quick.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from service.jobs.preview import preview_json
+from service.jobs.submission import Submission, submission
+from service.json_text import to_bytes
+from service.results.fits import fit_json, read_fit
+from service.schedules.fields import ScheduleFields, change_fields, read_fields
+from service.spec.document import load_spec, parse_spec
+from service.spec.extend import parse_extended
+from service.spec.machine.shaft_check import compile_elsewhere
+from service.storage.store import Store
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from datetime import datetime
+
+    from service.spec.text import Format
+    from worker.chunking import Chunking
+
+
+def prepare() -> None:
+    """First thing in a process that checks: this module is loaded, and what is not compiled is left to others.
+
+    matplotlib and the machine shaft's kernels are loaded by the first who needs them: a study that is submitted right
+    after the start of the service need not wait for them.
+    """
+    compile_elsewhere()
+
+
+class Library:
+    """The studies that there are, for what has to be known of them; a process it is sent to opens a store of its own.
+
+    Parameters
+    ----------
+    store : Store
+    """
+
+    def __init__(self, store: Store) -> None:
+        self.store = store
+
+    def __reduce__(self) -> tuple[Callable[[str, Chunking], Library], tuple[str, Chunking]]:
+        return _library, (self.store.session.url.render_as_string(hide_password=False), self.store.chunking)
+
+
+@lru_cache(maxsize=1)
+def _library(url: str, chunking: Chunking) -> Library:
+    return Library(Store.open(url, chunking=chunking))
+
+
+def preview(library: Library, content: bytes, form: Format, finish: datetime | None, now: datetime) -> bytes:
+    """The preview of the spec in a request's body, as JSON text; raises SpecError."""
+    parsed, store = parse_spec(load_spec(content, form)), library.store
+    left = None if finish is None else (finish - now).total_seconds()
+    return to_bytes(preview_json(parsed, store.chunking, store.reusable(parsed.study), left))
+
+
+def new_study(
+    library: Library,
+    content: bytes,
+    form: Format,
+    fresh: bool,
+    finish: datetime | None,
+    now: datetime,
+    given: Mapping[str, object],
+) -> Submission:
+    """The study of the spec in a request's body; raises SpecError."""
+    parsed, store = parse_spec(load_spec(content, form)), library.store
+    return submission(parsed, store.chunking, store.reusable, now, fresh, finish, given)
+
+
+def extended_study(
+    library: Library,
+    study_id: str,
+    content: bytes,
+    form: Format,
+    finish: datetime | None,
+    now: datetime,
+    given: Mapping[str, object],
+) -> Submission:
+    """A study with what the body of a request adds to it; raises SpecError and StudyNotFound."""
+    store = library.store
+    parsed = parse_extended(store.spec(study_id), store.study(study_id), load_spec(content, form))
+    return submission(parsed, store.chunking, store.reusable, now, finish_by=finish, given=given)
+
+
+def clutch_fit(content: bytes, form: Format) -> bytes:
+    """The report of the fit that a request's body asks for, as JSON text; raises SpecError."""
+    return to_bytes(fit_json(read_fit(load_spec(content, form))))
+
+
+def schedule_body(content: bytes, form: Format, now: datetime, old: ScheduleFields | None = None) -> ScheduleFields:
+    """`schedule_fields` of the body of a request."""
+    return schedule_fields(load_spec(content, form), now, old)
+
+
+def schedule_fields(data: object, now: datetime, old: ScheduleFields | None = None) -> ScheduleFields:
+    """The fields of a new schedule, or those of an ``old`` one with some changed; raises SpecError."""
+    return read_fields(data, now) if old is None else change_fields(old, data, now)

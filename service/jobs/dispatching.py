@@ -1,0 +1,238 @@
+"""A dispatcher on a database: alone (`sprag worker`) or as a child process of the service (`sprag serve`)."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import socket
+import time
+from dataclasses import dataclass, field, replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from service import logs
+from service.jobs.housekeeping import Housekeeping
+from service.jobs.maintenance import Maintenance, MaintenancePlan
+from service.jobs.scheduler import Scheduler
+from service.logs import LogFormat
+from service.storage.part import SILENT_SECONDS, SystemClock
+from service.storage.readiness import LOCKED_SECONDS
+from service.storage.session import lock_of
+from service.storage.store import Store
+from worker import models
+from worker.chunking import Chunking
+from worker.dispatcher import Dispatcher
+from worker.pool.processes import end_with_parent, ignore_interrupts, interrupts_held_back
+from worker.ports import EpochLostError, ExecutorError, StoreError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from multiprocessing.context import SpawnProcess
+    from types import FrameType
+
+    from service.settings import Settings
+    from service.storage.lock import OneHolder
+    from worker.ports import Executor
+
+_LOG = logging.getLogger(__name__)
+
+#: Seconds between two tries of a standby to take the lock.
+STANDBY_SECONDS = 0.3
+#: Seconds without a sign of life after which a worker that is to be replaced counts as hung.
+HUNG_SECONDS = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerSettings:
+    """What a dispatcher needs to know: database (SQLAlchemy URL), processes of the pool, seconds allowed to a chunk."""
+
+    database_url: str
+    processes: int
+    chunk_timeout: float
+    #: Cases of one chunk of the studies that schedules submit; 0: about a second of work.
+    chunk_cases: int = 0
+    maintenance: MaintenancePlan = field(default_factory=MaintenancePlan)
+    log_format: LogFormat = "text"
+    #: Where chunks run (`Settings.executor`).
+    executor: str = "pool"
+
+
+def worker_settings(settings: Settings) -> WorkerSettings:
+    """The part of ``settings`` that a dispatcher needs."""
+    folder = Path(settings.backup_folder).expanduser().absolute() if settings.backup_folder else None
+    plan = MaintenancePlan(folder, settings.backup_keep, settings.keep_days, settings.nightly_at, settings.zone)
+    return WorkerSettings(
+        settings.database_url,
+        settings.pool_processes,
+        settings.chunk_timeout,
+        settings.chunk_cases,
+        plan,
+        settings.log_format,
+        settings.executor,
+    )
+
+
+class StopFlag:
+    """Set by a signal or another thread, asked by the dispatcher's loop."""
+
+    def __init__(self) -> None:
+        self._set = False
+
+    def set(self) -> None:
+        """Ask for the end."""
+        self._set = True
+
+    def __call__(self) -> bool:
+        return self._set
+
+
+def owner_name() -> str:
+    """This process as people can find it."""
+    return f"{socket.gethostname()}:{os.getpid()}"
+
+
+def pool(settings: WorkerSettings) -> Executor:
+    """Where the chunks of these settings run: a process pool, whose processes start with the first, or Dask."""
+    if settings.executor != "pool":
+        return _cluster(settings)
+    from worker.executors.process_pool import ProcessPoolExecutor
+
+    return ProcessPoolExecutor(settings.processes, chunk_timeout=settings.chunk_timeout)
+
+
+def _cluster(settings: WorkerSettings, *, renew: bool = False) -> Executor:
+    try:
+        from worker.executors.dask import DaskExecutor
+    except ImportError:
+        raise ExecutorError("Dask is not installed: pip install 'sprag[cluster]'") from None
+    url = settings.executor if "://" in settings.executor else ""
+    return DaskExecutor(url, settings.processes, chunk_timeout=settings.chunk_timeout, renew=renew)
+
+
+def renewed_pool(settings: WorkerSettings) -> Executor:
+    """A new pool whose processes compile every kernel anew: what lay in the cache is thrown away, on every host."""
+    if "://" in settings.executor:
+        return _cluster(settings, renew=True)
+    models.discard_compiled()
+    return pool(settings)
+
+
+def run_dispatcher(
+    settings: WorkerSettings,
+    stopping: Callable[[], bool],
+    *,
+    say: Callable[[str], None] = _LOG.info,
+    executor: Callable[[WorkerSettings], Executor] = pool,
+    renewed: Callable[[WorkerSettings], Executor] = renewed_pool,
+    take_over: bool = False,
+) -> None:
+    """Run every study of the database until ``stopping()``. Waits as a standby while another dispatcher is at work.
+
+    With ``take_over`` it does not wait: the other one can store nothing any more, and ends when it finds that out. One
+    that hangs on this host is killed.
+
+    Raises StoreError (EpochLostError when another dispatcher took over) and ExecutorError, each with one sentence.
+    """
+    chunking = Chunking(settings.chunk_cases, settings.processes, settings.chunk_timeout)
+    with Store.open(settings.database_url, chunking=chunking) as store:
+        store.require_sound()
+        scheduler, maintenance = Scheduler(store), Maintenance(store, _possible(store, settings.maintenance, say))
+        housekeeping = Housekeeping(store)
+        lock = lock_of(store.session, owner_name())
+        try:
+            if take_over:
+                _take_over(store, lock, say)
+            elif not _stand_by(store, lock, stopping, say):
+                return
+            say(f"worker with {settings.processes} processes at work on {store.session.location}")
+            dispatcher = Dispatcher(
+                store,
+                executor(settings),
+                SystemClock(),
+                owner=owner_name(),
+                renew=lambda: renewed(settings),
+                news=store.session.news(),
+            )
+            scheduler.start()
+            maintenance.start()
+            housekeeping.start()
+            dispatcher.run(stopping)
+        finally:
+            scheduler.stop()
+            maintenance.stop()
+            housekeeping.stop()
+            lock.release()
+
+
+def _possible(store: Store, plan: MaintenancePlan, say: Callable[[str], None]) -> MaintenancePlan:
+    """The plan without backups where the database is not ours to copy."""
+    if plan.folder is None or not store.session.on_server:
+        return plan
+    say(f"no backups are made of {store.session.location}: use PostgreSQL's own tools, such as pg_dump")
+    return replace(plan, folder=None)
+
+
+def _stand_by(store: Store, lock: OneHolder, stopping: Callable[[], bool], say: Callable[[str], None]) -> bool:
+    """Wait for the lock; False when ``stopping()`` came first. A holder that is not heard of any more is told once."""
+    if lock.take():
+        return True
+    say(f"another worker (process {lock.holder()}) is at work on {store.session.location}; waiting for its end")
+    told = False
+    while not lock.take():
+        if stopping():
+            return False
+        if not told and (silence := store.silence() or 0.0) > SILENT_SECONDS:
+            told = True
+            say(
+                f"nothing was heard of process {lock.holder()} for {silence:.0f} s; end it, or go on without it: "
+                "`sprag worker --take-over`"
+            )
+        time.sleep(STANDBY_SECONDS)
+    return True
+
+
+def _take_over(store: Store, lock: OneHolder, say: Callable[[str], None]) -> None:
+    """Take the lock from its holder. One that hangs is ended: its transaction may keep all others out."""
+    if lock.take():
+        return
+    holder = lock.holder()
+    hung = (store.silence() or 0.0) > HUNG_SECONDS or not store.session.can_write(LOCKED_SECONDS)
+    if hung and lock.end_holder():
+        say(f"process {holder} hung and was ended")
+    lock.seize()
+
+
+def stop_on_signals() -> StopFlag:
+    """A flag that SIGTERM and SIGINT set, so that the loop ends in order; for the main thread of a process."""
+    flag = StopFlag()
+
+    def ask(_number: int, _frame: FrameType | None) -> None:
+        flag.set()
+
+    signal.signal(signal.SIGTERM, ask)
+    signal.signal(signal.SIGINT, ask)
+    return flag
+
+
+def start_dispatcher_process(settings: WorkerSettings) -> SpawnProcess:
+    """Start a dispatcher as a child of this process, which it does not outlive; ``terminate()`` ends it in order."""
+    process = get_context("spawn").Process(
+        target=_child, args=(settings, os.getpid()), name="sprag-dispatcher", daemon=False
+    )
+    with interrupts_held_back():
+        process.start()
+    return process
+
+
+def _child(settings: WorkerSettings, parent: int) -> None:
+    flag = stop_on_signals()
+    ignore_interrupts()
+    end_with_parent(parent, signal.SIGTERM)
+    logs.configure(settings.log_format, requests=False)
+    try:
+        run_dispatcher(settings, flag)
+    except (EpochLostError, StoreError, ExecutorError) as error:
+        _LOG.error("the worker ends: %s", error)
+        raise SystemExit(3) from None

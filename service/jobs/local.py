@@ -1,0 +1,162 @@
+"""Running one study to its end in this process, without a server: `sprag run`."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from service.jobs.dispatching import STANDBY_SECONDS, WorkerSettings, owner_name, pool, renewed_pool
+from service.stale_files import marked, sweep
+from service.storage.part import SystemClock
+from service.storage.room import GOES_ON
+from service.storage.session import lock_of
+from service.storage.store import Store
+from worker.chunking import Chunking
+from worker.dispatcher import Dispatcher
+from worker.executors.inline import InlineExecutor
+from worker.ports import ExecutorError, StoreError
+from worker.states import StudyState, TransitionError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from datetime import datetime
+
+    from service.storage.records import Progress, StudyRecord
+    from worker.ports import Executor
+    from worker.study import Study
+
+_FOLDER_PREFIX = "sprag-run-"
+#: What the reason of a study that is held for want of room ends with; true of services, and not here.
+_LATER = (f"; {GOES_ON}", "; it is tried again from time to time")
+#: Seconds between two reports of progress.
+REPORT_SECONDS = 0.25
+
+
+class StudyHeldError(StoreError):
+    """The study was held before its end; the message says why."""
+
+
+class RunInterruptedError(KeyboardInterrupt):
+    """The run was interrupted and its study cancelled; ``record`` tells what of it is kept."""
+
+    def __init__(self, record: StudyRecord) -> None:
+        super().__init__()
+        self.record = record
+
+
+@dataclass(frozen=True, slots=True)
+class LocalRun:
+    """A study that was run to its end, and the store that holds its rows while the context lasts."""
+
+    store: Store
+    record: StudyRecord
+
+
+@contextmanager
+def run_here(
+    spec: Mapping[str, Any],
+    study: Study,
+    *,
+    processes: int,
+    database_url: str | None = None,
+    chunk_cases: int = 0,
+    chunk_timeout: float = 600.0,
+    warnings: Sequence[str] = (),
+    fresh: bool = False,
+    finish_by: datetime | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+    executor: Executor | None = None,
+) -> Iterator[LocalRun]:
+    """Run ``study`` to its end on ``processes`` processes and give its rows.
+
+    Without ``database_url`` the database is a temporary one and gone with the context. When another dispatcher is at
+    work on the database given, that one runs the study and this process waits. ``processes`` 0 runs the cases in this
+    process, which suits a few; 1 and more start a pool. At ``finish_by`` it ends with what is done. Raises StoreError
+    and ExecutorError, each with one sentence; RunInterruptedError on Ctrl-C, when the study has been cancelled, so that
+    no later worker goes on with it.
+    """
+    sweep(Path(tempfile.gettempdir()).glob(f"{_FOLDER_PREFIX}*"))
+    with tempfile.TemporaryDirectory(prefix=_FOLDER_PREFIX) as folder, marked(Path(folder)):
+        url = database_url or f"sqlite:///{Path(folder) / 'run.sqlite3'}"
+        with Store.open(url, chunking=Chunking(chunk_cases, max(processes, 1), chunk_timeout)) as store:
+            record = store.create_study(spec, study, warnings=warnings, fresh=fresh, finish_by=finish_by)
+            settings = WorkerSettings(url, processes, chunk_timeout)
+            watch = _Watch(store, record.id, on_progress)
+            lock = lock_of(store.session, owner_name())
+            try:
+                while not watch.ended():
+                    if lock.take():
+                        runner = executor or (pool(settings) if processes else InlineExecutor())
+                        renew = None if executor or not processes else partial(renewed_pool, settings)
+                        Dispatcher(
+                            store, runner, SystemClock(), owner=owner_name(), only=record.number, renew=renew
+                        ).run(watch.ended)
+                    else:
+                        time.sleep(STANDBY_SECONDS)
+            except (KeyboardInterrupt, ExecutorError) as error:
+                ended = _cancelled(store, record.id, ours=lock.take())
+                if isinstance(error, KeyboardInterrupt) and database_url is not None:
+                    raise RunInterruptedError(ended) from None
+                raise
+            finally:
+                lock.release()
+            yield LocalRun(store, watch.final(passing=database_url is None))
+
+
+def _cancelled(store: Store, study_id: str, *, ours: bool) -> StudyRecord:
+    """Cancel the study unless it has ended; ``ours``: no other dispatcher is there to bring it to its end."""
+    with suppress(TransitionError):
+        record = store.cancel_study(study_id)
+        if ours:
+            store.settle(store.take_over(owner_name()), record.number)
+    return store.get_study(study_id)
+
+
+class _Watch:
+    """Looks at one study now and then: tells its progress, knows its end."""
+
+    def __init__(self, store: Store, study_id: str, report: Callable[[Progress], None] | None) -> None:
+        self._store = store
+        self._id = study_id
+        self._report = report
+        self._next_report = 0.0
+
+    def ended(self) -> bool:
+        """Whether nothing more will be run."""
+        now = time.monotonic()
+        if self._report is not None and now >= self._next_report:
+            self._report(self._store.progress(self._id))
+            self._next_report = now + REPORT_SECONDS
+        state = self._store.get_study(self._id).state
+        return state.terminal or state is StudyState.PAUSED
+
+    def final(self, *, passing: bool) -> StudyRecord:
+        """The study at its end; raises StudyHeldError when it was held instead, its rows lost with a passing database.
+
+        Nothing goes on by itself here, whatever the reason says of services.
+        """
+        record = self._store.get_study(self._id)
+        if self._report is not None:
+            self._report(self._store.progress(self._id))
+        if not record.over:
+            raise StudyHeldError(f"the study was held: {_told(record, passing=passing)}")
+        return record
+
+
+def _told(record: StudyRecord, *, passing: bool) -> str:
+    """Why the study was held, and what can be done where it was for want of room."""
+    reason = record.reason or "somebody paused it"
+    cause = next((reason.removesuffix(later) for later in _LATER if reason.endswith(later)), None)
+    if cause is None:
+        return reason
+    if passing:
+        return f"{cause}; nothing of it is kept: make room, or name another place with TMPDIR or --db"
+    return (
+        f"{cause}; {record.done} of {record.cases} cases are kept as {record.id}, and `sprag worker` or `sprag serve` "
+        "with this database goes on with it when there is room"
+    )

@@ -1,0 +1,160 @@
+"""Maintenance at night, beside a dispatcher: backups, of which the latest are kept; old studies are deleted.
+
+A backup's name tells when it was made, and from the names follows whether one is due: nothing else is remembered.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from service.schedules.times import Timing, read_time_of_day
+from service.stale_files import sweep
+from service.storage.clock_watch import ClockWatch
+from service.storage.errors import StoreError
+from service.storage.maintenance import PART_SUFFIX
+from service.storage.private_files import PRIVATE_FOLDER_MODE
+
+if TYPE_CHECKING:
+    from service.storage.store import Store
+
+_LOG = logging.getLogger("sprag.maintenance")
+
+#: Seconds between two looks at the clock, and before something that failed is tried again.
+LOOK_SECONDS = 20.0
+AGAIN = timedelta(minutes=10)
+_NAME: Final = re.compile(r"sprag-(\d{8}T\d{6}Z)\.sqlite3")
+_STAMP: Final = "%Y%m%dT%H%M%SZ"
+
+
+@dataclass(frozen=True, slots=True)
+class MaintenancePlan:
+    """Where backups go (None: there are none) and how many stay; days ended studies stay (0: for ever); when."""
+
+    folder: Path | None = None
+    keep: int = 14
+    study_days: int = 0
+    time: str = "02:30"
+    zone: str = "UTC"
+
+    @property
+    def timing(self) -> Timing:
+        """Every night at the time."""
+        at = read_time_of_day(self.time)
+        return Timing(f"{at.minute} {at.hour} * * *", None, self.zone)
+
+    @property
+    def wanted(self) -> bool:
+        """Whether there is anything to do."""
+        return self.folder is not None or self.study_days > 0
+
+
+def backups(folder: Path) -> list[tuple[datetime, Path]]:
+    """The backups in ``folder`` with the times at which they were made, oldest first."""
+    if not folder.is_dir():
+        return []
+    found = ((_NAME.fullmatch(path.name), path) for path in folder.iterdir())
+    return sorted(
+        (datetime.strptime(match[1], _STAMP).replace(tzinfo=UTC), path) for match, path in found if match is not None
+    )
+
+
+@dataclass(slots=True)
+class _Task:
+    """Something to be done each night; `do` is told the time and whether the clock is believed, and says if it did it.
+
+    ``done`` is the due time that is done with, ``wait_until`` the time before which it is not tried again.
+    """
+
+    name: str
+    do: Callable[[datetime, bool], bool]
+    done: datetime | None = None
+    wait_until: datetime | None = None
+
+
+class Maintenance(threading.Thread):
+    """Does what the plan says, every night by the store's clock, until `stop`."""
+
+    def __init__(self, store: Store, plan: MaintenancePlan, watch: ClockWatch | None = None) -> None:
+        super().__init__(name="sprag-maintenance", daemon=True)
+        self._store = store
+        self._plan = plan
+        self._watch = watch or ClockWatch(store)
+        self._ending = threading.Event()
+        self._tasks: list[_Task] = []
+        if plan.folder is not None:
+            self._tasks.append(_Task("backup", partial(self._back_up, plan.folder)))
+        if plan.study_days:
+            self._tasks.append(_Task("deletion of old studies", self._prune))
+
+    def run(self) -> None:
+        """Look, and again; at the clock even where nothing else is wanted."""
+        self.begin()
+        while not self._ending.wait(LOOK_SECONDS):
+            self.look()
+
+    def stop(self) -> None:
+        """End the thread; returns when it has ended, after a backup that is being written."""
+        self._ending.set()
+        if self.is_alive():
+            self.join()
+
+    def begin(self) -> None:
+        """Make up for what was due while nothing was running; a backup that was made since is enough."""
+        now = self._store.clock.now()
+        due = self._plan.timing.latest_until(now)
+        for task in self._tasks:
+            if task.name == "backup" and self._plan.folder is not None:
+                made = [when for when, _ in backups(self._plan.folder) if when <= now]
+                if made and (due is None or made[-1] >= due):
+                    task.done = due
+        self.look()
+
+    def look(self) -> None:
+        """Do what is due, each task for itself; what fails is said, and tried again later."""
+        now = self._store.clock.now()
+        due = self._plan.timing.latest_until(now)
+        try:
+            believed = self._watch.believable()
+        except StoreError as error:
+            _LOG.error("The clock cannot be judged, and nothing is deleted: %s", error)
+            believed = False
+        for task in self._tasks:
+            if task.done == due or (task.wait_until is not None and task.wait_until - AGAIN <= now < task.wait_until):
+                continue
+            try:
+                if not task.do(now, believed):
+                    continue
+            except (StoreError, OSError) as error:
+                _LOG.error("The nightly %s failed and is tried again in 10 minutes: %s", task.name, error)
+                task.wait_until = now + AGAIN
+                continue
+            task.done, task.wait_until = due, None
+
+    def _back_up(self, folder: Path, now: datetime, believed: bool) -> bool:
+        folder.mkdir(PRIVATE_FOLDER_MODE, parents=True, exist_ok=True)
+        sweep(folder.glob(f".sprag-*.sqlite3.*{PART_SUFFIX}"))
+        target = folder / f"sprag-{now.astimezone(UTC):{_STAMP}}.sqlite3"
+        if not target.exists():
+            self._store.backup(target)
+            _LOG.info("Backup: %s (%.3g MB).", target, target.stat().st_size / 1e6)
+        if believed:
+            # A name from the future was made under a wrong clock: it neither goes nor pushes a true one out.
+            for _, path in [made for made in backups(folder) if made[0] <= now][: -self._plan.keep]:
+                path.unlink()
+        return True
+
+    def _prune(self, now: datetime, believed: bool) -> bool:
+        if not believed:
+            return False
+        gone = self._store.prune(now - timedelta(days=self._plan.study_days))
+        if gone:
+            _LOG.info("Deleted, because they ended more than %d days ago: %s.", self._plan.study_days, ", ".join(gone))
+        return True

@@ -1,0 +1,72 @@
+"""What a study would cost, said before it is submitted."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from service.results.fits import fit_json
+from service.schedules.deadline import finish_warnings
+from service.spec.catalogue import axes_json
+from worker import models
+from worker.chunking import work_of
+
+if TYPE_CHECKING:
+    from service.spec.document import ParsedSpec
+    from worker.chunking import Chunking
+    from worker.study import Study
+
+_FIRST_CASES = 5
+#: Bytes of a row beside its results: key, case number, ending, flags and SQLite's own header.
+_ROW_BYTES = 48
+_NUMBER_BYTES = 10
+
+
+def estimated_bytes(study: Study) -> int:
+    """Rough size of the results of ``study`` in the database."""
+    return study.cases * (_ROW_BYTES + _NUMBER_BYTES * len(models.study_results(study)))
+
+
+def estimated_seconds(study: Study, chunking: Chunking, to_run: int) -> float:
+    """Rough time (s) of running that many cases of ``study`` on the processes of ``chunking``, compilation included."""
+    if not to_run:
+        return 0.0
+    # A study of fewer cases than processes still takes the time of one case.
+    rounds = max(to_run / chunking.processes, 1.0)
+    return work_of(rounds) * models.estimate_seconds_per_case(study) + models.estimate_compile_seconds(study)
+
+
+def preview_json(
+    parsed: ParsedSpec,
+    chunking: Chunking,
+    reusable: int = 0,
+    seconds_left: float | None = None,
+    start_seconds: float = 0.0,
+) -> dict[str, Any]:
+    """What ``parsed`` would be as a study that is cut and run so, as JSON data.
+
+    ``reusable`` of its cases need not be run, because studies of the database have them. ``estimated_seconds`` (wall
+    time, the compilation of a kernel that the cache does not have and ``start_seconds`` of the pool included) and
+    ``estimated_bytes`` (in the database) are rough. When ``seconds_left`` until a deadline will hardly do, it
+    is told.
+    """
+    study = parsed.study
+    seconds = start_seconds + estimated_seconds(study, chunking, study.cases - reusable)
+    late = () if seconds_left is None else finish_warnings(study, seconds, seconds_left)
+    first = range(min(_FIRST_CASES, study.cases))
+    return {
+        "model": study.model,
+        "name": study.name,
+        "cases": study.cases,
+        "shape": list(study.shape),
+        "combine": study.combine,
+        "axes": axes_json(study),
+        "results": len(models.study_results(study)),
+        "reusable": reusable,
+        "estimated_seconds": seconds,
+        "estimated_bytes": estimated_bytes(study),
+        "warnings": [*parsed.warnings, *chunking.warnings(study), *late],
+        "fits": {pointer: fit_json(fit) for pointer, fit in parsed.fits.items()},
+        "first_cases": [
+            {"case": case, "parameters": values} for case, values in zip(first, study.values_with(first), strict=True)
+        ],
+    }

@@ -1,0 +1,145 @@
+"""The scheduler: takes up what is due, submits it, and holds studies outside their windows. Runs beside a dispatcher.
+
+However many schedulers look at one database, each due time becomes one study: who takes it up first writes its row, and
+the study is submitted under a key made of schedule and due time, so that a scheduler that dies in between is no loss.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from datetime import timedelta
+from typing import TYPE_CHECKING
+
+from service.storage.errors import StoreError
+from worker.states import StudyState
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+    from service.storage.schedules import OpenRun, ScheduleRecord
+    from service.storage.store import Store
+
+_LOG = logging.getLogger("sprag.schedules")
+
+#: Seconds between two looks at what is due.
+LOOK_SECONDS = 1.0
+#: Seconds between two tries of a run that was refused for a reason that passes, and for how long it is tried.
+RETRY_SECONDS = 30.0
+GRACE = timedelta(hours=12)
+#: Seconds between two looks for schedules that a clock that was ahead has put off.
+RECOVERY_SECONDS = 30.0
+#: Problems that pass by themselves: the disk is short, the queue is full, a process is not to be had.
+_TRANSIENT = frozenset({"storage-full", "queue-full", "unavailable"})
+
+
+class Scheduler(threading.Thread):
+    """Looks at the schedules of a store every second, by the store's clock, until `stop`."""
+
+    def __init__(self, store: Store) -> None:
+        super().__init__(name="sprag-scheduler", daemon=True)
+        self._store = store
+        self._ending = threading.Event()
+        self._next_recovery = float("-inf")
+        #: By schedule and due time: before when (monotonic, s) what was refused for the time being is not tried again.
+        self._next_try: dict[tuple[int, int], float] = {}
+
+    def run(self) -> None:
+        """Look, and again. Trouble with the database is said once and waited out."""
+        trouble = None
+        while not self._ending.wait(LOOK_SECONDS):
+            try:
+                self.look()
+                trouble = None
+            except StoreError as error:
+                if str(error) != trouble:
+                    trouble = str(error)
+                    _LOG.error("The schedules cannot be kept: %s", error)
+            except Exception:
+                _LOG.exception("A fault in keeping the schedules; it is tried again")
+                self._ending.wait(60.0)
+
+    def stop(self) -> None:
+        """End the thread; returns when it has ended."""
+        self._ending.set()
+        if self.is_alive():
+            self.join()
+
+    def look(self) -> None:
+        """One look: what is due is submitted, and windows are kept."""
+        now = self._store.clock.now()
+        if self._store.clock.monotonic() >= self._next_recovery:
+            self._next_recovery = self._store.clock.monotonic() + RECOVERY_SECONDS
+            for schedule in self._store.recover_schedules(now):
+                _LOG.warning("The clock was put back: the schedule %s is due at its next time again.", schedule)
+        for record in self._store.due_schedules(now):
+            self._take(record)
+        for run in self._store.open_runs():
+            if self._store.clock.monotonic() >= self._next_try.get((run.schedule, run.due), 0.0):
+                self._submit(run)
+        for study in self._store.bound_studies():
+            inside = study.window.open_at(now)
+            if inside and study.held:
+                self._store.let_in(study.number)
+            elif not inside and study.state in {StudyState.QUEUED, StudyState.RUNNING}:
+                self._store.hold_for_window(study.number, f"outside its window, {study.window}; it goes on by itself")
+
+    def _take(self, record: ScheduleRecord) -> None:
+        """Take up the latest due time; the ones before it that nobody was there for are only counted."""
+        now, timing = self._store.clock.now(), record.fields.timing
+        assert record.next_due is not None
+        due = max(timing.latest_until(now) or record.next_due, record.next_due)
+        missed = timing.missed(record.next_due, due)
+        if self._store.take_due(record, due, missed, timing.next_after(now)) and missed:
+            _LOG.warning("The schedule %s was missed %d times before %s.", record.id, missed, due.isoformat())
+
+    def _put_off(self, run: OpenRun, problem: str) -> None:
+        """Try a run again later that was refused for a reason that passes."""
+        self._next_try[run.schedule, run.due] = self._store.clock.monotonic() + RETRY_SECONDS
+        if run.problem is None:
+            _LOG.warning("The schedule %s was due, and no study came of it yet: %s", run.id, problem)
+        self._store.put_off_run(run, problem)
+
+    def _submit(self, run: OpenRun) -> None:
+        from dataclasses import replace
+
+        from service.faults import FaultError
+        from service.jobs.submission import accept
+        from service.spec.document import parse_spec
+        from service.spec.report import SpecError
+
+        try:
+            parsed = parse_spec(run.fields.spec)
+            if run.fields.name:
+                parsed = replace(parsed, study=replace(parsed.study, name=run.fields.name))
+            # No client can send a key with a blank in it.
+            key = f"schedule {run.id} {run.due}"
+            fields = run.fields
+            # Of the beginning that was meant: a run that is put off must not slip to the deadline of the next day.
+            finish = _finish_of(run)
+            study = accept(self._store, parsed, key, fields.priority, fields.fresh, finish)
+        except (SpecError, FaultError) as error:
+            now, end = self._store.clock.now(), _grace_end(run)
+            if isinstance(error, FaultError) and error.code in _TRANSIENT and now < end:
+                self._put_off(run, f"{error} It is tried again until {end.isoformat(timespec='seconds')}.")
+                return
+            _LOG.error("The schedule %s was due, and no study came of it: %s", run.id, error)
+            self._store.close_run(run, problem=str(error))
+            return
+        self._next_try.pop((run.schedule, run.due), None)
+        self._store.close_run(run, study=study.number)
+        _LOG.info("The schedule %s was due: study %s.", run.id, study.id)
+
+
+def _finish_of(run: OpenRun) -> datetime | None:
+    """The deadline of a run; None where it has none."""
+    from service.schedules.deadline import run_finish_at
+
+    text = run.fields.finish_by
+    return None if text is None else run_finish_at(text, run.fields.timing.zone, run.begun_at)
+
+
+def _grace_end(run: OpenRun) -> datetime:
+    """Until when a run that is refused for a reason that passes is tried: its deadline, the next due time, `GRACE`."""
+    ends = (run.begun_at + GRACE, _finish_of(run), run.fields.timing.next_after(run.begun_at))
+    return min(end for end in ends if end is not None)

@@ -1,0 +1,126 @@
+"""Taking a study in: the one way for the interface, the form and the schedules."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from service.faults import FaultError
+from service.jobs.preview import estimated_bytes, estimated_seconds
+from service.schedules.deadline import finish_warnings
+from service.storage.room import RESERVE_BYTES
+from service.storage.studies import study_row
+from worker.limits import MAX_WAITING_STUDIES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from datetime import datetime
+
+    from service.spec.document import ParsedSpec
+    from service.storage.records import StudyRecord
+    from service.storage.store import Store
+    from worker.chunking import Chunking
+    from worker.study import Study
+
+
+@dataclass(frozen=True, slots=True)
+class Submission:
+    """A checked study as it will be written down.
+
+    Attributes
+    ----------
+    row : dict
+        See `service.storage.studies.study_row`.
+    body_hash : str
+        Of the spec and the parameters of the request, for the idempotency key.
+    bytes : int
+        Rough size of its results.
+    fresh, finish_by
+        As for `accept`.
+    """
+
+    row: dict[str, Any]
+    body_hash: str
+    bytes: int
+    fresh: bool = False
+    finish_by: datetime | None = None
+
+
+def submission(
+    parsed: ParsedSpec,
+    chunking: Chunking,
+    reusable: Callable[[Study], int],
+    now: datetime,
+    fresh: bool = False,
+    finish_by: datetime | None = None,
+    given: Mapping[str, object] | None = None,
+) -> Submission:
+    """``parsed`` with all its warnings; ``reusable`` tells how many cases of a study other studies have.
+
+    One idempotency key means one spec with one set of ``given`` parameters, as the client wrote them: a deadline "8 h"
+    is another moment at each sending.
+    """
+    asked = [parsed.spec, dict(given)] if given else parsed.spec
+    warnings = (*parsed.warnings, *chunking.warnings(parsed.study))
+    if finish_by is not None:
+        to_run = parsed.study.cases - (0 if fresh else reusable(parsed.study))
+        seconds = estimated_seconds(parsed.study, chunking, to_run)
+        warnings += finish_warnings(parsed.study, seconds, (finish_by - now).total_seconds())
+    return Submission(
+        study_row(parsed.spec, parsed.study, chunking, warnings),
+        hashlib.sha256(json.dumps(asked, sort_keys=True).encode("ascii")).hexdigest(),
+        estimated_bytes(parsed.study),
+        fresh,
+        finish_by,
+    )
+
+
+def accept(
+    store: Store,
+    parsed: ParsedSpec,
+    idempotency_key: str | None = None,
+    priority: int = 0,
+    fresh: bool = False,
+    finish_by: datetime | None = None,
+    given: Mapping[str, object] | None = None,
+) -> StudyRecord:
+    """Take a study in, warnings and all; FaultError when its results would not fit on the disk.
+
+    ``given`` as for `submission`.
+    """
+    made = submission(parsed, store.chunking, store.reusable, store.clock.now(), fresh, finish_by, given)
+    return take_in(store, made, idempotency_key, priority)
+
+
+def take_in(store: Store, made: Submission, idempotency_key: str | None = None, priority: int = 0) -> StudyRecord:
+    """Write a submission down; FaultError when there are too many studies, or no room for its results."""
+    known = store.study_of_key(idempotency_key, made.body_hash) if idempotency_key else None
+    if known is not None:
+        return known
+    if store.waiting_studies() >= MAX_WAITING_STUDIES:
+        raise FaultError("queue-full", f"{MAX_WAITING_STUDIES:,} studies have not ended yet.")
+    _require_room(store, made.bytes)
+    return store.insert_study(
+        made.row,
+        idempotency_key=idempotency_key,
+        body_hash=made.body_hash,
+        priority=priority,
+        fresh=made.fresh,
+        finish_by=made.finish_by,
+    )
+
+
+def _require_room(store: Store, needed: int) -> None:
+    """Refuse a study whose results would not fit on the disk."""
+    left = max(store.room() - RESERVE_BYTES, 0)
+    if needed > left:
+        raise FaultError(
+            "storage-full",
+            f"The results would take about {_size(needed)}; the database has room for {_size(left)} more.",
+        )
+
+
+def _size(count: int) -> str:
+    return f"{count / 1e9:.3g} GB" if count >= 1e8 else f"{count / 1e6:.3g} MB"

@@ -1,0 +1,370 @@
+"""Curves and maps of a study: which cases belong to which point, and their results, exact as the database has them.
+
+`select` and `select_map` decide from the study alone which cases are drawn, and refuse what is not clear; `draw` and
+`draw_map` then fetch the results of just these cases. HTTP interface and command line both stand on these.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.faults import ErrorItem
+from service.results.selection import Fixed, SelectionError, axis_name, held_text, listed, locate_axes, require_axis
+from service.spec.catalogue import result_of, unit_of, unknown_result
+from worker.limits import MAX_CURVE_VALUES
+from worker.models import WorkerEnding
+from worker.models.codes import PENDING
+
+if TYPE_CHECKING:
+    from service.storage.records import CaseColumns
+    from worker.models import ResultInfo
+    from worker.study import Study
+
+#: Parameters without which a picture tells nobody what it shows.
+_OPERATING_POINT: Final = (
+    "excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y", "shaft.load",
+    "mean_speed", "drive.inertia",
+)  # fmt: skip
+
+#: Results of cases, aligned with them: (case numbers, result names) -> columns.
+Fetch = Callable[[NDArray[np.int64], Sequence[str]], "CaseColumns"]
+
+
+@dataclass(frozen=True, slots=True)
+class CurveQuery:
+    """What to draw: paths and result names as SPEC.md writes them; values of ``at`` as text with or without a unit."""
+
+    x: str
+    y: tuple[str, ...]
+    by: tuple[str, ...] = ()
+    at: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """The cases of one curve, in order of its points; ``by`` and ``at`` hold the fixed parameters (SI)."""
+
+    by: dict[str, float]
+    at: dict[str, float]
+    x: tuple[float, ...]
+    cases: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """The cases of all curves, chosen from the study alone; ``units`` (SI) of every path that is drawn or fixed.
+
+    For people: ``names`` of the drawn paths with those tied to them, and ``held``, the fixed ones with their values,
+    also those of the operating point that vary nowhere.
+    """
+
+    x: str
+    units: dict[str, str]
+    names: dict[str, str]
+    held: tuple[str, ...]
+    x_values: tuple[float, ...]
+    results: tuple[ResultInfo, ...]
+    lines: tuple[Line, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """One curve: a line of cases with their results (NaN where there is none) and endings."""
+
+    line: Line
+    y: dict[str, NDArray[np.float64]]
+    endings: list[str]
+
+    def run(self) -> NDArray[np.intp]:
+        """Places of the cases that were run, ascending: what a picture joins. Of a coarser study, its own points."""
+        return np.flatnonzero(~_not_run(np.array(self.endings, dtype=object)))
+
+
+@dataclass(frozen=True, slots=True)
+class Curves:
+    """Curves over one axis."""
+
+    selection: Selection
+    curves: tuple[Curve, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """SPEC.md's document: null for a missing number, with the ending that explains it."""
+        chosen = self.selection
+        return {
+            "x": {"path": chosen.x, "unit": chosen.units[chosen.x], "values": list(chosen.x_values)},
+            "units": chosen.units,
+            "results": {info.name: {"unit": info.unit, "description": info.description} for info in chosen.results},
+            "curves": [
+                {
+                    "by": curve.line.by,
+                    "at": curve.line.at,
+                    "x": list(curve.line.x),
+                    "cases": curve.line.cases.tolist(),
+                    "y": {info.name: numbers(curve.y[info.name], info.kind == "count") for info in chosen.results},
+                    "endings": curve.endings,
+                }
+                for curve in self.curves
+            ],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Map:
+    """One result over two axes; ``values``, ``endings`` and ``cases`` have the shape (y values, x values).
+
+    ``names`` and ``held`` are for people, as those of `Selection`; ``units`` and ``names`` belong to x and y.
+    """
+
+    x: str
+    y: str
+    units: tuple[str, str]
+    names: tuple[str, str]
+    held: tuple[str, ...]
+    x_values: tuple[float, ...]
+    y_values: tuple[float, ...]
+    at: dict[str, float]
+    at_units: dict[str, str]
+    result: ResultInfo
+    cases: NDArray[np.int64]
+    values: NDArray[np.float64]
+    endings: list[list[str]]
+
+    def to_json(self) -> dict[str, Any]:
+        """The map as JSON data; ``z.values[j][i]`` belongs to ``y.values[j]`` and ``x.values[i]``."""
+        count = self.result.kind == "count"
+        return {
+            "x": {"path": self.x, "unit": self.units[0], "values": list(self.x_values)},
+            "y": {"path": self.y, "unit": self.units[1], "values": list(self.y_values)},
+            "z": {
+                "name": self.result.name,
+                "unit": self.result.unit,
+                "description": self.result.description,
+                "values": [numbers(row, count) for row in self.values],
+            },
+            "units": {self.x: self.units[0], self.y: self.units[1], **self.at_units},
+            "at": self.at,
+            "cases": self.cases.tolist(),
+            "endings": self.endings,
+        }
+
+    def run(self) -> Map:
+        """The part of the map all of whose cases were run; the map itself where none was.
+
+        Of a study that stopped on its way from coarse to fine it is a coarser grid without holes.
+        """
+        missing = _not_run(np.array(self.endings, dtype=object)).reshape(self.values.shape)
+        rows, columns = _complete(missing)
+        if not missing.any() or not (rows.size and columns.size):
+            return self
+        return replace(
+            self,
+            x_values=tuple(self.x_values[index] for index in columns),
+            y_values=tuple(self.y_values[index] for index in rows),
+            cases=self.cases[np.ix_(rows, columns)],
+            values=self.values[np.ix_(rows, columns)],
+            endings=[[self.endings[row][column] for column in columns] for row in rows],
+        )
+
+
+def _complete(missing: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows and columns that are left when the emptiest is taken away, again and again, until nothing is missing."""
+    rows, columns = np.ones(missing.shape[0], dtype=np.bool_), np.ones(missing.shape[1], dtype=np.bool_)
+    in_rows, in_columns = missing.sum(axis=1), missing.sum(axis=0)
+    while in_rows.any():
+        row, column = int(in_rows.argmax()), int(in_columns.argmax())
+        if in_rows[row] * rows.sum() >= in_columns[column] * columns.sum():
+            rows[row], in_rows[row] = False, 0
+            in_columns -= missing[row] & columns
+        else:
+            columns[column], in_columns[column] = False, 0
+            in_rows -= missing[:, column] & rows
+    return np.flatnonzero(rows), np.flatnonzero(columns)
+
+
+def _not_run(endings: NDArray[np.object_]) -> NDArray[np.bool_]:
+    """Which cases have no ending of their own, yet or for good; shape as ``endings``."""
+    return np.asarray((endings == PENDING) | (endings == WorkerEnding.CANCELLED.value), dtype=np.bool_)
+
+
+def numbers(values: NDArray[np.float64], count: bool = False) -> list[float | int | None]:
+    """Doubles as JSON numbers, NaN as null; counts as integers."""
+    return [None if math.isnan(value) else int(value) if count else value for value in values.tolist()]
+
+
+def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Selection:
+    """The cases of the curves that ``query`` asks for.
+
+    Raises
+    ------
+    SelectionError
+        Unknown path or result, a value that its axis does not have, an axis left open, or too many numbers.
+    """
+    results = _results(infos, "y", query.y)
+    x_axis = require_axis(study, "x", query.x)
+    fixed = locate_axes(study, query.at)
+    by_axes = {path: require_axis(study, "by", path) for path in dict.fromkeys(query.by)}
+    _no_axis_twice({query.x: x_axis}, "by", by_axes, fixed)
+    chooser = _zip_lines if study.combine == "zip" else _grid_lines
+    x_values, lines = chooser(study, x_axis, by_axes, fixed, len(results))
+    made = tuple(lines)
+    units = {path: unit_of(study, path) for path in (query.x, *made[0].by, *made[0].at)}
+    names = {path: axis_name(study, path) for path in (query.x, *made[0].by)}
+    return Selection(query.x, units, names, _held(study, made[0]), x_values, results, made)
+
+
+def _held(study: Study, line: Line) -> tuple[str, ...]:
+    """The fixed axes, then what of the operating point varies nowhere."""
+    varying = study.axis_paths
+    always = [path for path in _OPERATING_POINT if path in study.base and path not in varying]
+    fixed = [*line.at.items(), *((path, study.base[path]) for path in always)]
+    return tuple(held_text(study, path, value) for path, value in fixed)
+
+
+def draw(selection: Selection, fetch: Fetch) -> Curves:
+    """Fetch the results of the selected cases, in one go."""
+    names = [info.name for info in selection.results]
+    columns = fetch(np.concatenate([line.cases for line in selection.lines]), names)
+    endings = [ending or PENDING for ending in columns.endings]
+    curves, start = [], 0
+    for line in selection.lines:
+        part = slice(start, start + line.cases.size)
+        curves.append(Curve(line, {name: columns.values[name][part] for name in names}, endings[part]))
+        start = part.stop
+    return Curves(selection, tuple(curves))
+
+
+def draw_map(
+    study: Study, infos: Sequence[ResultInfo], x: str, y: str, z: str, at: Sequence[tuple[str, str]], fetch: Fetch
+) -> Map:
+    """One result over two axes of a grid; raises SelectionError as `select` does."""
+    (result,) = _results(infos, "z", (z,))
+    if study.combine == "zip":
+        raise SelectionError([ErrorItem("a map needs a grid; the axes of this study go together (zip)", parameter="x")])
+    x_axis, y_axis = require_axis(study, "x", x), require_axis(study, "y", y)
+    fixed = locate_axes(study, at)
+    _no_axis_twice({x: x_axis}, "y", {y: y_axis}, fixed)
+    x_values, lines = _grid_lines(study, x_axis, {y: y_axis}, fixed, 1, way_out="give")
+    rows = list(lines)
+    cases = np.stack([row.cases for row in rows])
+    columns = fetch(cases.reshape(-1), [z])
+    endings = [ending or PENDING for ending in columns.endings]
+    width = len(x_values)
+    return Map(
+        x,
+        y,
+        (unit_of(study, x), unit_of(study, y)),
+        (axis_name(study, x), axis_name(study, y)),
+        _held(study, rows[0]),
+        x_values,
+        tuple(row.by[y] for row in rows),
+        rows[0].at,
+        {path: unit_of(study, path) for path in rows[0].at},
+        result,
+        cases,
+        columns.values[z].reshape(cases.shape),
+        [endings[start : start + width] for start in range(0, len(endings), width)],
+    )
+
+
+def _results(infos: Sequence[ResultInfo], parameter: str, names: Sequence[str]) -> tuple[ResultInfo, ...]:
+    names = tuple(dict.fromkeys(names))
+    faults = [
+        ErrorItem(unknown_result(infos, name), parameter=parameter, value=name, allowed=listed(i.name for i in infos))
+        for name in names
+        if result_of(infos, name) is None
+    ]
+    if faults:
+        raise SelectionError(faults)
+    return tuple(info for name in names if (info := result_of(infos, name)) is not None)
+
+
+def _no_axis_twice(x: dict[str, int], second: str, others: dict[str, int], fixed: Fixed) -> None:
+    taken: dict[int, str] = {}
+    uses = [("x", path, axis) for path, axis in x.items()] + [(second, path, axis) for path, axis in others.items()]
+    uses += [("at", path, axis) for axis, (path, _) in fixed.items()]
+    for parameter, path, axis in uses:
+        if axis in taken:
+            message = f"the axis is already taken by {taken[axis]}; one axis can have one role only"
+            raise SelectionError([ErrorItem(message, parameter=parameter, value=path)])
+        taken[axis] = f"{parameter}={path}"
+
+
+def _check_size(points: int, results: int) -> None:
+    if points * results > MAX_CURVE_VALUES:
+        message = (
+            f"{points} points of {results} results are asked for; choose fewer with at=, or take them from the results"
+        )
+        raise SelectionError([ErrorItem(message, parameter="at", allowed=f"<= {MAX_CURVE_VALUES} numbers")])
+
+
+def _grid_lines(
+    study: Study, x_axis: int, by: dict[str, int], fixed: Fixed, results: int, way_out: str = "name it in by=, or give"
+) -> tuple[tuple[float, ...], Iterator[Line]]:
+    axes = study.axes
+    named = {x_axis, *by.values(), *fixed}
+    faults = [
+        ErrorItem(
+            f"the axis {axis.paths[0]} is left open: {way_out} its value as at={axis.paths[0]}=VALUE",
+            parameter="at",
+            allowed=listed(axis.values),
+            unit=unit_of(study, axis.paths[0]),
+        )
+        for position, axis in enumerate(axes)
+        if position not in named and len(axis) > 1
+    ]
+    if faults:
+        raise SelectionError(faults)
+    _check_size(math.prod([len(axes[i]) for i in (x_axis, *by.values())]), results)
+
+    strides = [math.prod(study.shape[i + 1 :]) for i in range(len(axes))]
+    at = {path: axes[i].values[index] for i, (path, index) in fixed.items()}
+    at |= {axes[i].paths[0]: axes[i].values[0] for i in range(len(axes)) if i not in named}
+    origin = sum(index * strides[i] for i, (_, index) in fixed.items())
+    x_order = np.argsort(axes[x_axis].array, kind="stable")
+    x_values = tuple(axes[x_axis].array[x_order].tolist())
+
+    def lines() -> Iterator[Line]:
+        orders = [np.argsort(axes[i].array, kind="stable").tolist() for i in by.values()]
+        for indices in itertools.product(*orders):
+            chosen = list(zip(by.items(), indices, strict=True))
+            first = origin + sum(index * strides[i] for (_, i), index in chosen)
+            values = {path: axes[i].values[index] for (path, i), index in chosen}
+            yield Line(values, at, x_values, (first + x_order * strides[x_axis]).astype(np.int64))
+
+    return x_values, lines()
+
+
+def _zip_lines(
+    study: Study, x_axis: int, by: dict[str, int], fixed: Fixed, results: int
+) -> tuple[tuple[float, ...], Iterator[Line]]:
+    axes = study.axes
+    chosen = np.ones(study.cases, dtype=np.bool_)
+    for i, (_, index) in fixed.items():
+        chosen &= axes[i].array == axes[i].values[index]
+    cases = np.flatnonzero(chosen).astype(np.int64)
+    if cases.size == 0:
+        message = "no case has all these values together"
+        raise SelectionError([ErrorItem(message, parameter="at", value=listed(p for p, _ in fixed.values()))])
+    _check_size(cases.size, results)
+    at = {path: axes[i].values[index] for i, (path, index) in fixed.items()}
+    x_all = axes[x_axis].array
+
+    def lines() -> Iterator[Line]:
+        if not by:
+            yield Line({}, at, tuple(x_all[cases].tolist()), cases)
+            return
+        keys = np.stack([axes[i].array[cases] for i in by.values()], axis=1)
+        groups, member = np.unique(keys, axis=0, return_inverse=True)
+        order = np.argsort(member.reshape(-1), kind="stable")
+        parts = np.split(cases[order], np.cumsum(np.bincount(member.reshape(-1)))[:-1])
+        for values, part in zip(groups.tolist(), parts, strict=True):
+            yield Line(dict(zip(by, values, strict=True)), at, tuple(x_all[part].tolist()), part)
+
+    return tuple(x_all[cases].tolist()), lines()

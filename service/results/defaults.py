@@ -1,0 +1,89 @@
+"""The curve shown first for a study: speed against load where it has them, whatever is nearest to it elsewhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+from service.results.curves import CurveQuery
+from service.results.selection import axis_name, held_text
+from service.spec.catalogue import unit_of
+
+if TYPE_CHECKING:
+    from worker.models import ResultInfo
+    from worker.study import Axis, Study
+
+#: Axes a designer draws along, and then those told apart by colour, first choice first; of either model.
+_ALONG: Final = ("shaft.load", "excitation.frequency", "drive.inertia")
+_APART: Final = (
+    "excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y", "shaft.load", "mean_speed",
+)  # fmt: skip
+_RESULTS: Final = ("shaft.speed.mean", "shaft.speed.max", "irregularity")
+_MOST_CURVES: Final = 8
+#: Results of the mechanical characteristic, and how many of another model stand for them.
+_CHARACTERISTIC: Final = (
+    "shaft.speed.mean", "torque.mean", "power.useful.mean", "efficiency",
+    "irregularity", "omega.max", "omega.min", "energy.fluctuation", "drive_torque.mean", "required_inertia",
+)  # fmt: skip
+
+
+def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
+    """What to draw for ``study``; None when nothing varies.
+
+    Axes not drawn are held at the value of the base where they have it, else at the value in their middle.
+    """
+    varying = [axis for axis in study.axes if len(axis) > 1]
+    if not varying:
+        return None
+    names = [info.name for info in infos]
+    y = tuple(name for name in _RESULTS if name in names) or (names[0],)
+    x = next((path for path in _ALONG for axis in varying if path in axis.paths), varying[0].paths[0])
+    if study.combine == "zip":
+        return CurveQuery(x, y)
+    others = [axis for axis in varying if x not in axis.paths]
+    few = [axis for axis in others if len(axis) <= _MOST_CURVES]
+    by = next((path for path in _APART for axis in few if path in axis.paths), few[0].paths[0] if few else None)
+    held = [axis for axis in others if by not in axis.paths]
+    at = tuple((axis.paths[0], repr(usual_value(study, axis))) for axis in held)
+    return CurveQuery(x, y if by is None else y[:1], () if by is None else (by,), at)
+
+
+def characteristic_names(infos: Sequence[ResultInfo]) -> tuple[str, ...]:
+    """The results that tell most of a machine: speed, torque, power and efficiency where it has them."""
+    names = [info.name for info in infos]
+    return tuple(name for name in _CHARACTERISTIC if name in names) or tuple(names[: len(_CHARACTERISTIC)])
+
+
+def usual_value(study: Study, axis: Axis) -> float:
+    """The value at which an axis that is not drawn is held: the base's where the axis has it, else its middle one."""
+    base = study.base.get(axis.paths[0])
+    index = None if base is None else axis.index_of(base)
+    return sorted(axis.values)[len(axis) // 2] if index is None else axis.values[index]
+
+
+def drawn_numbers(study: Study, query: CurveQuery) -> int:
+    """How many numbers the curves of ``query`` (from `main_query`) have."""
+    if study.combine == "zip":
+        return study.cases * len(query.y)
+    axes = [axis for path in (query.x, *query.by) for axis in study.axes if path in axis.paths]
+    return math.prod(map(len, axes)) * len(query.y)
+
+
+def caption(study: Study, query: CurveQuery) -> str:
+    """What the curves of ``query`` show, as a sentence without its full stop."""
+    by = ", ".join(_with_unit(study, path) for path in query.by)
+    held = [held_text(study, path, float(value)) for path, value in query.at]
+    first = f"{', '.join(query.y)} against {_with_unit(study, query.x)}" + (f", a curve for each {by}" if by else "")
+    return "; ".join([first, *held])
+
+
+def _with_unit(study: Study, path: str) -> str:
+    unit = unit_of(study, path)
+    return axis_name(study, path) + ("" if unit == "1" else f" ({unit})")
+
+
+def query_pairs(query: CurveQuery, **more: str) -> list[tuple[str, str]]:
+    """The same as the query parameters of the curves' address."""
+    pairs = [("x", query.x), *(("y", name) for name in query.y), *(("by", path) for path in query.by)]
+    return [*pairs, *(("at", f"{path}={value}") for path, value in query.at), *more.items()]

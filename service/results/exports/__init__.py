@@ -1,0 +1,63 @@
+"""All rows of a study as a file, in every format people work with, written piece by piece, however many there are.
+
+CSV, JSON and JSON lines (`text`), Parquet and Arrow (`arrow`), spreadsheets (`xlsx`), labelled grids (`netcdf`).
+Reading the numbers gives the same doubles back; what could not be computed is empty, null or NaN, never 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from service.formats import FORMATS, MEDIA_TYPES, SUFFIXES, Format, format_of
+from service.results.exports.source import Source
+from service.results.exports.text import (
+    csv_pieces,
+    escape,
+    json_lines_pieces,
+    json_pieces,
+    row_json,
+    rows_json,
+    table_csv,
+)
+
+__all__ = [
+    "FORMATS",
+    "MEDIA_TYPES",
+    "SUFFIXES",
+    "Format",
+    "Source",
+    "csv_pieces",
+    "escape",
+    "export",
+    "format_of",
+    "json_lines_pieces",
+    "json_pieces",
+    "row_json",
+    "rows_json",
+    "table_csv",
+]
+
+
+def export(source: Source, form: Format) -> Iterator[bytes]:
+    """The file in pieces, each of about one block of rows. Libraries are loaded for the format that is asked for."""
+    if form == "csv":
+        return csv_pieces(source)
+    if form == "json":
+        return json_pieces(source)
+    if form == "jsonl":
+        return json_lines_pieces(source)
+    if form == "parquet":
+        from service.results.exports.arrow import parquet_pieces
+
+        return parquet_pieces(source)
+    if form == "arrow":
+        from service.results.exports.arrow import arrow_pieces
+
+        return arrow_pieces(source)
+    if form == "xlsx":
+        from service.results.exports.xlsx import xlsx_pieces
+
+        return xlsx_pieces(source)
+    from service.results.exports.netcdf import netcdf_pieces
+
+    return netcdf_pieces(source)

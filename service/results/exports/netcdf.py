@@ -1,0 +1,176 @@
+"""Rows as a labelled grid: a CF NetCDF file; its dimensions are the axes, units and meanings are attributes."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from service.results.exports.inputs import description_of
+from service.results.exports.source import machine
+from service.results.exports.spool import spooled
+from service.spec.catalogue import unit_of
+from worker.models.codes import ENDING_CODES, FLAG_MASKS, PENDING, flags_mask
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from service.results.exports.source import Source
+    from worker.study import Axis, Study
+
+_CONVENTIONS: Final = "CF-1.11"
+_CASE: Final = "case"
+#: Level of zlib: higher ones take several times as long for a few hundredths of the size.
+_LEVEL: Final = 1
+
+
+def netcdf_pieces(source: Source) -> Iterator[bytes]:
+    """The file in pieces. It is made on the disk, one result at a time, so that memory stays small."""
+    return spooled(partial(_write, source))
+
+
+def _write(source: Source, folder: Path) -> Path:
+    import xarray as xr
+
+    study, path = source.study, folder / "results.nc"
+    rows = _Columns(source, folder / "columns")
+    grid = _Grid(study)
+    head = xr.Dataset(coords=grid.coordinates(), attrs=_about(source))
+    head["ending"] = grid.variable(rows.endings, _ending_attributes())
+    head["flags"] = grid.variable(rows.flags, _flag_attributes())
+    head.to_netcdf(path, engine="h5netcdf", unlimited_dims=())
+    for index, info in enumerate(source.infos):
+        attributes = {"units": info.unit, "long_name": info.description}
+        column = grid.variable(rows.column(index), attributes)
+        # The coordinates are in the file already; xarray names them only for variables that are written beside them.
+        if grid.labels:
+            column.attrs["coordinates"] = " ".join(grid.labels)
+        xr.Dataset({info.name: column}).to_netcdf(path, engine="h5netcdf", mode="a")
+    return path
+
+
+class _Grid:
+    """The places of a study's cases in the file.
+
+    Attributes
+    ----------
+    dims : names of the dimensions: the first path of each axis of a grid; ``case`` where axes go together
+    shape : their lengths
+    labels : coordinates that are no dimension: the case's number in a grid, further paths of tied axes
+    """
+
+    def __init__(self, study: Study) -> None:
+        self._study = study
+        self._together = study.combine != "grid"
+        self.dims = (_CASE,) if self._together else tuple(axis.paths[0] for axis in study.axes)
+        self.shape = study.shape or ((1,) if self._together else ())
+        self._orders = [slice(None)] if self._together else [_order(axis) for axis in study.axes]
+        paths = study.axis_paths if self._together else [path for axis in study.axes for path in axis.paths[1:]]
+        self.labels = [*paths] if self._together else [_CASE, *paths]
+
+    def place(self, column: NDArray[Any]) -> NDArray[Any]:
+        """A column in the order of cases as an array over the dimensions."""
+        array = column.reshape(self.shape)
+        for dimension, order in enumerate(self._orders):
+            array = array[(slice(None),) * dimension + (order,)]
+        return array
+
+    def variable(self, column: NDArray[Any], attributes: dict[str, Any]) -> Any:
+        """A column as a compressed variable over the dimensions."""
+        import xarray as xr
+
+        encoding: dict[str, Any] = {"zlib": True, "complevel": _LEVEL, "shuffle": True} if self.dims else {}
+        return xr.Variable(self.dims, self.place(column), attributes, encoding)
+
+    def coordinates(self) -> dict[str, Any]:
+        """Values of every axis path along its dimension, and the number of every case."""
+        import xarray as xr
+
+        study = self._study
+        unfilled: dict[str, Any] = {"_FillValue": None}
+        found: dict[str, Any] = {}
+        for index, axis in enumerate(study.axes):
+            dimension, order = (0, slice(None)) if self._together else (index, self._orders[index])
+            for path in axis.paths:
+                attributes = {"units": unit_of(study, path), "long_name": description_of(study, path) or path}
+                found[path] = xr.Variable(self.dims[dimension], axis.array[order], attributes, unfilled)
+        numbers = self.variable(
+            np.arange(study.cases, dtype=np.int64), {"units": "1", "long_name": "number of the case"}
+        )
+        return {**found, _CASE: numbers}
+
+
+def _order(axis: Axis) -> Any:
+    """What brings the values of an axis into the order of CF coordinates, which only rise or only fall."""
+    steps = np.diff(axis.array)
+    return slice(None) if (steps > 0).all() or (steps < 0).all() else np.argsort(axis.array)
+
+
+def _about(source: Source) -> dict[str, Any]:
+    study = source.study
+    return {
+        "Conventions": _CONVENTIONS,
+        "title": study.name or "parameter study",
+        "history": f"written by Sprag {version('sprag')}",
+        **{name: str(value) for name, value in source.about.items()},
+        **{name: part if isinstance(part, str) else json.dumps(part) for name, part in machine(source).items()},
+    }
+
+
+def _ending_attributes() -> dict[str, Any]:
+    return {
+        "long_name": "how the case ended",
+        "flag_values": np.array(list(ENDING_CODES.values()), dtype=np.int16),
+        "flag_meanings": " ".join(ENDING_CODES),
+    }
+
+
+def _flag_attributes() -> dict[str, Any]:
+    return {
+        "long_name": "what to know of the case",
+        "flag_masks": np.array(list(FLAG_MASKS.values()), dtype=np.int32),
+        "flag_meanings": " ".join(FLAG_MASKS),
+    }
+
+
+class _Columns:
+    """The rows of a study turned into columns: results in a file, endings and flags in memory."""
+
+    def __init__(self, source: Source, path: Path) -> None:
+        self._path = path
+        self._cases = cases = source.study.cases
+        self.endings: NDArray[np.int16] = np.full(cases, ENDING_CODES[PENDING], dtype=np.int16)
+        self.flags: NDArray[np.int32] = np.zeros(cases, dtype=np.int32)
+        file = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+        try:
+            for block in source.blocks:
+                self._note(block.cases, block.endings, block.flags)
+                # Runs of consecutive cases, which nearly always is the whole block.
+                starts = np.flatnonzero(np.diff(block.cases, prepend=block.cases[0] - 2) != 1)
+                for begin, end in zip(starts, [*starts[1:], len(block)], strict=True):
+                    for index in range(len(source.infos)):
+                        at = 8 * (index * cases + int(block.cases[begin]))
+                        os.pwrite(file, np.ascontiguousarray(block.values[begin:end, index]).tobytes(), at)
+        finally:
+            os.close(file)
+
+    def _note(self, cases: NDArray[np.int64], endings: list[str], flags: list[str]) -> None:
+        self.endings[cases] = [ENDING_CODES[ending] for ending in endings]
+        masks = {text: flags_mask(text) for text in set(flags)}
+        self.flags[cases] = [masks[text] for text in flags]
+
+    def column(self, index: int) -> NDArray[np.float64]:
+        """One result of all cases, NaN where there is none."""
+        column = np.full(self._cases, np.nan)
+        with self._path.open("rb") as file:
+            file.seek(8 * index * self._cases)
+            read = np.fromfile(file, dtype=np.float64, count=self._cases)
+        column[: read.size] = read
+        column[self.endings == ENDING_CODES[PENDING]] = np.nan
+        return column

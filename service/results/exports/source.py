@@ -1,0 +1,72 @@
+"""What is exported: a study, its rows, and what each column of the table means."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+from service.results.exports.inputs import choices, defaults
+
+if TYPE_CHECKING:
+    from service.storage.records import RowBlock
+    from worker.models import ResultInfo
+    from worker.study import Study
+
+
+#: Parts of a spec that describe the machine and its run; the axes stand in the rows themselves.
+_GIVEN: Final = ("base", "run")
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """What is exported: a study, the description of its results, and where its rows come from, in order of cases.
+
+    ``spec`` is the user's own, which has what is no number: kinds, formulas, tables, measured points.
+    """
+
+    study: Study
+    infos: tuple[ResultInfo, ...]
+    blocks: Iterable[RowBlock]
+    about: dict[str, Any]
+    spec: Mapping[str, Any] = field(default_factory=dict)
+
+
+def machine(source: Source) -> dict[str, Any]:
+    """The machine and its run for programs, plain JSON data.
+
+    ``base`` and ``run`` in SI numbers, ``choices`` (what is no number), ``defaults`` (paths of what nobody gave), and
+    ``given``, both as the user wrote them.
+    """
+    study, spec = source.study, source.spec
+    return {
+        "base": study.base,
+        "choices": choices(study, spec),
+        "run": study.run,
+        "combine": study.combine,
+        "given": given(spec),
+        "defaults": defaults(study, spec),
+    }
+
+
+def given(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """The machine and its run as the user wrote them, with their units: plain JSON data."""
+    return {name: spec[name] for name in _GIVEN if spec.get(name)}
+
+
+def given_texts(spec: Mapping[str, Any]) -> dict[str, str]:
+    """The same, flat: ``base.mechanism.slider_crank.crank`` -> ``40 mm``; tables and lists as JSON text."""
+    return {path: text for name, part in given(spec).items() for path, text in _flat(name, part)}
+
+
+def _flat(path: str, value: object) -> Iterator[tuple[str, str]]:
+    if isinstance(value, Mapping) and value:
+        for name, item in value.items():
+            yield from _flat(f"{path}.{name}", item)
+    elif isinstance(value, list) and any(isinstance(item, Mapping) for item in value):
+        for index, item in enumerate(value):
+            yield from _flat(f"{path}.{index}", item)
+    else:
+        text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+        yield path, text.encode("utf-8", "backslashreplace").decode()

@@ -1,0 +1,28 @@
+"""Files that cannot be written from front to back: made in a folder of their own, then handed out piece by piece."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Final
+
+from service.stale_files import marked, sweep
+
+_PREFIX: Final = "sprag-export-"
+_PIECE: Final = 1 << 20
+
+
+def spooled(write: Callable[[Path], Path]) -> Iterator[bytes]:
+    """The bytes of the file that ``write`` makes in the folder it is given; the folder goes with the last piece.
+
+    What a killed process left of such folders is swept up.
+    """
+    sweep(Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"))
+    with (
+        tempfile.TemporaryDirectory(prefix=_PREFIX) as folder,
+        marked(Path(folder)),
+        write(Path(folder)).open("rb") as file,
+    ):
+        while piece := file.read(_PIECE):
+            yield piece

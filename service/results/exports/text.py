@@ -1,0 +1,114 @@
+"""Rows as text: CSV for tables, JSON and JSON lines for programs. A row never depends on how the cases were batched."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any, Final
+
+from service.json_text import to_bytes
+from service.results.exports.source import machine
+from service.spec.catalogue import unit_of
+
+if TYPE_CHECKING:
+    from service.results.exports.source import Source
+    from service.storage.records import CaseRow, RowBlock
+    from worker.study import Study
+
+#: A spreadsheet takes a cell that begins like this for a formula.
+_FORMULA_STARTS: Final = ("=", "+", "-", "@", "\t", "\r")
+
+
+def row_json(row: CaseRow, parameters: dict[str, float]) -> dict[str, Any]:
+    """One case as every interface shows it; ``parameters`` are its axis parameters, SI."""
+    return {
+        "case": row.case,
+        "parameters": parameters,
+        "ending": row.ending,
+        "flags": list(row.flags),
+        "results": row.results,
+    }
+
+
+def rows_json(study: Study, block: RowBlock) -> Iterator[dict[str, Any]]:
+    """The cases of a block as `row_json` gives them."""
+    columns = {path: column.tolist() for path, column in study.columns(block.cases).items()}
+    for index, row in enumerate(block.rows()):
+        yield row_json(row, {path: column[index] for path, column in columns.items()})
+
+
+def json_pieces(source: Source) -> Iterator[bytes]:
+    """``{..., "axes": [...], "results": [...], "rows": [row, row, ...]}``, a row on a line."""
+    study = source.study
+    head = {
+        **source.about,
+        "axes": [
+            {"paths": list(axis.paths), "unit": unit_of(study, axis.paths[0]), "values": len(axis)}
+            for axis in study.axes
+        ],
+        "results": [{"name": info.name, "unit": info.unit} for info in source.infos],
+        **machine(source),
+    }
+    yield to_bytes(head)[:-1] + b',"rows":['
+    separator = b"\n"
+    for block in source.blocks:
+        piece = [to_bytes(row) for row in rows_json(study, block)]
+        if piece:
+            yield separator + b",\n".join(piece)
+            separator = b",\n"
+    yield b"\n]}\n"
+
+
+def json_lines_pieces(source: Source) -> Iterator[bytes]:
+    """One flat object a line, with the same names as the columns of `csv_pieces`; null for what is missing."""
+    study = source.study
+    for block in source.blocks:
+        columns = {path: column.tolist() for path, column in study.columns(block.cases).items()}
+        for index, row in enumerate(block.rows()):
+            parameters = {path: column[index] for path, column in columns.items()}
+            flat = {"case": row.case, **parameters, "ending": row.ending, "flags": list(row.flags), **row.results}
+            yield to_bytes(flat) + b"\n"
+
+
+def csv_pieces(source: Source) -> Iterator[bytes]:
+    """Header ``case, axis paths, ending, flags, result names``; empty cells for what could not be computed."""
+    study = source.study
+    paths = study.axis_paths
+    yield _csv_lines([["case", *paths, "ending", "flags", *(info.name for info in source.infos)]])
+    for block in source.blocks:
+        columns = study.columns(block.cases)
+        parameters = zip(*(columns[path].tolist() for path in paths), strict=True) if paths else iter(lambda: (), None)
+        lines = (
+            [row.case, *map(repr, values), row.ending, ";".join(row.flags), *map(_cell, row.results.values())]
+            for row, values in zip(block.rows(), parameters, strict=False)
+        )
+        yield _csv_lines(lines)
+
+
+def table_csv(header: Iterable[str], columns: Iterable[Iterable[object]]) -> bytes:
+    """A small table given by its columns, as CSV with the same cells as `csv_pieces`."""
+    rows = ([_cell(value) for value in row] for row in zip(*columns, strict=True))
+    return _csv_lines(_with_header(list(header), rows))
+
+
+def _with_header(header: list[str], rows: Iterable[list[Any]]) -> Iterator[list[Any]]:
+    yield header
+    yield from rows
+
+
+def _cell(value: object) -> str:
+    if value is None or value != value:  # noqa: PLR0124 - NaN
+        return ""
+    return repr(value) if isinstance(value, float) else escape(str(value)) if isinstance(value, str) else str(value)
+
+
+def escape(text: str) -> str:
+    """Text that a spreadsheet does not take for a formula."""
+    return "'" + text if text.startswith(_FORMULA_STARTS) else text
+
+
+def _csv_lines(rows: Iterable[Iterable[object]]) -> bytes:
+    buffer = io.StringIO()
+    csv.writer(buffer, lineterminator="\n").writerows(rows)
+    return buffer.getvalue().encode("utf-8")

@@ -1,0 +1,82 @@
+"""A clutch fit as asked for in JSON data, and its report, the same for the HTTP interface and the commands."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+from service.spec.fields import placed, read_number, read_object
+from service.spec.machine.clutch import read_clutch
+from service.spec.report import Report
+from worker import models
+
+if TYPE_CHECKING:
+    from worker.models import ClutchFit
+
+#: Fields of a request for a fit.
+REQUEST_FIELDS: Final = ("data", "accuracy", "max_degree", "through_origin", "angles_include_backlash", "backlash")
+
+
+def fit_json(fit: ClutchFit) -> dict[str, Any]:
+    """The whole report of ``fit``, SI units; an infinite condition number is null."""
+    return {
+        "coefficients": list(fit.coefficients),
+        "windup_limit": fit.windup_limit,
+        "degree": fit.degree,
+        "accuracy": fit.accuracy,
+        "rms": fit.rms,
+        "max_residual": fit.max_residual,
+        "rank": fit.rank,
+        "condition_number": _finite(fit.condition_number),
+        "eigenvalues": list(fit.eigenvalues),
+        "monotone": fit.monotone,
+        "negative": fit.negative,
+        "residuals": list(fit.residuals),
+        "rows_in_backlash": list(fit.rows_in_backlash),
+        "degrees_tried": degrees_json(fit.degrees_tried),
+        "warnings": list(fit.warnings),
+    }
+
+
+def degrees_json(degrees: Any) -> list[dict[str, Any]]:
+    """The reports of the degrees that a fit tried."""
+    return [
+        {
+            "degree": report.degree,
+            "rms": report.rms,
+            "max_residual": report.max_residual,
+            "rank": report.rank,
+            "condition_number": _finite(report.condition_number),
+            "eigenvalues": list(report.eigenvalues),
+        }
+        for report in degrees
+    ]
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def read_fit(data: object) -> ClutchFit:
+    """The fit that plain JSON data with rows, accuracy and choices ask for; raises SpecError."""
+    report = Report(data)
+    found = dict(read_object(report, "", data, REQUEST_FIELDS) or {})
+    backlash = read_number(report, "/backlash", found.pop("backlash", 0.0), _backlash())
+    if backlash and found.get("angles_include_backlash") is not True:
+        report.problem(
+            "/backlash", "is taken off the angles only where they include it", backlash,
+            allowed="with `angles_include_backlash` true; else 0 or left out", unit="rad",
+        )  # fmt: skip
+    clutch = None
+    if not report.problems:
+        # Without rows this would be taken for a law that lacks its coefficients.
+        clutch = read_clutch(report, "", {"data": None, **found}, "clutch.", [backlash or 0.0])
+    report.raise_if_any()
+    assert clutch is not None
+    assert clutch.fit is not None
+    return clutch.fit
+
+
+def _backlash() -> models.Parameter:
+    entry = next(e for e in models.parameter_catalogue(models.model_names()[0]) if e.path.endswith(".backlash"))
+    return placed(entry, "backlash")

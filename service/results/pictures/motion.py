@@ -1,0 +1,53 @@
+"""The motion of one case as a picture: angles, speeds, torques and powers over the states of clutches and shaft."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from service.results.pictures.curves import Picture, render
+from service.results.pictures.panels import STATES, panels, spans_of
+from service.results.wording import words
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from worker.models import Trajectory
+
+
+def draw_motion(made: Trajectory, title: str, picture: Picture) -> bytes:
+    """The picture of a motion; lines of one plot are told apart by colour and by style."""
+    rows = panels(made)
+
+    def paint(figure: Figure) -> None:
+        heights = [*(3.0 for _ in rows), 0.45 * len(made.states) + 0.3]
+        plots = figure.subplots(len(rows) + 1, 1, sharex=True, height_ratios=heights)
+        for axes, (quantity, unit, lines) in zip(plots, rows, strict=False):
+            for (name, label), style in zip(lines, ("-", "--", ":", "-.") * 3, strict=False):
+                axes.plot(made.times, made.values[:, made.names.index(name)], style, label=label, linewidth=1.1)
+            axes.set_ylabel(f"{quantity} ({unit})")
+            if len(lines) > 1:
+                axes.legend(fontsize=8, loc="upper right", framealpha=0.8)
+        _strip(plots[-1], made)
+        plots[-1].set_xlabel("time (s)")
+        figure.suptitle(title, fontsize=10)
+
+    return render(paint, picture, (8.0, 2.1 * len(rows) + 0.5 * len(made.states) + 1.0))
+
+
+def _strip(axes: Axes, made: Trajectory) -> None:
+    from matplotlib.patches import Patch
+
+    shown: dict[str, Patch] = {}
+    for row, states in enumerate(made.states.values()):
+        for state, first, stop in spans_of(list(states)):
+            colour, _, hatch = STATES.get(state, ("#999999", "", "++"))
+            begin, last = float(made.times[first]), float(made.times[min(stop, made.times.size - 1)])
+            style: dict[str, Any] = {"facecolor": colour, "hatch": hatch, "edgecolor": "#333333", "linewidth": 0.0}
+            axes.broken_barh([(begin, last - begin)], (row - 0.4, 0.8), **style)
+            shown.setdefault(state, Patch(label=words(state).lower(), **style))
+    axes.set_yticks(range(len(made.states)), [words(name) for name in made.states])
+    axes.grid(visible=False)
+    axes.legend(
+        handles=list(shown.values()), fontsize=7, ncols=len(shown), loc="upper center", bbox_to_anchor=(0.5, -0.6)
+    )

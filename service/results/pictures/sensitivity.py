@@ -1,0 +1,92 @@
+"""Pictures of what results depend on: shares of the variance as bars, main effects as lines."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from service.faults import ErrorItem
+from service.results.pictures.curves import Picture, axis_label, head, render
+from service.results.selection import SelectionError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from service.results.sensitivity import Sensitivity
+
+MOST_RESULTS: Final = 8
+#: Characters of a line of notes that surely fit into the width of a picture.
+_NOTE_WIDTH: Final = 110
+
+
+def draw_sensitivity(found: Sequence[Sensitivity], title: str, picture: Picture) -> bytes:
+    """A row of two plots for each result; raises SelectionError when there are more than one picture can show."""
+    if len(found) > MOST_RESULTS:
+        message = f"{len(found)} results are too many for one picture; choose fewer, or take the numbers"
+        raise SelectionError([ErrorItem(message, parameter="y", allowed=f"<= {MOST_RESULTS} results")])
+    axes = len(found[0].effects)
+    return render(partial(_paint, found, title), picture, (10.0, 0.8 + len(found) * max(2.6, 1.0 + 0.45 * axes)))
+
+
+def _paint(found: Sequence[Sensitivity], title: str, figure: Figure) -> None:
+    plots = figure.subplots(len(found), 2, squeeze=False, width_ratios=(3, 4))
+    for (bars, lines), item in zip(plots, found, strict=True):
+        _bars(bars, item)
+        _lines(lines, item)
+    notes = dict.fromkeys(note for item in found for note in item.notes)
+    head(figure, title, tuple("\n".join(textwrap.wrap(note, _NOTE_WIDTH)) for note in notes))
+
+
+def _bars(axes: Axes, item: Sensitivity) -> None:
+    names = ["\n".join(effect.paths[:2]) for effect in item.effects]
+    places = np.arange(len(names))
+    shares = (
+        ("first order", [(effect.first, effect.first_error) for effect in item.effects], -0.2),
+        ("total", [(effect.total, effect.total_error) for effect in item.effects], 0.2),
+    )
+    for index, (name, values, offset) in enumerate(shares):
+        if all(value is None for value, _ in values):
+            continue
+        axes.barh(
+            places + offset,
+            [np.nan if value is None else value for value, _ in values],
+            0.38,
+            xerr=None if all(error is None for _, error in values) else [error or 0.0 for _, error in values],
+            color=f"C{index}",
+            label=name,
+        )
+    axes.set_yticks(places, names, fontsize=8)
+    axes.invert_yaxis()
+    axes.set_xlabel(f"share of the variance of {item.info.name}")
+    if axes.has_data():
+        axes.legend(fontsize=8, loc="best")
+    else:
+        _tell(axes, "no shares of the variance" if item.cases else "no case has this result")
+
+
+def _lines(axes: Axes, item: Sensitivity) -> None:
+    """Every axis from its least to its largest value, so that axes of different units stand in one plot."""
+    for index, effect in enumerate(item.effects):
+        if not np.isfinite(effect.means).any():
+            continue
+        low, high = effect.values.min(), effect.values.max()
+        place = (effect.values - low) / (high - low) if high > low else np.zeros(effect.values.size)
+        unit = "" if effect.unit == "1" else f" {effect.unit}"
+        text = f"{effect.paths[0]}: {low:.4g} .. {high:.4g}{unit}"
+        axes.plot(place, effect.means, marker="o", markersize=3.0, color=f"C{index}", label=text)
+    axes.set_xlabel("axis, from its least to its largest value")
+    axes.set_ylabel(f"mean of {axis_label(item.info.name, item.info.unit)}")
+    if axes.has_data():
+        axes.legend(fontsize=8, loc="best")
+    else:
+        _tell(axes, "no case has this result")
+
+
+def _tell(axes: Axes, sentence: str) -> None:
+    """A sentence in the middle of a panel that has nothing to draw."""
+    axes.text(0.5, 0.5, sentence, ha="center", va="center", transform=axes.transAxes, color="0.35")

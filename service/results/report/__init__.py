@@ -1,0 +1,25 @@
+"""A study as a document to be printed: what was asked, how it ended, ranges of all results, and their curves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final, Literal, get_args
+
+if TYPE_CHECKING:
+    from service.results.report.content import Report
+
+__all__ = ["MEDIA_TYPES", "REPORT_FORMATS", "ReportFormat", "write_report"]
+
+ReportFormat = Literal["html", "pdf"]
+REPORT_FORMATS: Final[tuple[ReportFormat, ...]] = get_args(ReportFormat)
+MEDIA_TYPES: Final[dict[ReportFormat, str]] = {"html": "text/html; charset=utf-8", "pdf": "application/pdf"}
+
+
+def write_report(report: Report, form: ReportFormat) -> bytes:
+    """The document. Libraries are loaded for the format that is asked for."""
+    writer: Callable[[Report], bytes]
+    if form == "html":
+        from service.results.report.html import html_report as writer
+    else:
+        from service.results.report.pdf import pdf_report as writer
+    return writer(report)

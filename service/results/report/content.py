@@ -1,0 +1,199 @@
+"""What a report says, as plain values: the same for every way of writing it down."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from service.results.curves import Curves, Fetch, draw, select
+from service.results.defaults import main_query
+from service.results.exports.inputs import Input, inputs, run_inputs
+from service.results.exports.source import given_texts
+from service.results.pictures.curves import require_drawable
+from service.results.selection import SelectionError
+from service.spec.catalogue import unit_of
+from worker import models
+
+if TYPE_CHECKING:
+    from service.storage.records import RowBlock, StudyRecord
+    from service.storage.store import Store
+    from worker.models import ResultInfo
+    from worker.study import Study
+
+#: First parts of names of results that tell of the computation rather than of the machine.
+_CHECKS: Final = ("balance", "run", "reset")
+_RESULTS_A_PICTURE: Final = 3
+_MOST_PICTURES: Final = 24
+_LONGEST_GIVEN: Final = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class AxisRow:
+    """One axis as a line of a table."""
+
+    paths: str
+    unit: str
+    values: int
+    first: float
+    last: float
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """What one result came to over all cases that have it; ``least`` and the others are None where none has."""
+
+    info: ResultInfo
+    known: int
+    least: float | None
+    least_case: int | None
+    mean: float | None
+    largest: float | None
+    largest_case: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """Everything a report says."""
+
+    title: str
+    facts: tuple[tuple[str, str], ...]
+    warnings: tuple[str, ...]
+    axes: tuple[AxisRow, ...]
+    run: tuple[Input, ...]
+    endings: tuple[tuple[str, int, str], ...]
+    inputs: tuple[Input, ...]
+    given: dict[str, str]
+    ranges: tuple[Range, ...]
+    pictures: tuple[Curves, ...]
+    note: str
+
+
+def report_of(store: Store, study_id: str) -> Report:
+    """The report of a stored study; raises StudyNotFound."""
+    record, progress = store.look(study_id)
+    return make_report(
+        record,
+        store.study(study_id),
+        progress.endings,
+        store.iter_rows(study_id),
+        partial(store.rows_for_cases, study_id),
+        store.spec(study_id),
+    )
+
+
+def make_report(
+    record: StudyRecord,
+    study: Study,
+    endings: dict[str, int],
+    blocks: Iterable[RowBlock],
+    fetch: Fetch,
+    spec: Mapping[str, Any],
+) -> Report:
+    """The report of a study as it is now; reads all its rows once. ``spec`` is the user's own."""
+    infos = models.study_results(study)
+    pictures, note = _pictures(study, infos, fetch)
+    return Report(
+        record.name or record.model,
+        _facts(record, study),
+        record.warnings,
+        tuple(
+            AxisRow(", ".join(a.paths), unit_of(study, a.paths[0]), len(a), a.values[0], a.values[-1])
+            for a in study.axes
+        ),
+        run_inputs(study, spec),
+        tuple((name, count, models.ENDING_SENTENCES.get(name, "")) for name, count in endings.items()),
+        inputs(study, spec),
+        {path: _shortened(text) for path, text in given_texts(spec).items()},
+        ranges(infos, blocks),
+        pictures,
+        note,
+    )
+
+
+def _shortened(text: str) -> str:
+    """A long table cut: a report is to be read, the exports have all of it."""
+    return text if len(text) <= _LONGEST_GIVEN else f"{text[:_LONGEST_GIVEN]} ... ({len(text)} characters in all)"
+
+
+def _facts(record: StudyRecord, study: Study) -> tuple[tuple[str, str], ...]:
+    ended = record.finished_at
+    return (
+        ("study", record.id),
+        ("model", record.model),
+        ("state", f"{record.state.value}: {record.state.sentence}"),
+        ("cases", f"{record.cases:,}, of which {record.done:,} are done and {record.ok:,} ended ok"),
+        ("axes", {"grid": "every combination", "zip": "side by side"}[study.combine] if study.axes else "none"),
+        ("submitted", f"{record.created_at:%Y-%m-%d %H:%M} UTC"),
+        ("ended", "not yet" if ended is None else f"{ended:%Y-%m-%d %H:%M} UTC"),
+        ("engine", record.engine_version),
+        ("hash of the physics", record.physics_hash),
+    )
+
+
+def ranges(infos: Sequence[ResultInfo], blocks: Iterable[RowBlock]) -> tuple[Range, ...]:
+    """Least, mean and largest of every result over the rows, with the first case that has the extreme."""
+    every = np.arange(len(infos))
+    known, total = np.zeros(every.size, dtype=np.int64), np.zeros(every.size)
+    # Least and largest: of each result the value and its case.
+    value = {np.less: np.full(every.size, np.inf), np.greater: np.full(every.size, -np.inf)}
+    case = {better: np.zeros(every.size, dtype=np.int64) for better in value}
+    for block in blocks:
+        there = ~np.isnan(block.values)
+        known += there.sum(axis=0)
+        total += np.where(there, block.values, 0.0).sum(axis=0)
+        for better, best in value.items():
+            filled = np.where(there, block.values, np.inf if better is np.less else -np.inf)
+            at = filled.argmin(axis=0) if better is np.less else filled.argmax(axis=0)
+            new = better(filled[at, every], best)
+            best[new], case[better][new] = filled[at, every][new], block.cases[at[new]]
+    found = zip(
+        infos,
+        known.tolist(),
+        value[np.less].tolist(),
+        case[np.less].tolist(),
+        (total / np.maximum(known, 1)).tolist(),
+        value[np.greater].tolist(),
+        case[np.greater].tolist(),
+        strict=True,
+    )
+    return tuple(Range(*row) if row[1] else Range(row[0], 0, None, None, None, None, None) for row in found)
+
+
+def _pictures(study: Study, infos: tuple[ResultInfo, ...], fetch: Fetch) -> tuple[tuple[Curves, ...], str]:
+    """The study's main curve for every group of results that belong together; and why there is none."""
+    query = main_query(study, infos)
+    if query is None:
+        return (), "Nothing varies in this study, so that there is no curve."
+    groups = list(_groups(infos))
+    chosen = [info for group in groups for info in group]
+    try:
+        whole = draw(select(study, infos, replace(query, y=tuple(info.name for info in chosen))), fetch)
+        require_drawable(_part(whole, groups[0]))
+    except SelectionError as error:
+        return (), f"There are no curves here: {error}."
+    return tuple(_part(whole, group) for group in groups), ""
+
+
+def _groups(infos: Sequence[ResultInfo]) -> Iterator[tuple[ResultInfo, ...]]:
+    """Results of one unit and one part of the machine, a few at a time."""
+    found: dict[tuple[str, ...], list[ResultInfo]] = {}
+    for info in infos:
+        first, *rest = info.name.split(".")
+        if first in _CHECKS or info.kind == "count":
+            continue
+        part = f"{first}.{rest[0]}" if rest and rest[0].isdigit() else first
+        found.setdefault((part, info.unit), []).append(info)
+    every = (
+        tuple(group[start : start + _RESULTS_A_PICTURE])
+        for group in found.values()
+        for start in range(0, len(group), _RESULTS_A_PICTURE)
+    )
+    yield from list(every)[:_MOST_PICTURES]
+
+
+def _part(whole: Curves, group: tuple[ResultInfo, ...]) -> Curves:
+    return replace(whole, selection=replace(whole.selection, results=group))

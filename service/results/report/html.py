@@ -1,0 +1,50 @@
+"""The report as one HTML file that needs nothing else: pictures inside, ready to be printed."""
+
+from __future__ import annotations
+
+import base64
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+
+from service.results.pictures.curves import draw_curves
+
+if TYPE_CHECKING:
+    from service.results.curves import Curves
+    from service.results.report.content import Report
+
+
+@lru_cache(maxsize=1)
+def _template() -> Template:
+    environment = Environment(
+        loader=PackageLoader("service.results.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["number"] = number_text
+    environment.filters["input"] = input_text
+    environment.filters["picture"] = _picture
+    return environment.get_template("report.html")
+
+
+def number_text(value: float | None) -> str:
+    """A number as people read it, a dash for none."""
+    return "–" if value is None else f"{value:.6g}"
+
+
+def input_text(value: float | str | None) -> str:
+    """An input: a number as people read it, a choice as it is called."""
+    return value if isinstance(value, str) else number_text(value)
+
+
+def _picture(curves: Curves) -> str:
+    """The curves as an image that stands in the page itself."""
+    return "data:image/svg+xml;base64," + base64.b64encode(draw_curves(curves, "", "svg")).decode("ascii")
+
+
+def html_report(report: Report) -> bytes:
+    """The page."""
+    return _template().render(report=report).encode("utf-8")

@@ -1,0 +1,122 @@
+"""Axes of a study as people name them: by any of their paths, their values with or without a unit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from service.faults import ErrorItem, shown
+from service.spec.catalogue import unit_of
+from service.spec.report import did_you_mean, quantity_text
+from service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
+from worker.study import SAME_VALUE
+
+if TYPE_CHECKING:
+    from worker.study import Axis, Study
+
+#: Fixed axes: position of the axis -> (the path it was named by, position of the value on it).
+Fixed = dict[int, tuple[str, int]]
+
+_LISTED = 24
+
+
+class SelectionError(Exception):
+    """The selection of cases is not clear or not possible; ``errors`` names each parameter at fault."""
+
+    def __init__(self, errors: Iterable[ErrorItem]) -> None:
+        self.errors = tuple(errors)
+        super().__init__("; ".join(f"{item.parameter}: {item.message}" for item in self.errors))
+
+    def __reduce__(self) -> tuple[type[SelectionError], tuple[tuple[ErrorItem, ...]]]:
+        return SelectionError, (self.errors,)
+
+
+def listed(values: Iterable[object]) -> str:
+    """Values for a message, the middle of a long list left out."""
+    texts = [f"{value!r}" if isinstance(value, float) else str(value) for value in values]
+    if len(texts) > _LISTED:
+        texts = [*texts[: _LISTED - 4], f"… {len(texts) - _LISTED} more", *texts[-4:]]
+    return ", ".join(texts)
+
+
+def require_axis(study: Study, parameter: str, path: str) -> int:
+    """Position of the axis that has ``path`` among its paths; SelectionError (about ``parameter``) else."""
+    position = study.axis_of(path)
+    if position is not None:
+        return position
+    fixed = path in study.base
+    message = (
+        f"not an axis: it is {quantity_text(study.base[path], unit_of(study, path))} in every case"
+        if fixed
+        else "not an axis of this study"
+    ) + did_you_mean(path, study.axis_paths)
+    raise SelectionError(
+        [
+            ErrorItem(
+                message, parameter=parameter, value=shown(path), allowed=listed(study.axis_paths) or "no axis at all"
+            )
+        ]
+    )
+
+
+def axis_name(study: Study, path: str) -> str:
+    """``path`` with the paths tied to it: ``excitation.amplitude_x = excitation.amplitude_y``."""
+    position = study.axis_of(path)
+    tied = () if position is None else study.axes[position].paths
+    return " = ".join(dict.fromkeys((path, *tied)))
+
+
+def held_text(study: Study, path: str, value: float) -> str:
+    """A parameter held at ``value`` (SI) as people read it: ``excitation.frequency = 25 Hz``."""
+    unit = unit_of(study, path)
+    return f"{axis_name(study, path)} = {value:.6g}" + ("" if unit == "1" else f" {unit}")
+
+
+def locate_axes(study: Study, at: Sequence[tuple[str, str]]) -> Fixed:
+    """The axes and the positions on them that pairs of path and value (as text) name.
+
+    A path that is no axis is taken where its one value is the given one. Raises SelectionError otherwise.
+    """
+    fixed: Fixed = {}
+    for path, text in at:
+        position = study.axis_of(path)
+        if position is None and path not in study.base:
+            require_axis(study, "at", path)
+        unit = unit_of(study, path)
+        value = _value(path, text, unit)
+        if position is None:
+            if not math.isclose(study.base[path], value, rel_tol=SAME_VALUE):
+                require_axis(study, "at", path)
+            continue
+        index = study.axes[position].index_of(value)
+        if index is None:
+            raise _no_such_value(path, text, study.axes[position], unit)
+        if fixed.setdefault(position, (path, index))[1] != index:
+            raise SelectionError(
+                [ErrorItem("the axis is given two values", parameter="at", value=shown(f"{path}={text}"))]
+            )
+    return fixed
+
+
+def _value(path: str, text: str, unit: str) -> float:
+    try:
+        number, unit_text = split_quantity(text)
+        return parse_quantity(text, unit) if unit_text else to_float(number)
+    except QuantityError as error:
+        item = ErrorItem(f"{path} {error}", parameter="at", value=shown(f"{path}={text}"), unit=unit)
+        raise SelectionError([item]) from error
+
+
+def _no_such_value(path: str, text: str, axis: Axis, unit: str) -> SelectionError:
+    return SelectionError(
+        [
+            ErrorItem(
+                "the axis has no such value",
+                parameter="at",
+                value=shown(f"{path}={text}"),
+                allowed=listed(sorted(axis.values)),
+                unit=unit,
+            )
+        ]
+    )

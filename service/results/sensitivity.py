@@ -1,0 +1,278 @@
+"""What the results of a study depend on: main effects of every axis, and shares of the variance (Sobol indices).
+
+First-order index of an axis: the share of a result's variance that knowing this axis alone would take away. Total
+index: the share that would stay if everything but this axis were known; it counts interactions too. (Saltelli et al.,
+Computer Physics Communications 181 (2010) 259; Tarantola et al., Reliability Engineering 91 (2006) 717.)
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+
+from service.faults import ErrorItem
+from service.results.curves import Fetch, numbers
+from service.results.selection import SelectionError, axis_name, listed
+from service.results.sensitivity_design import (
+    factorial_table,
+    going_together,
+    is_factorial,
+    is_sample,
+    scattered,
+    why_no_shares,
+)
+from service.spec.catalogue import result_of, unit_of, unknown_result
+from worker import models
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from worker.models import ResultInfo
+    from worker.study import Axis, Study
+
+    Numbers = NDArray[np.float64]
+
+#: How the indices were found: exactly from a full grid, from the design made for them, from a sample, or not at all.
+Method = Literal["grid", "saltelli", "rbd-fast", "none"]
+#: Cases that are looked at; more take seconds and say nothing new.
+MOST_CASES: Final = 1_000_000
+#: Groups that the values of an axis without a grid are put into, to tell its main effect.
+BINS: Final = 10
+#: Least cases from which indices are estimated.
+LEAST_CASES: Final = 65
+_SEED: Final = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """What one axis does to one result.
+
+    Attributes
+    ----------
+    values, means : arrays of one length
+        Values of the axis (SI), or middles of groups of them, and the mean of the result there; NaN for none.
+    first, total : float or None
+        Indices, None where the method does not tell them.
+    first_error, total_error : float or None
+        Half widths of their 95 % intervals; None where they are exact.
+    """
+
+    paths: tuple[str, ...]
+    unit: str
+    values: Numbers
+    means: Numbers
+    first: float | None
+    first_error: float | None
+    total: float | None
+    total_error: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Sensitivity:
+    """Effects of every axis that varies on one result, over the ``cases`` that have it; ``missing`` have not."""
+
+    info: ResultInfo
+    method: Method
+    cases: int
+    missing: int
+    mean: float | None
+    variance: float | None
+    effects: tuple[Effect, ...]
+    notes: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """The same as JSON data."""
+        return {
+            "result": self.info.name,
+            "unit": self.info.unit,
+            "description": self.info.description,
+            "method": self.method,
+            "cases": self.cases,
+            "missing": self.missing,
+            "mean": self.mean,
+            "variance": self.variance,
+            "effects": [
+                {
+                    "paths": list(effect.paths),
+                    "unit": effect.unit,
+                    "values": numbers(effect.values),
+                    "means": numbers(effect.means),
+                    "first_order": effect.first,
+                    "first_order_error": effect.first_error,
+                    "total": effect.total,
+                    "total_error": effect.total_error,
+                }
+                for effect in self.effects
+            ],
+            "notes": list(self.notes),
+        }
+
+
+def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fetch: Fetch) -> list[Sensitivity]:
+    """Effects of the axes of ``study`` on the results ``names``.
+
+    ``spec`` is the user's own: it tells whether the cases are the design for Sobol indices.
+    Raises SelectionError for an unknown result, a study in which nothing varies, or one that is too large.
+    """
+    infos = models.study_results(study)
+    faults = [
+        ErrorItem(unknown_result(infos, name), parameter="y", value=name, allowed=listed(info.name for info in infos))
+        for name in names
+        if result_of(infos, name) is None
+    ]
+    varying = [axis for axis in study.axes if len(set(axis.values)) > 1]
+    if not varying and not faults:
+        faults = [ErrorItem("nothing varies in this study", parameter="y")]
+    if study.cases > MOST_CASES:
+        faults.append(ErrorItem("the study is too large for it", value=study.cases, allowed=f"<= {MOST_CASES:,} cases"))
+    if faults:
+        raise SelectionError(faults)
+    columns = fetch(np.arange(study.cases, dtype=np.int64), list(names))
+    base = _saltelli_base(study, spec)
+    found = (result_of(infos, name) for name in names)
+    return [_of_result(study, varying, info, columns.values[info.name], base) for info in found if info is not None]
+
+
+def _saltelli_base(study: Study, spec: Mapping[str, Any]) -> int | None:
+    """Points that the study's Saltelli design was made from; None when its cases are no such design."""
+    axes = spec.get("axes")
+    if not (isinstance(axes, list) and len(axes) == 1 and isinstance(axes[0], Mapping)) or spec.get("exclude"):
+        return None
+    sample = axes[0]
+    if sample.get("sample") != "saltelli" or sample.get("count", 0) * (len(study.axes) + 2) != study.cases:
+        return None
+    return int(sample["count"])
+
+
+def _of_result(study: Study, varying: list[Axis], info: ResultInfo, y: Numbers, base: int | None) -> Sensitivity:
+    known = np.isfinite(y)
+    cases, missing = int(known.sum()), int((~known).sum())
+    values = y[known]
+    mean = float(values.mean()) if cases else None
+    variance = float(values.var()) if cases else None
+    positions = [study.axes.index(axis) for axis in varying]
+    every = study.indices(range(study.cases))
+    columns = np.stack([axis.array[every[at]] for axis, at in zip(varying, positions, strict=True)], axis=1)
+    notes = [f"{missing} cases without this result are left out"] if missing else []
+    method: Method = "none"
+    indices: list[Indices] = [(None, None, None, None)] * len(varying)
+    if not cases:
+        notes = ["no case has this result"]
+    elif study.combine == "grid" and not missing:
+        method = "grid"
+        indices = _grid_indices(y.reshape(study.shape), positions)
+    elif base is not None:
+        method = "saltelli"
+        indices = _saltelli_indices(y, base, len(study.axes), notes)
+        indices = [indices[at] for at in positions]
+    elif study.combine == "zip" and (scarce := _too_few(columns[known])):
+        notes.append(scarce)
+    elif study.combine == "zip" and is_sample(columns[known]):
+        method = "rbd-fast"
+        indices = _sample_indices(columns[known], values, notes)
+    elif not missing and is_factorial(columns):
+        method = "grid"
+        indices = _grid_indices(factorial_table(columns, y), list(range(len(varying))))
+    else:
+        notes.append(why_no_shares(columns, known, [axis_name(study, axis.paths[0]) for axis in varying]))
+    if mean is not None and variance is not None and variance <= (1e-13 * mean) ** 2:
+        notes.append("the result is the same in every case")
+        indices = [(None, None, None, None)] * len(varying)
+    effects = tuple(
+        Effect(axis.paths, unit_of(study, axis.paths[0]), *_main_effect(axis, column[known], values), *numbers_)
+        for axis, column, numbers_ in zip(varying, columns.T, indices, strict=True)
+    )
+    return Sensitivity(info, method, cases, missing, mean, variance, effects, tuple(notes))
+
+
+Indices = tuple[float | None, float | None, float | None, float | None]
+
+
+def _main_effect(axis: Axis, column: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:
+    """Mean of the result at each value of the axis, or over groups of about equally many values where it has many.
+
+    The cases of one value are never parted: a group that had some of them only would tell of other axes too.
+    """
+    values = np.unique(axis.array)
+    if values.size > 2 * BINS and column.size < 4 * values.size:
+        there, count = np.unique(column, return_counts=True)
+        ends = np.cumsum(count)
+        bounds = [int(ends[part[-1]]) for part in np.array_split(np.arange(there.size), BINS) if part.size]
+        parts = np.split(np.argsort(column, kind="stable"), bounds[:-1]) if bounds else []
+        return np.array([column[part].mean() for part in parts]), np.array([y[part].mean() for part in parts])
+    group = np.searchsorted(values, column)
+    count = np.bincount(group, minlength=values.size)
+    total = np.bincount(group, weights=y, minlength=values.size)
+    with np.errstate(invalid="ignore"):
+        return values, np.asarray(np.where(count > 0, total / np.maximum(count, 1), np.nan), dtype=np.float64)
+
+
+def _grid_indices(table: Numbers, positions: list[int]) -> list[Indices]:
+    """Exact shares of the variance over the points of a full grid, every point weighing the same."""
+    variance = float(table.var())
+    every = tuple(range(table.ndim))
+    found: list[Indices] = []
+    for axis in positions:
+        others = tuple(other for other in every if other != axis)
+        first = float(table.mean(axis=others).var()) if others else variance
+        total = float(table.var(axis=axis).mean())
+        found.append((first / variance, None, total / variance, None) if variance > 0.0 else (None,) * 4)
+    return found
+
+
+def _saltelli_indices(y: Numbers, base: int, dimensions: int, notes: list[str]) -> list[Indices]:
+    """SALib's estimates; a point of which any case is missing is left out with all its cases."""
+    from SALib.analyze import sobol
+
+    blocks = y.reshape(base, dimensions + 2)
+    whole = np.isfinite(blocks).all(axis=1)
+    if not whole.all():
+        notes.append(f"{int((~whole).sum())} of {base} points of the design are left out with all their cases")
+    if whole.sum() * (dimensions + 2) < LEAST_CASES:
+        notes.append("too few cases for indices")
+        return [(None, None, None, None)] * dimensions
+    with _quiet():
+        found = sobol.analyze(_problem(dimensions), blocks[whole].reshape(-1), calc_second_order=False, seed=_SEED)
+    return [
+        tuple(_finite(found[key][index]) for key in ("S1", "S1_conf", "ST", "ST_conf"))  # type: ignore[misc]
+        for index in range(dimensions)
+    ]
+
+
+def _too_few(x: Numbers) -> str:
+    """The sentence for too few cases of a sample, shape (cases, axes); "" where they suffice or are no sample."""
+    few = len(x) < LEAST_CASES and going_together(x) is None and all(scattered(column) for column in x.T)
+    return f"too few cases for indices: {len(x)}, and {LEAST_CASES} are needed" if few else ""
+
+
+def _sample_indices(x: Numbers, y: Numbers, notes: list[str]) -> list[Indices]:
+    """First-order indices from a sample (`is_sample`), by SALib's random balance design."""
+    from SALib.analyze import rbd_fast
+
+    notes.append("total indices need a full grid or a sample by the method saltelli")
+    with _quiet():
+        found = rbd_fast.analyze(_problem(x.shape[1]), x, y, M=max(2, min(10, (len(y) - 1) // 10)), seed=_SEED)
+    return [(_finite(found["S1"][i]), _finite(found["S1_conf"][i]), None, None) for i in range(x.shape[1])]
+
+
+def _problem(dimensions: int) -> dict[str, Any]:
+    names = [str(index) for index in range(dimensions)]
+    return {"num_vars": dimensions, "names": names, "bounds": [[0.0, 1.0]] * dimensions}
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """SALib divides by the variance without a look; where it is 0, the indices say nothing and become None."""
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

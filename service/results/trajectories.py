@@ -1,0 +1,94 @@
+"""Instantaneous values of one case: which times or angles, and the document or table of them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from service.faults import parameter_error, shown
+from service.json_text import to_bytes
+from service.results.curves import numbers
+from service.results.exports import table_csv
+from service.spec.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
+from worker import models
+
+if TYPE_CHECKING:
+    from service.results.exports import Format
+    from worker.models import Extent, Trajectory
+    from worker.study import Study
+
+
+def span(study: Study, case: int, start: str | None, end: str | None) -> tuple[float, float]:
+    """First and last place of a part of the case's extent (time in s, angle in rad); by default all of it.
+
+    ``start`` and ``end`` are SI numbers, or quantities with a unit or in periods. Raises FaultError, about the
+    parameter ``from`` or ``to``, when they are no places within it.
+    """
+    extent = models.extent(study, case)
+    first = 0.0 if start is None else _place("from", start, extent)
+    last = extent.end if end is None else _place("to", end, extent)
+    # The last digit of an end given in periods or degrees is not the client's to know.
+    if math.isclose(last, extent.end, rel_tol=1e-12):
+        last = extent.end
+    whole = {"time": "the run", "angle": "the cycle"}[extent.along]
+    if not 0.0 <= first < extent.end:
+        raise parameter_error(
+            "from", f"outside {whole}", shown(start), f"0 .. {extent.end!r} {extent.unit}, before `to`"
+        )
+    if not first < last <= extent.end:
+        message = f"outside {whole}, or not after `from`"
+        raise parameter_error("to", message, shown(end), f"{first!r} .. {extent.end!r} {extent.unit}")
+    return first, last
+
+
+def _place(name: str, text: str, extent: Extent) -> float:
+    try:
+        number, unit = split_quantity(text)
+        if unit in PERIOD_NAMES:
+            return to_float(number) * extent.period
+        return parse_quantity(text, extent.unit) if unit else to_float(number)
+    except QuantityError as error:
+        kind = {"time": "a time in s or periods", "angle": "an angle in rad, deg or cycles"}[extent.along]
+        raise parameter_error(name, str(error), shown(text), kind) from error
+
+
+def trajectory_file(study: Study, case: int, start: float, end: float, points: int, form: Format) -> bytes:
+    """The case run again and written down. For the computing process: large answers take seconds to write."""
+    made = models.run_trajectory(study, case, start, end, points)
+    if form == "csv":
+        return trajectory_csv(made)
+    return to_bytes(trajectory_json(made, case, study.case_parameters(case)))
+
+
+def trajectory_json(made: Trajectory, case: int, parameters: dict[str, float]) -> dict[str, Any]:
+    """The values as JSON data; ``parameters`` are the axis parameters of the case, SI."""
+    variables = {name: {"unit": unit} for name, unit in zip(made.names, made.units, strict=True)}
+    values = {name: numbers(made.values[:, column]) for column, name in enumerate(made.names)}
+    if made.along == "angle":
+        return {
+            "case": case,
+            "parameters": parameters,
+            "axis": {"name": "angles", "unit": "rad"},
+            "angles": made.times.tolist(),
+            "variables": variables,
+            "values": values,
+            "phi_c": list(made.phi_c),
+            "ending": made.ending,
+        }
+    return {
+        "case": case,
+        "parameters": parameters,
+        "axis": {"name": "times", "unit": "s"},
+        "times": made.times.tolist(),
+        "variables": variables,
+        "values": values,
+        "states": {name: list(states) for name, states in made.states.items()},
+        "ending": made.ending,
+    }
+
+
+def trajectory_csv(made: Trajectory) -> bytes:
+    """The values as CSV: time or angle, every variable, every state."""
+    header = [made.along, *made.names, *(f"{name}.state" for name in made.states)]
+    columns = [made.times.tolist(), *(made.values[:, i].tolist() for i in range(len(made.names)))]
+    return table_csv(header, [*columns, *made.states.values()])

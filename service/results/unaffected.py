@@ -1,0 +1,129 @@
+"""Parameters that were varied without any result changing: found in pairs of cases that differ in nothing else."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Iterator, Sequence
+from functools import partial
+from threading import Lock
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from service.results.curves import Fetch
+from worker import models
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from service.storage.records import StudyRecord
+    from service.storage.store import Store
+    from worker.study import Study
+
+    Cases = NDArray[np.int64]
+
+#: Cases that are looked at for one axis.
+MOST_CASES: Final = 5_000
+#: Cases of a study whose axes go together; of more it is not told.
+MOST_ROWS: Final = 200_000
+#: Results closer than this (relative) are the same: the rest is rounding.
+_SAME: Final = 1e-9
+#: First parts of names of results that tell of the computation rather than of the machine.
+_CHECKS: Final = ("balance", "run", "reset")
+_KEPT: Final = 256
+
+
+def unaffected(study: Study, fetch: Fetch) -> tuple[str, ...]:
+    """A sentence for each axis that changes no result in any of the cases looked at, which are many."""
+    infos = models.study_results(study)
+    names = [info.name for info in infos if info.name.split(".")[0] not in _CHECKS]
+    found = []
+    for position, axis in enumerate(study.axes):
+        looked = 0
+        for groups in _groups(study, position):
+            if _changes(groups, names, fetch):
+                looked = 0
+                break
+            looked += sum(map(len, groups))
+        if looked:
+            everywhere = looked >= study.cases
+            where = "any case" if everywhere else f"any of {looked:,} cases that were looked at"
+            found.append(f"{' = '.join(axis.paths)} was varied, but changes no result in {where}")
+    return tuple(found)
+
+
+def _groups(study: Study, position: int) -> Iterator[list[Cases]]:
+    """Cases that differ in one axis only, group by group: few at first, then more, to the limit."""
+    lines = _grid_lines(study, position) if study.combine == "grid" else _table_groups(study, position)
+    at, looked = 0, 0
+    size = 1
+    while at < len(lines) and looked < MOST_CASES:
+        part = lines[at : at + size]
+        yield part
+        looked += sum(map(len, part))
+        at, size = at + size, size * 8
+
+
+def _grid_lines(study: Study, position: int) -> list[Cases]:
+    """Lines along the axis, spread evenly over the grid."""
+    length = len(study.axes[position])
+    if length < 2:
+        return []
+    stride = int(np.prod(study.shape[position + 1 :], dtype=np.int64))
+    lines = study.cases // length
+    chosen = np.unique(np.linspace(0, lines - 1, min(lines, max(1, MOST_CASES // length)), dtype=np.int64))
+    starts = chosen // stride * (stride * length) + chosen % stride
+    steps = np.unique(np.linspace(0, length - 1, min(length, MOST_CASES), dtype=np.int64))
+    return [start + steps * stride for start in starts]
+
+
+def _table_groups(study: Study, position: int) -> list[Cases]:
+    """Cases of a table that are equal in everything but one axis."""
+    if study.cases > MOST_ROWS or len(study.axes) < 2:
+        return []
+    others = np.stack([axis.array for index, axis in enumerate(study.axes) if index != position], axis=1)
+    _, member, count = np.unique(others, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(member.reshape(-1), kind="stable")
+    parts = np.split(order, np.cumsum(count)[:-1])
+    return [part.astype(np.int64) for part in parts if part.size > 1][:MOST_CASES]
+
+
+def _changes(groups: Sequence[Cases], names: Sequence[str], fetch: Fetch) -> bool:
+    """Whether any result or ending differs within any group; a case that is not done yet could."""
+    columns = fetch(np.concatenate(groups), names)
+    table = np.stack([columns.values[name] for name in names], axis=1)
+    start = 0
+    for group in groups:
+        part = slice(start, start + len(group))
+        endings = set(columns.endings[part])
+        rows = table[part]
+        if len(endings) > 1 or None in endings:
+            return True
+        if not np.isclose(rows, rows[:1], rtol=_SAME, atol=0.0, equal_nan=True).all():
+            return True
+        start = part.stop
+    return False
+
+
+class Unaffected:
+    """`unaffected` of ended studies, kept in memory: their rows do not change."""
+
+    def __init__(self) -> None:
+        self._found: OrderedDict[tuple[str, int], tuple[str, ...]] = OrderedDict()
+        self._lock = Lock()
+
+    def of(self, store: Store, record: StudyRecord) -> tuple[str, ...]:
+        """The sentences about a study; none before its end."""
+        if not record.state.terminal or not record.done:
+            return ()
+        key = (record.id, record.revision)
+        with self._lock:
+            if key in self._found:
+                self._found.move_to_end(key)
+                return self._found[key]
+        found = unaffected(store.study(record.id), partial(store.rows_for_cases, record.id))
+        with self._lock:
+            self._found[key] = found
+            while len(self._found) > _KEPT:
+                self._found.popitem(last=False)
+        return found

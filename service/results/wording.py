@@ -1,0 +1,72 @@
+"""How numbers, units and names are written for people."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Final
+
+from markupsafe import Markup
+
+#: Narrow blank without a line break: between thousands, as ISO 80000 writes them.
+_THIN: Final = "\N{NARROW NO-BREAK SPACE}"
+_RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+#: Significant digits of numbers on pages; files and the interface for programs have all of them.
+_DIGITS: Final = 5
+#: MODEL's letters as books print them: base and index.
+_SYMBOLS: Final = {
+    "nu/2pi": ("f", ""),
+    "chi": ("χ", ""),
+    "lambda": ("λ", ""),
+    "delta": ("δ", ""),
+    "phi(0)": ("φ", "0"),
+    "phi'(0)": ("ω", "0"),
+    "phi_e'(0)": ("ω", "e0"),
+    "c_(K+1)": ("c", "k"),
+    "u_end": ("u", "end"),
+}
+_GREEK: Final = {"beta": "β", "delta": "δ", "phi": "φ", "w": "ω"}
+
+
+def number(value: float | None, digits: int = _DIGITS) -> str:
+    """A number as people read it: few digits, thousands apart, powers of ten raised; a dash for none."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "–"
+    if isinstance(value, int):
+        return f"{value:,}".replace(",", _THIN)
+    text = f"{value:.{digits}g}".replace("-", "−", 1 if value < 0 else 0)
+    mantissa, _, exponent = text.partition("e")
+    rounded = float(f"{value:.{digits}g}")
+    if 1e3 <= abs(rounded) < 1e7 and (exponent or ("." not in text and abs(value) >= 1e4)):
+        return _grouped(rounded)
+    if not exponent:
+        return text
+    return f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}"
+
+
+def _grouped(value: float) -> str:
+    return f"{value:,.0f}".replace(",", _THIN).replace("-", "−")
+
+
+def unit_text(unit: str | None) -> str:
+    """``kg*m^2`` as ``kg·m²``; nothing for a number without a unit."""
+    if unit in (None, "1"):
+        return ""
+    raised = re.sub(r"\^(-?\d+)", lambda found: found[1].translate(_RAISED), str(unit))
+    return raised.replace("*", "·")
+
+
+def symbol(text: str) -> Markup:
+    """A letter of the model with its index, as books print it."""
+    base, _, index = text.partition("_")
+    if not index and (found := re.fullmatch(r"([A-Za-z]+)(\d+)", text)):
+        base, index = found[1], found[2]
+    base, index = _SYMBOLS.get(text, (_GREEK.get(base, base), index))
+    return Markup("<i>{}</i>{}").format(base, Markup("<sub>{}</sub>").format(index) if index else "")
+
+
+def words(name: str) -> str:
+    """``shaft.speed.mean`` as ``Shaft speed mean``."""
+    text = name.replace(".", " ").replace("_", " ").strip()
+    text = re.sub(r"^pendulums (\d+)", r"pendulum \1", text)
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,113 @@
+"""Deadlines as people give them, and what can be done by one."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING, Final
+from zoneinfo import ZoneInfo
+
+from service.schedules.times import TimingError, read_time_of_day
+from service.spec.units import QuantityError, parse_quantity
+from worker.limits import MAX_FINISH_DAYS
+from worker.order import coverage, order_of
+
+if TYPE_CHECKING:
+    from worker.study import Study
+
+#: Least time that a deadline leaves, in s: a shorter one is a slip.
+_LEAST_SECONDS: Final = 1.0
+ALLOWED: Final = (
+    'a time to come with its offset, such as "2027-01-31T06:00+01:00", or a duration from the submission, such as '
+    f'"8 h"; 1 s to {MAX_FINISH_DAYS} days ahead'
+)
+ALLOWED_OF_RUNS: Final = (
+    'a time of day, such as "06:00", or a duration from the beginning of the run, such as "8 h"; 1 s to '
+    f"{MAX_FINISH_DAYS} days"
+)
+
+
+class FinishError(ValueError):
+    """No deadline that can be kept; the message is one clause."""
+
+
+def finish_at(text: str, now: datetime) -> datetime:
+    """The deadline (UTC) that ``text`` names at ``now``: a time with its offset, or a duration. Raises FinishError."""
+    text = text.strip()
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        return now + timedelta(seconds=_seconds(text))
+    if moment.tzinfo is None:
+        # A sign that was not encoded comes out of an address as a blank.
+        raise FinishError("has no offset from UTC; write Z, or +01:00 (in an address %2B01:00)")
+    try:
+        ahead = (moment - now).total_seconds()
+        moment = moment.astimezone(UTC)
+    except OverflowError:
+        raise FinishError("is too far away") from None
+    if ahead <= 0.0:
+        raise FinishError(f"has passed already; it is {now.astimezone(UTC).isoformat(timespec='seconds')} now")
+    _require_near(ahead)
+    return moment
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = parse_quantity(text, "s")
+    except QuantityError:
+        raise FinishError("is neither a time nor a duration with its unit") from None
+    if seconds <= 0.0:
+        raise FinishError("is no time to come")
+    _require_near(seconds)
+    return seconds
+
+
+def _require_near(seconds: float) -> None:
+    if not _LEAST_SECONDS <= seconds <= MAX_FINISH_DAYS * 86400.0:
+        raise FinishError("is too soon" if seconds < _LEAST_SECONDS else "is too far away")
+
+
+def check_run_finish(text: str) -> str:
+    """A deadline of the runs of a schedule, as it is kept: a time of day or a duration. Raises FinishError."""
+    text = text.strip()
+    try:
+        return f"{read_time_of_day(text):%H:%M}"
+    except TimingError:
+        _seconds(text)
+        return text
+
+
+def run_finish_at(text: str, zone: str, begin: datetime) -> datetime:
+    """The deadline (UTC) of a run that begins at ``begin``: the next such time of day in ``zone``, or after a while.
+
+    A time of day that a change of the clocks leaves out is read by the offset before it; one that comes twice is the
+    first.
+    """
+    try:
+        clock = read_time_of_day(text)
+    except TimingError:
+        return begin + timedelta(seconds=_seconds(text))
+    local = begin.astimezone(ZoneInfo(zone))
+    for day in range(3):
+        due = datetime.combine(local.date() + timedelta(days=day), clock, ZoneInfo(zone)).astimezone(UTC)
+        if (due - begin).total_seconds() >= _LEAST_SECONDS:
+            return due
+    raise AssertionError("a time of day comes every day")
+
+
+def finish_warnings(study: Study, seconds: float, left: float) -> tuple[str, ...]:
+    """What is to be said of a study that takes about ``seconds`` of work when ``left`` seconds are left for it."""
+    if seconds <= left:
+        return ()
+    done = int(study.cases * left / seconds)
+    return (
+        f"By estimate it will not be finished by then: about {_hours(seconds)} are needed and {_hours(left)} are left, "
+        f"enough for about {done:,} of {study.cases:,} cases: then {coverage(order_of(study), done)}.",
+    )
+
+
+def _hours(seconds: float) -> str:
+    for unit, size in (("d", 86400.0), ("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2.0 * size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds:.3g} s"

@@ -1,0 +1,1 @@
+"""Axes of a study: values, points, samples, combinations, exclusions."""

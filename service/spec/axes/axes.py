@@ -1,0 +1,199 @@
+"""The axes of a spec: paths, tied paths and their values; sizes are checked before anything is expanded."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from service.spec.axes.values import PLANS, Plan, count_text
+from service.spec.fields import read_object
+from service.spec.machine.drive import Machine
+from service.spec.report import Report, join, quantity_text
+from worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_TIED_PATHS
+from worker.models import Parameter
+from worker.study import Axis, Combine
+
+FIELDS = ("path", *PLANS)
+
+
+def read_axes(report: Report, data: object, combine: Combine, machine: Machine) -> tuple[Axis, ...] | None:
+    """The axes with their values in SI numbers; None when something is wrong with any, which is noted.
+
+    Counts are compared with the limits before a value is computed, so that no spec can ask for much memory.
+    """
+    if not isinstance(data, list) or len(data) > MAX_AXES:
+        report.problem("/axes", "must be a list of axes", data, allowed=f"a list of 0 to {MAX_AXES} axes")
+        return None
+    before = report.found
+    read = [read_axis(report, join("/axes", index), item, machine) for index, item in enumerate(data)]
+    check_paths(report, [(paths or ()) for paths, _ in read])
+    plans = [plan for _, plan in read if plan is not None]
+    if not _sizes_fit(report, plans, combine) or len(plans) < len(data) or report.found > before:
+        return None
+    axes: list[Axis] = []
+    for paths, plan in read:
+        if paths is None or plan is None:
+            return None
+        values = expand(report, plan, [machine.parameters[path] for path in paths], combine)
+        if values is None:
+            return None
+        axes.append(Axis(paths, values))
+    if combine == "zip" and not _rows_differ(report, axes, machine):
+        return None
+    return tuple(axes)
+
+
+def axis_values(
+    report: Report, pointer: str, data: object, machine: Machine
+) -> tuple[tuple[str, ...], tuple[float, ...]] | None:
+    """Paths and values (SI) of one axis alone; None when something is wrong with it, which is noted."""
+    paths, plan = read_axis(report, pointer, data, machine)
+    if paths is None or plan is None or not _sizes_fit(report, [plan], "grid"):
+        return None
+    values = expand(report, plan, [machine.parameters[path] for path in paths], "grid")
+    return None if values is None else (paths, values)
+
+
+def read_axis(
+    report: Report, pointer: str, data: object, machine: Machine
+) -> tuple[tuple[str, ...] | None, Plan | None]:
+    """The paths of one axis, and its values counted but not there yet; None for what could not be read."""
+    found = read_object(report, pointer, data, FIELDS)
+    if found is None:
+        return None, None
+    paths = read_paths(report, join(pointer, "path"), found.get("path"), machine)
+    ways = [name for name in PLANS if name in found]
+    if len(ways) != 1:
+        given = f"{len(ways)} are given: {', '.join(ways)}" if ways else "none is given"
+        report.problem(
+            pointer, f"needs exactly one of {', '.join(PLANS)}; {given}", allowed="one of " + ", ".join(PLANS)
+        )
+        return paths, None
+    if paths is None:
+        return None, None
+    plan = PLANS[ways[0]](report, join(pointer, ways[0]), found[ways[0]], machine.parameters[paths[0]])
+    return paths, plan
+
+
+def read_paths(report: Report, pointer: str, data: object, machine: Machine) -> tuple[str, ...] | None:
+    """The paths of one axis, all known and of one unit; None, and problems noted, otherwise."""
+    items = data if isinstance(data, list) else [data]
+    if data is None or not 1 <= len(items) <= MAX_TIED_PATHS:
+        report.problem(
+            pointer, "must name what varies" if data is not None else "is required", data,
+            allowed=f"a path such as 'excitation.frequency', or a list of 1 to {MAX_TIED_PATHS} of them",
+        )  # fmt: skip
+        return None
+    found: list[Parameter] = []
+    for index, path in enumerate(items):
+        where = join(pointer, index) if isinstance(data, list) else pointer
+        if not isinstance(path, str):
+            report.problem(where, "must be a path, as text", path, allowed="a path such as 'excitation.frequency'")
+        elif path in machine.parameters:
+            found.append(machine.parameters[path])
+        elif report.full:
+            break
+        elif not machine.assumed(path):
+            report.problem(where, machine.why_not(path), path, allowed="the path of a number in `base`")
+    if len(found) < len(items):
+        return None
+    units = list(dict.fromkeys(entry.unit for entry in found))
+    if len(units) > 1:
+        report.problem(pointer, f"ties parameters of different units: {', '.join(units)}", data, allowed="one unit")
+        return None
+    return tuple(entry.path for entry in found)
+
+
+def check_paths(report: Report, axes: Sequence[tuple[str, ...]], pointer: str = "/axes") -> None:
+    """Notes every path that stands twice, in one axis or on two; ``pointer`` is that of the list of axes."""
+    taken: dict[str, int] = {}
+    for index, paths in enumerate(axes):
+        for path, times in Counter(paths).items():
+            if times > 1:
+                report.problem(join(pointer, index, "path"), "names the same path twice", path)
+            if path in taken:
+                report.problem(
+                    join(pointer, index, "path"), f"this path already stands on axis {taken[path]}", path,
+                    allowed="each path on one axis",
+                )  # fmt: skip
+            taken.setdefault(path, index)
+
+
+def _sizes_fit(report: Report, plans: list[Plan], combine: Combine) -> bool:
+    counts = [plan.count for plan in plans]
+    before = report.found
+    for plan in plans:
+        if plan.count > MAX_AXIS_VALUES:
+            report.problem(
+                plan.pointer, f"asks for {count_text(plan.count)} values", allowed=f"at most {MAX_AXIS_VALUES:,} values"
+            )
+    if report.found == before and sum(counts) > MAX_AXIS_VALUES:
+        report.problem(
+            "/axes",
+            f"the axes ask for {count_text(sum(counts))} values together",
+            allowed=f"at most {MAX_AXIS_VALUES:,}",
+        )
+    if combine == "zip":
+        if len(set(counts)) > 1:
+            report.problem(
+                "/axes", "axes that are zipped must have equally many values", [count_text(count) for count in counts],
+                allowed="axes of one length, or combine: 'grid'",
+            )  # fmt: skip
+    elif report.found == before and math.prod(counts) > MAX_CASES:
+        report.problem(
+            "/axes", f"the grid has {count_text(math.prod(counts))} cases "
+            f"({' x '.join(count_text(count) for count in counts)})", allowed=f"at most {MAX_CASES:,} cases",
+        )  # fmt: skip
+    return report.found == before
+
+
+def expand(report: Report, plan: Plan, parameters: list[Parameter], combine: Combine) -> tuple[float, ...] | None:
+    """The values of a plan, in range for every parameter, each once on an axis of a grid; None, and a problem noted."""
+    values = plan.expand()
+    seen: dict[float, int] = {}
+    for index, value in enumerate(values):
+        where = join(plan.pointer, index) if plan.listed else plan.pointer
+        refusing = next((entry for entry in parameters if not entry.accepts(value)), None)
+        if refusing is not None:
+            report.problem(
+                where, f"value {index} is out of range for {refusing.path}", _shown(plan, value, refusing),
+                allowed=refusing.range_text(), unit=refusing.unit,
+            )  # fmt: skip
+            return None
+        if combine == "grid" and value in seen:
+            report.problem(
+                where, f"value {index} repeats value {seen[value]}", _shown(plan, value, parameters[0]),
+                allowed="each value once", unit=parameters[0].unit,
+            )  # fmt: skip
+            return None
+        seen[value] = index
+    return tuple(value + 0.0 for value in values)  # no negative zero
+
+
+def _shown(plan: Plan, value: float, parameter: Parameter) -> float | str:
+    """A value for a message: where the user wrote it, it is shown as written; else it needs its unit."""
+    return value if plan.listed else quantity_text(value, parameter.unit)
+
+
+def _rows_differ(report: Report, axes: list[Axis], machine: Machine) -> bool:
+    seen: dict[tuple[float, ...], int] = {}
+    for case, row in enumerate(zip(*(axis.values for axis in axes), strict=True)):
+        if seen.setdefault(row, case) != case:
+            pairs = [(axis.paths[0], value) for axis, value in zip(axes, row, strict=True)]
+            values = [f"{path} = {quantity_text(value, machine.parameters[path].unit)}" for path, value in pairs]
+            report.problem(
+                "/axes", f"cases {seen[row]} and {case} are the same: every zipped axis repeats its value", values,
+                allowed="each combination of values once",
+            )  # fmt: skip
+            return False
+    return True
+
+
+def varied_values(path: str, axes: tuple[Axis, ...] | None, base: Mapping[str, Any]) -> tuple[float, ...]:
+    """Every value (SI) that ``path`` takes in the study: those of its axis, else the base's; empty when unknown."""
+    for axis in axes or ():
+        if path in axis.paths:
+            return axis.values
+    return (base[path],) if path in base else ()

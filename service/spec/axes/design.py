@@ -1,0 +1,216 @@
+"""What varies in a study: axes as a grid or side by side, and whatever has to be written out case by case.
+
+A plain grid or zip of axes stays what it is. Samples, points, groups, unions and exclusions are put together here and
+become one table, a zip of as many axes as parameters vary.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, cast
+
+import numpy as np
+
+from service.spec.axes.axes import check_paths, expand, read_axes, read_axis
+from service.spec.axes.blocks import (
+    Block,
+    as_axes,
+    chosen,
+    first_rows,
+    made,
+    one_after_another,
+    product,
+    side_by_side,
+)
+from service.spec.axes.exclude import kept, read_exclude
+from service.spec.axes.points import read_points
+from service.spec.axes.sample import read_sample
+from service.spec.axes.values import count_text
+from service.spec.fields import read_object
+from service.spec.report import Report, did_you_mean, join, quantity_text
+from worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_COLUMNS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from service.spec.machine.drive import Machine
+    from worker.study import Axis, Combine
+
+COMBINE: Final = ("grid", "zip", "union")
+GROUP_FIELDS: Final = ("combine", "axes")
+_ALLOWED: Final = "'grid' (every combination), 'zip' (side by side) or 'union' (one after the other)"
+
+
+def read_design(report: Report, found: Mapping[str, Any], machine: Machine) -> tuple[tuple[Axis, ...] | None, Combine]:
+    """The axes of the study and how they go together, from the spec's fields `axes`, `combine` and `exclude`.
+
+    The axes are None when something is wrong, which is noted.
+    """
+    combine = _read_combine(report, "/combine", found.get("combine", "grid"))
+    items = found.get("axes", [])
+    plain = not isinstance(items, list) or all(_kind(item) == "axis" for item in items)
+    if plain and combine != "union" and "exclude" not in found:
+        chosen_combine = cast("Combine", combine or "grid")
+        return read_axes(report, items, chosen_combine, machine), chosen_combine
+    conditions = read_exclude(report, found["exclude"], machine) if "exclude" in found else []
+    block = _group(report, "", items, combine, machine)
+    if block is None or report.problems or not _fits(report, block):
+        return None, "zip"
+    columns = block.make()
+    if columns is None or report.problems:
+        return None, "zip"
+    if conditions:
+        columns = chosen(columns, kept(conditions, columns, machine.values, _length(columns)))
+        return _as_axes(report, columns, machine, excluded=True), "zip"
+    return _as_axes(report, columns, machine, block.lines), "zip"
+
+
+def _as_axes(
+    report: Report,
+    columns: dict[str, NDArray[np.float64]],
+    machine: Machine,
+    lines: tuple[int, ...] = (),
+    *,
+    excluded: bool = False,
+) -> tuple[Axis, ...] | None:
+    count = _length(columns)
+    if not count:
+        message = "every case is excluded" if excluded else "nothing varies"
+        report.problem("/exclude" if excluded else "/axes", message, allowed="at least one case that is left")
+        return None
+    first = first_rows(columns)
+    if first.size < count:
+        again = int(np.setdiff1d(np.arange(count), first)[0])
+        alike = np.all([column == column[again] for column in columns.values()], axis=0)
+        units = {path: machine.parameters[path].unit for path in columns}
+        values = [f"{path} = {quantity_text(column[again], units[path])}" for path, column in columns.items()]
+        before = int(np.flatnonzero(alike)[0])
+        message = f"cases {before} and {again}, counted from 0, are the same"
+        if lines:
+            message = f"lines {lines[before]} and {lines[again]} are the same"
+        where = "/axes/0/points" if lines else "/axes"
+        report.problem(where, message, values, allowed="each combination of values once")
+        return None
+    return as_axes(columns)
+
+
+def _length(columns: Mapping[str, NDArray[np.float64]]) -> int:
+    return next(iter(columns.values())).size if columns else 0
+
+
+def _kind(item: object) -> str:
+    """What an item of `axes` is, by the field that no other kind has."""
+    if isinstance(item, Mapping):
+        for kind, mark in (("sample", "sample"), ("points", "points"), ("group", "axes")):
+            if mark in item:
+                return kind
+    return "axis"
+
+
+def _read_combine(report: Report, pointer: str, data: object) -> str | None:
+    if isinstance(data, str) and data in COMBINE:
+        return data
+    hint = did_you_mean(data, COMBINE) if isinstance(data, str) else ""
+    report.problem(pointer, f"must be 'grid', 'zip' or 'union'{hint}", data, allowed=_ALLOWED)
+    return None
+
+
+def _group(report: Report, pointer: str, items: object, combine: str | None, machine: Machine) -> Block | None:
+    """The block of a list of axes, samples, points and (at the top) groups."""
+    where = join(pointer, "axes")
+    if not isinstance(items, list) or not 1 <= len(items) <= MAX_AXES:
+        report.problem(where, "must be a list of axes", items, allowed=f"a list of 1 to {MAX_AXES} axes")
+        return None
+    top = not pointer
+    read = [_item(report, join(where, i), item, combine, machine, top=top) for i, item in enumerate(items)]
+    blocks = [block for block in read if block is not None]
+    if len(blocks) < len(items) or combine is None:
+        return None
+    if combine != "union":
+        check_paths(report, [block.paths for block in blocks], where)
+    counts = [block.count for block in blocks]
+    if combine == "zip" and len(set(counts)) > 1:
+        report.problem(
+            where, "axes that are zipped must have equally many values", [count_text(count) for count in counts],
+            allowed="axes of one length, or combine: 'grid'",
+        )  # fmt: skip
+        return None
+    count = {"grid": math.prod(counts), "zip": counts[0], "union": sum(counts)}[combine]
+    paths = tuple(dict.fromkeys(path for block in blocks for path in block.paths))
+    lines = blocks[0].lines if top and len(blocks) == 1 else ()
+    return Block(pointer, paths, count, partial(_make, report, where, blocks, combine, machine), lines)
+
+
+def _make(
+    report: Report, where: str, blocks: list[Block], combine: str, machine: Machine
+) -> dict[str, NDArray[np.float64]] | None:
+    tables = made(blocks)
+    if tables is None:
+        return None
+    counts = [_length(columns) for columns in tables]
+    if combine == "grid":
+        return product(tables, counts)
+    if combine == "zip" and len(set(counts)) > 1:  # a union inside had the same cases twice
+        report.problem(where, "axes that are zipped must have equally many different cases", counts)
+        return None
+    if combine == "zip":
+        return side_by_side(tables)
+    # A limit that is not given is no number that the cases of other axes could have.
+    lacking = [path for path in dict.fromkeys(path for columns in tables for path in columns)
+               if path not in machine.values and any(path not in columns for columns in tables)]  # fmt: skip
+    for path in lacking:
+        report.problem(where, f"varies {path} in a part of the cases only, and `base` does not give it for the others",
+                       allowed="its value in `base` too")  # fmt: skip
+    return None if lacking else one_after_another(tables, counts, machine.values)
+
+
+def _item(
+    report: Report, pointer: str, data: object, combine: str | None, machine: Machine, *, top: bool
+) -> Block | None:
+    kind = _kind(data)
+    readers: dict[str, Callable[..., Block | None]] = {"sample": read_sample, "points": read_points}
+    if kind in readers:
+        return readers[kind](report, pointer, data, machine)
+    if kind == "axis":
+        return _axis(report, pointer, data, "zip" if combine == "zip" else "grid", machine)
+    found = read_object(report, pointer, data, GROUP_FIELDS) or {}
+    if not top:
+        report.problem(pointer, "is a group inside a group", allowed="an axis, a sample or points")
+        return None
+    inner = _read_combine(report, join(pointer, "combine"), found.get("combine", "grid"))
+    return _group(report, pointer, found.get("axes"), inner, machine)
+
+
+def _axis(report: Report, pointer: str, data: object, combine: Combine, machine: Machine) -> Block | None:
+    paths, plan = read_axis(report, pointer, data, machine)
+    if paths is None or plan is None:
+        return None
+    counts = Counter(paths)
+    if max(counts.values()) > 1:
+        report.problem(join(pointer, "path"), "names the same path twice", counts.most_common(1)[0][0])
+        return None
+
+    def make() -> dict[str, NDArray[np.float64]] | None:
+        values = expand(report, plan, [machine.parameters[path] for path in paths], combine)
+        return None if values is None else dict.fromkeys(paths, np.array(values))
+
+    return Block(pointer, paths, plan.count, make)
+
+
+def _fits(report: Report, block: Block) -> bool:
+    """Whether the table may be made: every number of it is kept with the study."""
+    if len(block.paths) > MAX_COLUMNS:
+        report.problem("/axes", f"{len(block.paths)} parameters vary", allowed=f"at most {MAX_COLUMNS} parameters")
+        return False
+    most = MAX_AXIS_VALUES // max(len(block.paths), 1)
+    if block.count <= most:
+        return True
+    report.problem(
+        "/axes",
+        f"{count_text(block.count)} cases of {len(block.paths)} parameters are to be written out one by one",
+        allowed=f"at most {MAX_AXIS_VALUES:,} numbers, here {most:,} cases; a plain grid may have more",
+    )
+    return False

@@ -1,0 +1,102 @@
+"""Conditions that take cases out of a study: ranges of parameters that are not to be run together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from service.spec.fields import read_number, read_object
+from service.spec.report import Report, join
+from worker.limits import MAX_AXIS_VALUES
+from worker.study import SAME_VALUE
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from service.spec.machine.drive import Machine
+
+FIELDS: Final = ("above", "below", "at_least", "at_most", "is")
+#: path -> [(field, value)]: all of them must hold for a case to be excluded
+Condition = dict[str, list[tuple[str, float]]]
+
+
+def read_exclude(report: Report, data: object, machine: Machine) -> list[Condition]:
+    """The conditions: a case is excluded when all parts of any one hold. Problems are noted."""
+    if not isinstance(data, list):
+        report.problem("/exclude", "must be a list of conditions", data, allowed="a list of objects, each by its paths")
+        return []
+    found = []
+    for index, item in enumerate(data):
+        pointer = join("/exclude", index)
+        if not isinstance(item, Mapping) or not item:
+            report.problem(
+                pointer, "must say what is excluded", item, allowed='such as {"shaft.load": {"above": "0.5 N*m"}}'
+            )
+            continue
+        parts = {
+            str(path): _parts(report, join(pointer, path), str(path), part, machine) for path, part in item.items()
+        }
+        found.append(parts)
+    return found
+
+
+def _parts(report: Report, pointer: str, path: str, data: object, machine: Machine) -> list[tuple[str, float]]:
+    parameter = machine.parameters.get(path)
+    if parameter is None:
+        report.problem(pointer, machine.why_not(path), path, allowed="the path of a number in `base`")
+        return []
+    found = read_object(report, pointer, data, FIELDS)
+    if found is None:
+        return []
+    if not found:
+        report.problem(pointer, "says nothing of the values", data, allowed="one of " + ", ".join(FIELDS))
+    parts: list[tuple[str, float]] = []
+    for name in FIELDS:
+        if name not in found:
+            continue
+        given = found[name]
+        if isinstance(given, list):
+            if name != "is" or not 1 <= len(given) <= MAX_AXIS_VALUES:
+                allowed = "one quantity" if name != "is" else "1 value or more"
+                report.problem(join(pointer, name), "must be a quantity", given, allowed=allowed)
+                continue
+            values = [read_number(report, join(pointer, name, i), item, parameter) for i, item in enumerate(given)]
+        else:
+            values = [read_number(report, join(pointer, name), given, parameter)]
+        parts += [(name, value) for value in values if value is not None]
+    return parts
+
+
+def kept(
+    conditions: list[Condition], columns: Mapping[str, NDArray[np.float64]], base: Mapping[str, float], count: int
+) -> NDArray[np.bool_]:
+    """Which of ``count`` cases no condition excludes."""
+    keep = np.ones(count, dtype=np.bool_)
+    for condition in conditions:
+        held = np.ones(count, dtype=np.bool_)
+        for path, parts in condition.items():
+            column = columns.get(path)
+            # Only limits may be missing from the base: they are then infinite.
+            held &= _held(np.full(count, base.get(path, np.inf)) if column is None else column, parts)
+        keep &= ~held
+    return keep
+
+
+def _held(column: NDArray[np.float64], parts: list[tuple[str, float]]) -> NDArray[np.bool_]:
+    """Limits hold together; of several values under ``is``, any will do."""
+    held = np.ones(column.shape, dtype=np.bool_)
+    equal = [value for name, value in parts if name == "is"]
+    if equal:
+        held &= np.any([np.isclose(column, value, rtol=SAME_VALUE, atol=0.0) for value in equal], axis=0)
+    for name, value in parts:
+        if name == "above":
+            held &= column > value
+        elif name == "below":
+            held &= column < value
+        elif name == "at_least":
+            held &= column >= value
+        elif name == "at_most":
+            held &= column <= value
+    return held

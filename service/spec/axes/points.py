@@ -1,0 +1,138 @@
+"""Cases given one by one as the text of a CSV file: a header of parameters, with a unit where it is not SI."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from service.spec.axes.axes import read_paths
+from service.spec.axes.blocks import Block
+from service.spec.fields import exact, read_object
+from service.spec.numbers import parse_number
+from service.spec.report import Report, join, shorten_text
+from service.spec.units import QuantityError, to_float
+from worker.limits import MAX_AXIS_VALUES, MAX_COLUMNS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from service.spec.machine.drive import Machine
+    from worker.models import Parameter
+
+FIELDS: Final = ("points",)
+#: "shaft.load", "shaft.load [N*mm]", "shaft.load (N*mm)"
+_HEADING: Final = re.compile(r"\s*([^\s\[\(]+)\s*(?:[\[\(]\s*([^\]\)]+?)\s*[\]\)])?\s*")
+
+
+def read_points(report: Report, pointer: str, data: Mapping[str, Any], machine: Machine) -> Block | None:
+    """The block of cases in a CSV text; None, and problems noted, when something is wrong with it."""
+    found = read_object(report, pointer, data, FIELDS) or {}
+    where, text = join(pointer, "points"), found.get("points")
+    if not isinstance(text, str):
+        allowed = "a header of paths, then a line for each case"
+        report.problem(where, "must be the text of a CSV file", text, allowed=allowed)
+        return None
+    try:
+        rows = _rows(text.removeprefix("\ufeff"))
+    except csv.Error as error:
+        report.problem(where, f"is no CSV text: {error}")
+        return None
+    columns = len(rows[0].cells) if rows else 0
+    if len(rows) < 2 or not 1 <= columns <= MAX_COLUMNS or len(rows) - 1 > MAX_AXIS_VALUES:
+        report.problem(
+            where, f"has {max(len(rows) - 1, 0)} lines of {columns} columns under its header",
+            allowed=f"1 line or more of 1 to {MAX_COLUMNS} columns",
+        )  # fmt: skip
+        return None
+    headings = [_read_heading(report, where, cell, machine) for cell in rows[0].cells]
+    known = [heading for heading in headings if heading is not None]
+    if len(known) < len(headings):
+        return None
+    values = _read_cells(report, where, rows[1:], known)
+    if values is None:
+        return None
+    paths = tuple(heading.parameter.path for heading in known)
+    if len(set(paths)) < len(paths):
+        report.problem(where, "names the same path twice", [shorten_text(path) for path in paths])
+        return None
+    lines = tuple(row.line for row in rows[1:])
+    return Block(pointer, paths, len(lines), lambda: dict(zip(paths, values, strict=True)), lines)
+
+
+class _Row(NamedTuple):
+    """The cells of a row and the line of the text that it ends in, from 1."""
+
+    line: int
+    cells: list[str]
+
+
+class _Heading(NamedTuple):
+    """What a column holds; ``unit`` is "" where its header gives none."""
+
+    parameter: Parameter
+    unit: str
+
+    def __str__(self) -> str:
+        return self.parameter.path + (f" [{self.unit}]" if self.unit else "")
+
+
+def _rows(text: str) -> list[_Row]:
+    """Rows that are not empty. What the header is parted by, parts all of it: commas, or semicolons, or tabs.
+
+    Lines may end as any system ends them, old ones with a carriage return alone.
+    """
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    header = text.lstrip().partition("\n")[0]
+    delimiter = next((sign for sign in ",;\t" if sign in header), ",")
+    reader = csv.reader(io.StringIO(text), delimiter=delimiter, strict=True)
+    return [_Row(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
+
+
+def _read_heading(report: Report, where: str, cell: str, machine: Machine) -> _Heading | None:
+    match = _HEADING.fullmatch(cell)
+    if match is None:
+        report.problem(where, "has a heading that names no parameter", cell, allowed="a path, its unit in brackets")
+        return None
+    paths = read_paths(report, where, match[1], machine)
+    return None if paths is None else _Heading(machine.parameters[paths[0]], match[2] or "")
+
+
+def _read_cells(
+    report: Report, where: str, rows: list[_Row], headings: list[_Heading]
+) -> list[NDArray[np.float64]] | None:
+    columns = [np.empty(len(rows)) for _ in headings]
+    before = report.found
+    for number, (line, row) in enumerate(rows):
+        if len(row) != len(headings):
+            report.problem(where, f"line {line} has {len(row)} cells", allowed=f"{len(headings)} cells")
+            continue
+        for column, cell, heading in zip(columns, row, headings, strict=True):
+            try:
+                column[number] = _read_cell(cell.strip(), heading)
+            except QuantityError as error:
+                written = f"{cell.strip()} {heading.unit}" if heading.unit and _is_number(cell) else cell.strip()
+                report.problem(
+                    where, f"line {line}, column {shorten_text(str(heading))}: {error}", written,
+                    allowed=heading.parameter.range_text(), unit=heading.parameter.unit,
+                )  # fmt: skip
+        if report.full:
+            break
+    return None if report.found > before else [column + 0.0 for column in columns]
+
+
+def _read_cell(cell: str, heading: _Heading) -> float:
+    """A cell: a number in the unit of its column (SI where there is none), or a text with a unit of its own."""
+    if not cell:
+        raise QuantityError("is empty")
+    if not _is_number(cell):
+        return to_float(exact(cell, heading.parameter))
+    return to_float(exact(f"{cell} {heading.unit}" if heading.unit else float(cell), heading.parameter))
+
+
+def _is_number(cell: str) -> bool:
+    return parse_number(cell) is not None

@@ -1,0 +1,136 @@
+"""Points drawn over ranges of parameters: Latin hypercube, Sobol sequence, and the design for Sobol indices; seeded."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+
+from service.spec.axes.axes import read_paths
+from service.spec.axes.blocks import Block
+from service.spec.fields import read_number, read_object, read_whole
+from service.spec.report import Report, did_you_mean, join
+from worker.limits import MAX_AXES, MAX_AXIS_VALUES
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from service.spec.machine.drive import Machine
+
+FIELDS: Final = ("sample", "count", "seed", "ranges")
+METHODS: Final = ("latin_hypercube", "sobol", "saltelli")
+SCALES: Final = ("linear", "log")
+_RANGE_FIELDS: Final = ("path", "from", "to", "scale")
+LARGEST_SEED: Final = 2**32 - 1
+
+
+@dataclass(frozen=True)
+class SampleRange:
+    """Tied paths and the range (SI) that they are drawn from; on a log scale, even in the logarithm."""
+
+    paths: tuple[str, ...]
+    low: float
+    high: float
+    scale: Literal["linear", "log"]
+
+    def place(self, unit: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Numbers between 0 and 1 as values of the range."""
+        if self.scale == "log":
+            values = self.low * (self.high / self.low) ** unit
+        else:
+            values = self.low + (self.high - self.low) * unit
+        return np.asarray(np.clip(values, min(self.low, self.high), max(self.low, self.high)), dtype=np.float64)
+
+
+def read_sample(report: Report, pointer: str, data: Mapping[str, Any], machine: Machine) -> Block | None:
+    """The block of a sample; None, and problems noted, when something is wrong with it."""
+    before = report.found
+    found = read_object(report, pointer, data, FIELDS) or {}
+    method = _choice(report, join(pointer, "sample"), found.get("sample"), METHODS)
+    count = read_whole(report, join(pointer, "count"), found.get("count"), 1, MAX_AXIS_VALUES)
+    seed = read_whole(report, join(pointer, "seed"), found.get("seed", 0), 0, LARGEST_SEED)
+    items = found.get("ranges")
+    if not isinstance(items, list) or not 1 <= len(items) <= MAX_AXES:
+        message = "must be a list of ranges" if "ranges" in found else "is required"
+        report.problem(join(pointer, "ranges"), message, items, allowed=f"a list of 1 to {MAX_AXES} ranges")
+        return None
+    ranges = [_read_range(report, join(pointer, "ranges", index), item, machine) for index, item in enumerate(items)]
+    if count is not None and method != "latin_hypercube" and count & (count - 1):
+        report.problem(
+            join(pointer, "count"), f"a {method} sample fills its ranges evenly only with a power of two", count,
+            allowed="a power of 2",
+        )  # fmt: skip
+    if report.found > before or method is None or count is None or seed is None:
+        return None
+    known = tuple(item for item in ranges if item is not None)
+    cases = count * (len(known) + 2) if method == "saltelli" else count
+    make = partial(draw, method, count, seed, known)
+    return Block(pointer, tuple(path for item in known for path in item.paths), cases, make)
+
+
+def _read_range(report: Report, pointer: str, data: object, machine: Machine) -> SampleRange | None:
+    found = read_object(report, pointer, data, _RANGE_FIELDS)
+    if found is None:
+        return None
+    paths = read_paths(report, join(pointer, "path"), found.get("path"), machine)
+    scale = _choice(report, join(pointer, "scale"), found.get("scale", "linear"), SCALES)
+    if paths is None:
+        return None
+    ends = []
+    for name in ("from", "to"):
+        for path in paths:
+            value = read_number(report, join(pointer, name), found.get(name), machine.parameters[path])
+            if value is None:
+                return None
+        ends.append(value)
+    low, high = (float(end) for end in ends if end is not None)
+    unit = machine.parameters[paths[0]].unit
+    if low == high:
+        report.problem(join(pointer, "to"), "is the same as `from`", high, allowed="another value", unit=unit)
+        return None
+    if scale == "log" and low * high <= 0.0:
+        report.problem(pointer, "a log scale needs two ends of one sign, neither of them 0",
+                       [found.get("from"), found.get("to")], unit=unit)  # fmt: skip
+        return None
+    return None if scale is None else SampleRange(paths, low, high, "log" if scale == "log" else "linear")
+
+
+def _choice(report: Report, pointer: str, value: object, known: tuple[str, ...]) -> str | None:
+    if isinstance(value, str) and value in known:
+        return value
+    hint = did_you_mean(value, known) if isinstance(value, str) else ""
+    message = "is required" if value is None else f"there is no such choice{hint}"
+    report.problem(pointer, message, value, allowed=", ".join(f"'{name}'" for name in known))
+    return None
+
+
+def draw(method: str, count: int, seed: int, ranges: tuple[SampleRange, ...]) -> dict[str, NDArray[np.float64]]:
+    """The sample: the same for the same arguments, on every machine."""
+    unit = unit_sample(method, count, seed, len(ranges))
+    found: dict[str, NDArray[np.float64]] = {}
+    for index, item in enumerate(ranges):
+        found.update(dict.fromkeys(item.paths, item.place(unit[:, index])))
+    return found
+
+
+def unit_sample(method: str, count: int, seed: int, dimensions: int) -> NDArray[np.float64]:
+    """Points in the unit cube, shape (cases, dimensions); of the Saltelli design count*(dimensions + 2)."""
+    from scipy.stats import qmc
+
+    if method == "latin_hypercube":
+        points = qmc.LatinHypercube(dimensions, rng=np.random.default_rng(seed)).random(count)
+    elif method == "sobol":
+        points = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(count)
+    else:
+        from SALib.sample import sobol
+
+        names = [str(index) for index in range(dimensions)]
+        problem = {"num_vars": dimensions, "names": names, "bounds": [[0, 1]] * dimensions}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)
+            points = sobol.sample(problem, count, calc_second_order=False, seed=seed)
+    return np.asarray(points, dtype=np.float64)

@@ -1,0 +1,161 @@
+"""The values of an axis: a list, an even or a geometric division, or steps. Counted first, expanded only then."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Final
+
+from service.spec.fields import read_exact, read_whole
+from service.spec.report import Report, join
+from service.spec.units import QuantityError, parse_exact, to_float
+from worker.limits import MAX_AXIS_VALUES
+from worker.models import Parameter
+
+#: How far beyond its end a step range may reach, in steps: rounding of ends that were computed.
+_STEP_ROUNDING: Final = Fraction(1, 10**9)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Values of an axis that are counted but not yet there.
+
+    Attributes
+    ----------
+    pointer : str
+        JSON Pointer of what gives them; for a list, each value stands under its index.
+    count : int
+        How many there will be; may be huge.
+    expand : callable
+        Gives them, SI, in order.
+    listed : bool
+        Whether the user wrote every value.
+    """
+
+    pointer: str
+    count: int
+    expand: Callable[[], list[float]]
+    listed: bool = False
+
+
+def plan_values(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
+    """The plan of a plain list of quantities."""
+    if not isinstance(data, list) or not data:
+        message = "has no values" if data == [] else "must be a list of values"
+        report.problem(pointer, message, data, allowed=f"1 to {MAX_AXIS_VALUES:,} values")
+        return None
+    numbers = [read_exact(report, join(pointer, index), value, parameter) for index, value in enumerate(data)]
+    exact = [number for number in numbers if number is not None]
+    if len(exact) < len(numbers):
+        return None
+    return Plan(pointer, len(exact), lambda: [to_float(number) for number in exact], listed=True)
+
+
+def plan_linspace(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
+    """The plan of ``[from, to, count]``, both ends included, evenly divided."""
+    division = _division(report, pointer, data, parameter)
+    if division is None:
+        return None
+    start, stop, count = division
+    step = (stop - start) / max(count - 1, 1)
+    return Plan(pointer, count, lambda: _steps(start, step, count))
+
+
+def plan_geomspace(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
+    """The plan of ``[from, to, count]``, both ends included, each value the same multiple of the one before."""
+    division = _division(report, pointer, data, parameter)
+    if division is None:
+        return None
+    start, stop, count = division
+    if start * stop <= 0:
+        report.problem(pointer, "a geometric range needs two ends of one sign, neither of them 0", data)
+        return None
+    return Plan(pointer, count, lambda: _multiples(to_float(start), to_float(stop), count))
+
+
+def plan_range(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
+    """The plan of ``[from, to, step]``; ``to`` is among the values when a whole number of steps leads there."""
+    items = _three(report, pointer, data, "[from, to, step]")
+    if items is None:
+        return None
+    start = read_exact(report, join(pointer, 0), items[0], parameter)
+    stop = read_exact(report, join(pointer, 1), items[1], parameter)
+    try:
+        step = parse_exact(items[2], parameter.unit)
+    except QuantityError as error:
+        report.problem(join(pointer, 2), str(error), items[2], unit=parameter.unit)
+        return None
+    if start is None or stop is None:
+        return None
+    if step == 0 or (stop - start) * step < 0:
+        message = "is 0" if step == 0 else "leads away from the end"
+        allowed = "a step greater than 0" if stop >= start else "a step less than 0, since the range goes down"
+        report.problem(join(pointer, 2), f"the step {message}", items[2], allowed=allowed, unit=parameter.unit)
+        return None
+    whole = math.floor((stop - start) / step + _STEP_ROUNDING)
+    return Plan(pointer, whole + 1, lambda: _stepped(start, stop, step, whole))
+
+
+PLANS: Final[dict[str, Callable[[Report, str, object, Parameter], Plan | None]]] = {
+    "values": plan_values,
+    "linspace": plan_linspace,
+    "geomspace": plan_geomspace,
+    "range": plan_range,
+}
+
+
+def count_text(count: int) -> str:
+    """A count for a message, however large."""
+    return f"{count:,}" if count < 10**15 else f"about 10^{round(count.bit_length() * math.log10(2))}"
+
+
+def _three(report: Report, pointer: str, data: object, allowed: str) -> Sequence[Any] | None:
+    if isinstance(data, list) and len(data) == 3:
+        return data
+    report.problem(pointer, "must be a list of three", data, allowed=allowed)
+    return None
+
+
+def _division(
+    report: Report, pointer: str, data: object, parameter: Parameter
+) -> tuple[Fraction, Fraction, int] | None:
+    items = _three(report, pointer, data, "[from, to, count]")
+    if items is None:
+        return None
+    start = read_exact(report, join(pointer, 0), items[0], parameter)
+    stop = read_exact(report, join(pointer, 1), items[1], parameter)
+    count = read_whole(report, join(pointer, 2), items[2], 1, MAX_AXIS_VALUES)
+    if start is None or stop is None or count is None:
+        return None
+    if count == 1 and start != stop:
+        report.problem(
+            join(pointer, 2), "one value cannot stand at two different ends", count, allowed="2 or more, or equal ends"
+        )
+        return None
+    return start, stop, count
+
+
+def _steps(start: Fraction, step: Fraction, count: int) -> list[float]:
+    """start + i*step, each correctly rounded: whole numbers over one denominator, divided once."""
+    common = math.lcm(start.denominator, step.denominator)
+    first = start.numerator * (common // start.denominator)
+    by = step.numerator * (common // step.denominator)
+    return [(first + index * by) / common for index in range(count)]
+
+
+def _stepped(start: Fraction, stop: Fraction, step: Fraction, whole: int) -> list[float]:
+    values = _steps(start, step, whole + 1)
+    if abs(start + whole * step - stop) <= abs(step) * _STEP_ROUNDING:
+        values[-1] = to_float(stop)
+    return values
+
+
+def _multiples(start: float, stop: float, count: int) -> list[float]:
+    if count == 1:
+        return [start]
+    sign = math.copysign(1.0, start)
+    low, high = math.log10(abs(start)), math.log10(abs(stop))
+    inner = [sign * 10.0 ** (low + (high - low) * index / (count - 1)) for index in range(1, count - 1)]
+    return [start, *inner, stop]

@@ -1,0 +1,139 @@
+"""The study spec, version 1: raw JSON or TOML data in, a study in SI numbers out, or all that is wrong with it.
+
+The parts stand in the modules beside it (`text`, `units`, `run`, `warnings`, the `report` of problems) and in three
+packages: `machine` (drive, clutch, shaft), `axes` (values, points, samples, combinations), `schema`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any, Final
+
+from service.spec.axes.axes import varied_values
+from service.spec.axes.design import read_design
+from service.spec.fields import read_object
+from service.spec.machine.clutch import check_laws
+from service.spec.machine.drive import Machine, read_base
+from service.spec.machine.shaft import read_shaft
+from service.spec.report import Problem, Report, SpecError, did_you_mean
+from service.spec.run import read_run, refuse_run
+from service.spec.text import Format, load_spec
+from service.spec.warnings import warn_machine_shaft, warn_vibration_drive
+from worker import models
+from worker.limits import MAX_NAME_LENGTH
+from worker.study import Study
+
+if TYPE_CHECKING:
+    from worker.models import ClutchFit
+
+__all__ = ["VERSION", "ParsedSpec", "Problem", "SpecError", "format_of", "load_spec", "parse_spec"]
+
+#: The version of the spec that this program reads.
+VERSION: Final = 1
+#: What a study without a name is called.
+UNNAMED: Final = "untitled"
+
+FIELDS: Final = ("sprag", "model", "name", "base", "run", "axes", "combine", "exclude")
+
+_WARNINGS: Final[dict[str, Callable[[Report, Study], None]]] = {
+    models.VIBRATION_DRIVE: warn_vibration_drive,
+    models.MACHINE_SHAFT: warn_machine_shaft,
+}
+
+
+@dataclass(frozen=True)
+class ParsedSpec:
+    """A spec that can be run.
+
+    Attributes
+    ----------
+    study : Study
+        The same in SI numbers, clutch data fitted, axes expanded.
+    warnings : tuple of str
+        What is allowed but probably not meant, each a sentence with its numbers.
+    fits : dict
+        JSON Pointer of a clutch given as measured data -> its fit.
+    spec : dict
+        The user's own spec, as it was given.
+    """
+
+    study: Study
+    warnings: tuple[str, ...]
+    fits: dict[str, ClutchFit] = field(default_factory=dict)
+    spec: dict[str, Any] = field(default_factory=dict)
+
+
+def format_of(name: str) -> Format:
+    """The format of a spec's file by its name: TOML when it ends in ``.toml``, else JSON."""
+    return "toml" if PurePath(name).suffix.lower() == ".toml" else "json"
+
+
+def parse_spec(data: object) -> ParsedSpec:
+    """The study that ``data`` (plain JSON data, as from `load_spec`) describes.
+
+    Raises
+    ------
+    SpecError
+        With everything that is wrong with it: each problem has its JSON Pointer, the value, and what is allowed.
+    """
+    report = Report(data)
+    found = read_object(report, "", data, FIELDS)
+    if found is None:
+        raise report.error()
+    _read_version(report, found)
+    name = _read_name(report, found.get("name", UNNAMED))
+    # A spec of an unknown model cannot be read any further.
+    model = _read_model(report, found)
+    if model is None:
+        raise report.error()
+    if model == models.MACHINE_SHAFT:
+        study = _read_machine_shaft(report, found, name)
+        _WARNINGS[model](report, study)
+        return ParsedSpec(study, tuple(report.warnings), {}, dict(found))
+    machine = read_base(report, found.get("base"), model)
+    axes, combine = read_design(report, found, machine)
+    run = read_run(report, found.get("run", {}), varied_values("excitation.frequency", axes, machine.values))
+    check_laws(report, machine.clutches, axes or (), combine)
+    report.raise_if_any()
+    study = Study(model, name, _in_order(machine), run, axes or (), combine)
+    _WARNINGS[model](report, study)
+    return ParsedSpec(study, tuple(report.warnings), machine.fits, dict(found))
+
+
+def _read_machine_shaft(report: Report, found: Mapping[str, Any], name: str) -> Study:
+    machine = read_shaft(report, found.get("base"))
+    axes, combine = read_design(report, found, machine)
+    run = refuse_run(report, found.get("run", {}))
+    report.raise_if_any()
+    return Study(models.MACHINE_SHAFT, name, _in_order(machine), run, axes or (), combine, machine.structure)
+
+
+def _read_version(report: Report, found: Mapping[str, Any]) -> None:
+    version = found.get("sprag")
+    if version is None or isinstance(version, bool) or version != VERSION or not isinstance(version, int):
+        message = "is required: the version of the spec" if version is None else "is no version this program reads"
+        report.problem("/sprag", message, version, allowed=str(VERSION))
+
+
+def _read_name(report: Report, value: object) -> str:
+    if isinstance(value, str) and 0 < len(value.strip()) <= len(value) <= MAX_NAME_LENGTH and value.isprintable():
+        return value.strip()
+    report.problem("/name", "must be a printable text in one line", value, allowed=f"1 to {MAX_NAME_LENGTH} characters")
+    return UNNAMED
+
+
+def _read_model(report: Report, found: Mapping[str, Any]) -> str | None:
+    model, known = found.get("model"), models.model_names()
+    if isinstance(model, str) and model in known:
+        return model
+    hint = did_you_mean(model, known) if isinstance(model, str) else ""
+    message = "is required" if model is None else f"is no model this program knows{hint}"
+    report.problem("/model", message, model, allowed=", ".join(f"'{name}'" for name in known))
+    return None
+
+
+def _in_order(machine: Machine) -> dict[str, float]:
+    """The base with its paths sorted, so that equal machines are stored alike however they were written."""
+    return {path: machine.values[path] + 0.0 for path in sorted(machine.values)}

@@ -1,0 +1,105 @@
+"""A study with more in it: further values on its axes, further axes, further cases.
+
+The cases that the study has already are the same cases in the new one, so that only what is new has to be run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final
+
+from service.spec.axes.axes import axis_values
+from service.spec.document import ParsedSpec, parse_spec
+from service.spec.fields import read_object
+from service.spec.machine.drive import read_base
+from service.spec.report import Problem, Report, SpecError, join, quantity_text
+
+if TYPE_CHECKING:
+    from service.spec.machine.drive import Machine
+    from worker.study import Study
+
+FIELDS: Final = ("axes", "cases", "name")
+
+
+def parse_extended(spec: Mapping[str, Any], study: Study, addition: object) -> ParsedSpec:
+    """The study of `extended_spec`, checked; pointers of problems are into ``addition`` where they are about it."""
+    try:
+        return parse_spec(extended_spec(spec, study, addition))
+    except SpecError as error:
+        if not (isinstance(addition, Mapping) and "cases" in addition):
+            raise
+        # The study itself is the first of the axes, what was added follows.
+        before = 1 if study.axes else 0
+        raise SpecError([_moved(problem, before) for problem in error.problems]) from error
+
+
+def _moved(problem: Problem, before: int) -> Problem:
+    head, _, rest = problem.pointer.removeprefix("/axes/").partition("/")
+    if not problem.pointer.startswith("/axes/") or not head.isdigit() or int(head) < before:
+        return problem
+    return replace(problem, pointer=f"/cases/{int(head) - before}" + (f"/{rest}" if rest else ""))
+
+
+def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> dict[str, Any]:
+    """The spec of the study that has the cases of ``study`` and those that ``addition`` asks for.
+
+    Parameters
+    ----------
+    spec : the study's own spec
+    study : the same in SI numbers
+    addition : plain JSON data: ``axes``, values for axes of a grid, old or new; or ``cases``, axes, samples, points and
+        groups as in a spec, whose cases come after those of the study; and a ``name``
+
+    Raises
+    ------
+    SpecError
+        With everything that is wrong with ``addition``; pointers are into it.
+    """
+    report = Report(addition)
+    found = dict(read_object(report, "", addition, FIELDS) or {})
+    report.raise_if_any()
+    given = [name for name in ("axes", "cases") if name in found]
+    if len(given) != 1:
+        report.problem("", "needs either `axes` or `cases`", given, allowed="one of axes, cases")
+        raise report.error()
+    items = found[given[0]]
+    if not isinstance(items, list) or not items:
+        report.problem(f"/{given[0]}", "must be a list", items, allowed="1 item or more, as in the axes of a spec")
+        raise report.error()
+    kept = {key: value for key, value in spec.items() if key not in {"axes", "combine", "exclude"}}
+    kept["name"] = found.get("name", study.name)
+    own = [{"path": list(axis.paths), "values": list(axis.values)} for axis in study.axes]
+    if given == ["cases"]:
+        first = [{"combine": study.combine, "axes": own}] if own else []
+        return {**kept, "combine": "union", "axes": [*first, *items]}
+    if study.combine != "grid":
+        report.problem("/axes", "the axes of this study go together, case by case", allowed="`cases` instead")
+        raise report.error()
+    machine = read_base(Report(), spec.get("base"), study.model)
+    for index, item in enumerate(items):
+        _add(report, join("/axes", index), item, study, own, machine)
+    report.raise_if_any()
+    return {**kept, "combine": "grid", "axes": own}
+
+
+def _add(
+    report: Report, pointer: str, item: object, study: Study, axes: list[dict[str, Any]], machine: Machine
+) -> None:
+    """Put the values of one item on the axis of its paths, which is made where there is none."""
+    read = axis_values(report, pointer, item, machine)
+    if read is None:
+        return
+    paths, values = read
+    positions = {study.axis_of(path) for path in paths}
+    position = next(iter(positions))
+    if len(positions) > 1:
+        report.problem(join(pointer, "path"), "names parameters of several axes", list(paths), allowed="one axis")
+    elif position is not None:
+        axes[position]["values"] = list(dict.fromkeys([*axes[position]["values"], *values]))
+    else:
+        bases = list(dict.fromkeys(study.base[path] for path in paths))
+        if len(bases) > 1:
+            told = [quantity_text(base, machine.parameters[paths[0]].unit) for base in bases]
+            report.problem(join(pointer, "path"), "ties parameters whose values in the base differ", told)
+        axes.append({"path": list(paths), "values": list(dict.fromkeys([*bases, *values]))})

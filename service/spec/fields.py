@@ -1,0 +1,111 @@
+"""Reading single fields of a spec: numbers with units and ranges, whole numbers, flags, objects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+from service.spec.report import Report, join
+from service.spec.units import QuantityError, example, parse_exact, to_float
+from worker.models import Parameter
+
+
+def coefficient_unit(index: int) -> str:
+    """Unit of the clutch coefficient at ``index`` (0 is c_1): "N*m", "N*m/rad", "N*m/rad^2", .."""
+    return "N*m" + ("" if index == 0 else "/rad" if index == 1 else f"/rad^{index}")
+
+
+def placed(parameter: Parameter, path: str) -> Parameter:
+    """The catalogue's ``parameter`` as it stands at the flat ``path``, indices filled in, its unit too."""
+    unit = coefficient_unit(int(path.rsplit(".", 1)[-1])) if parameter.unit.endswith("^K") else parameter.unit
+    return replace(parameter, path=path, unit=unit)
+
+
+def exact(value: object, parameter: Parameter) -> Fraction:
+    """The exact SI number that ``value`` means; QuantityError when it is none, or out of ``parameter``'s range."""
+    number = parse_exact(value, parameter.unit)
+    if not parameter.accepts(to_float(number)):
+        raise QuantityError("is out of range")
+    return number
+
+
+def read_exact(report: Report, pointer: str, value: object, parameter: Parameter) -> Fraction | None:
+    """The exact SI number of one field, in ``parameter``'s range; None, and a problem noted, when it is not one."""
+    if report.full:
+        return None
+    try:
+        return exact(value, parameter)
+    except QuantityError as error:
+        report.problem(pointer, str(error), value, allowed=parameter.range_text(), unit=parameter.unit)
+        return None
+
+
+def read_number(report: Report, pointer: str, value: object, parameter: Parameter) -> float | None:
+    """As `read_exact`, rounded to the nearest double."""
+    number = read_exact(report, pointer, value, parameter)
+    return None if number is None else to_float(number)
+
+
+def read_whole(report: Report, pointer: str, value: object, low: int, high: int) -> int | None:
+    """A whole number from ``low`` to ``high``; None, and a problem noted, when it is not one."""
+    if isinstance(value, bool) or not isinstance(value, int):
+        report.problem(pointer, "must be a whole number", value, allowed=f"{low} to {high:,}")
+        return None
+    if not low <= value <= high:
+        report.problem(pointer, "is out of range", value, allowed=f"{low} to {high:,}")
+        return None
+    return value
+
+
+def read_flag(report: Report, pointer: str, value: object) -> bool | None:
+    """true or false; None, and a problem noted, when it is neither."""
+    if isinstance(value, bool):
+        return value
+    report.problem(pointer, "must be true or false", value, allowed="true or false")
+    return None
+
+
+def read_object(report: Report, pointer: str, value: object, known: Iterable[str]) -> Mapping[str, Any] | None:
+    """An object with none but ``known`` fields (others are noted); None, and a problem noted, when it is no object."""
+    known = tuple(known)
+    if not isinstance(value, Mapping):
+        message = "is required" if value is None else "must be an object"
+        report.problem(pointer, message, value, allowed="an object with the fields " + ", ".join(known))
+        return None
+    report.unknown_fields(pointer, value, known)
+    return value
+
+
+def read_parameters(
+    report: Report, pointer: str, data: Mapping[str, Any], parameters: Mapping[str, Parameter]
+) -> dict[str, float]:
+    """Numbers of an object's fields by the path of their parameter, defaults filled in; what is wrong is left out.
+
+    Parameters
+    ----------
+    parameters : name of the field -> its `placed` parameter
+    """
+    found: dict[str, float] = {}
+    for name, parameter in parameters.items():
+        if name in data:
+            number = read_number(report, join(pointer, name), data[name], parameter)
+        elif parameter.default is None:
+            missing(report, join(pointer, name), parameter)
+            number = None
+        else:
+            number = parameter.default
+        if number is not None:
+            found[parameter.path] = number
+    return found
+
+
+def missing(report: Report, pointer: str, parameter: Parameter) -> None:
+    """Notes that a required number is missing."""
+    report.problem(
+        pointer,
+        f"is required ({parameter.help}, for example {example(parameter.unit)})",
+        allowed=parameter.range_text(),
+        unit=parameter.unit,
+    )

@@ -1,0 +1,1 @@
+"""The machine of a study: drive, clutches, shaft."""

@@ -1,0 +1,248 @@
+"""The clutch of a spec: coefficients, or measured data that are fitted here; and the check of every law of a study."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from service.spec.fields import missing, placed, read_flag, read_number, read_object, read_whole
+from service.spec.report import Report, join, quantity_text
+from worker import models
+from worker.limits import MAX_CLUTCH_LAWS, MAX_CLUTCH_ROWS
+from worker.models import CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, Parameter
+
+if TYPE_CHECKING:
+    from worker.models import ClutchFit
+    from worker.study import Axis, Combine
+
+_BY_LAW = ("coefficients", "windup_limit")
+_BY_DATA = ("data", "accuracy", "max_degree", "through_origin", "angles_include_backlash")
+FIELDS = (*_BY_LAW, *_BY_DATA)
+
+_ANGLE = Parameter("angle", "xi", "rad", 0.0, 1e3, False, None, "measured angle")
+_TORQUE = Parameter("torque", "M", "N*m", -1e9, 1e9, False, None, "measured torque")
+_ACCURACY = Parameter("accuracy", "", "N*m", 0.0, 1e9, True, None, "largest residual of the fit that is accepted")
+
+
+@dataclass(frozen=True)
+class Clutch:
+    """A clutch as the spec gives it.
+
+    Attributes
+    ----------
+    pointer : str
+        JSON Pointer of its object.
+    prefix : str
+        What its flat paths begin with: "clutch." or "pendulums.N.clutch.".
+    coefficients : tuple of float
+        c_1 first, N*m/rad^(k-1).
+    windup_limit : float
+        End of the law's range, rad; infinite when there is none.
+    fit : ClutchFit or None
+        Where the coefficients come from measured data.
+    """
+
+    pointer: str
+    prefix: str
+    coefficients: tuple[float, ...]
+    windup_limit: float
+    fit: ClutchFit | None = None
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Its flat paths and SI numbers; without the windup limit when there is none."""
+        limit = {} if math.isinf(self.windup_limit) else {f"{self.prefix}windup_limit": self.windup_limit}
+        return {f"{self.prefix}coefficients.{k}": value for k, value in enumerate(self.coefficients)} | limit
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """Flat paths that an axis can vary; none when the law comes from data."""
+        if self.fit is not None:
+            return {}
+        paths = [(f"{self.prefix}coefficients.{k}", CLUTCH_COEFFICIENT) for k in range(len(self.coefficients))]
+        return {
+            path: placed(entry, path) for path, entry in [*paths, (f"{self.prefix}windup_limit", CLUTCH_WINDUP_LIMIT)]
+        }
+
+
+def read_clutch(report: Report, pointer: str, data: object, prefix: str, backlashes: Sequence[float]) -> Clutch | None:
+    """The clutch at ``pointer``; None when it cannot be read, everything wrong with it noted.
+
+    Parameters
+    ----------
+    backlashes : backlash (rad) of each pendulum that has this clutch; needed when the angles include it
+    """
+    found = read_object(report, pointer, data, FIELDS)
+    if found is None:
+        return None
+    by_law, by_data = [name for name in _BY_LAW if name in found], [name for name in _BY_DATA if name in found]
+    if by_law and by_data:
+        report.problem(
+            pointer,
+            f"is given both as a law ({', '.join(by_law)}) and as measured data ({', '.join(by_data)})",
+            allowed=f"either {', '.join(_BY_LAW)} or {', '.join(_BY_DATA)}",
+        )
+        return None
+    if by_data:
+        return _measured(report, pointer, found, prefix, backlashes)
+    return _given(report, pointer, found, prefix)
+
+
+def _given(report: Report, pointer: str, data: Mapping[str, Any], prefix: str) -> Clutch | None:
+    items = data.get("coefficients")
+    where = join(pointer, "coefficients")
+    allowed = f"a list of 1 to {MAX_COEFFICIENTS} numbers, c_1 first (N*m, N*m/rad, N*m/rad^2, ..)"
+    limit: float | None = math.inf
+    if "windup_limit" in data:
+        limit = read_number(report, join(pointer, "windup_limit"), data["windup_limit"], CLUTCH_WINDUP_LIMIT)
+    if items is None:
+        report.problem(where, "is required (or `data` with `accuracy`)", allowed=allowed)
+        return None
+    if not isinstance(items, list) or not 1 <= len(items) <= MAX_COEFFICIENTS:
+        report.problem(where, "must be a list of clutch coefficients", items, allowed=allowed)
+        return None
+    numbers = [
+        read_number(report, join(where, k), item, placed(CLUTCH_COEFFICIENT, f"{prefix}coefficients.{k}"))
+        for k, item in enumerate(items)
+    ]
+    if limit is None or None in numbers:
+        return None
+    return Clutch(pointer, prefix, tuple(number for number in numbers if number is not None), limit)
+
+
+def _measured(
+    report: Report, pointer: str, data: Mapping[str, Any], prefix: str, backlashes: Sequence[float]
+) -> Clutch | None:
+    before = report.found
+    rows = _rows(report, join(pointer, "data"), data.get("data"))
+    accuracy = None
+    if "accuracy" in data:
+        accuracy = read_number(report, join(pointer, "accuracy"), data["accuracy"], _ACCURACY)
+    else:
+        missing(report, join(pointer, "accuracy"), _ACCURACY)
+    options: dict[str, Any] = {}
+    if "max_degree" in data:
+        where = join(pointer, "max_degree")
+        options["max_degree"] = read_whole(report, where, data["max_degree"], 1, MAX_COEFFICIENTS - 1)
+    for name in ("through_origin", "angles_include_backlash"):
+        if name in data:
+            options[name] = read_flag(report, join(pointer, name), data[name])
+    if options.get("angles_include_backlash"):
+        if len(set(backlashes)) > 1:
+            report.problem(
+                join(pointer, "angles_include_backlash"),
+                "one clutch for all pendulums needs one backlash for all of them to be taken off the angles; give the "
+                "clutch in each pendulum instead",
+                [quantity_text(backlash, "rad") for backlash in backlashes],
+            )
+        elif backlashes:
+            options["backlash"] = backlashes[0]
+        else:
+            return None  # the backlash itself could not be read, which is noted already
+    if accuracy is None or report.found > before:
+        return None
+    try:
+        fit = models.fit_clutch(rows, accuracy, **options)
+    except models.ClutchFitError as error:
+        report.problem(
+            join(pointer, *(error.name or "data").split(".")), error.message, _shown(error.value), allowed=error.allowed
+        )
+        return None
+    for warning in fit.warnings:
+        report.warn(f"{pointer}: {warning}")
+    return Clutch(pointer, prefix, fit.coefficients, fit.windup_limit, fit)
+
+
+def _rows(report: Report, pointer: str, data: object) -> list[tuple[float, float]]:
+    allowed = f"a list of 2 to {MAX_CLUTCH_ROWS:,} rows [angle, torque]"
+    if not isinstance(data, list) or not 2 <= len(data) <= MAX_CLUTCH_ROWS:
+        message = "is required" if data is None else "must be a list of measured rows"
+        report.problem(pointer, message, data, allowed=allowed)
+        return []
+    rows: list[tuple[float, float]] = []
+    for index, row in enumerate(data):
+        where = join(pointer, index)
+        if not isinstance(row, list) or len(row) != 2:
+            report.problem(where, "must be a row of two numbers", row, allowed="[angle, torque]")
+            continue
+        angle = read_number(report, join(where, 0), row[0], _ANGLE)
+        torque = read_number(report, join(where, 1), row[1], _TORQUE)
+        if angle is not None and torque is not None:
+            rows.append((angle, torque))
+    return rows
+
+
+def _shown(value: object) -> object:
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+def check_laws(report: Report, clutches: Iterable[Clutch], axes: Sequence[Axis], combine: Combine) -> None:
+    """Notes every clutch whose law is negative in its range, or zero everywhere, in some case of the study.
+
+    The torque rises with each coefficient, and a wider range only adds windups, so of a grid's laws the one with the
+    smallest coefficients and the widest range is the worst, and the only one to look at.
+    """
+    for clutch in clutches:
+        if clutch.fit is not None:
+            continue
+        varied = {
+            path: (position, axis)
+            for position, axis in enumerate(axes)
+            for path in axis.paths
+            if path.startswith(clutch.prefix)
+        }
+        if not varied:
+            _check_law(report, clutch, clutch.values, "")
+            continue
+        pointer = f"/axes/{min(position for position, _ in varied.values())}"
+        worst = {
+            path: (max if path.endswith("windup_limit") else min)(axis.values) for path, (_, axis) in varied.items()
+        }
+        if combine == "grid":
+            _check_law(report, clutch, clutch.values | worst, pointer)
+        elif not _passes(clutch, clutch.values | worst):
+            _check_zipped(report, clutch, {path: axis.values for path, (_, axis) in varied.items()}, pointer)
+
+
+def _check_zipped(report: Report, clutch: Clutch, varied: Mapping[str, tuple[float, ...]], pointer: str) -> None:
+    laws = dict.fromkeys(zip(*varied.values(), strict=True))
+    if len(laws) > MAX_CLUTCH_LAWS:
+        report.problem(
+            pointer,
+            f"zips {len(laws):,} different clutch laws, too many to check one by one for negative torque",
+            allowed=f"at most {MAX_CLUTCH_LAWS:,} different laws, or smallest coefficients that make a law without",
+        )
+        return
+    for law in laws:
+        if not _check_law(report, clutch, clutch.values | dict(zip(varied, law, strict=True)), pointer):
+            return
+
+
+def _law(clutch: Clutch, values: Mapping[str, float]) -> tuple[list[float], float]:
+    coefficients = [values[f"{clutch.prefix}coefficients.{k}"] for k in range(len(clutch.coefficients))]
+    return coefficients, values.get(f"{clutch.prefix}windup_limit", math.inf)
+
+
+def _passes(clutch: Clutch, values: Mapping[str, float]) -> bool:
+    try:
+        models.check_law(*_law(clutch, values))
+    except models.ClutchLawError:
+        return False
+    return True
+
+
+def _check_law(report: Report, clutch: Clutch, values: Mapping[str, float], pointer: str) -> bool:
+    coefficients, limit = _law(clutch, values)
+    try:
+        law = models.check_law(coefficients, limit)
+    except models.ClutchLawError as error:
+        where = pointer or join(clutch.pointer, *(error.name or "coefficients").split("."))
+        report.problem(where, error.message, coefficients, allowed=error.allowed)
+        return False
+    for warning in law.warnings:
+        report.warn(f"{pointer or clutch.pointer}: {warning}")
+    return True

@@ -1,0 +1,187 @@
+"""The machine of a spec (`base`): every parameter by its flat path in SI numbers, and the paths that axes can vary."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from service.spec.fields import placed, read_number, read_object, read_parameters
+from service.spec.machine.clutch import Clutch, read_clutch
+from service.spec.report import Report, did_you_mean, join
+from worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, Parameter, parameter_catalogue
+
+if TYPE_CHECKING:
+    from worker.models import ClutchFit
+
+_PENDULUM_PATH = re.compile(r"pendulums\.([0-9]{1,9})\.(.+)")
+_CLUTCH_PATH = re.compile(r"(?:pendulums\.[0-9]{1,9}\.)?clutch\.(.+)")
+
+
+@dataclass
+class Machine:
+    """What the base of a spec says, as far as it could be read.
+
+    Attributes
+    ----------
+    values : flat path -> SI number; incomplete when problems were noted
+    pendulums : number of pendulums; None when they could not be read
+    clutches : the one clutch of all pendulums, or one for each; those that could be read
+    parameters : flat path -> parameter, for every number that an axis can vary
+    """
+
+    values: dict[str, float] = field(default_factory=dict)
+    pendulums: int | None = None
+    clutches: list[Clutch] = field(default_factory=list)
+    parameters: dict[str, Parameter] = field(default_factory=dict)
+
+    @property
+    def fits(self) -> dict[str, ClutchFit]:
+        """JSON Pointer of each clutch that was fitted here -> its fit."""
+        return {clutch.pointer: clutch.fit for clutch in self.clutches if clutch.fit is not None}
+
+    def assumed(self, path: str) -> bool:
+        """Whether ``path`` could be a number of a part of the base that could not be read."""
+        return not self.clutches and assumed_clutch(path)
+
+    def why_not(self, path: str) -> str:
+        """Why an axis cannot vary ``path``: a sentence that says what it can."""
+        inside = _PENDULUM_PATH.fullmatch(path)
+        if inside and self.pendulums is not None and int(inside[1]) >= self.pendulums:
+            return f"there is no pendulum {inside[1]}: pendulums are numbered from 0 to {self.pendulums - 1}"
+        clutch_path = _CLUTCH_PATH.fullmatch(path)
+        if clutch_path:
+            return self._why_not_clutch(path, clutch_path[1])
+        known = tuple(self.parameters)
+        return "names no numeric parameter of the base" + did_you_mean(path.removeprefix("base."), known)
+
+    def _why_not_clutch(self, path: str, rest: str) -> str:
+        prefix = path.removesuffix(rest)
+        clutch = next((clutch for clutch in self.clutches if clutch.prefix == prefix), None)
+        if clutch is None and self.clutches:
+            if self.clutches[0].prefix == "clutch.":
+                return f"the clutch is common to all pendulums: its paths begin with 'clutch.', as in 'clutch.{rest}'"
+            return f"each pendulum has its own clutch: its paths begin as in 'pendulums.0.clutch.{rest}'"
+        if clutch is not None and clutch.fit is not None:
+            return "the clutch law comes from measured data and is not varied; give coefficients to vary it"
+        if clutch is not None and rest.startswith("coefficients."):
+            last = len(clutch.coefficients) - 1
+            return f"the clutch has no such coefficient: they are numbered from 0 (c_1) to {last} (c_{last + 1})"
+        return "names no numeric parameter of the clutch" + did_you_mean(path, self.parameters)
+
+
+def read_base(report: Report, data: object, model: str) -> Machine:
+    """The machine in ``data`` (the spec's `base`), everything wrong with it noted in ``report``."""
+    machine = Machine()
+    catalogue = [entry for entry in parameter_catalogue(model) if not entry.path.startswith("clutch.")]
+    sections = list(dict.fromkeys(entry.path.split(".")[0] for entry in catalogue))
+    found = read_object(report, "/base", data, (*sections, "clutch"))
+    if found is None:
+        _assume_everything(catalogue, machine)
+        return machine
+    for section in sections:
+        entries = [entry for entry in catalogue if entry.path.split(".")[0] == section]
+        pointer = join("/base", section)
+        if section == "pendulums":
+            _read_pendulums(report, pointer, found.get(section), entries, machine)
+        elif entries[0].path == section:
+            value = found.get(section, entries[0].default)
+            number = read_number(report, pointer, value, entries[0])
+            machine.values.update({} if number is None else {section: number})
+            machine.parameters[section] = entries[0]
+        else:
+            _read_section(report, pointer, found.get(section), section, entries, machine)
+    if machine.pendulums is None:
+        _assume_everything(catalogue, machine)
+    _read_clutches(report, found, machine)
+    return machine
+
+
+def _read_section(
+    report: Report, pointer: str, data: object, prefix: str, entries: list[Parameter], machine: Machine
+) -> None:
+    """Reads the object whose fields are the last names of ``entries``' paths, placed under ``prefix``."""
+    parameters = {name: placed(entry, f"{prefix}.{name}") for entry in entries if (name := entry.path.split(".")[-1])}
+    machine.parameters.update({entry.path: entry for entry in parameters.values()})
+    names = (*parameters, "clutch") if prefix.startswith("pendulums.") else tuple(parameters)
+    if data is None:
+        required = [name for name, entry in parameters.items() if entry.default is None]
+        report.problem(pointer, f"is required, with at least {', '.join(required)}", allowed="an object")
+        return
+    found = read_object(report, pointer, data, names)
+    if found is not None:
+        machine.values.update(read_parameters(report, pointer, found, parameters))
+
+
+def _read_pendulums(report: Report, pointer: str, data: object, entries: list[Parameter], machine: Machine) -> None:
+    if not isinstance(data, list) or not 1 <= len(data) <= MAX_PENDULUMS:
+        message = "is required" if data is None else "must be a list of pendulums"
+        report.problem(pointer, message, data, allowed=f"a list of 1 to {MAX_PENDULUMS} pendulums")
+        return
+    machine.pendulums = len(data)
+    for index, pendulum in enumerate(data):
+        # A null in the list is no missing section but a wrong pendulum.
+        item = "null" if pendulum is None else pendulum
+        _read_section(report, join(pointer, index), item, f"pendulums.{index}", entries, machine)
+
+
+def _read_clutches(report: Report, base: Mapping[str, Any], machine: Machine) -> None:
+    listed = base.get("pendulums")
+    pendulums = listed if isinstance(listed, list) and machine.pendulums is not None else []
+    own = [index for index, item in enumerate(pendulums) if isinstance(item, Mapping) and "clutch" in item]
+    backlashes = [machine.values.get(f"pendulums.{index}.backlash") for index in range(len(pendulums))]
+    known = [value for value in backlashes if value is not None]
+    if "clutch" in base:
+        if own:
+            report.problem(
+                "/base/clutch",
+                f"is common to all pendulums, yet pendulums {', '.join(map(str, own))} also have their own",
+                allowed="one clutch in `base`, or one in each pendulum",
+            )
+        _add(machine, read_clutch(report, "/base/clutch", base["clutch"], "clutch.", known))
+    elif not own:
+        report.problem(
+            "/base/clutch",
+            "is required: coefficients, or measured data with an accuracy",
+            allowed="one clutch in `base`, or one in each pendulum",
+        )
+    for index in range(len(pendulums)) if own else ():
+        pointer = f"/base/pendulums/{index}/clutch"
+        backlash = backlashes[index]
+        if index in own:
+            prefix = f"pendulums.{index}.clutch."
+            shared = [] if backlash is None else [backlash]
+            _add(machine, read_clutch(report, pointer, pendulums[index]["clutch"], prefix, shared))
+        elif "clutch" not in base:
+            report.problem(
+                pointer,
+                f"is required, since pendulum {own[0]} has its own",
+                allowed="one clutch in `base`, or one in each pendulum",
+            )
+
+
+def _add(machine: Machine, clutch: Clutch | None) -> None:
+    if clutch is not None:
+        machine.clutches.append(clutch)
+        machine.values.update(clutch.values)
+        machine.parameters.update(clutch.parameters)
+
+
+def _assume_everything(catalogue: list[Parameter], machine: Machine) -> None:
+    """Lets axes name whatever a machine could have, so that an unreadable base brings no second problem there."""
+    for entry in catalogue:
+        for index in range(MAX_PENDULUMS if ".N." in entry.path else 1):
+            path = entry.path.replace(".N.", f".{index}.")
+            machine.parameters.setdefault(path, placed(entry, path))
+
+
+def assumed_clutch(path: str) -> bool:
+    """Whether ``path`` could be one of a clutch that could not be read."""
+    match = _CLUTCH_PATH.fullmatch(path)
+    if match is None:
+        return False
+    name, _, index = match[1].partition(".")
+    if name == "coefficients":
+        return index.isascii() and index.isdigit() and len(index) < 4 and int(index) < MAX_COEFFICIENTS
+    return match[1] == "windup_limit"

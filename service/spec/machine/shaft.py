@@ -1,0 +1,155 @@
+"""The machine shaft of a spec (`base`): its structure, every number by its flat path, and the paths that axes can vary.
+
+The fields are nested as the paths are: the number at ``mechanism.slider_crank.crank`` stands at
+``/base/mechanism/slider_crank/crank``. What is wrong with the machine as a whole (`shaft_check`) is looked for
+once its parts could be read.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from service.spec.catalogue import general_path
+from service.spec.fields import missing, read_number, read_object
+from service.spec.machine.drive import Machine
+from service.spec.machine.shaft_check import check_machine
+from service.spec.machine.shaft_parts import (
+    read_balance,
+    read_choice,
+    read_constants,
+    read_cycle,
+    read_drive,
+    read_mechanism,
+    read_operation,
+    read_phi_c,
+)
+from service.spec.report import Report, did_you_mean, join
+from worker import models
+from worker.models import Parameter, machine_shaft
+
+FIELDS: Final = (
+    "cycle", "mean_speed", "mean_speed_is", "drive", "mechanism", "operation", "balance", "phi_c", "constants",
+    "wanted_irregularity", "gravity",
+)  # fmt: skip
+MEAN_SPEEDS: Final = ("midrange", "angle", "time")
+_INDEXED = re.compile(r"operation\.steps\.([0-9]{1,9})\.")
+
+
+@dataclass
+class ShaftMachine(Machine):
+    """What the base of a machine shaft says, as far as it could be read.
+
+    Attributes
+    ----------
+    structure : what of it is no number, as a study keeps it; None when it could not be read
+    places : "drive", "mechanism", "operation" -> JSON Pointer of its formula, its table, or all of it
+    """
+
+    structure: dict[str, Any] | None = None
+    places: dict[str, str] = field(default_factory=dict)
+
+    def assumed(self, path: str) -> bool:
+        """Whether ``path`` could be a number of a machine whose structure could not be read."""
+        return self.structure is None and any(
+            entry.path in {general_path(path), re.sub(r"^constants\..*", "constants.NAME", path)}
+            for entry in models.parameter_catalogue(models.MACHINE_SHAFT)
+        )
+
+    def why_not(self, path: str) -> str:
+        """Why an axis cannot vary ``path``: a sentence that says what it can."""
+        steps = 0 if self.structure is None else int(self.structure["operation"]["steps"])
+        step = _INDEXED.match(path)
+        if step and steps:
+            return f"there is no step {step[1]}: steps are numbered from 0 to {steps - 1}"
+        if path.startswith("constants.") and self.structure is not None:
+            return "is no constant of this machine" + did_you_mean(path, self.parameters)
+        catalogue = {entry.path for entry in models.parameter_catalogue(models.MACHINE_SHAFT)}
+        if general_path(path) in catalogue:
+            return "is no parameter of this machine, whose parts are of another kind" + did_you_mean(
+                path, self.parameters
+            )
+        return "names no numeric parameter of the base" + did_you_mean(path.removeprefix("base."), self.parameters)
+
+
+def read_shaft(report: Report, data: object) -> ShaftMachine:
+    """The machine in ``data`` (the spec's `base`), everything wrong with it noted in ``report``."""
+    machine = ShaftMachine()
+    found = read_object(report, "/base", data, FIELDS)
+    if found is None:
+        return machine
+    before = report.found
+    structure = _read_structure(report, found, machine.places)
+    if structure is None:
+        return machine
+    machine.structure = structure
+    machine.parameters = machine_shaft.parameters_of(structure)
+    _unused(report, found, structure)
+    for path, entry in machine.parameters.items():
+        number = _read(report, found, path, entry)
+        if number is not None:
+            machine.values[path] = number
+    if report.found == before:
+        check_machine(report, structure, machine.values, machine.places)
+    return machine
+
+
+def _read_structure(report: Report, found: Mapping[str, Any], places: dict[str, str]) -> dict[str, Any] | None:
+    """The structure as plain data; None, and problems noted, when some part of it could not be read."""
+    drive = read_drive(report, found.get("drive"), places)
+    mechanism = read_mechanism(report, found.get("mechanism"), places)
+    operation = read_operation(report, found.get("operation"), places)
+    cycle = read_cycle(report, found.get("cycle", 1))
+    constants = read_constants(report, found.get("constants", {}))
+    balance = read_balance(report, found, drive)
+    mean = read_choice(report, "/base", found, "mean_speed_is", MEAN_SPEEDS, MEAN_SPEEDS[0])
+    before = report.found
+    phi_c = read_phi_c(report, found.get("phi_c"))
+    parts = (drive, mechanism, operation, cycle, constants, balance, mean)
+    if any(part is None for part in parts) or report.found > before:
+        return None
+    return {
+        "cycle": cycle, "mean_speed_is": mean, "balance": balance, "drive": drive, "mechanism": mechanism,
+        "operation": operation, "constants": constants, "phi_c": phi_c,
+    }  # fmt: skip
+
+
+def _unused(report: Report, found: Mapping[str, Any], structure: Mapping[str, Any]) -> None:
+    """Notes numbers that this machine has no use for, which a user surely means otherwise."""
+    if structure["balance"] == "motor" and "mean_speed" in found:
+        report.problem("/base/mean_speed", "is not required of a machine with a motor: the speed is a result",
+                       found["mean_speed"], allowed='no mean_speed, or another balance than "motor"')  # fmt: skip
+    drive = found.get("drive")
+    if isinstance(drive, Mapping) and "scale" in drive and "drive.scale" not in machine_shaft.parameters_of(structure):
+        report.problem("/base/drive/scale", "is the factor on a table or formula of the driving torque, and there is "
+                       "none", drive["scale"])  # fmt: skip
+    operation = found.get("operation")
+    if isinstance(operation, Mapping) and structure["operation"]["over"] == "angle" and "during" in operation:
+        report.problem("/base/operation/during", "tells strokes, and this diagram goes over the angle",
+                       operation["during"], allowed='with `over` "stroke" only')  # fmt: skip
+
+
+def _read(report: Report, found: Mapping[str, Any], path: str, entry: Parameter) -> float | None:
+    """The number at a flat path of the base; None, and a problem noted, when it is missing or wrong."""
+    place: Any = found
+    keys: list[str | int] = []
+    for key in path.split("."):
+        index: str | int = int(key) if isinstance(place, list) else key
+        keys.append(index)
+        inside = isinstance(place, list) or (isinstance(place, Mapping) and key in place)
+        if not inside:
+            break
+        place = place[index]
+    else:
+        return read_number(report, join("/base", *keys), place, entry)
+    if entry.default is None:
+        missing(report, join("/base", *_all_keys(path)), entry)
+        return None
+    # No end of a range is a number that could be stored.
+    return entry.default if entry.accepts(entry.default) else None
+
+
+def _all_keys(path: str) -> list[str]:
+    return path.split(".")

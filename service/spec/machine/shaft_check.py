@@ -1,0 +1,96 @@
+"""What is wrong with a machine shaft as a whole: parts that make no machine, and machines without a steady cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Final
+
+from service.spec.report import Report
+from worker.models import (
+    Ending,
+    ExpressionError,
+    InsufficientInertiaError,
+    KernelShape,
+    MachineError,
+    is_compiled,
+    machine_shaft,
+)
+
+#: Where the fault of a machine that ends so is told.
+_POINTERS: Final[dict[Ending | None, str]] = {
+    Ending.UNBALANCED_WORK: "/base/balance",
+    Ending.NEGATIVE_INERTIA: "/base/drive/inertia",
+    Ending.MOTOR_STALLED: "/base/drive/motor",
+}
+_PARTS: Final = ("mechanism", "drive", "operation")
+_NEUTRAL: Final[dict[str, dict[str, Any]]] = {"drive": {}, "mechanism": {"kind": "none"}, "operation": {}}
+
+
+class NotCompiledError(Exception):
+    """The kernel of ``shape`` is needed, and is compiled elsewhere: see `compile_elsewhere`."""
+
+    def __init__(self, shape: KernelShape) -> None:
+        super().__init__(shape)
+        self.shape = shape
+
+
+_compiles_here = True
+
+
+def compile_elsewhere() -> None:
+    """From now on checks in this process raise NotCompiledError rather than compile, which can take a minute."""
+    global _compiles_here  # noqa: PLW0603 - a habit of the whole process
+    _compiles_here = False
+
+
+def check_machine(
+    report: Report, structure: Mapping[str, Any], values: Mapping[str, float], places: Mapping[str, str]
+) -> None:
+    """Notes what is wrong with a machine whose numbers are all in range.
+
+    Parameters
+    ----------
+    structure : as a study keeps it
+    values : flat path -> SI number, all that the structure needs
+    places : part -> JSON Pointer of its formula, its table, or all of it
+    """
+    shape = machine_shaft.shape_of()
+    if not _compiles_here and not is_compiled(shape):
+        raise NotCompiledError(shape)
+    before = report.found
+    for part in _PARTS:
+        # Alone but for the mechanism, which an operation needs, so that a fault is told where it is.
+        alone = {name: structure[name] if name in {part, "mechanism"} else _NEUTRAL[name] for name in _PARTS}
+        own = {**structure, **alone}
+        if part != "drive" and structure["balance"] == "motor":
+            own["balance"] = "constant"
+        _note(report, places[part], partial(machine_shaft.check_structure, own), structure[part].get("formula"))
+        if report.found > before:
+            return
+    _note(report, "/base", partial(machine_shaft.check_structure, structure))
+    if report.found > before:
+        return
+    try:
+        machine_shaft.check(structure, values)
+    except ExpressionError as error:
+        report.problem(places.get(error.part, "/base"), str(error), structure.get(error.part, {}).get("formula"))
+    except InsufficientInertiaError as error:
+        allowed = f"> {error.least_mean_speed:.6g} rad/s"
+        report.problem("/base/mean_speed", str(error), error.asked, allowed=allowed, unit="rad/s")
+    except machine_shaft.RelationError as error:
+        report.problem("/base/" + error.path.replace(".", "/"), str(error), error.value, allowed=error.allowed)
+    except MachineError as error:
+        pointer = _POINTERS.get(error.ending)
+        if error.ending is Ending.CANNOT_ASSEMBLE:
+            pointer = places["mechanism"]
+        if error.ending is Ending.NEGATIVE_INERTIA and structure["mechanism"]["kind"] in {"table", "formula"}:
+            pointer = places["mechanism"]
+        report.problem(pointer or "/base", str(error))
+
+
+def _note(report: Report, pointer: str, check: Callable[[], None], value: object = None) -> None:
+    try:
+        check()
+    except MachineError as error:
+        report.problem(pointer, str(error), value)

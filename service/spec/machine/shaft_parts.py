@@ -1,0 +1,311 @@
+"""The parts of a machine shaft in a spec: what is no number of drive, mechanism, operation and cycle."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from service.spec.fields import read_number, read_object, read_whole
+from service.spec.report import Report, did_you_mean, join
+from service.spec.units import QuantityError, parse_quantity
+from worker import models
+from worker.models import Parameter, machine_shaft
+
+BALANCES: Final = ("constant", "scale", "refuse", "motor")
+LAWS: Final = ("cycloidal", "polynomial_345")
+INTERPOLATIONS: Final = ("smooth", "linear")
+MOTORS: Final = ("linear", "kloss")
+#: What of a mechanism is no number: field -> its choices.
+MECHANISM_CHOICES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
+    "slider_crank": {},
+    "four_bar": {},
+    "quick_return": {"kind": ("crank_shaper", "whitworth")},
+    "cam": {"rise": LAWS, "fall": LAWS},
+}
+MECHANISMS: Final = ("table", "formula", *MECHANISM_CHOICES)
+#: Ways to give an operation's diagram.
+FORMS: Final = ("value", "steps", "table", "formula")
+OPERATION_CHOICES: Final[dict[str, tuple[str, ...]]] = {
+    "quantity": ("force", "torque"),
+    "over": ("angle", "stroke"),
+    "during": ("forward", "return", "both"),
+    "sense": ("resisting", "fixed"),
+}
+OPERATION_FIELDS: Final = (*FORMS, "gas", *OPERATION_CHOICES, "interpolation", "scale")
+STEP_FIELDS: Final = ("from", "to", "value")
+_NAME = re.compile(r"[A-Za-z_][A-Za-z_0-9]{0,39}")
+_ANY: Final = 1e30
+_ANGLE = Parameter("angle", "phi", "rad", -100.0, 100.0, False, None, "angle of the shaft")
+_FRACTION = Parameter("fraction", "x", "1", 0.0, 1.0, False, None, "fraction of the stroke")
+
+
+def number_fields(prefix: str) -> tuple[str, ...]:
+    """Names of the numbers directly under ``prefix`` (with its last dot) in the catalogue."""
+    paths = [entry.path for entry in models.parameter_catalogue(models.MACHINE_SHAFT)]
+    names = [path.removeprefix(prefix) for path in paths if path.startswith(prefix)]
+    return tuple(name for name in names if "." not in name)
+
+
+def read_choice(
+    report: Report, pointer: str, found: Mapping[str, Any], name: str, choices: Sequence[str], default: str | None
+) -> str | None:
+    """The choice in field ``name``; None, and a problem noted, when it is none of ``choices``."""
+    value = found.get(name, default)
+    if isinstance(value, str) and value in choices:
+        return value
+    hint = did_you_mean(value, choices) if isinstance(value, str) else ""
+    message = "is required" if value is None else f"is none of the choices{hint}"
+    report.problem(join(pointer, name), message, value, allowed=", ".join(f"'{choice}'" for choice in choices))
+    return None
+
+
+def read_cycle(report: Report, value: object) -> int | None:
+    """Revolutions of a cycle."""
+    most = max(machine_shaft.REVOLUTIONS)
+    turns: float | None = None
+    if isinstance(value, str):
+        try:
+            turns = parse_quantity(value, "rad") / (2.0 * math.pi)
+        except QuantityError as error:
+            report.problem("/base/cycle", str(error), value, allowed=f"1 to {most} revolutions")
+            return None
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        turns = float(value)
+    for known in machine_shaft.REVOLUTIONS:
+        if turns is not None and math.isclose(turns, known, rel_tol=1e-12):
+            return known
+    report.problem("/base/cycle", "must be a whole number of revolutions", value,
+                   allowed=f'"1 revolution" to "{most} revolutions", or 1 to {most}')  # fmt: skip
+    return None
+
+
+def read_phi_c(report: Report, value: object) -> int | None:
+    """Which of the angles with T = T_mean is taken; None for the first at which T rises."""
+    return None if value is None else read_whole(report, "/base/phi_c", value, 0, 1000)
+
+
+def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, Any] | None) -> str | None:
+    """What makes the work over a cycle zero; a motor balances by itself, and a torque that is given is kept."""
+    motor = drive is not None and drive["motor"] is not None
+    given = isinstance(found.get("drive"), Mapping) and "torque" in found["drive"]
+    default = "motor" if motor else "refuse" if given else "constant"
+    balance = read_choice(report, "/base", found, "balance", BALANCES, default)
+    if balance is None or drive is None:
+        return balance
+    if balance == "motor" and not motor:
+        report.problem("/base/drive/motor", 'is required by the balance "motor"', allowed="a motor, linear or kloss")
+        return None
+    if balance != "motor" and motor:
+        report.problem("/base/balance", "is not that of a machine with a motor", balance, allowed="'motor'")
+        return None
+    if balance == "scale" and not given:
+        report.problem("/base/drive/torque", 'is required by the balance "scale", which multiplies it by a factor',
+                       allowed="a torque, a table or a formula")  # fmt: skip
+        return None
+    return balance
+
+
+def read_constants(report: Report, data: object) -> list[str] | None:
+    """Names of the constants of formulas."""
+    if not isinstance(data, Mapping) or len(data) > machine_shaft.MAX_CONSTANTS:
+        allowed = f"an object of at most {machine_shaft.MAX_CONSTANTS} names with their numbers"
+        report.problem("/base/constants", "must be an object of names with their numbers", data, allowed=allowed)
+        return None
+    wrong = [name for name in data if not _NAME.fullmatch(name)]
+    for name in wrong:
+        report.problem(join("/base/constants", name), "is no name for a constant", name,
+                       allowed="letters, digits and _, at most 40, no digit first")  # fmt: skip
+    return None if wrong else sorted(data)
+
+
+def read_drive(report: Report, data: object, places: dict[str, str]) -> dict[str, Any] | None:
+    """The drive: its torque's form, or its motor."""
+    places["drive"] = "/base/drive"
+    found = read_object(report, "/base/drive", data, ("inertia", "torque", "scale", "motor"))
+    if found is None:
+        return None
+    drive: dict[str, Any] = {"form": "constant", "table": None, "formula": None, "motor": None}
+    if "motor" in found:
+        if "torque" in found:
+            report.problem("/base/drive/torque", "stands beside a motor, which gives the torque by itself",
+                           found["torque"], allowed="a torque or a motor")  # fmt: skip
+            return None
+        return _read_motor(report, found["motor"], drive)
+    torque = found.get("torque")
+    if not isinstance(torque, Mapping):
+        return drive
+    given = read_object(report, "/base/drive/torque", torque, ("table", "formula", "interpolation"))
+    diagram = None if given is None else _diagram(report, "/base/drive/torque", given, _ANGLE, _unit("N*m"))
+    if diagram is None:
+        return None
+    places["drive"] = f"/base/drive/torque/{diagram['form']}"
+    return drive | diagram
+
+
+def _read_motor(report: Report, data: object, drive: dict[str, Any]) -> dict[str, Any] | None:
+    found = read_object(report, "/base/drive/motor", data, ("kind", *number_fields("drive.motor.")))
+    if found is None:
+        return None
+    kind = read_choice(report, "/base/drive/motor", found, "kind", MOTORS, None)
+    if kind is None:
+        return None
+    own = _numbers_of({"balance": "motor", "drive": {"motor": kind}}, "drive.motor.")
+    _refuse_foreign(report, "/base/drive/motor", found, ("kind", *own), f"a {kind} motor")
+    return drive | {"motor": kind}
+
+
+def _numbers_of(structure: Mapping[str, Any], prefix: str) -> list[str]:
+    return [path.removeprefix(prefix) for path in machine_shaft.parameters_of(structure) if path.startswith(prefix)]
+
+
+def _refuse_foreign(report: Report, pointer: str, found: Mapping[str, Any], own: Sequence[str], what: str) -> None:
+    for name in found:
+        if name not in own:
+            report.problem(join(pointer, name), f"is no field of {what}", found[name], allowed=", ".join(own))
+
+
+def read_mechanism(report: Report, data: object, places: dict[str, str]) -> dict[str, Any] | None:
+    """The mechanism: which one, and what of it is no number."""
+    places["mechanism"] = "/base/mechanism"
+    if data is None:
+        return {"kind": "none"}
+    found = read_object(report, "/base/mechanism", data, (*MECHANISMS, "interpolation"))
+    if found is None:
+        return None
+    kinds = [kind for kind in MECHANISMS if kind in found]
+    if len(kinds) != 1:
+        given = f"{len(kinds)} are given: {', '.join(kinds)}" if kinds else "none is given"
+        report.problem("/base/mechanism", f"needs exactly one of {', '.join(MECHANISMS)}; {given}",
+                       allowed="one of " + ", ".join(MECHANISMS))  # fmt: skip
+        return None
+    kind = kinds[0]
+    places["mechanism"] = pointer = join("/base/mechanism", kind)
+    if kind in {"table", "formula"}:
+        diagram = _diagram(report, "/base/mechanism", found, _ANGLE, _unit("kg*m^2"))
+        return None if diagram is None else {"kind": kind, "table": diagram["table"], "formula": diagram["formula"]}
+    if "interpolation" in found:
+        report.problem("/base/mechanism/interpolation", "belongs to a table, and there is none", found["interpolation"])
+    choices = MECHANISM_CHOICES[kind]
+    own = read_object(report, pointer, found[kind], (*choices, *number_fields(f"mechanism.{kind}.")))
+    if own is None:
+        return None
+    made: dict[str, Any] = {"kind": kind}
+    for name, allowed in choices.items():
+        # A quick return is the one or the other; the laws of cams have a usual one.
+        choice = read_choice(report, pointer, own, name, allowed, None if name == "kind" else allowed[0])
+        if choice is None:
+            return None
+        made["quick_return" if name == "kind" else name] = choice
+    return made
+
+
+def read_operation(report: Report, data: object, places: dict[str, str]) -> dict[str, Any] | None:
+    """The operation: what resists, how it is given, over what."""
+    places["operation"] = "/base/operation"
+    if data is None:
+        return {"quantity": "none", "over": "angle", "steps": 0}
+    found = read_object(report, "/base/operation", data, OPERATION_FIELDS)
+    if found is None:
+        return None
+    if "gas" in found:
+        return _read_gas(report, found)
+    forms = [form for form in FORMS if form in found]
+    if len(forms) != 1:
+        given = f"{len(forms)} are given: {', '.join(forms)}" if forms else "none is given"
+        report.problem("/base/operation", f"needs exactly one of {', '.join((*FORMS, 'gas'))}; {given}",
+                       allowed="one of " + ", ".join((*FORMS, "gas")))  # fmt: skip
+        return None
+    defaults = {
+        "quantity": None,
+        **{name: choices[0] for name, choices in OPERATION_CHOICES.items() if name != "quantity"},
+    }
+    chosen = {
+        name: read_choice(report, "/base/operation", found, name, choices, defaults[name])
+        for name, choices in OPERATION_CHOICES.items()
+    }
+    if None in chosen.values():
+        return None
+    operation: dict[str, Any] = {**chosen, "steps": 0}
+    form = forms[0]
+    places["operation"] = join("/base/operation", form)
+    if form == "value":
+        return operation | {"form": "constant"}
+    if form == "steps":
+        count = _read_steps(report, found["steps"])
+        return None if count is None else operation | {"form": "steps", "steps": count}
+    place = _ANGLE if chosen["over"] == "angle" else _FRACTION
+    diagram = _diagram(report, "/base/operation", found, place, _unit("N" if chosen["quantity"] == "force" else "N*m"))
+    return None if diagram is None else operation | diagram
+
+
+def _read_gas(report: Report, found: Mapping[str, Any]) -> dict[str, Any] | None:
+    foreign = [name for name in found if name not in {"gas", "scale"}]
+    for name in foreign:
+        report.problem(join("/base/operation", name), "does not belong to a gas, which is compressed by the working "
+                       "part over the whole cycle", found[name], allowed="gas, scale")  # fmt: skip
+    known = number_fields("operation.gas.")
+    if foreign or read_object(report, "/base/operation/gas", found["gas"], known) is None:
+        return None
+    return {"quantity": "gas", "over": "angle", "steps": 0}
+
+
+def _read_steps(report: Report, data: object) -> int | None:
+    most = machine_shaft.MAX_STEPS
+    if not isinstance(data, list) or not 1 <= len(data) <= most:
+        report.problem("/base/operation/steps", "must be a list of steps", data, allowed=f"1 to {most} steps")
+        return None
+    read = [read_object(report, join("/base/operation/steps", k), item, STEP_FIELDS) for k, item in enumerate(data)]
+    return None if any(item is None for item in read) else len(data)
+
+
+def _unit(unit: str) -> Parameter:
+    return Parameter("value", "", unit, -_ANY, _ANY, False, None, "value")
+
+
+def _diagram(
+    report: Report, pointer: str, found: Mapping[str, Any], place: Parameter, value: Parameter
+) -> dict[str, Any] | None:
+    """Form, table and formula of what is given as one of both."""
+    given = [form for form in ("table", "formula") if form in found]
+    if len(given) != 1:
+        report.problem(pointer, "needs a table or a formula, one of both", dict(found), allowed="table or formula")
+        return None
+    if given[0] == "formula":
+        return _formula(report, pointer, found)
+    before = report.found
+    rows = _rows(report, join(pointer, "table"), found["table"], place, value)
+    interpolation = read_choice(report, pointer, found, "interpolation", INTERPOLATIONS, "smooth")
+    if report.found > before:
+        return None
+    return {"form": "table", "table": {"rows": rows, "interpolation": interpolation}, "formula": None}
+
+
+def _formula(report: Report, pointer: str, found: Mapping[str, Any]) -> dict[str, Any] | None:
+    formula = found["formula"]
+    if "interpolation" in found:
+        report.problem(join(pointer, "interpolation"), "belongs to a table, and this is a formula",
+                       found["interpolation"])  # fmt: skip
+        return None
+    if not isinstance(formula, str) or not formula.strip():
+        report.problem(join(pointer, "formula"), "must be a text", formula, allowed="a formula of phi, in rad")
+        return None
+    return {"form": "formula", "table": None, "formula": formula}
+
+
+def _rows(report: Report, pointer: str, data: object, place: Parameter, value: Parameter) -> list[list[float]]:
+    most = machine_shaft.MAX_ROWS
+    if not isinstance(data, list) or not 2 <= len(data) <= most:
+        report.problem(pointer, "must be a list of rows", data, allowed=f"2 to {most:,} rows [{place.path}, value]")
+        return []
+    rows: list[list[float]] = []
+    for index, row in enumerate(data):
+        where = join(pointer, index)
+        if not isinstance(row, list) or len(row) != 2:
+            report.problem(where, "must be a row of two numbers", row, allowed=f"[{place.path}, value]")
+            continue
+        x, y = (read_number(report, join(where, k), row[k], entry) for k, entry in enumerate((place, value)))
+        if x is not None and y is not None:
+            rows.append([x, y])
+    return rows

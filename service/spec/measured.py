@@ -1,0 +1,183 @@
+"""Measured data of a clutch as test benches write them: two columns, angle and torque, in a text file.
+
+Columns stand apart by comma, semicolon or tab (then a decimal comma is understood), or blanks. A header is optional and
+may name the units: ``angle_deg, torque_Nmm`` or ``angle [mrad]; torque [N*m]``. Without units the numbers are rad
+and N*m, which is said; a header of other words is refused. Cells may stand in quotation marks. Empty lines and lines
+that begin with ``#`` are passed over.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.spec.numbers import parse_number
+from service.spec.report import Problem
+from worker.limits import MAX_CLUTCH_ROWS
+
+#: Problems told of one file; a file of another kind has one in every line.
+_MAX_PROBLEMS = 20
+_QUANTITIES = (("angle", "rad"), ("torque", "N*m"))
+#: Headings that are understood although they name no unit, by column.
+_WORDS = (
+    frozenset({"angle", "windup", "twist", "rotation", "phi", "xi", "u"}),
+    frozenset({"torque", "moment", "m", "t"}),
+)
+#: Larger angles, taken as rad because no unit is named, are rather degrees.
+_LARGEST_PLAUSIBLE = 0.5
+_UNIT_IN_HEADER = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]$|^[A-Za-z]+_(\S+)$")
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredData:
+    """Measured rows.
+
+    Attributes
+    ----------
+    rows : float64 array, shape (m, 2)
+        Angle in rad and torque in N*m.
+    lines : tuple of int, length m
+        Number of the line of the file each row stands in, from 1.
+    warnings : tuple of str
+        Units that were assumed because the file names none.
+    """
+
+    rows: NDArray[np.float64]
+    lines: tuple[int, ...]
+    warnings: tuple[str, ...] = ()
+
+
+class MeasuredDataError(Exception):
+    """The text holds no measured data; ``problems`` name the lines of the text."""
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("\n".join(map(str, self.problems)))
+
+
+def parse_measured(text: str, convert: Callable[[str, str], float]) -> MeasuredData:
+    """Read the measured rows of ``text``.
+
+    Parameters
+    ----------
+    text : str
+        The file's text.
+    convert : function of (quantity, SI unit)
+        The number in SI of a quantity such as "1 deg"; raises ValueError for a wrong unit.
+
+    Raises
+    ------
+    MeasuredDataError
+        With every problem found, up to a bound.
+    """
+    lines = [
+        (number, stripped)
+        for number, line in enumerate(text.splitlines(), 1)
+        if (stripped := line.strip()) and not stripped.startswith("#")
+    ]
+    if not lines:
+        raise MeasuredDataError([Problem("line 1", "there are no data", None, "rows of angle and torque")])
+    factors: tuple[float | None, float | None] = (None, None)
+    if _is_header(_cells(lines[0][1])):
+        factors = _factors(*lines[0], convert)
+        lines = lines[1:]
+    return _numbers(lines, factors)
+
+
+def _cells(line: str) -> list[str]:
+    if ";" in line:
+        return [_unquoted(cell).replace(",", ".") for cell in line.split(";")]
+    parts = line.split("\t")
+    if len(parts) == 2 and not any(part.strip().endswith(",") for part in parts):
+        return [_unquoted(part).replace(",", ".") for part in parts]
+    separator = "," if "," in line else "\t" if "\t" in line else None
+    return [_unquoted(cell) for cell in line.split(separator)]
+
+
+def _unquoted(cell: str) -> str:
+    cell = cell.strip()
+    return cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] and cell[0] in "\"'" else cell
+
+
+def _is_header(cells: list[str]) -> bool:
+    return all(parse_number(cell) is None for cell in cells)
+
+
+def _factors(number: int, line: str, convert: Callable[[str, str], float]) -> tuple[float | None, float | None]:
+    """Factors of the two columns to SI, from the header's units; None for a column that names none."""
+    cells = _cells(line)
+    if len(cells) != 2 and not any(separator in line for separator in ";,\t"):
+        cells = [cell.strip() for cell in re.split(r"(?<=[\])])\s+|\s{2,}", line) if cell.strip()]
+    if len(cells) != 2:
+        raise MeasuredDataError(
+            [Problem(f"line {number}", "the header has not two columns", line[:80], "angle, torque")]
+        )
+    factors: list[float | None] = []
+    problems = []
+    for cell, (name, unit), words in zip(cells, _QUANTITIES, _WORDS, strict=True):
+        try:
+            factors.append(_factor(cell, unit, words, convert))
+        except ValueError as error:
+            problems.append(Problem(f"line {number}", f"column {name}: {error}", cell, f"a unit of {unit}"))
+    if problems:
+        raise MeasuredDataError(problems)
+    return factors[0], factors[1]
+
+
+def _factor(heading: str, unit: str, words: frozenset[str], convert: Callable[[str, str], float]) -> float | None:
+    found = _UNIT_IN_HEADER.search(heading)
+    text = ((found[1] or found[2]) if found else heading.rpartition(" ")[2]).strip()
+    if text.lower() in words:
+        return None
+    if found is None and len(text) < 2:
+        raise ValueError(f"'{heading}' names neither the quantity nor its unit")
+    return convert(f"1 {text}", unit)
+
+
+def _assumed(factors: tuple[float | None, float | None], rows: NDArray[np.float64]) -> Iterator[str]:
+    """What was taken for granted where the file names no units."""
+    bare = [
+        f"{name}s are taken in {unit}"
+        for factor, (name, unit) in zip(factors, _QUANTITIES, strict=True)
+        if factor is None
+    ]
+    if bare:
+        yield f"the file does not name every unit: {' and '.join(bare)}; a header such as angle_deg,torque_Nm tells"
+    largest = float(np.abs(rows[:, 0]).max())
+    if factors[0] is None and largest > _LARGEST_PLAUSIBLE:
+        yield f"the largest angle would be {largest:g} rad, {math.degrees(largest):.4g} degrees; was it in degrees?"
+
+
+def _numbers(lines: list[tuple[int, str]], factors: tuple[float | None, float | None]) -> MeasuredData:
+    problems = list(_wrong_rows(lines))
+    if problems:
+        raise MeasuredDataError(problems[:_MAX_PROBLEMS])
+    if not 1 <= len(lines) <= MAX_CLUTCH_ROWS:
+        message = "there are no rows under the header" if not lines else f"{len(lines)} rows"
+        raise MeasuredDataError([Problem("data", message, len(lines), f"1 .. {MAX_CLUTCH_ROWS} rows")])
+    rows = np.array([[float(cell) for cell in _cells(line)] for _, line in lines], dtype=np.float64)
+    scaled = rows * np.array([1.0 if factor is None else factor for factor in factors])
+    return MeasuredData(scaled, tuple(number for number, _ in lines), tuple(_assumed(factors, rows)))
+
+
+def _wrong_rows(lines: list[tuple[int, str]]) -> Iterator[Problem]:
+    for number, line in lines:
+        cells = _cells(line)
+        if len(cells) != 2:
+            few = f"{len(cells)} column" + ("" if len(cells) == 1 else "s")
+            allowed = "two columns: angle, torque"
+            if "," in line:
+                allowed += "; decimal commas only where tabs or semicolons part the columns, else 0.25"
+            yield Problem(f"line {number}", few, line.replace("\t", " ")[:80], allowed)
+            continue
+        for cell, (name, _) in zip(cells, _QUANTITIES, strict=True):
+            value = parse_number(cell)
+            if value is None:
+                yield Problem(f"line {number}", f"the {name} is no number", cell[:80], "a number")
+            elif not math.isfinite(value):
+                yield Problem(f"line {number}", f"the {name} is not finite", cell[:80], "a finite number")

@@ -1,0 +1,203 @@
+"""What a spec has wrong, said in one way: JSON Pointer, message, value received, allowed range and unit."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from service.faults import ErrorItem
+from worker.limits import MAX_PROBLEMS
+
+_LONGEST_TEXT = 60
+_LONGEST_LIST = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One thing wrong with a spec.
+
+    Attributes
+    ----------
+    pointer : str
+        JSON Pointer (RFC 6901) to the field; "" is the whole document.
+    message : str
+        What is wrong, for people, without the value.
+    value : object
+        The value received, shortened, always plain JSON data.
+    allowed : str or None
+        The allowed range or choice.
+    unit : str or None
+        The SI unit of the field.
+    """
+
+    pointer: str
+    message: str
+    value: object = None
+    allowed: str | None = None
+    unit: str | None = None
+
+    def __str__(self) -> str:
+        details = (
+            []
+            if self.value is None
+            else [f"got {self.value!r}" if isinstance(self.value, str) else f"got {self.value}"]
+        )
+        if self.allowed is not None:
+            details.append(f"allowed: {self.allowed}")
+        if self.unit is not None and (self.allowed is None or self.unit not in self.allowed):
+            details.append(f"unit {self.unit}")
+        where = self.pointer or "(the whole spec)"
+        return f"{where}: {self.message}" + (f" ({'; '.join(details)})" if details else "")
+
+
+class SpecError(Exception):
+    """A spec that cannot be run, with everything wrong in it. ``str()`` gives a line for each problem."""
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        self.problems: tuple[Problem, ...] = tuple(problems)
+        super().__init__("\n".join(map(str, self.problems)))
+
+    def __reduce__(self) -> tuple[type[SpecError], tuple[tuple[Problem, ...]]]:
+        return SpecError, (self.problems,)
+
+
+class Report:
+    """Collects problems and warnings while ``source``, plain data that the user wrote, is read."""
+
+    def __init__(self, source: object = None) -> None:
+        self._source = source
+        self.problems: list[Problem] = []
+        #: Problems that were found, those included that are not noted any more.
+        self.found = 0
+        self.warnings: list[str] = []
+
+    def problem(
+        self, pointer: str, message: str, value: object = None, *, allowed: str | None = None, unit: str | None = None
+    ) -> None:
+        """Notes a problem, unless there are `MAX_PROBLEMS` already; numbers that the user wrote stand as written."""
+        self.found += 1
+        if not self.full:
+            shown = _as_written(value, _at(self._source, pointer))
+            self.problems.append(Problem(pointer, message, shorten(shown), allowed, unit))
+
+    @property
+    def full(self) -> bool:
+        """Whether there are so many problems that looking for more would only take time."""
+        return len(self.problems) >= MAX_PROBLEMS
+
+    def warn(self, message: str) -> None:
+        """Notes something that is allowed but probably not meant; the same sentence only once."""
+        if message not in self.warnings:
+            self.warnings.append(message)
+
+    def unknown_fields(self, pointer: str, found: Mapping[str, object], known: Iterable[str]) -> None:
+        """Notes every key of ``found`` that is not ``known``, with the nearest known one."""
+        known = tuple(known)
+        for key in found:
+            if key not in known and not self.full:
+                self.problem(
+                    join(pointer, key),
+                    f"unknown field{did_you_mean(key, known)}",
+                    found[key],
+                    allowed="the fields " + ", ".join(known),
+                )
+
+    def raise_if_any(self) -> None:
+        """Raises `SpecError` with everything noted so far, if anything was."""
+        if self.problems:
+            raise self.error()
+
+    def error(self) -> SpecError:
+        """The error with everything noted so far."""
+        more = [Problem("", f"only the first {MAX_PROBLEMS} problems are listed")] if self.full else []
+        return SpecError([*self.problems, *more])
+
+
+def _at(source: object, pointer: str) -> object:
+    """What stands at a JSON Pointer; None where nothing does."""
+    for part in pointer.split("/")[1:]:
+        key = part.replace("~1", "/").replace("~0", "~")
+        if isinstance(source, Mapping):
+            source = source.get(key)
+        elif isinstance(source, list) and key.isdecimal() and int(key) < len(source):
+            source = source[int(key)]
+        else:
+            return None
+    return source
+
+
+def _as_written(value: object, written: object) -> object:
+    """``written`` in the place of the SI number, or numbers, that were made of it."""
+    if isinstance(value, list | tuple) and isinstance(written, list) and 0 < len(value) == len(written):
+        pairs = list(zip(value, written, strict=True))
+        return [_as_written(*pair) for pair in pairs]
+    numeric = isinstance(value, float | int) and not isinstance(value, bool)
+    return written if numeric and isinstance(written, str | float | int) and not isinstance(written, bool) else value
+
+
+def quantity_text(number: float, unit: str) -> str:
+    """A computed number for a message, with its unit."""
+    return f"{number:.10g}" + ("" if unit == "1" else f" {unit}")
+
+
+def join(pointer: str, *keys: str | int) -> str:
+    """``pointer`` extended by object keys and list positions, escaped as RFC 6901 says; long keys are cut short."""
+    parts = (shorten_text(str(key)).replace("~", "~0").replace("/", "~1") for key in keys)
+    return pointer + "".join(f"/{part}" for part in parts)
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """ "; did you mean 'x'?" for the known word nearest to ``word``, or "" where none is near."""
+    if len(word) > 2 * _LONGEST_TEXT:
+        return ""
+    by_lower = {name.lower(): name for name in known}
+    near = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
+    return f"; did you mean '{by_lower[near[0]]}'?" if near else ""
+
+
+def shorten_text(text: str) -> str:
+    """``text`` cut to what fits into a message, without characters that cannot be sent (lone surrogates)."""
+    text = text.encode("utf-8", "replace").decode("utf-8")
+    return text if len(text) <= _LONGEST_TEXT else text[: _LONGEST_TEXT - 1] + "…"
+
+
+def shorten(value: object, depth: int = 2) -> object:
+    """``value`` as small plain JSON data: no NaN, no infinities, no long texts, lists or numbers, no deep nesting."""
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, int):
+        # Python refuses to print very long integers; a length says more than a million digits do.
+        return (
+            value
+            if abs(value) < 10**40
+            else f"an integer of about {int(value.bit_length() * math.log10(2)) + 1} digits"
+        )
+    if isinstance(value, float):
+        return value if math.isfinite(value) else str(value)
+    if isinstance(value, str):
+        return shorten_text(value)
+    if isinstance(value, Mapping):
+        return _shorten_mapping(value, depth)
+    if isinstance(value, list | tuple):
+        if depth == 0:
+            return f"a list of {len(value)}"
+        rest = [f"… {len(value) - _LONGEST_LIST} more"] if len(value) > _LONGEST_LIST else []
+        return [shorten(item, depth - 1) for item in value[:_LONGEST_LIST]] + rest
+    return f"a {type(value).__name__}"
+
+
+def _shorten_mapping(value: Mapping[Any, object], depth: int) -> object:
+    if depth == 0 or len(value) > _LONGEST_LIST:
+        return f"an object of {len(value)} fields"
+    return {shorten_text(str(key)): shorten(item, depth - 1) for key, item in value.items()}
+
+
+def spec_items(problems: Iterable[Problem]) -> tuple[ErrorItem, ...]:
+    """Problems of a spec as faults of a request."""
+    return tuple(
+        ErrorItem(item.message, item.pointer, value=item.value, allowed=item.allowed, unit=item.unit)
+        for item in problems
+    )

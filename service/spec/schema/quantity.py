@@ -1,0 +1,36 @@
+"""Parts of JSON Schemas that every model has: quantities with their units."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from service.spec.schema.axes import Schema
+from service.spec.units import example
+from worker.limits import MAX_QUANTITY_LENGTH
+from worker.models import Parameter
+
+_TEXT: Final[Schema] = {"type": "string", "minLength": 1, "maxLength": MAX_QUANTITY_LENGTH}
+
+
+def quantity_schema(parameter: Parameter) -> Schema:
+    """Schema of one quantity: a number in the parameter's SI unit and range, or a text with its unit."""
+    schema: Schema = {
+        "anyOf": [{"type": "number", **_bounds(parameter)}, _TEXT],
+        "description": f"{parameter.help} ({parameter.symbol}), {parameter.unit}",
+        "examples": [text.strip('"') for text in example(parameter.unit).replace(" or ", ", ").split(", ")],
+        "x-unit": parameter.unit,
+        "x-range": parameter.range_text(),
+    }
+    if parameter.default is not None and math.isfinite(parameter.default):
+        schema["default"] = parameter.default
+    return schema
+
+
+def _bounds(parameter: Parameter) -> Schema:
+    bounds: Schema = {}
+    if math.isfinite(parameter.low):
+        bounds["exclusiveMinimum" if parameter.low_open else "minimum"] = parameter.low
+    if math.isfinite(parameter.high):
+        bounds["maximum"] = parameter.high
+    return bounds

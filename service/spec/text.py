@@ -1,0 +1,184 @@
+"""The text of a spec, JSON or TOML, to plain data: strictly, with bounded work, every fault with its place."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import tomllib
+from typing import Any, Final, Literal
+
+from service.spec.report import Problem, Report, SpecError, join
+from worker.limits import MAX_BODY_BYTES, MAX_DEPTH, MAX_INTEGER_DIGITS
+
+_LONGEST_BITS: Final = math.ceil(MAX_INTEGER_DIGITS * math.log2(10))
+
+Format = Literal["json", "toml"]
+
+# Both patterns step over a whole string, closed or not, so that a scan looks at each character once.
+_JSON_TOKEN: Final = re.compile(r'"(?:[^"\\]|\\.)*+"?|[\[{]|[\]}]', re.DOTALL)
+_TOML_TOKEN: Final = re.compile(
+    r'"""(?:[^"\\]|\\.|"(?!""))*+(?:""")?'
+    r"|'''(?:[^']|'(?!''))*+(?:''')?"
+    r'|"(?:[^"\\\n]|\\.)*+"?'
+    r"|'[^'\n]*+'?"
+    r"|\#[^\n]*+|[\w+\-]++|[ \t]++|.",
+    re.DOTALL,
+)
+
+
+class _Repeated(dict[str, Any]):
+    """An object some of whose keys stood in it more than once."""
+
+    def __init__(self, pairs: list[tuple[str, Any]], repeated: list[str]) -> None:
+        super().__init__(pairs)
+        self.repeated = repeated
+
+
+class _LongInteger:
+    """An integer with more digits than are worth converting."""
+
+    def __init__(self, digits: int) -> None:
+        self.digits = digits
+
+
+def load_spec(text: str | bytes, format: Format) -> object:
+    """The plain data of a spec's text.
+
+    Parameters
+    ----------
+    text : str or bytes
+        UTF-8, with or without a byte order mark, at most `MAX_BODY_BYTES`.
+    format : "json" or "toml"
+
+    Returns
+    -------
+    object
+        Dictionaries, lists, texts, booleans, finite numbers and null, at most `MAX_DEPTH` deep.
+
+    Raises
+    ------
+    SpecError
+        Too large, not UTF-8, not well-formed, too deep, a key twice in one object, a number that is not finite or far
+        beyond a double's range, a date, or a text with half a character (a lone surrogate).
+    """
+    source = _decode(text)
+    data = _json(source) if format == "json" else _toml(source)
+    report = Report()
+    plain = _plain(data, "", 0, report)
+    report.raise_if_any()
+    return plain
+
+
+def _decode(text: str | bytes) -> str:
+    raw = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
+    if len(raw) > MAX_BODY_BYTES:
+        raise _fault(f"the spec is {len(raw):,} bytes long", allowed=f"at most {MAX_BODY_BYTES:,} bytes")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise _fault(f"the spec is not UTF-8 text: byte {error.start} is wrong") from None
+
+
+def _fault(message: str, allowed: str | None = None) -> SpecError:
+    return SpecError([Problem("", message, allowed=allowed)])
+
+
+def _too_deep() -> SpecError:
+    return _fault("lists and objects are nested too deeply", allowed=f"at most {MAX_DEPTH} levels")
+
+
+def _json(source: str) -> object:
+    depth = 0
+    for match in _JSON_TOKEN.finditer(source):
+        depth += {"[": 1, "{": 1, "]": -1, "}": -1}.get(match[0], 0)
+        if depth > MAX_DEPTH:
+            raise _too_deep()
+    try:
+        return json.loads(source, object_pairs_hook=_pairs, parse_int=_integer)
+    except json.JSONDecodeError as error:
+        raise _fault(f"not JSON: {error.msg} in line {error.lineno}, column {error.colno}") from None
+
+
+def _pairs(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) == len(pairs):
+        return found
+    seen: set[str] = set()
+    return _Repeated(pairs, [key for key, _ in pairs if key in seen or seen.add(key)])  # type: ignore[func-returns-value]
+
+
+def _integer(digits: str) -> int | _LongInteger:
+    # Conversion takes quadratic time, and Python itself refuses more than some thousand digits.
+    return int(digits) if len(digits) <= MAX_INTEGER_DIGITS else _LongInteger(len(digits.lstrip("-")))
+
+
+def _toml(source: str) -> object:
+    _check_toml_depth(source)
+    try:
+        return tomllib.loads(source)
+    except tomllib.TOMLDecodeError as error:
+        raise _fault(f"not TOML: {str(error)[:200]}") from None
+    except ValueError:
+        # What the TOML grammar accepts but Python's numbers or dates do not.
+        raise _fault("not TOML that can be read: a number or a date is out of range") from None
+    except RecursionError:
+        raise _too_deep() from None
+
+
+def _check_toml_depth(source: str) -> None:
+    """Refuses deep brackets and long dotted keys, whose time in the parser grows with the square of their parts."""
+    depth = dots = 0
+    after_dot = False
+    for match in _TOML_TOKEN.finditer(source):
+        token = match[0]
+        if token == ".":  # noqa: S105
+            dots, after_dot = dots + 1, True
+        elif token[0] in " \t":
+            continue
+        elif token[0] in "[{":
+            depth, dots = depth + 1, 0
+        elif token[0] in "]}":
+            depth, dots = depth - 1, 0
+        else:
+            dots, after_dot = dots if after_dot else 0, False
+        if max(depth, dots) > MAX_DEPTH:
+            raise _too_deep()
+
+
+def _plain(data: object, pointer: str, depth: int, report: Report) -> object:
+    """``data`` itself when it is plain; notes what is not."""
+    if isinstance(data, dict | list):
+        if depth >= MAX_DEPTH:
+            raise _too_deep()
+        return _plain_container(data, pointer, depth, report)
+    if isinstance(data, str):
+        if _halved(data):
+            report.problem(pointer, "the text holds half a character (a lone surrogate)", data)
+    elif isinstance(data, int):
+        if data.bit_length() > _LONGEST_BITS:
+            report.problem(pointer, "is beyond the range of numbers", data)
+    elif isinstance(data, _LongInteger):
+        report.problem(pointer, "is beyond the range of numbers", f"an integer of {data.digits} digits")
+    elif isinstance(data, float):
+        if not math.isfinite(data):
+            report.problem(pointer, "must be a finite number (NaN, Infinity and what overflows are none)", data)
+    elif data is not None:
+        report.problem(pointer, "is a date or a time, which no field of a spec is", str(data))
+    return data
+
+
+def _plain_container(data: dict[str, Any] | list[Any], pointer: str, depth: int, report: Report) -> object:
+    if isinstance(data, list):
+        return [_plain(item, f"{pointer}/{index}", depth + 1, report) for index, item in enumerate(data)]
+    if isinstance(data, _Repeated):
+        for key in data.repeated:
+            report.problem(join(pointer, key), "this field is given more than once")
+    for key in data:
+        if _halved(key):
+            report.problem(join(pointer, key), "the field's name holds half a character (a lone surrogate)")
+    return {key: _plain(item, join(pointer, key), depth + 1, report) for key, item in data.items()}
+
+
+def _halved(text: str) -> bool:
+    return not text.isascii() and any("\ud800" <= character <= "\udfff" for character in text)

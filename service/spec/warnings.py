@@ -1,0 +1,224 @@
+"""What a spec may say but probably does not mean: unstable pendulums, impossible inertias, slips of units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.spec.axes.axes import varied_values
+from service.spec.report import Report
+from worker.models import machine_shaft
+from worker.study import Axis, Study
+
+#: Combinations of the axes involved that are looked at one by one; of more, only the ends of the axes.
+_MOST_COMBINATIONS: Final = 100_000
+
+#: Last part of a path -> (largest plausible magnitude, its unit, what else may have been meant).
+_PLAUSIBLE: Final[dict[str, tuple[float, str, str]]] = {
+    "excitation.frequency": (1e3, "Hz", "was it in rpm or rad/s?"),
+    "excitation.amplitude_x": (0.1, "m", "was it in mm?"),
+    "excitation.amplitude_y": (0.1, "m", "was it in mm?"),
+    "excitation.phase": (2.0 * math.pi, "rad", "was it in degrees?"),
+    "inertia": (100.0, "kg*m^2", "was it in g*cm^2 or kg*mm^2?"),
+    "mass": (1e3, "kg", "was it in g?"),
+    "arm": (1.0, "m", "was it in mm?"),
+    "spring_arm": (1.0, "m", "was it in mm?"),
+    "spring_rate": (1e8, "N/m", "was it in another unit?"),
+    "damping": (100.0, "N*m*s/rad", "was it in another unit?"),
+    "backlash": (0.1, "rad", "was it in degrees?"),
+    "initial_angle": (math.pi, "rad", "was it in degrees?"),
+    "initial_speed": (1e3, "rad/s", "was it in rpm?"),
+    "load": (1e4, "N*m", "was it in N*mm?"),
+}
+
+
+def warn_vibration_drive(report: Report, study: Study) -> None:
+    """Notes what is implausible about a vibration drive anywhere on the axes of ``study``."""
+    for path in dict.fromkeys((*study.base, *study.axis_paths)):
+        _plausible(report, study, path)
+    if not any(any(_values(study, f"excitation.amplitude_{axis}")) for axis in "xy"):
+        report.warn("/base/excitation: both amplitudes are 0, so the base does not move")
+    if min(_values(study, "excitation.frequency")) < 0.1:
+        where = _pointer(study, "excitation.frequency")
+        report.warn(f"{where}: below 0.1 Hz, which is slow for a vibration drive")
+    pendulums = sum(path.startswith("pendulums.") and path.endswith(".mass") for path in study.base)
+    across, along = (any(_values(study, f"excitation.amplitude_{axis}")) for axis in "xy")
+    starts = [f"pendulums.{index}.initial_{name}" for index in range(pendulums) for name in ("angle", "speed")]
+    if along and not across and not any(any(_values(study, path)) for path in starts):
+        report.warn(
+            "/base/pendulums: with vibration along y alone a pendulum that starts upright without speed stays upright, "
+            "even at parametric resonance: nothing would move; give an initial_angle (say 0.01 rad) or an amplitude_x"
+        )
+    for index in range(pendulums):
+        _stability(report, study, index)
+        _inertia(report, study, index)
+
+
+#: The same for a machine shaft.
+_PLAUSIBLE_SHAFT: Final[dict[str, tuple[float, str, str]]] = {
+    "mean_speed": (1e3, "rad/s", "was it in rpm?"),
+    **dict.fromkeys(
+        ("crank", "rod", "offset", "rod_centre", "frame", "coupler", "rocker", "coupler_centre", "pivot_distance",
+         "link_arm", "lift"),
+        (10.0, "m", "was it in mm?"),
+    ),
+    "inclination": (2.0 * math.pi, "rad", "was it in degrees?"),
+}  # fmt: skip
+
+
+def warn_machine_shaft(report: Report, study: Study) -> None:
+    """Notes what is implausible about a machine shaft anywhere on the axes of ``study``."""
+    for path in dict.fromkeys((*study.base, *study.axis_paths)):
+        _plausible(report, study, path, _PLAUSIBLE_SHAFT)
+    structure = study.structure or {}
+    if structure["balance"] == "constant" and (
+        structure["drive"]["form"] != "constant" or any(_values(study, "drive.torque"))
+    ):
+        report.warn(
+            '/base/drive/torque: is not used: the balance "constant" puts the mean resistance in its place; choose '
+            '"scale" or "refuse" to keep its course'
+        )
+    if structure["balance"] == "motor" and _values(study, "wanted_irregularity"):
+        report.warn("/base/wanted_irregularity: is not used: with a motor no required inertia is computed")
+    if structure["operation"]["quantity"] == "none" and structure["mechanism"]["kind"] == "none":
+        report.warn("/base: neither mechanism nor operation, so that the shaft turns evenly")
+    _shaft_relations(report, study)
+
+
+def _shaft_relations(report: Report, study: Study) -> None:
+    """Notes cases whose numbers do not go together, which the base alone would be refused for."""
+    operation = (study.structure or {})["operation"]
+    if operation["quantity"] == "gas":
+        _discharge(report, study)
+    elif operation.get("form") == "steps":
+        for k in range(operation["steps"]):
+            _turned_step(report, study, k, wraps=operation["over"] == "angle")
+    _chosen_angle(report, study)
+
+
+def _discharge(report: Report, study: Study) -> None:
+    names = ("suction_pressure", "discharge_pressure", "clearance", "exponent")
+    low, high, clearance, exponent, weight = _columns(study, [f"operation.gas.{name}" for name in names])
+    low, high, most = np.broadcast_arrays(low, high, machine_shaft.reachable_pressure(low, clearance, exponent))
+    where = _pointer(study, "operation.gas.discharge_pressure")
+    beyond, below = high > most, high < low
+    if beyond.any():
+        report.warn(
+            f"{where}: the compressor comes to {most[beyond].min():.6g} Pa at most, and discharges nothing at a higher "
+            "pressure: its valves stay shut" + _share(beyond, weight)
+        )
+    if below.any():
+        report.warn(f"{where}: is below the pressure of suction: nothing is compressed" + _share(below, weight))
+
+
+def _turned_step(report: Report, study: Study, index: int, *, wraps: bool) -> None:
+    paths = [f"operation.steps.{index}.{end}" for end in ("from", "to")]
+    first, last, weight = _columns(study, paths)
+    turned = np.asarray(first > last)
+    varied = [path for path in paths if path in study.axis_paths]
+    if not varied or not turned.any() or (wraps and turned.all()):
+        return
+    what = (
+        "where `from` passes `to` the step goes on over the end of the cycle, and acts in nearly all of it"
+        if wraps
+        else "where `from` passes `to` the step over the stroke never acts"
+    )
+    report.warn(f"{_pointer(study, varied[0])}: {what}" + _share(turned, weight))
+
+
+def _chosen_angle(report: Report, study: Study) -> None:
+    """The base machine tells how many angles with the mean energy there are to choose from."""
+    structure = study.structure or {}
+    chosen = structure["phi_c"]
+    if chosen is None:
+        return
+    count = machine_shaft.base_results(structure, study.base)["phi_c.count"]
+    # Where there is none at all, works are counted from the angle 0 whatever was chosen.
+    if 0 < count <= chosen:
+        report.warn(
+            f"/base/phi_c: {chosen} is out of reach: the machine of base has {count:.0f} angles with T = T_mean, "
+            f"numbered 0 to {count - 1:.0f}; phi_c and the results of s3 and s4 stay empty"
+        )
+
+
+def _values(study: Study, path: str) -> tuple[float, ...]:
+    return varied_values(path, study.axes, study.base)
+
+
+def _plausible(report: Report, study: Study, path: str, known: dict[str, tuple[float, str, str]] = _PLAUSIBLE) -> None:
+    entry = known.get(path) or known.get(path.rsplit(".", 1)[-1])
+    if entry is None:
+        return
+    limit, unit, question = entry
+    largest = max(_values(study, path), key=abs)
+    if abs(largest) > limit:
+        report.warn(f"{_pointer(study, path)}: {largest:g} {unit} is more than {limit:.4g} {unit}; {question}")
+
+
+def _pointer(study: Study, path: str) -> str:
+    """Where the values of ``path`` stand in the spec: its axis, which is told with the path, or the base."""
+    for position, axis in enumerate(study.axes):
+        if path in axis.paths:
+            return f"/axes/{position} ({path})"
+    return "/base/" + path.replace(".", "/")
+
+
+def _stability(report: Report, study: Study, index: int) -> None:
+    """c a^2 against M g l: below it the upright (for l > 0) position is unstable without vibration (MODEL.md A1)."""
+    names = ("spring_rate", "spring_arm", "mass", "arm")
+    c, a, mass, arm, g, weight = _columns(study, [*(f"pendulums.{index}.{name}" for name in names), "gravity"])
+    spring, gravity = np.broadcast_arrays(c * a**2, mass * g * arm)
+    unstable = spring < gravity
+    if unstable.any():
+        worst = int(np.argmin(np.where(unstable, spring - gravity, np.inf)))
+        report.warn(
+            f"/base/pendulums/{index}: c a^2 < M g l: the spring's {spring.flat[worst]:.4g} N*m/rad do not hold the "
+            f"pendulum up against gravity's {gravity.flat[worst]:.4g} N*m/rad; without vibration it falls to one side"
+            + _share(unstable, weight)
+        )
+
+
+def _inertia(report: Report, study: Study, index: int) -> None:
+    """J >= M l^2 holds for every rigid body about an axis at distance l from its centre of mass (parallel axes)."""
+    names = ("inertia", "mass", "arm")
+    inertia, mass, arm, weight = _columns(study, [f"pendulums.{index}.{name}" for name in names])
+    have, need = np.broadcast_arrays(inertia, mass * arm**2)
+    wrong = have < need * (1.0 - 1e-9)
+    if wrong.any():
+        worst = int(np.argmax(np.where(wrong, need - have, -np.inf)))
+        report.warn(
+            f"/base/pendulums/{index}: J < M l^2: an inertia of {have.flat[worst]:.4g} kg*m^2 about the axis is less "
+            f"than the {need.flat[worst]:.4g} kg*m^2 of the mass at its arm alone, which no rigid body has"
+            + _share(wrong, weight)
+        )
+
+
+def _share(found: NDArray[np.bool_], weight: NDArray[np.float64]) -> str:
+    """How many cases it concerns, where every combination was looked at."""
+    cases = float(weight)
+    if found.size == 1 or not cases:
+        return "" if found.size == 1 else " (in the worst case of the axes)"
+    return f" (in {int(found.sum() * cases):,} of {int(found.size * cases):,} cases)"
+
+
+def _columns(study: Study, paths: Sequence[str]) -> list[NDArray[np.float64]]:
+    """Values of ``paths`` in every combination of the axes that vary any of them, broadcastable against each other.
+
+    The last array is the number of cases that share a combination; 0 when only the axes' ends were combined.
+    """
+    axes = tuple(axis for axis in study.axes if set(axis.paths) & set(paths))
+    involved = replace(study, axes=axes)
+    cases_each = study.cases // involved.cases
+    if involved.cases > _MOST_COMBINATIONS:
+        cases_each = 0
+        if study.combine == "grid":
+            ends = tuple(Axis(axis.paths, tuple(dict.fromkeys((min(axis.values), max(axis.values))))) for axis in axes)
+            involved = replace(study, axes=ends)
+    varied = involved.columns(range(involved.cases))
+    columns = [np.asarray(varied.get(path, study.base[path]), dtype=np.float64) for path in paths]
+    return [*columns, np.asarray(float(cases_each))]

@@ -1,0 +1,278 @@
+"""What commands say about wrong input: every problem on a line of its own, exit code 2, never a traceback."""
+
+import errno
+import json
+import os
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from engine.endings import Ending
+from tests.wrong_specs import WRONG, changed
+from worker import models
+from worker.models import Trajectory
+from worker.study import Study
+
+Sprag = Callable[..., Any]
+
+
+@pytest.fixture(params=WRONG)
+def wrong(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, str]:
+    text, named = WRONG[request.param]
+    path = tmp_path / "spec.json"
+    path.write_text(text)
+    return path, named
+
+
+@pytest.mark.parametrize("command", [["validate"], ["preview"], ["run"], ["trajectory", "--case", "0"], ["submit"]])
+def test_wrong_specs(sprag: Sprag, wrong: tuple[Path, str], command: list[str]) -> None:
+    path, named = wrong
+    if command == ["submit"] and named != "nested":
+        # Whether the spec can be run is the service's to say; only what cannot be sent is found here.
+        assert sprag(*command, path, "--server", "http://127.0.0.1:9").code in (2, 3)
+        return
+    done = sprag(*command, path)
+    assert done.code == 2
+    assert done.out == ""
+    assert named in done.err
+
+
+def test_wrong_specs_for_programs(sprag: Sprag, wrong: tuple[Path, str]) -> None:
+    path, named = wrong
+    done = sprag("validate", path, "--json")
+    assert done.code == 2
+    assert done.data["valid"] is False
+    assert named in json.dumps(done.data["problems"])
+    failed = sprag("run", path, "--json")
+    assert json.loads(failed.err)["problems"] == done.data["problems"]
+
+
+def test_every_problem_has_its_own_line(sprag: Sprag, tmp_path: Path) -> None:
+    spec = json.loads(changed("/base/shaft/load", "0.1 kg"))
+    spec["base"]["excitation"]["frequency"] = -25
+    spec["bse"] = {}
+    path = tmp_path / "spec.json"
+    path.write_text(json.dumps(spec))
+    lines = sprag("validate", path).err.splitlines()
+    for pointer in ("/base/shaft/load", "/base/excitation/frequency", "/bse"):
+        assert sum(line.strip().startswith(pointer + ":") for line in lines) == 1
+    assert any("-25" in line and "allowed: > 0 Hz" in line for line in lines)
+
+
+def test_a_weak_spring_is_allowed_but_said(sprag: Sprag, tmp_path: Path) -> None:
+    path = tmp_path / "spec.json"
+    path.write_text(changed("/base/pendulums/0/spring_rate", "1 N/m"))
+    done = sprag("validate", path)
+    assert done.code == 0
+    assert done.err.startswith("warning: ")
+    assert sprag("validate", path, "--json").data["warnings"]
+
+
+@pytest.mark.parametrize("command", [["validate"], ["run"], ["submit"], ["fit", "--accuracy", "1"]])
+def test_files_that_cannot_be_read(sprag: Sprag, tmp_path: Path, command: list[str]) -> None:
+    binary = tmp_path / "spec.json"
+    binary.write_bytes(bytes(range(256)))
+    for path in (tmp_path / "nothing.json", tmp_path, binary, f"{tmp_path}/\0.json", binary / "below"):
+        done = sprag(*command, path)
+        assert done.code == 2
+        assert done.out == ""
+        assert done.err.startswith("sprag: ")
+
+
+def test_a_file_without_the_right_to_read_it(sprag: Sprag, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "spec.json"
+    path.write_text("{}")
+
+    def refuse(*_: object) -> None:  # the tests may run as root, who can read everything
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    monkeypatch.setattr(Path, "open", refuse)
+    done = sprag("validate", path)
+    assert done.code == 2
+    assert done.err == f"sprag: {path}: permission denied\n"
+
+
+def test_a_file_beyond_the_limit(sprag: Sprag, tmp_path: Path) -> None:
+    path = tmp_path / "spec.json"
+    path.write_bytes(b" " * (1024 * 1024 + 1))
+    done = sprag("validate", path)
+    assert done.code == 2
+    assert "larger than the allowed" in done.err
+
+
+def test_toml_json_and_a_name_without_ending_are_told_apart(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    for source in ("one_pendulum.json", "two_pendulums.toml"):
+        path = tmp_path / "spec"
+        path.write_bytes((examples / source).read_bytes())
+        assert sprag("validate", path).code == 0
+    path = tmp_path / "spec.toml"
+    path.write_text("sprag = = 1")
+    assert "TOML" in sprag("validate", path).err
+
+
+@pytest.mark.parametrize("command", ["validate", "preview", "run"])
+def test_what_is_wrong_with_points_is_told_of_their_file(
+    sprag: Sprag, examples: Path, tmp_path: Path, command: str
+) -> None:
+    points = tmp_path / "points.csv"
+    points.write_text("excitation.frequency [rpm];shaft.load\n1500;0.1\n\n1800;-250 N*mm\n-3;\n")
+    done = sprag(command, examples / "one_pendulum.json", "--points", points)
+    assert (done.code, done.out) == (2, "")
+    _, load, speed, empty = done.err.splitlines()
+    assert load.startswith(f"  {points}: line 4, column shaft.load: is out of range (got '-250 N*mm'; allowed: >= 0 ")
+    assert "line 5, column excitation.frequency [rpm]: is out of range (got '-3 rpm'; allowed: > 0 Hz" in speed
+    assert "line 5, column shaft.load: is empty" in empty
+    gone = sprag(command, examples / "one_pendulum.json", "--points", tmp_path / "none.csv")
+    assert (gone.code, gone.err) == (2, f"sprag: {tmp_path / 'none.csv'}: no such file or directory\n")
+    both = sprag(command, "-", "--points", "-")
+    assert both.code == 2
+    assert "--points: standard input is the spec already" in both.err
+
+
+def test_a_file_of_utf_16_is_told_what_to_do_with(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    points = tmp_path / "points.csv"
+    for encoding in ("utf-16-le", "utf-16-be"):
+        points.write_bytes("\ufeffshaft.load\n0.1\n".encode(encoding))
+        done = sprag("validate", examples / "one_pendulum.json", "--points", points)
+        assert (done.code, done.out) == (2, "")
+        assert done.err == f"sprag: {points}: UTF-16 text; save it as UTF-8 (spreadsheets call it CSV UTF-8)\n"
+
+
+def test_points_take_the_place_of_what_varies(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    points = tmp_path / "points.csv"
+    points.write_text("excitation.frequency [rpm],shaft.load\n1500,0.1\n1800,250 N*mm\n960,0\n")
+    spec = json.loads((examples / "one_pendulum.json").read_text())
+    assert spec["axes"]
+    path = tmp_path / "spec.json"
+    path.write_text(json.dumps({**spec, "combine": "grid", "exclude": [{"shaft.load": {"below": 1}}]}))
+    made = sprag("preview", path, "--points", points, "--json").data
+    assert made["cases"] == 3
+    assert [(axis["first"], axis["last"]) for axis in made["axes"]] == [(25.0, 16.0), (0.1, 0.0)]
+
+
+@pytest.mark.parametrize("target", ["", "/nowhere/rows.csv", "rows.csv/below"])
+def test_a_file_that_cannot_be_written(sprag: Sprag, examples: Path, tmp_path: Path, target: str) -> None:
+    (tmp_path / "rows.csv").write_text("")
+    file = target if target.startswith("/") else tmp_path / target
+    done = sprag("trajectory", examples / "one_pendulum.json", "--points", "2", "-o", file)
+    assert done.code == 2
+    assert done.out == ""
+
+
+def test_a_part_of_a_run_in_periods(sprag: Sprag, examples: Path) -> None:
+    spec = examples / "one_pendulum.json"
+    done = sprag("trajectory", spec, "--points", "2", "--from", "40 periods", "--to", "9e9 periods")
+    assert done.code == 2
+    assert "--to: outside the run" in done.err
+    assert "--from" not in done.err
+
+
+def test_a_shaft_that_stops_has_no_points_and_is_told_why(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    done = sprag("trajectory", examples / "press.toml", "--points", "5", "-o", tmp_path / "rows.csv")
+    assert done.code != 0
+    assert "case 0: inertia_insufficient, no points: The inertia is insufficient" in done.err
+    assert "5 points" not in done.err
+
+
+def test_a_motion_that_does_not_end_well_is_told_by_the_exit_code(
+    sprag: Sprag, examples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = {"ending": Ending.OK}
+
+    def instead(_study: Study, _case: int, start: float, end: float, _points: int) -> Trajectory:
+        return Trajectory(np.array([start, end]), ("speed",), ("rad/s",), np.zeros((2, 1)), {}, made["ending"])
+
+    monkeypatch.setattr(models, "run_trajectory", instead)
+    command = ["trajectory", examples / "one_pendulum.json", "--points", "2", "-o", tmp_path / "motion.csv"]
+    assert sprag(*command).code == 0
+    made["ending"] = Ending.DIVERGED
+    assert sprag(*command).code == 1
+    assert (tmp_path / "motion.csv").exists()
+
+
+def test_a_wrong_choice_is_told_without_the_names_of_libraries(sprag: Sprag, examples: Path) -> None:
+    done = sprag("run", examples / "one_pendulum.json", "--format", "xml")
+    assert done.code == 2
+    assert "Invalid value for '--format': 'xml' is not one of" in done.err
+
+
+def test_the_version(sprag: Sprag) -> None:
+    done = sprag("--version")
+    assert (done.code, done.out) == (0, f"sprag {version('sprag')}\n")
+
+
+def test_a_usage_error_names_the_help(sprag: Sprag) -> None:
+    for arguments in (
+        ["nonsense"],
+        ["run"],
+        ["run", "--nonsense", "x"],
+        ["fit", "x", "--accuracy", "1", "--max-degree", "a"],
+    ):
+        done = sprag(*arguments)
+        assert done.code == 2
+        assert "--help" in done.err
+    assert json.loads(sprag("run", "--json").err)["exit_code"] == 2
+
+
+def test_the_source_of_a_kernel_is_shown(sprag: Sprag) -> None:
+    done = sprag("doctor", "--kernel")
+    assert done.code == 0
+    assert done.out.startswith('"""Generated kernel: 1 pendulum(s), 4 clutch coefficients, order 12')
+    compile(done.out, "kernel", "exec")
+    other = sprag("doctor", "--kernel", "--pendulums", 2, "--coefficients", 3, "--tolerance", 1e-6, "--json").data
+    assert (other["pendulums"], other["coefficients"], other["tolerance"]) == (2, 3, 1e-6)
+    assert other["source"].startswith('"""Generated kernel: 2 pendulum(s), 3 clutch coefficients, order 9')
+
+
+@pytest.mark.parametrize(
+    "options", [["--pendulums", "2"], ["--kernel", "--pendulums", "9"], ["--kernel", "--tolerance", "1"]]
+)
+def test_a_kernel_that_there_is_not(sprag: Sprag, options: list[str]) -> None:
+    done = sprag("doctor", *options)
+    assert done.code == 2
+    assert options[-2] in done.err
+
+
+def small(examples: Path, tmp_path: Path) -> Path:
+    """A crank press in three cases, of which one ends otherwise than ok."""
+    text = (examples / "press.toml").read_text(encoding="utf-8")
+    path = tmp_path / "press.toml"
+    path.write_text(
+        text.partition("[[axes]]")[0] + '[[axes]]\npath = "mean_speed"\nvalues = ["20 rpm", "120 rpm", "180 rpm"]\n'
+    )
+    return path
+
+
+def test_a_run_tells_how_its_cases_ended(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    done = sprag("run", small(examples, tmp_path), "-o", tmp_path / "rows.csv")
+    assert done.code == 1
+    assert "3 of 3 cases done, 2 ok" in done.err
+    assert "  1 inertia_insufficient: The inertia is insufficient" in done.err
+    assert done.out == ""
+
+
+def test_a_run_into_a_file_tells_programs_what_came_of_it(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    file = tmp_path / "rows.csv"
+    done = sprag("run", small(examples, tmp_path), "--json", "-o", file)
+    told = done.data
+    assert told.pop("seconds") > 0.0
+    assert told == {
+        "file": str(file), "study": None, "cases": 3, "done": 3, "ok": 2, "reused": 0,
+        "endings": {"ok": 2, "inertia_insufficient": 1},
+    }  # fmt: skip
+    assert file.read_text().startswith("case,mean_speed,ending,flags,")
+    motion = tmp_path / "motion.csv"
+    told = sprag("trajectory", small(examples, tmp_path), "--case", "1", "--points", "5", "--json", "-o", motion).data
+    assert told == {"file": str(motion), "case": 1, "ending": "ok", "points": 5}
+    assert not motion.read_text().startswith("{")
+
+
+def test_an_estimate_has_start_and_compilation_in_it(
+    sprag: Sprag, examples: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(models, "estimate_compile_seconds", lambda _study: 40.0)
+    assert sprag("preview", examples / "press.toml", "--json").data["estimated_seconds"] > 42.0

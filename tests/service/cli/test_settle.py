@@ -1,0 +1,81 @@
+"""The command `sprag settle`."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from engine.vibration_drive.regimes import settled_infos
+from tests.conftest import Finished
+
+Sprag = Callable[..., Finished]
+_DRIVE = "one_pendulum.json"
+
+
+def test_one_case_is_shown_with_its_regime(sprag: Sprag, examples: Path) -> None:
+    done = sprag("settle", examples / _DRIVE, "--case", 178)
+    assert done.code == 0
+    assert "22.835" in done.out
+    assert "regime.multiplier" in done.out
+    assert "regime.exponent" not in done.out
+    assert "1 periodic" in done.err
+
+
+def test_rows_have_parameters_ending_regime_and_every_result(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    file = tmp_path / "settled.csv"
+    assert sprag("settle", examples / _DRIVE, "--case", 178, "--case", 176, "-o", file).code == 0
+    rows = list(csv.DictReader(io.StringIO(file.read_text(encoding="utf-8"))))
+    assert [row["case"] for row in rows] == ["178", "176"]
+    assert [row["regime"] for row in rows] == ["periodic", "coasting"]
+    assert float(rows[0]["shaft.load"]) == 0.2
+    assert float(rows[0]["shaft.speed.mean"]) == pytest.approx(22.8350116679, abs=1e-9)
+    assert set(rows[0]) > {info.name for info in settled_infos(1)}
+    assert rows[0]["regime.exponent"] == ""
+
+
+def test_json_is_null_where_there_is_no_value(sprag: Sprag, examples: Path) -> None:
+    (row,) = sprag("settle", examples / _DRIVE, "--case", 178, "--json").data
+    assert row["regime"] == "periodic"
+    assert row["results"]["regime.order"] == 2
+    assert row["results"]["regime.exponent"] is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("press.toml",), "/model"),
+        ((_DRIVE, "--case", 512), "0 .. 511"),
+        ((_DRIVE, "--at-most", 50), "100"),
+    ],
+)
+def test_what_cannot_be_settled_is_refused(sprag: Sprag, examples: Path, arguments: tuple[Any, ...], told: str) -> None:
+    done = sprag("settle", examples / arguments[0], *arguments[1:])
+    assert done.code == 2
+    assert told in done.err
+    assert done.out == ""
+
+
+def test_a_case_that_ends_otherwise_is_told(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    spec = json.loads((examples / _DRIVE).read_text(encoding="utf-8"))
+    spec["base"]["pendulums"][0] |= {"spring_rate": 0, "damping": 0, "mass": 1e3, "arm": 1e3}
+    spec["base"]["shaft"] |= {"inertia": 1e-9}
+    path = tmp_path / "spec.json"
+    path.write_text(json.dumps(spec), encoding="utf-8")
+    (row,) = sprag("settle", path, "--case", 178, "--json", "--at-most", 100).data
+    assert row["ending"] != "ok"
+    assert row["regime"] == "none"
+    assert set(row["results"].values()) == {None}
+
+
+def test_every_regime_is_in_the_reference() -> None:
+    from engine.vibration_drive.regimes import Regime
+
+    page = (Path(__file__).resolve().parents[3] / "docs" / "reference.md").read_text(encoding="utf-8")
+    for regime in Regime:
+        assert f"| `{regime.name.lower()}` | {regime.sentence} |" in page

@@ -1,0 +1,272 @@
+"""The Python client, synchronous and asynchronous, against the service: the same studies, the same numbers."""
+
+from __future__ import annotations
+
+import inspect
+import io
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import httpx
+import numpy as np
+import openpyxl
+import pandas as pd
+import pytest
+from anyio.from_thread import BlockingPortal
+
+from service.client import (
+    AsyncClient,
+    AsyncStudy,
+    Client,
+    Curves,
+    RefusedError,
+    SpecFileError,
+    Study,
+    StudyTimeoutError,
+    UnreachableError,
+)
+from service.client.types import StudyDetail
+from tests.service.conftest import PortalTransport, Service
+
+if TYPE_CHECKING:
+    from worker.models import ChunkResult
+
+SPEED = "shaft.speed.mean"
+
+
+@pytest.fixture
+def client(service: Service, portal: BlockingPortal) -> Iterator[Client]:
+    """A client of the service of the test."""
+    with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
+        yield client
+
+
+class Filling:
+    """Fills a study with rows when it is told of it for the first time, as a dispatcher would meanwhile."""
+
+    def __init__(self, service: Service) -> None:
+        self.service = service
+        self.states: list[str] = []
+        self.rows: ChunkResult | None = None
+
+    def __call__(self, study: StudyDetail, /) -> None:
+        self.states.append(study["state"])
+        if self.rows is None:
+            self.rows = self.service.fill(study["id"])
+
+
+def test_a_study_from_submission_to_table_grid_and_curves(
+    client: Client, service: Service, spec: dict[str, Any], tmp_path: Path
+) -> None:
+    assert client.preview(spec)["cases"] == 9
+    filling = Filling(service)
+    study = client.submit(spec, key="one").wait(progress=filling)
+    assert client.submit(spec, key="one").id == study.id
+    assert filling.states[-1] == "finished"
+    assert filling.rows is not None
+    speeds = filling.rows.values[:, 0]
+
+    table = study.table()
+    assert list(table["case"]) == list(range(9))
+    np.testing.assert_array_equal(table[SPEED], speeds)
+    grid = study.grid()
+    np.testing.assert_array_equal(grid[SPEED].values.reshape(-1), speeds)
+
+    curves = study.curves("shaft.load", [SPEED, "torque.max"], by="excitation.frequency")
+    frame = curves.to_pandas()
+    assert list(frame.columns) == ["excitation.frequency", "shaft.load", SPEED, "torque.max", "ending", "case"]
+    np.testing.assert_array_equal(frame[SPEED], speeds)
+    assert frame.attrs["units"]["shaft.load"] == "N*m"
+    labelled = curves.to_xarray()
+    np.testing.assert_array_equal(labelled[SPEED].values.reshape(-1), speeds)
+    assert labelled[SPEED].attrs["units"] == "rad/s"
+    held = study.curves("shaft.load", SPEED, at={"excitation.frequency": np.float64(16.0)})
+    np.testing.assert_array_equal(held.to_pandas()[SPEED], speeds[:3])
+    assert study.curves("shaft.load", SPEED, at={"excitation.frequency": "960 rpm"}) == held
+
+    assert study.map("shaft.load", "excitation.frequency", SPEED)["z"]["values"][0][0] == speeds[0]
+    assert study.sensitivity(SPEED)["results"][0]["result"] == SPEED
+    book = openpyxl.load_workbook(study.export(tmp_path / "rows.xlsx"))
+    assert book.sheetnames == ["cases", "inputs"]
+    assert study.export(tmp_path / "report.pdf").read_bytes().startswith(b"%PDF")
+    assert len(pd.read_csv(io.BytesIO(study.download("csv")))) == 9
+    assert study.picture(tmp_path / "curve.svg", "shaft.load", SPEED, by="excitation.frequency").stat().st_size > 1000
+    with pytest.raises(ValueError, match="tells no format"):
+        study.export(tmp_path / "rows.doc")
+    with pytest.raises(RefusedError, match="no such format"):
+        study.export(tmp_path / "rows.xlsx", "doc")
+    assert openpyxl.load_workbook(tmp_path / "rows.xlsx").sheetnames == ["cases", "inputs"]
+
+    larger = study.extend([{"path": "shaft.load", "values": [0.5]}], name="larger")
+    assert larger.detail()["cases"] == 12
+    assert [item["id"] for item in client.studies()] == [larger.id, study.id]
+    assert [item["name"] for item in client.studies("queued")] == ["larger"]
+    assert larger.act("cancel")["state"] in ("cancelling", "cancelled")
+    assert client.study(study.id).detail()["progress"]["endings"] == {"ok": 8, "chatter": 1}
+
+
+def test_specs_come_from_files_too(client: Client, examples: Path) -> None:
+    for name in ("one_pendulum.json", "two_pendulums.toml"):
+        assert client.preview(examples / name)["cases"] > 50
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "part"),
+    [
+        ("none.toml", None, "No such file"),
+        ("bad.toml", b"a = = 1", "is no TOML"),
+        ("bad.json", b"{", "is no JSON"),
+        ("binary.json", b"\xff\xfe", "can't decode"),
+    ],
+)
+def test_a_file_without_a_spec_is_named(
+    client: Client, tmp_path: Path, name: str, content: bytes | None, part: str
+) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(SpecFileError, match=part) as caught:
+        client.submit(tmp_path / name)
+    assert name in str(caught.value)
+
+
+def test_refusals_carry_the_fields_of_the_problem(client: Client, spec: dict[str, Any]) -> None:
+    spec["base"]["shaft"]["inertia"] = "-2 kg*m^2"
+    with pytest.raises(RefusedError) as caught:
+        client.submit(spec)
+    (error,) = caught.value.errors
+    assert (error["pointer"], error["value"], error["unit"]) == ("/base/shaft/inertia", "-2 kg*m^2", "kg*m^2")
+    assert error["allowed"] == "> 0 kg*m^2 and <= 1e+06 kg*m^2"
+    assert caught.value.status == 422
+    with pytest.raises(RefusedError, match="no study"):
+        client.study("st_0")
+
+
+def test_waiting_ends_after_its_time(client: Client, spec: dict[str, Any]) -> None:
+    study = client.submit(spec)
+    with pytest.raises(StudyTimeoutError, match="is queued after 0 s") as caught:
+        study.wait(timeout=0.0)
+    assert caught.value.study["id"] == study.id
+
+
+def test_a_bar_is_shown_on_standard_error(
+    client: Client, service: Service, spec: dict[str, Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = client.submit(spec)
+    service.fill(study.id)
+    study.wait(progress=True)
+    assert capsys.readouterr().out == ""
+
+
+def test_cases_side_by_side_with_equal_parameters_are_no_grid(client: Client, service: Service) -> None:
+    point = {"by": {}, "at": {}, "x": [1.0, 1.0], "cases": [0, 1], "y": {SPEED: [1.0, None]}, "endings": ["ok", "x"]}
+    data: Any = {
+        "study": "st", "x": {"path": "shaft.load", "unit": "N*m", "values": [1.0, 1.0]}, "units": {"shaft.load": "N*m"},
+        "results": {SPEED: {"unit": "rad/s", "description": ""}}, "curves": [point],
+    }  # fmt: skip
+    assert Curves(data).to_pandas()[SPEED].isna().tolist() == [False, True]
+    with pytest.raises(ValueError, match="no grid"):
+        Curves(data).to_xarray()
+
+
+async def asynchronous(service: Service, spec: dict[str, Any], folder: Path) -> None:
+    """The same with the other client."""
+    filling = Filling(service)
+    transport = httpx.ASGITransport(service.app)
+    async with AsyncClient("http://localhost", transport=transport) as client:
+        assert (await client.preview(spec))["cases"] == 9
+        study = await (await client.submit(spec, key="one")).wait(progress=filling)
+        assert filling.rows is not None
+        speeds = filling.rows.values[:, 0]
+        np.testing.assert_array_equal((await study.table())[SPEED], speeds)
+        np.testing.assert_array_equal((await study.grid())[SPEED].values.reshape(-1), speeds)
+        curves = await study.curves("shaft.load", SPEED, by="excitation.frequency")
+        np.testing.assert_array_equal(curves.to_pandas()[SPEED], speeds)
+        assert (await study.sensitivity(SPEED))["results"][0]["result"] == SPEED
+        assert (await study.map("shaft.load", "excitation.frequency", SPEED))["z"]["values"][0][0] == speeds[0]
+        held = await study.map("shaft.load", "excitation.frequency", SPEED, at={"excitation.amplitude_x": "2 mm"})
+        assert held["z"]["values"][0][0] == speeds[0]
+        assert len(pd.read_csv(await study.export(folder / "rows.csv"))) == 9
+        assert (await study.export(folder / "rows.bin", "pdf")).read_bytes().startswith(b"%PDF")
+        picture = await study.picture(folder / "curve.png", "shaft.load", SPEED, by="excitation.frequency")
+        assert picture.read_bytes().startswith(b"\x89PNG")
+        with pytest.raises(ValueError, match="tells no format"):
+            await study.export(folder / "rows.doc")
+        with pytest.raises(RefusedError, match="no such format"):
+            await study.picture(folder / "curve.gif", "shaft.load", SPEED)
+        with pytest.raises(RefusedError, match="no such format"):
+            await study.export(folder / "none.csv", "doc")
+        assert not (folder / "none.csv").exists()
+        assert (await study.download("pdf")).startswith(b"%PDF")
+        larger = await study.extend(cases=[{"points": "shaft.load\n0.9\n"}])
+        assert (await larger.detail())["cases"] == 10
+        assert [item["id"] async for item in client.studies()] == [larger.id, study.id]
+        assert (await larger.act("cancel"))["id"] == larger.id
+        with pytest.raises(StudyTimeoutError):
+            await (await client.submit(spec, fresh=True)).wait(timeout=0.0)
+        with pytest.raises(RefusedError, match="no such format"):
+            await study.download("doc")
+        with pytest.raises(RefusedError, match="no study"):
+            await client.study("st_0")
+    async with AsyncClient("http://127.0.0.1:9") as nobody:
+        with pytest.raises(UnreachableError):
+            await nobody.preview(spec)
+        with pytest.raises(UnreachableError):
+            await nobody.read("/studies", [])
+        with pytest.raises(UnreachableError):
+            await AsyncStudy(nobody, "st_1").export(folder / "none.csv")
+        assert not (folder / "none.csv").exists()
+
+
+def test_the_asynchronous_client_does_the_same(
+    service: Service, portal: BlockingPortal, spec: dict[str, Any], tmp_path: Path
+) -> None:
+    portal.call(partial(asynchronous, service, spec, tmp_path))
+
+
+def public(kind: type) -> dict[str, inspect.Signature]:
+    """Public methods of a class with their parameters, whatever they give."""
+    found = {name: item for name, item in vars(kind).items() if inspect.isfunction(item) and not name.startswith("_")}
+    return {name: inspect.signature(item).replace(return_annotation=None) for name, item in found.items()}
+
+
+def test_both_clients_have_the_same_methods() -> None:
+    assert public(AsyncStudy) == public(Study)
+    both = public(Client)
+    assert {name: signature for name, signature in public(AsyncClient).items() if name in both} == both
+    # What the asynchronous one has in the place of `Client.plain`.
+    assert set(public(AsyncClient)) - set(both) == {"request", "read", "pieces", "events"}
+
+
+@pytest.mark.parametrize("value", [float("nan"), np.float64("inf")])
+def test_a_number_that_is_none_is_refused_with_its_path(
+    client: Client, service: Service, portal: BlockingPortal, spec: dict[str, Any], value: float
+) -> None:
+    wrong = {**spec, "axes": ({"path": "shaft.load", "values": (0.1, value)},)}
+    with pytest.raises(RefusedError, match=r"^/axes/0/values/1: must be a finite number") as caught:
+        client.submit(wrong)
+    assert caught.value.status == 422
+    assert [(fault["pointer"], fault["value"]) for fault in caught.value.errors] == [("/axes/0/values/1", str(value))]
+
+    async def asynchronous_one() -> None:
+        async with AsyncClient("http://localhost", transport=httpx.ASGITransport(service.app)) as other:
+            with pytest.raises(RefusedError, match=r"^/axes/0/values/1: must be a finite number"):
+                await other.preview(wrong)
+
+    portal.call(asynchronous_one)
+
+
+def test_server_and_token_come_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SPRAG_SERVER", "http://127.0.0.1:9/")
+    monkeypatch.setenv("SPRAG_TOKEN", "secret")
+    seen: list[httpx.Request] = []
+
+    def answer(request: httpx.Request) -> httpx.Response:
+        seen.append(request)
+        return httpx.Response(200, json={"id": "st_1"})
+
+    with Client(transport=httpx.MockTransport(answer)) as client:
+        assert repr(client.study("st_1")) == "Study('st_1')"
+    assert seen[0].headers["authorization"] == "Bearer secret"
+    assert seen[0].url == "http://127.0.0.1:9/api/v1/studies/st_1"

@@ -1,0 +1,192 @@
+"""The documented interface is the real one: the document is valid, and every example in it works."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import jsonschema
+import pytest
+from fastapi.routing import iter_route_contexts
+from openapi_spec_validator import OpenAPIV31SpecValidator
+from pydantic import SecretStr
+
+from service.http.api.schedules import EXAMPLE
+from service.http.app import create_app
+from service.http.guard import OPEN_PATHS
+from service.http.problems import PROBLEM_TYPES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import httpx
+
+    from service.settings import Settings
+    from tests.service.conftest import Service
+
+    Connect = Callable[..., httpx.Client]
+
+METHODS = ("get", "post", "patch", "delete")
+
+
+@pytest.fixture
+def document(service: Service) -> dict[str, Any]:
+    """The document as the service gives it."""
+    found: dict[str, Any] = service.http.get("/openapi.json").json()
+    return found
+
+
+def operations(document: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
+    """Address, method and description of every operation."""
+    return [
+        (path, method, item[method]) for path, item in document["paths"].items() for method in METHODS if method in item
+    ]
+
+
+def test_the_document_is_openapi_3_1(document: dict[str, Any]) -> None:
+    assert document["openapi"].startswith("3.1")
+    OpenAPIV31SpecValidator(document).validate()
+
+
+def test_links_give_what_their_targets_take(document: dict[str, Any]) -> None:
+    by_id = {operation["operationId"]: operation for _, _, operation in operations(document)}
+    links = [
+        (link, answer)
+        for operation in by_id.values()
+        for answer in operation["responses"].values()
+        for link in answer.get("links", {}).values()
+    ]
+    targets = {link["operationId"] for link, _ in links}
+    assert {"get_study", "delete_study", "get_curves", "get_case", "change_schedule", "create_study"} <= targets
+    for link, answer in links:
+        target = by_id[link["operationId"]]
+        taken = {parameter["name"]: parameter for parameter in target.get("parameters", ())}
+        needed = {name for name, parameter in taken.items() if parameter["in"] == "path"}
+        assert needed == set(link.get("parameters", {})), link
+        assert ("requestBody" in link) <= ("requestBody" in target), link
+        assert "application/json" in answer["content"], link
+
+
+def test_the_document_says_whether_a_token_is_needed(service: Service, settings: Settings, connect: Connect) -> None:
+    with_token = settings.model_copy(update={"token": SecretStr("correct-horse-battery-staple")})
+    app = create_app(with_token, store=service.store, computer=service.computer, checker=service.checker)
+    header = {"Authorization": "Bearer correct-horse-battery-staple"}
+    guarded = connect(app).get("/openapi.json", headers=header).json()
+    OpenAPIV31SpecValidator(guarded).validate()
+    opened = service.http.get("/openapi.json").json()
+    for path, method, operation in operations(guarded):
+        wanted = None if path in OPEN_PATHS else [{"bearer": []}]
+        assert operation.get("security") == wanted, (path, method)
+        assert opened["paths"][path][method].get("security") == (wanted and [*wanted, {}])
+
+
+def test_every_operation_is_documented(service: Service, document: dict[str, Any]) -> None:
+    found = {(path, method) for path, method, _ in operations(document)}
+    routes = {
+        (str(route.path_format), method.lower())
+        for route in iter_route_contexts(service.app.routes)
+        for method in route.methods or ()
+        if getattr(route.original_route, "include_in_schema", True) and str(route.path_format).startswith("/api")
+    }
+    assert routes <= found
+    identifiers = [operation["operationId"] for _, _, operation in operations(document)]
+    assert len(set(identifiers)) == len(identifiers)
+    for path, method, operation in operations(document):
+        assert operation["tags"], path
+        assert operation["description"].endswith("."), (path, method)
+        for parameter in operation.get("parameters", ()):
+            assert parameter["description"], (path, parameter["name"])
+
+
+def test_every_operation_documents_its_problems(document: dict[str, Any]) -> None:
+    seen: set[str] = set()
+    for path, method, operation in operations(document):
+        responses = operation["responses"]
+        if path.startswith("/api"):
+            assert {"401", "421", "422", "500", "503"} <= set(responses), (path, method)
+        for status, response in responses.items():
+            if int(status) < 400:
+                continue
+            (media, content), *others = response["content"].items()
+            assert (media, others) == ("application/problem+json", [])
+            assert content["schema"] == {"$ref": "#/components/schemas/Problem"}
+            for slug, example in content["examples"].items():
+                assert example["value"]["status"] == int(status)
+                jsonschema.validate(
+                    example["value"],
+                    {**document["components"]["schemas"]["Problem"], "components": document["components"]},
+                )
+                seen.add(slug)
+    undocumented = set(PROBLEM_TYPES) - seen - {"not-found", "method-not-allowed", "bad-request"}
+    assert undocumented == set()
+
+
+def send(service: Service, path: str, method: str, operation: dict[str, Any], study_id: str) -> list[httpx.Response]:
+    """What the service answers to every documented example of an operation."""
+    address = path.replace("{study_id}", study_id)
+    if "{schedule_id}" in path:
+        kept = service.http.post("/api/v1/schedules", json=EXAMPLE).json()["id"]
+        address = address.replace("{schedule_id}", kept)
+    query: list[tuple[str, str]] = []
+    headers: dict[str, str] = {}
+    for parameter in operation.get("parameters", ()):
+        for example in parameter["schema"].get("examples", ())[:1]:
+            if parameter["in"] == "path":
+                address = address.replace(f"{{{parameter['name']}}}", str(example))
+            elif parameter["in"] == "header":
+                headers[parameter["name"]] = str(example)
+            elif parameter["name"] != "by" or not path.endswith("/curves"):
+                values = example if isinstance(example, list) else [example]
+                query += [
+                    (parameter["name"], str(value))
+                    for value in values
+                    if parameter["name"] != "at" or "map" not in path
+                ]
+    answers = []
+    contents = operation.get("requestBody", {}).get("content", {None: {"examples": {"none": {"value": None}}}})
+    for media, content in contents.items():
+        for example in content["examples"].values():
+            text = example["value"] if isinstance(example["value"], str) else json.dumps(example["value"])
+            kind = {} if media is None else {"Content-Type": media}
+            body = None if media is None else text
+            sent = {**headers, **kind}
+            if body is not None and "Idempotency-Key" in sent:
+                sent["Idempotency-Key"] += str(len(answers))
+            answers.append(service.http.request(method, address, params=query, content=body, headers=sent))
+    return answers
+
+
+def test_every_example_works(service: Service, document: dict[str, Any]) -> None:
+    for path, method, operation in operations(document):
+        study_id = service.submit()
+        if "cancel" not in path and "pause" not in path and "resume" not in path:
+            service.fill(study_id)
+        for answer in send(service, path, method, operation, study_id):
+            assert answer.status_code < 300, (method, path, answer.text)
+            declared = operation["responses"][str(answer.status_code)].get("content", {})
+            media = answer.headers.get("content-type", "").partition(";")[0]
+            if declared:
+                assert media in declared, (method, path)
+            if media == "application/json" and "schema" in declared[media]:
+                schema = {**declared[media]["schema"], "components": document["components"]}
+                jsonschema.validate(answer.json(), schema, cls=jsonschema.Draft202012Validator)
+
+
+def test_examples_of_bodies_fit_their_schemas(document: dict[str, Any]) -> None:
+    for _path, _method, operation in operations(document):
+        content = operation.get("requestBody", {}).get("content", {}).get("application/json", {"examples": {}})
+        for example in content["examples"].values():
+            schema = {**content["schema"], "components": document["components"]}
+            jsonschema.validate(example["value"], schema, cls=jsonschema.Draft202012Validator)
+
+
+def test_the_page_of_the_interface_is_up_to_date(document: dict[str, Any]) -> None:
+    page = (Path(__file__).resolve().parents[4] / "docs" / "http.md").read_text()
+    rows = [
+        f"| {method.upper()} | `{path}` | {' '.join(operation['description'].split())} |"
+        for path, method, operation in operations(document)
+    ]
+    rows += [f"| `{kind.uri}` | {kind.status} | {kind.title} | {kind.help} |" for kind in PROBLEM_TYPES.values()]
+    assert [row for row in rows if row not in page] == []
+    assert sum(line.startswith("| ") and "`/" in line for line in page.splitlines()) == len(rows)

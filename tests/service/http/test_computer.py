@@ -1,0 +1,87 @@
+"""Computations in a process of their own."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from service.http.computer import MAX_WAITING, Limits, ProcessComputer
+from service.http.problems import ApiError
+from tests.worker import fakes
+from worker import models
+from worker.limits import COMPUTATION_BYTES
+
+if TYPE_CHECKING:
+    from anyio.from_thread import BlockingPortal
+
+
+@pytest.fixture
+def computer() -> Iterator[ProcessComputer]:
+    """A computer with short timeouts."""
+    made = ProcessComputer(Limits(1.0, COMPUTATION_BYTES))
+    yield made
+    made.close()
+
+
+def test_it_computes_elsewhere_and_survives_crashes(computer: ProcessComputer, portal: BlockingPortal) -> None:
+    assert portal.call(computer.run, os.getpid) != os.getpid()
+    with pytest.raises(ApiError) as died:
+        portal.call(computer.run, os._exit, 3)
+    assert died.value.code == "not-computed"
+    with pytest.raises(ApiError) as late:
+        portal.call(computer.run, time.sleep, 60)
+    assert late.value.code == "timed-out"
+    with pytest.raises(ValueError, match=r"math domain|nonnegative"):
+        portal.call(computer.run, math.sqrt, -1.0)
+    assert portal.call(computer.run, math.sqrt, 4.0) == 2.0
+
+
+SHAPE = models.KernelShape("vibration-drive", 1, 2, 1e-9)
+
+
+def test_a_kernel_takes_longer_than_a_computation_may_and_outlives_its_request(
+    tmp_path: Path, portal: BlockingPortal
+) -> None:
+    begun, told = tmp_path / "begun", tmp_path / "told"
+    os.mkfifo(begun)
+    os.mkfifo(told)
+    computer = ProcessComputer(
+        Limits(0.01, COMPUTATION_BYTES), load=partial(fakes.load_between, begun=str(begun), told=str(told))
+    )
+    try:
+        left = portal.start_task_soon(computer.load, SHAPE)
+        begun.read_text()  # waits until it compiles
+        left.cancel()
+        again = portal.start_task_soon(computer.load, SHAPE)
+        told.write_text("now")
+        assert again.result(timeout=60) is None
+        portal.call(computer.load, SHAPE)  # compiling again would wait for ever
+    finally:
+        computer.close()
+
+
+def test_a_kernel_that_fails_is_told_and_tried_again(portal: BlockingPortal) -> None:
+    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES), load=fakes.load_dies)
+    try:
+        for _ in range(2):
+            with pytest.raises(ApiError) as died:
+                portal.call(computer.load, SHAPE)
+            assert died.value.code == "not-computed"
+    finally:
+        computer.close()
+
+
+def test_it_takes_only_so_many_at_once(computer: ProcessComputer, portal: BlockingPortal) -> None:
+    waiting = [portal.start_task_soon(computer.run, time.sleep, 60) for _ in range(MAX_WAITING)]
+    with pytest.raises(ApiError) as refused:
+        portal.call(computer.run, math.sqrt, 4.0)
+    assert refused.value.code == "unavailable"
+    for task in waiting:
+        task.cancel()

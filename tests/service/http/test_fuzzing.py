@@ -1,0 +1,63 @@
+"""Made-up requests: no server error, no status, type or body that the documentation does not tell."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pydantic import SecretStr
+
+from service.http.api.schedules import EXAMPLE
+from service.http.app import create_app
+from service.http.problems import ApiError
+from tests.service.http.fuzzing import CHECKS, fuzz, with_ids
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import httpx
+
+    from service.settings import Settings
+    from tests.service.conftest import Service
+
+#: A spec has thousands of bounds, and a report takes a second to print: left to ``python -m benchmarks.fuzz``.
+HEAVY = {
+    **dict.fromkeys(
+        ("create_study", "preview_study", "extend_study", "create_schedule", "change_schedule"), ("coverage",)
+    ),
+    "get_report": ("examples", "coverage"),
+}
+TOKEN = "correct-horse-battery-staple"
+
+
+def not_here(*_: Any, **__: Any) -> Any:
+    """Stands for the engine, which has its own tests."""
+    raise ApiError("not-computed", "It is not computed here.")
+
+
+def things(service: Service) -> dict[str, list[Any]]:
+    """Ids of a study at work with half of its rows, of ended ones, and of a schedule, by the names of parameters."""
+    ended, begun = [service.submit(), service.submit()], service.submit()
+    for study_id in ended:
+        service.fill(study_id)
+    service.fill(begun, range(4))
+    kept = [service.http.post("/api/v1/schedules", json=EXAMPLE).json()["id"] for _ in range(2)]
+    return {"study_id": [begun, *ended], "case": [0], "schedule_id": kept}
+
+
+def test_made_up_requests_are_answered_as_documented(
+    service: Service, settings: Settings, connect: Callable[..., httpx.Client]
+) -> None:
+    ids = things(service)
+    service.computer.answer = not_here
+    with_token = settings.model_copy(update={"token": SecretStr(TOKEN)})
+    app = create_app(with_token, store=service.store, computer=service.computer, checker=service.checker)
+    app.state.context.ending.set()  # streams of events end at once
+    document = connect(app).get("/openapi.json", headers={"Authorization": f"Bearer {TOKEN}"}).json()
+    summary = fuzz(with_ids(document, ids), TOKEN, 3, app=app, skip=HEAVY)
+    told = "\n".join(f"{finding}\n{more}" for finding, more in summary.findings.items())
+    assert not summary.findings, f"{summary}\n{told}"
+    assert summary.operations >= 30
+    assert len(summary.served) >= summary.operations - 3, sorted(summary.served)
+    assert set(summary.phases) == {"examples", "coverage", "fuzzing", "stateful"}
+    assert {401, 404, 405, 422} <= set(summary.statuses)
+    assert set(CHECKS) <= set(summary.checks)

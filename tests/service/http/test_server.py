@@ -1,0 +1,106 @@
+"""The dispatcher beside the service: started again when it dies, ended with the service."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+import pytest
+
+from service.http.server import AddressError, Supervisor, serve
+
+if TYPE_CHECKING:
+    from service.settings import Settings
+
+
+class FakeChild:
+    """A process that lives as long as it is told to."""
+
+    def __init__(self, *, obedient: bool = True) -> None:
+        self.exitcode: int | None = None
+        self.obedient = obedient
+        self.asked: list[str] = []
+        self.gone = threading.Event()
+
+    def die(self, code: int) -> None:
+        """End by itself."""
+        self.exitcode = code
+        self.gone.set()
+
+    def join(self, timeout: float | None = None) -> None:
+        """Wait for the end; an end that nobody waits for long does not come."""
+        if self.obedient or timeout is None:
+            self.gone.wait(timeout)
+
+    def terminate(self) -> None:
+        """Obey, or not."""
+        self.asked.append("terminate")
+        if self.obedient:
+            self.die(0)
+
+    def kill(self) -> None:
+        """Nobody survives this."""
+        self.asked.append("kill")
+        self.die(-9)
+
+
+class Nursery:
+    """Starts fake processes."""
+
+    def __init__(self, *, obedient: bool = True) -> None:
+        self.children: list[FakeChild] = []
+        self.born = threading.Semaphore(0)
+        self.obedient = obedient
+
+    def __call__(self) -> FakeChild:
+        self.children.append(FakeChild(obedient=self.obedient))
+        self.born.release()
+        return self.children[-1]
+
+
+def test_a_dead_child_is_replaced_and_the_last_one_ended() -> None:
+    nursery = Nursery()
+    supervisor = Supervisor(nursery, delays=(0.0, 0.0))
+    supervisor.start()
+    for number in range(3):
+        assert nursery.born.acquire(timeout=10)
+        nursery.children[number].die(1)
+    assert nursery.born.acquire(timeout=10)
+    supervisor.stop()
+    assert [child.exitcode for child in nursery.children] == [1, 1, 1, 0]
+    assert nursery.children[-1].asked == ["terminate"]
+    assert not supervisor.is_alive()
+
+
+def test_a_child_that_ends_with_everything_else_is_not_replaced(caplog: pytest.LogCaptureFixture) -> None:
+    nursery, leaving = Nursery(), threading.Event()
+    supervisor = Supervisor(nursery, delays=(60.0, 60.0), leaving=leaving)
+    supervisor.start()
+    assert nursery.born.acquire(timeout=10)
+    nursery.children[0].die(0)
+    leaving.set()
+    supervisor.join(10)
+    assert not supervisor.is_alive()
+    supervisor.stop()
+    assert len(nursery.children) == 1
+    assert caplog.messages == []
+
+
+def test_a_child_that_does_not_end_is_killed() -> None:
+    nursery = Nursery(obedient=False)
+    supervisor = Supervisor(nursery)
+    supervisor.start()
+    assert nursery.born.acquire(timeout=10)
+    supervisor.stop()
+    assert nursery.children[0].asked == ["terminate", "kill"]
+
+
+def test_an_address_in_use_is_told(settings: Settings) -> None:
+    import socket
+
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        busy = settings.model_copy(update={"port": taken.getsockname()[1]})
+        with pytest.raises(AddressError, match=r"cannot listen on 127\.0\.0\.1 port"):
+            serve(busy)
+    with pytest.raises(AddressError):
+        serve(settings.model_copy(update={"host": "[::1%none]"}))

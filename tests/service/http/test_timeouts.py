@@ -1,0 +1,145 @@
+"""Clients that send or take nothing, on real sockets: they are left, and the others are served meanwhile."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import httpx
+import pytest
+import uvicorn
+
+from service.http import guard
+from service.http.api import events
+from service.http.context import Places
+from service.http.timeouts import TimeoutProtocol
+from service.jobs.submission import accept
+from service.spec.document import parse_spec
+from tests.service.conftest import API, Service
+from worker import limits
+
+#: Far less than a person waits, far more than a request takes.
+SHORT = 0.3
+
+
+class Hasty(TimeoutProtocol):
+    """As patient as a test."""
+
+    head_seconds = SHORT
+    write_seconds = SHORT
+
+
+@contextmanager
+def serving(app: Any, **options: Any) -> Iterator[tuple[str, int]]:
+    """A server in a thread."""
+    listener = socket.create_server(("127.0.0.1", 0))
+    options = {"http": Hasty, **options}
+    config = uvicorn.Config(app, log_config=None, ws="none", lifespan="off", access_log=False, **options)
+    server = uvicorn.Server(config)
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+    thread.start()
+    try:
+        yield listener.getsockname()
+    finally:
+        server.should_exit = True
+        thread.join(60)
+
+
+def until_closed(connection: socket.socket) -> bytes:
+    """All that comes until the other side closes or resets; fails when it never does."""
+    connection.settimeout(60)
+    found = b""
+    try:
+        while part := connection.recv(65536):
+            found += part
+    except ConnectionResetError:
+        pass
+    return found
+
+
+HEAD = b"GET /livez HTTP/1.1\r\nHost: localhost\r\n"
+
+
+@pytest.mark.parametrize("sent", [b"", b"G", HEAD, HEAD + b"X: " + b"y" * 1000], ids=["nothing", "a", "b", "c"])
+def test_a_head_that_does_not_come_is_not_waited_for(service: Service, sent: bytes) -> None:
+    with serving(service.app) as address, socket.create_connection(address) as connection:
+        connection.sendall(sent)
+        assert httpx.get(f"http://localhost:{address[1]}/livez", timeout=60).status_code == 200
+        assert until_closed(connection) == b""
+
+
+def test_the_head_of_a_second_request_is_not_waited_for_either(service: Service) -> None:
+    with serving(service.app) as address, socket.create_connection(address) as connection:
+        connection.sendall(HEAD + b"\r\n")
+        assert connection.recv(65536).startswith(b"HTTP/1.1 200")
+        connection.sendall(HEAD)
+        assert until_closed(connection).count(b"HTTP/1.1 200") == 0
+
+
+def test_a_body_that_does_not_come_is_told_and_left(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guard, "BODY_SECONDS", SHORT)
+    head = b"POST /api/v1/studies HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+    with serving(service.app) as address, socket.create_connection(address) as connection:
+        connection.sendall(head + b"Content-Length: 99\r\n\r\n{")
+        answer = until_closed(connection)
+    assert answer.startswith(b"HTTP/1.1 408")
+    assert b"/problems/too-slow" in answer
+
+
+def test_who_takes_nothing_of_an_answer_is_left() -> None:
+    closed = threading.Event()
+
+    class Watched(Hasty):
+        def connection_lost(self, exc: Exception | None) -> None:
+            closed.set()
+            super().connection_lost(exc)
+
+    async def endless(_scope: Any, _receive: Any, send: Any) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        while not closed.is_set():
+            await send({"type": "http.response.body", "body": bytes(65536), "more_body": True})
+
+    with serving(endless, http=Watched) as address, socket.create_connection(address) as connection:
+        connection.sendall(HEAD + b"\r\n")
+        assert closed.wait(60)
+
+
+def test_a_long_answer_to_a_client_that_takes_it_is_not_cut() -> None:
+    size = 40_000_000
+
+    async def long(_scope: Any, _receive: Any, send: Any) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"%d" % size)]})
+        await send({"type": "http.response.body", "body": bytes(size)})
+
+    with serving(long) as address:
+        assert len(httpx.get(f"http://localhost:{address[1]}/", timeout=60).content) == size
+
+
+def test_streams_of_events_have_a_number_of_places(service: Service) -> None:
+    study_id = service.submit()
+    service.fill(study_id)
+    places = service.app.state.context.streams
+    for _ in range(3):  # a stream that has ended gives its place back
+        assert service.http.get(f"{API}/studies/{study_id}/events").status_code == 200
+    assert places.taken == 0
+    places.taken = places.most
+    full = service.http.get(f"{API}/studies/{study_id}/events")
+    assert (full.status_code, full.headers["retry-after"]) == (503, "10")
+    assert full.json()["type"] == "/problems/unavailable"
+    assert events.LOOK_SECONDS > 0
+    assert Places(1).take()
+
+
+def test_the_queue_has_an_end(service: Service, monkeypatch: pytest.MonkeyPatch, spec: dict[str, Any]) -> None:
+    monkeypatch.setattr("service.jobs.submission.MAX_WAITING_STUDIES", 2)
+    first = service.submit()
+    service.submit()
+    refused = service.http.post(f"{API}/studies", json=spec)
+    assert refused.status_code == 429
+    assert refused.json()["type"] == "/problems/queue-full"
+    service.fill(first)
+    accept(service.store, parse_spec(spec))
+    assert limits.MAX_WAITING_STUDIES >= 100

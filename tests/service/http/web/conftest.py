@@ -1,0 +1,134 @@
+"""A real service and a real browser, as a designer has them."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import shutil
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+from urllib.parse import urlsplit
+
+import httpx
+import pytest
+from playwright.sync_api import Browser, ConsoleMessage, Page, Request, sync_playwright
+
+from service.http.api.examples import SPEC
+from tests.acceptance.processes import SECONDS, service
+
+_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+#: What the policy keeps out of plotly, by the hashes that the browser tells of: empty style attributes, and that of the
+#: title of a colour bar that is drawn again, which has it as attributes too. Any other style of a page is an error.
+_HARMLESS = (
+    "a hash ('sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU=')",
+    "a hash ('sha256-AR/cKIZjWPcPmBUPDA6oti9XBiTbJvz0Cro2J1VzzS8=')",
+)
+
+
+@dataclass
+class Office:
+    """A running service, and a client of its interface to check what pages say."""
+
+    address: str
+    http: httpx.Client = field(repr=False)
+
+    def submit(self, spec: dict[str, Any] | None = None, wait: bool = True, **changes: Any) -> str:
+        """Submit the example with changes; its id, when it has ended."""
+        answer = self.http.post("/api/v1/studies", json={**copy.deepcopy(SPEC if spec is None else spec), **changes})
+        assert answer.status_code == 202, answer.text
+        study_id = str(answer.json()["id"])
+        if wait:
+            self.wait(study_id)
+        return study_id
+
+    def wait(self, study_id: str, states: tuple[str, ...] = ("finished", "failed", "cancelled")) -> dict[str, Any]:
+        """The study, once it is in one of ``states``: told by the service's own events."""
+        limit = time.monotonic() + SECONDS
+        with self.http.stream("GET", f"/api/v1/studies/{study_id}/events", timeout=SECONDS) as events:
+            for line in events.iter_lines():
+                assert time.monotonic() < limit
+                if line.startswith("data:") and json.loads(line[5:])["state"] in states:
+                    break
+        return self.get(f"/studies/{study_id}")
+
+    def get(self, path: str, **params: Any) -> Any:
+        """JSON of an address of the interface."""
+        answer = self.http.get("/api/v1" + path, params=params)
+        assert answer.status_code == 200, answer.text
+        return answer.json()
+
+
+@dataclass
+class Visitor:
+    """A tab of the browser, and what it asked of whom."""
+
+    page: Page
+    hosts: set[str] = field(default_factory=set)
+    errors: list[str] = field(default_factory=list)
+
+    def note_request(self, request: Request) -> None:
+        """Remember the host of a request."""
+        if not request.url.startswith(("data:", "blob:", "about:")):
+            self.hosts.add(urlsplit(request.url).netloc)
+
+    def note_message(self, message: ConsoleMessage) -> None:
+        """Remember errors of scripts; refused requests are told by the pages themselves."""
+        expected = (*_HARMLESS, "Failed to load resource")
+        if message.type == "error" and not any(text in message.text for text in expected):
+            self.errors.append(message.text)
+
+
+@pytest.fixture(scope="session")
+def chromium() -> str:
+    """Path of the system's Chromium; the gate has one, a user's machine need not."""
+    found = next((path for name in _NAMES if (path := shutil.which(name))), None)
+    if found is None:
+        if os.environ.get("CI", "").lower() == "true":
+            pytest.fail(f"no Chromium on this machine (looked for {', '.join(_NAMES)}); .ci/run installs it")
+        pytest.skip(f"needs Chromium: none of {', '.join(_NAMES)} is installed")
+    return found
+
+
+@pytest.fixture(scope="module")
+def browser(chromium: str) -> Iterator[Browser]:
+    """One browser for the tests of a module; its event loop ends with them."""
+    with sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="session")
+def office(tmp_path_factory: pytest.TempPathFactory, chromium: str) -> Iterator[Office]:
+    """A service with a database of its own, for all tests."""
+    with (
+        service(tmp_path_factory.mktemp("office"), SPRAG_PROCESSES="2") as started,
+        httpx.Client(base_url=started.address, timeout=60.0) as client,
+    ):
+        yield Office(started.address, client)
+
+
+@pytest.fixture(scope="session")
+def example(office: Office) -> str:
+    """The example study, finished: two axes, nine cases."""
+    return office.submit()
+
+
+@pytest.fixture
+def visitor(browser: Browser, office: Office, request: pytest.FixtureRequest) -> Iterator[Visitor]:
+    """A tab at desktop width (or as ``tab`` marks it); no page may ask another host or break a script."""
+    options = {"viewport": {"width": 1280, "height": 900}, "accept_downloads": True, **getattr(request, "param", {})}
+    context = browser.new_context(base_url=office.address, **options)
+    context.set_default_timeout(90_000)
+    page = context.new_page()
+    found = Visitor(page)
+    page.on("request", found.note_request)
+    page.on("console", found.note_message)
+    page.on("pageerror", lambda error: found.errors.append(str(error)))
+    yield found
+    context.close()
+    assert found.hosts <= {urlsplit(office.address).netloc}
+    assert found.errors == []

@@ -1,0 +1,105 @@
+"""Pages whose service is away for a while, and pages of studies that run: what is shown is so, or is said to be old."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from playwright.sync_api import expect
+
+from tests.service.http.web.fields import named
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+    from tests.service.http.web.conftest import Office, Visitor
+
+LONG = {
+    "axes": [
+        {"path": "shaft.load", "linspace": [0, 1, 250]},
+        {"path": "excitation.frequency", "linspace": [20, 35, 1000]},
+    ]
+}
+LOST = "The connection to the service is lost"
+
+
+def cut(page: Page) -> None:
+    """Nothing comes through any more."""
+    page.context.set_offline(True)
+
+
+def mend(page: Page) -> None:
+    """Everything comes through again, and the page is told to try."""
+    page.context.set_offline(False)
+    page.get_by_role("button", name="Try now").click()
+    expect(page.locator(".link-lost")).to_have_count(0)
+
+
+def test_an_old_picture_is_pale_under_a_new_choice_until_it_is_drawn(visitor: Visitor, example: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{example}/curves?x=shaft.load&y=shaft.speed.mean&at=excitation.frequency=16")
+    page.wait_for_function("() => document.querySelector('.plot')?.data")
+    shown = "JSON.stringify(document.querySelector('.plot')?.data?.[0].y)"
+    old = page.evaluate(f"() => {shown}")
+    cut(page)
+    named(page, "at").select_option(index=2)
+    expect(page.get_by_role("alert")).to_contain_text(LOST)
+    expect(page.locator("#curves")).to_have_class(re.compile("stale"))
+    mend(page)
+    page.wait_for_function(f"(old) => ![undefined, old].includes({shown})", arg=old)
+    expect(page.locator(".stale")).to_have_count(0)
+
+
+def test_the_form_does_not_keep_old_costs(visitor: Visitor) -> None:
+    page = visitor.page
+    page.goto("/new?preset=one_pendulum")
+    named(page, "/axes/0/count").fill("10")
+    expect(page.locator("[data-cases]")).to_have_text("320")
+    cut(page)
+    named(page, "/axes/0/count").fill("20")
+    expect(page.get_by_role("alert").filter(has_text=LOST)).to_be_visible()
+    expect(page.locator("#panel")).to_have_class(re.compile("stale"))
+    mend(page)
+    expect(page.locator("[data-cases]")).to_have_text("640")
+    expect(page.locator("#panel")).not_to_have_class(re.compile("stale"))
+
+
+def test_a_refusal_of_the_form_is_told(visitor: Visitor) -> None:
+    page = visitor.page
+    page.goto("/new?preset=one_pendulum")
+    expect(page.locator("[data-cases]")).to_have_count(1)
+    page.route("**/new/check", lambda route: route.fulfill(status=500, json={"detail": "A fault of the program."}))
+    named(page, "/axes/0/count").fill("20")
+    expect(page.locator("#panel [role=alert]")).to_contain_text("A fault of the program.")
+    expect(page.locator("#panel .cost")).to_have_count(0)
+
+
+def test_a_running_study_is_followed_on_every_page_and_through_a_lost_connection(
+    visitor: Visitor, office: Office
+) -> None:
+    page = visitor.page
+    page.goto("/")
+    study_id = office.submit(wait=False, name="Followed", **LONG)
+    row = page.locator("#studies tr", has_text="Followed")
+    expect(row.locator(".state")).to_have_text("running", timeout=60_000)
+
+    page.goto(f"/studies/{study_id}/curves?x=shaft.load&y=shaft.speed.mean&at=excitation.frequency=20")
+    page.wait_for_function("() => Number(document.querySelector('.plot')?.dataset.drawn) >= 3", timeout=60_000)
+    page.goto(f"/studies/{study_id}/map")
+    page.wait_for_function("() => Number(document.querySelector('.plot')?.dataset.drawn) >= 3", timeout=60_000)
+
+    page.goto(f"/studies/{study_id}/cases")
+    page.evaluate("() => { document.querySelector('#cases').dataset.mine = '1'; }")
+    page.wait_for_function("() => !document.querySelector('#cases').dataset.mine", timeout=60_000)
+
+    page.goto(f"/studies/{study_id}")
+    expect(page.locator("#progress")).to_contain_text("left", timeout=60_000)
+    cut(page)
+    page.evaluate("() => sprag.fetchJson('/api/v1/studies').catch(() => {})")
+    expect(page.get_by_role("alert")).to_contain_text(LOST)
+    office.http.post(f"/api/v1/studies/{study_id}:cancel")
+    office.wait(study_id)
+    mend(page)
+    expect(page.locator("#progress .state")).to_have_text("cancelled", timeout=60_000)
+    page.goto("/")
+    expect(row.locator(".state")).to_have_text("cancelled")

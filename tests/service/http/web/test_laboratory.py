@@ -1,0 +1,58 @@
+"""The laboratory keeps what is set: in its address, in the studies made of it, and over a change of the machine."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+from urllib.parse import parse_qs, urlsplit
+
+from playwright.sync_api import expect
+
+from tests.service.http.web.fields import drawn, fill, named
+
+if TYPE_CHECKING:
+    from tests.service.http.web.conftest import Visitor
+
+RAM = "mechanism.slider_crank.ram_mass"
+CRANK = "mechanism.slider_crank.crank"
+
+
+def test_a_setting_with_too_little_inertia_becomes_a_study_as_it_is(visitor: Visitor) -> None:
+    page = visitor.page
+    page.goto("/laboratory?machine=press")
+    drawn(page, "#lab-plot")
+    fill(page, {RAM: "60", "operation.scale": "2", "drive.inertia": "2"})
+    expect(page.locator("#answer")).to_contain_text("The inertia is insufficient")
+    slider = page.locator(f'input[type="range"][data-for="{RAM}"]')
+    assert slider.input_value() == "750"
+    page.wait_for_url("**drive.inertia=2&**")
+    page.reload()
+    expect(named(page, RAM)).to_have_value("60")
+    assert slider.input_value() == "750"
+    page.get_by_role("link", name="the masses").click()
+    spec = json.loads(named(page, "/text").input_value())
+    assert spec["base"]["drive"]["inertia"] == 2
+    assert spec["base"]["operation"]["scale"] == 2
+    assert spec["base"]["mechanism"]["slider_crank"]["ram_mass"] == 60
+
+
+def test_a_deep_link_keeps_numbers_that_have_no_slider(visitor: Visitor) -> None:
+    page = visitor.page
+    page.goto(f"/laboratory?machine=press&{CRANK}=90 mm")
+    drawn(page, "#lab-plot")
+    expect(named(page, CRANK)).to_have_value("90 mm")
+    named(page, "drive.inertia").fill("40")
+    page.wait_for_url("**drive.inertia=40&**")
+    assert parse_qs(urlsplit(page.url).query)[CRANK] == ["90 mm"]
+    page.get_by_role("link", name="the operation's load").click()
+    spec = json.loads(named(page, "/text").input_value())
+    assert spec["base"]["mechanism"]["slider_crank"]["crank"] == "90 mm"
+
+
+def test_the_machine_that_is_chosen_is_the_one_that_is_shown(visitor: Visitor) -> None:
+    page = visitor.page
+    page.goto("/laboratory?machine=press")
+    drawn(page, "#lab-plot")
+    page.locator("#machines select").select_option("conveyor")
+    page.wait_for_url("**/laboratory?machine=conveyor**")
+    expect(page.locator("#lab input[name=machine]")).to_have_value("conveyor")

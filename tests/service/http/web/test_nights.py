@@ -1,0 +1,204 @@
+"""Logging in with a token, and schedules, as people in an office do both in the browser."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from service.http.api.examples import SPEC
+from service.http.app import chunking, create_app
+from service.jobs.scheduler import Scheduler
+from service.settings import Settings
+from service.storage.store import Store
+from service.storage.tokens import TokenScope
+from tests.service.conftest import InThread, made_up
+from tests.serving import served
+from worker.models import ChunkResult
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from playwright.sync_api import BrowserContext
+
+expect.set_options(timeout=90_000)
+PLAIN = {"java_script_enabled": False}
+
+
+class NewYear:
+    """A clock that stands at noon of the first of January 2026, until it is set."""
+
+    def __init__(self) -> None:
+        self.moment = datetime(2026, 1, 1, 12, tzinfo=UTC)
+
+    def now(self) -> datetime:
+        """The moment it was set to."""
+        return self.moment
+
+
+@dataclass
+class House:
+    """A service of this process with its store and its clock."""
+
+    address: str
+    store: Store
+    clock: NewYear
+    study: str
+
+
+@pytest.fixture
+def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[House]:
+    """A service with one finished study of made-up rows, and no worker."""
+    for name in Settings.model_fields:
+        monkeypatch.delenv(f"SPRAG_{name.upper()}", raising=False)
+    settings = Settings(database=str(tmp_path / "sprag.sqlite3"), processes=1)
+    clock = NewYear()
+    with Store.open(settings.database_url, chunking=chunking(settings), clock=clock) as store:
+        app = create_app(settings, store=store, computer=InThread(), checker=InThread())
+        with served(app) as address:
+            yield House(address, store, clock, finished_study(store))
+
+
+def finished_study(store: Store) -> str:
+    """The example, submitted and ended with made-up rows; its id."""
+    from service.jobs.submission import accept
+    from service.spec.document import parse_spec
+
+    record = accept(store, parse_spec(SPEC))
+    rows, epoch = made_up(store.study(record.id)), store.take_over("test")
+    for chunk in store.claim(epoch, store.open_chunks(record.number)):
+        part = slice(chunk.first, chunk.first + chunk.count)
+        result = ChunkResult(chunk.first, rows.endings[part], rows.flags[part], rows.values[part])
+        assert store.commit(epoch, chunk, result)
+    store.settle(epoch, record.number)
+    return record.id
+
+
+@pytest.fixture(params=[{}, PLAIN], ids=["with scripts", "without"])
+def tab(house: House, browser: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
+    """A tab at the service, with JavaScript and without."""
+    context = browser.new_context(base_url=house.address, viewport={"width": 1280, "height": 900}, **request.param)
+    # The first page reads all presets, which takes a machine that is busy with other tests many seconds.
+    context.set_default_timeout(90_000)
+    yield context.new_page()
+    context.close()
+
+
+def log_in(page: Page, secret: str) -> None:
+    """Fill in the form of the login."""
+    page.get_by_label("Token").fill(secret)
+    page.get_by_role("button", name="Log in").click()
+
+
+def session_of(context: BrowserContext) -> list[dict[str, object]]:
+    """The cookies of the service."""
+    return [dict(cookie) for cookie in context.cookies() if cookie.get("name") == "sprag_session"]
+
+
+def test_a_browser_logs_in_looks_and_acts_and_logs_out(house: House, tab: Page) -> None:
+    secret, record = house.store.create_token("design office", TokenScope.WRITE)
+    tab.goto(f"/studies/{house.study}")
+    expect(tab).to_have_url(f"{house.address}/login?next=/studies/{house.study}")
+    log_in(tab, "sprag_wrong-wrong-wrong-wrong")
+    expect(tab.locator("#wrong-token")).to_have_text("This is no valid token.")
+    assert session_of(tab.context) == []
+    log_in(tab, secret)
+    expect(tab).to_have_url(f"{house.address}/studies/{house.study}")
+    (cookie,) = session_of(tab.context)
+    assert (cookie["httpOnly"], cookie["sameSite"], secret in str(cookie["value"])) == (True, "Lax", False)
+    expect(tab.get_by_role("heading", level=1)).to_contain_text("Feeder motor")
+    tab.goto("/schedules/new")
+    tab.get_by_label("Study").select_option(f"study {house.study}")
+    tab.get_by_role("button", name="Keep the schedule").click()
+    expect(tab.locator("tbody tr")).to_have_count(1)
+    tab.get_by_role("link", name="Log in or out").click()
+    expect(tab.get_by_text("You are logged in with the token design office")).to_be_visible()
+    tab.get_by_role("button", name="Log out").click()
+    assert session_of(tab.context) == []
+    tab.context.add_cookies([{"name": "sprag_session", "value": str(cookie["value"]), "url": house.address}])
+    tab.goto("/schedules")
+    expect(tab).to_have_url(f"{house.address}/login?next=/schedules")  # a copy of the cookie is worth nothing
+    assert record.scope is TokenScope.WRITE
+
+
+def test_a_token_to_look_sees_every_page_and_may_change_nothing(house: House, tab: Page) -> None:
+    secret, _ = house.store.create_token("wall display", TokenScope.READ)
+    tab.goto("/login")
+    log_in(tab, secret)
+    expect(tab).to_have_url(f"{house.address}/")
+    for page in ("/", f"/studies/{house.study}", f"/studies/{house.study}/cases/0", "/schedules", "/new", "/docs"):
+        answer = tab.goto(page)
+        assert answer is not None
+        assert answer.status == 200, page
+    tab.goto("/schedules/new")
+    tab.get_by_label("Study").select_option(f"study {house.study}")
+    with tab.expect_response(lambda answer: answer.request.method == "POST") as refused:
+        tab.get_by_role("button", name="Keep the schedule").click()
+    assert refused.value.status == 403
+    expect(tab.get_by_role("heading", level=1)).to_have_text("This token only allows to look")
+    expect(tab.get_by_text("The token wall display allows to look, not to change anything.")).to_be_visible()
+    assert house.store.list_schedules() == ()
+    tab.get_by_role("link", name="Log in with another token").click()
+    expect(tab.get_by_text("which allows to look at everything")).to_be_visible()
+
+
+def test_a_schedule_is_kept_changed_disabled_and_deleted(house: House, tab: Page) -> None:
+    tab.goto(f"/schedules/new?study={house.study}")
+    tab.get_by_label("Name of its studies").fill("Every working night")
+    tab.get_by_label("Cron expression").fill("0 25 * * *")
+    tab.get_by_label("Time zone").fill("Europe/Berln")
+    tab.get_by_role("button", name="Keep the schedule").click()
+    expect(tab.locator("#wrong-cron")).to_contain_text("five fields, such as")
+    expect(tab.locator("#wrong-zone")).to_contain_text("Europe/Berlin")
+    expect(tab.get_by_label("Cron expression")).to_have_value("0 25 * * *")
+    tab.get_by_label("Cron expression").fill("0 22 * * 1-5")
+    tab.get_by_label("Time zone").fill("Europe/Berlin")
+    tab.get_by_label("From").fill("22:00")
+    tab.get_by_role("button", name="Keep the schedule").click()
+    expect(tab.locator("#wrong-window_begin")).not_to_be_empty()
+    tab.get_by_label("Until").fill("06:00")
+    tab.get_by_role("button", name="Keep the schedule").click()
+    row = tab.locator("tbody tr")
+    # 22:00 in Berlin, where it is winter, is 21:00 UTC; the first of January 2026 is a Thursday.
+    expect(row).to_contain_text("2026-01-01 21:00:00 UTC")
+    expect(row).to_contain_text("22:00 to 06:00")
+    row.get_by_role("link", name="Every working night").click()
+    tab.get_by_label("Cron expression").fill("30 8 * 7 *")
+    for label in ("From", "Until"):
+        tab.get_by_label(label).fill("")
+    tab.get_by_role("button", name="Save").click()
+    expect(row).to_contain_text("2026-07-01 06:30:00 UTC")  # in summer Berlin is two hours ahead
+    expect(row).to_contain_text("any time")
+    row.get_by_role("button", name="Disable").click()
+    expect(row).to_contain_text("disabled")
+    expect(row).not_to_contain_text("2026-07-01")
+    row.get_by_role("button", name="Enable").click()
+    expect(row).to_contain_text("2026-07-01 06:30:00 UTC")
+    row.get_by_role("button", name="Delete").click()
+    expect(tab.get_by_text("There is no schedule yet.")).to_be_visible()
+    assert house.store.list_schedules() == ()
+
+
+def test_a_study_is_run_once_at_a_time_of_a_zone(house: House, tab: Page) -> None:
+    tab.goto("/schedules/new")
+    tab.get_by_label("Study").select_option("preset one_pendulum")
+    tab.get_by_label("once").check()
+    tab.get_by_label("Time", exact=True).fill("2025-12-31T22:00")
+    tab.get_by_label("Time zone").fill("Asia/Tokyo")
+    tab.get_by_role("button", name="Keep the schedule").click()
+    expect(tab.locator("#wrong-at")).to_contain_text("has passed already")
+    tab.get_by_label("Time", exact=True).fill("2026-01-02T07:30")
+    tab.get_by_role("button", name="Keep the schedule").click()
+    row = tab.locator("tbody tr")
+    expect(row).to_contain_text("2026-01-02 07:30 Asia/Tokyo")
+    expect(row).to_contain_text("2026-01-01 22:30:00 UTC")
+    house.clock.moment = datetime(2026, 1, 1, 22, 30, 1, tzinfo=UTC)
+    Scheduler(house.store).look()
+    tab.goto("/schedules")
+    row.get_by_role("link", name="its study").click()
+    expect(tab.get_by_role("heading", level=1)).to_be_visible()
+    assert len(house.store.list_studies().studies) == 2

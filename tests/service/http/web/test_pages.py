@@ -1,0 +1,247 @@
+"""Pages of studies of every shape, over made-up rows."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from worker import models
+
+if TYPE_CHECKING:
+    from tests.service.conftest import Service
+
+LOAD = {"path": "shaft.load", "values": [0.1, 0.2, 0.3]}
+FREQUENCY = {"path": "excitation.frequency", "values": [20, 25, 30]}
+MEASURED = {"data": [[0, 0], [0.01, 2], [0.02, 4], [0.03, 6]], "accuracy": 0.1}
+SHAPES: dict[str, dict[str, Any]] = {
+    "grid": {"axes": [LOAD, FREQUENCY]},
+    "zip": {"axes": [LOAD, FREQUENCY], "combine": "zip"},
+    "union": {"axes": [LOAD, FREQUENCY], "combine": "union"},
+    "one axis": {"axes": [LOAD]},
+    "one value": {"axes": [{**LOAD, "values": [0.1]}]},
+    "nothing": {"axes": []},
+    "three axes": {"axes": [LOAD, FREQUENCY, {"path": "pendulums.0.mass", "values": [0.4, 0.5]}]},
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_every_shape_of_study_has_its_pages(service: Service, spec: dict[str, Any], shape: str) -> None:
+    spec["base"]["clutch"] = MEASURED
+    study_id = service.submit({**spec, **SHAPES[shape]})
+    for filled in (False, True):
+        if filled:
+            service.fill(study_id)
+        for part in ("", "/cases", "/cases?sort=-shaft.speed.mean&ending=ok", "/cases/0"):
+            assert service.http.get(f"/studies/{study_id}{part}").status_code == 200, part
+        for part in ("/curves", "/map"):
+            assert service.http.get(f"/studies/{study_id}{part}").status_code in (200, 303), part
+        for figure in ("curves", "curves?columns=2", "map", "map?kind=contour"):
+            answer = service.http.get(f"/studies/{study_id}/figures/{figure}")
+            assert answer.status_code == 200, figure
+            assert set(answer.json()) >= {"data", "layout"}
+    assert "degree 1 reaches the accuracy" in service.http.get(f"/studies/{study_id}").text
+    assert service.http.get(f"/new?clone={study_id}").status_code == 200
+
+
+def test_figures_have_the_numbers_of_the_interface(service: Service) -> None:
+    study_id = service.submit()
+    service.fill(study_id)
+    query = {"x": "shaft.load", "by": "excitation.frequency", "y": ["torque.mean", "efficiency"]}
+    told = service.get(f"/studies/{study_id}/curves", **query)
+    figure = service.http.get(f"/studies/{study_id}/figures/curves", params=query).json()
+    lines = {(line["legendgroup"], line["yaxis"]): line for line in figure["data"]}
+    for index, curve in enumerate(told["curves"]):
+        for axis, name in (("y", "torque.mean"), ("y2", "efficiency")):
+            assert lines[str(index), axis]["y"] == curve["y"][name]
+            assert lines[str(index), axis]["customdata"] == curve["cases"]
+    drawn = service.get(f"/studies/{study_id}/map", x="shaft.load", y="excitation.frequency", z="efficiency")
+    query = {"x": "shaft.load", "y": "excitation.frequency", "z": "efficiency"}
+    heat = service.http.get(f"/studies/{study_id}/figures/map", params=query).json()["data"][0]
+    assert (heat["z"], heat["customdata"]) == (drawn["z"]["values"], drawn["cases"])
+
+
+@pytest.mark.parametrize("chunk_cases", [5_000])
+def test_a_long_curve_is_thinned_and_keeps_its_highest_point(service: Service, spec: dict[str, Any]) -> None:
+    spec["axes"] = [{"path": "shaft.load", "linspace": [0, 1, 20_000]}]
+    study_id = service.submit(spec)
+    whole = service.fill(study_id)
+    query = {"x": "shaft.load", "y": "torque.mean"}
+    (line,) = service.http.get(f"/studies/{study_id}/figures/curves", params=query).json()["data"]
+    told = service.get(f"/studies/{study_id}/curves", **query)["curves"][0]["y"]["torque.mean"]
+    assert len(line["y"]) <= 6_000 < len(told) == whole.count
+    known = [value for value in told if value is not None]
+    drawn = [value for value in line["y"] if value is not None]
+    assert (max(drawn), min(drawn)) == (max(known), min(known))
+
+
+def test_panels_are_as_high_among_many_as_among_few(service: Service) -> None:
+    study_id = service.submit()
+    service.fill(study_id)
+    names = [info.name for info in models.study_results(service.store.study(study_id))]
+    for count in (2, 12, 24):
+        query = {"x": "shaft.load", "y": names[:count]}
+        layout = service.http.get(f"/studies/{study_id}/figures/curves", params=query).json()["layout"]
+        inner = layout["height"] - layout["margin"]["t"] - layout["margin"]["b"]
+        spans = sorted(axis["domain"] for name, axis in layout.items() if name.startswith("yaxis"))
+        assert len(spans) == count
+        assert [(top - low) * inner for low, top in spans] == pytest.approx([230.0] * count)
+        gaps = [(after[0] - before[1]) * inner for before, after in itertools.pairwise(spans)]
+        assert gaps == pytest.approx([45.0] * (count - 1))
+
+
+def test_compared_studies_tell_what_is_held_with_its_unit(service: Service, spec: dict[str, Any]) -> None:
+    names = ["a", "A name that goes on and on, longer than any legend has room for: the end"]
+    ids = [service.submit({**spec, "name": name, "axes": [LOAD, FREQUENCY]}) for name in names]
+    for study_id in ids:
+        service.fill(study_id)
+    query = {"study": ids, "x": "shaft.load"}
+    page = service.http.get("/compare", params=query).text
+    assert page.count("excitation.frequency = 25 Hz") == 2
+    figure = service.http.get("/compare/figure", params=query).json()
+    first, second = (line["name"] for line in figure["data"])
+    assert (first, len(second)) == ("a", 60)
+    assert second.startswith("A name that goes on")
+    assert second.endswith("room for: the end")
+
+
+def test_a_compared_family_says_the_name_of_a_study_once(service: Service, spec: dict[str, Any]) -> None:
+    ids = [service.submit({**spec, "name": name, "axes": [LOAD, FREQUENCY]}) for name in ("first & best", "other")]
+    for study_id in ids:
+        service.fill(study_id)
+    query = {"study": ids, "x": "shaft.load", "by": "excitation.frequency"}
+    figure = service.http.get("/compare/figure", params=query).json()
+    values = [f"{value:g}" for value in FREQUENCY["values"]]
+    assert [line["name"] for line in figure["data"]] == values * 2
+    titles = [line["legendgrouptitle"]["text"] for line in figure["data"]]
+    rest = [""] * (len(values) - 1)
+    assert titles == ["first &amp; best", *rest, "other", *rest]
+    assert figure["layout"]["legend"]["title"]["text"] == "Excitation frequency (Hz)"
+    # What the pointer shows has no heading above it and says both.
+    assert "<extra>other, " in figure["data"][-1]["hovertemplate"]
+    picture = service.http.get("/compare/picture.svg", params=query)
+    assert picture.status_code == 200
+    texts = re.findall(r"<!-- (.*?) -->", picture.text)
+    assert texts.count("other") == 1
+    assert [text for text in texts if text in values].count(values[0]) >= 2
+
+
+def test_a_picture_without_rows_is_a_sentence_and_the_first_one_has_rows(
+    service: Service, spec: dict[str, Any]
+) -> None:
+    masses = {"path": "pendulums.0.mass", "linspace": [0.4, 0.6, 3]}
+    frequencies = {"path": "excitation.frequency", "values": [21, 25, 30]}
+    loads = {"path": "shaft.load", "linspace": [0, 0.5, 40]}
+    study_id = service.submit({**spec, "axes": [masses, frequencies, loads]})
+    query = {"x": "shaft.load", "y": "efficiency", "at": ["excitation.frequency=30", "pendulums.0.mass=0.5"]}
+    figure = service.http.get(f"/studies/{study_id}/figures/curves", params=query).json()
+    assert figure["note"] == "No case at excitation.frequency = 30 Hz, pendulums.0.mass = 0.5 kg is done yet."
+    assert figure["data"] == []
+    assert "at=pendulums.0.mass%3D0.5" in service.http.get(f"/studies/{study_id}").text
+    service.fill(study_id, range(1))
+    page = service.http.get(f"/studies/{study_id}").text
+    assert "at=pendulums.0.mass%3D0.4" in page
+
+
+@pytest.mark.parametrize(
+    ("part", "text"),
+    [
+        ("curves?x=shaft.lod", "did you mean"),
+        ("curves?x=shaft.load&y=efficency", "did you mean"),
+        ("curves?x=shaft.load&by=&at=excitation.frequency=99", "the axis has no such value"),
+        ("curves?x=shaft.load&at=nonsense", "must be path=value"),
+        ("map?z=none", "unknown result"),
+        ("cases?sort=nothing", "no such column"),
+        ("cases?ending=nothing", "no such ending"),
+        ("cases?at=shaft.load=7", "the axis has no such value"),
+        ("cases/0?from=9&to=3", "outside the run"),
+    ],
+)
+def test_wrong_choices_are_told_on_the_page(service: Service, part: str, text: str) -> None:
+    study_id = service.submit()
+    answer = service.http.get(f"/studies/{study_id}/{part}", headers={"Accept": "text/html"})
+    assert answer.status_code == 422
+    assert answer.headers["content-type"].startswith("text/html")
+    assert text in answer.text
+    assert 'role="alert"' in answer.text
+
+
+def test_errors_are_pages_for_browsers_and_documents_for_programs(service: Service) -> None:
+    for path in ("/studies/st_none", "/nowhere", "/new?preset=none", "/compare?study=st_none"):
+        page = service.http.get(path, headers={"Accept": "text/html,application/xhtml+xml"})
+        assert (page.status_code, page.headers["content-type"]) == (404, "text/html; charset=utf-8")
+        assert service.http.get(path).headers["content-type"] == "application/problem+json"
+    api = service.http.get("/api/v1/studies/st_none", headers={"Accept": "text/html"})
+    assert api.headers["content-type"] == "application/problem+json"
+
+
+def test_forms_take_what_browsers_send_and_nothing_else(service: Service) -> None:
+    assert service.http.post("/new", json={}).status_code == 415
+    form = {"Content-Type": "application/x-www-form-urlencoded"}
+    assert service.http.post("/new", content="&".join(["a=1"] * 3000), headers=form).status_code == 400
+    assert service.http.post("/new", content=b"\xff\xfe", headers=form).status_code == 400
+    empty = service.http.post("/new", content="do=submit", headers=form)
+    assert empty.status_code == 422
+    assert "is required" in empty.text
+    cross = service.http.post("/new", content="do=submit", headers={**form, "Origin": "http://evil.example"})
+    assert cross.status_code == 403
+
+
+def test_a_form_sent_twice_is_one_study(service: Service) -> None:
+    page = service.http.get("/new?preset=one_pendulum&mode=text").text
+    form = {"do": "submit", "key": "k", "format": "json", "/text": _textarea(page)}
+    first, again = (service.http.post("/new", data=form) for _ in range(2))
+    assert first.status_code == again.status_code == 303
+    assert first.headers["location"] == again.headers["location"]
+    changed = service.http.post("/new", data={**form, "/text": form["/text"].replace("0.5 kg", "0.6 kg")})
+    assert changed.headers["location"] != first.headers["location"]
+    other = service.http.post("/new", data={**form, "key": "another"})
+    assert other.headers["location"] != first.headers["location"]
+
+
+def _textarea(page: str) -> str:
+    import html
+    import re
+
+    found = re.search(r"<textarea[^>]*>(.*?)</textarea>", page, re.DOTALL)
+    assert found is not None
+    return html.unescape(found[1])
+
+
+def test_wishes_come_from_buttons(service: Service) -> None:
+    study_id = service.submit()
+    for verb, state in (("pause", "paused"), ("resume", "queued"), ("cancel", "cancelling")):
+        answer = service.http.post(f"/studies/{study_id}/{verb}")
+        assert (answer.status_code, answer.headers["location"]) == (303, f"/studies/{study_id}")
+        assert service.get(f"/studies/{study_id}")["state"] == state
+    assert service.http.post(f"/studies/{study_id}/resume").status_code == 409
+    assert service.http.post(f"/studies/{study_id}/explode").status_code == 404
+
+
+def test_a_study_is_deleted_after_a_question_and_only_once_it_has_ended(service: Service) -> None:
+    study_id, other = service.submit(), service.submit()
+    address = f"/studies/{study_id}/delete"
+    asked = service.http.get(address)
+    assert asked.status_code == 200
+    assert "has not ended" in asked.text
+    assert "<button" not in asked.text.partition("<main")[2]
+    refused = service.http.post(address, headers={"Accept": "text/html"})
+    assert refused.status_code == 409
+    assert service.get(f"/studies/{study_id}")["state"] == "queued"
+    assert address not in service.http.get(f"/studies/{study_id}").text
+
+    service.fill(study_id)
+    assert f'href="{address}"' in service.http.get(f"/studies/{study_id}").text
+    assert f'<form method="post" action="{address}">' in service.http.get(address).text
+    assert service.get(f"/studies/{study_id}")["state"] == "finished"  # asking deletes nothing
+    strange = service.http.post(address, headers={"Origin": "http://elsewhere.example"})
+    assert strange.status_code == 403
+    assert service.get(f"/studies/{study_id}")["state"] == "finished"
+    done = service.http.post(address)
+    assert (done.status_code, done.headers["location"]) == (303, "/")
+    for gone in (f"/studies/{study_id}", f"/api/v1/studies/{study_id}"):
+        assert service.http.get(gone).status_code == 404
+    assert service.http.post(address).status_code == 404
+    assert other in service.http.get("/").text

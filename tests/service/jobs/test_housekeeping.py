@@ -1,0 +1,116 @@
+"""Deleted studies are removed in the background and in steps; the log goes to its place while nothing happens."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from service.jobs.housekeeping import Housekeeping
+from service.storage import purging
+from service.storage.errors import DatabaseBusyError, StudyNotFound
+from service.storage.records import StudyRecord
+from service.storage.store import Store
+from tests.worker import fakes
+from worker.chunking import Chunking
+
+SECONDS = 120.0
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    with Store.open(f"sqlite:///{tmp_path / 'sprag.sqlite3'}", chunking=Chunking(cases=2)) as opened:
+        yield opened
+
+
+def finished(store: Store, cases: int = 9) -> StudyRecord:
+    record = store.create_study({}, fakes.study(cases))
+    epoch = store.take_over("test")
+    chunks = store.open_chunks(record.number)
+    store.claim(epoch, chunks)
+    for chunk in chunks:
+        store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
+    store.settle(epoch, record.number)
+    return record
+
+
+def count(store: Store, table: str) -> int:
+    with store.session.read() as connection:
+        return int(connection.exec_driver_sql(f"SELECT count(*) FROM {table}").scalar_one())
+
+
+def test_deleting_removes_no_row_itself_and_each_step_few(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(purging, "PURGED_ROWS", 4)
+    record, other = finished(store), finished(store)
+    store.delete_study(record.id)
+    with pytest.raises(StudyNotFound):
+        store.get_study(record.id)
+    assert count(store, "vibration_drive_1") == 18
+    assert list(store.purge_steps()) == [4, 4, 1, 4, 1, 1]  # rows, chunks, the study itself
+    assert (count(store, "vibration_drive_1"), count(store, "chunks"), count(store, "studies")) == (9, 5, 1)
+    assert list(store.purge_steps()) == []
+    assert len(store.case_rows(other.id)) == 9
+
+
+def test_what_is_deleted_is_removed_in_the_background(store: Store) -> None:
+    first, second = finished(store), finished(store)
+    store.delete_study(first.id)
+    keeping = Housekeeping(store)
+    gone = threading.Event()
+    steps = store.purge_steps
+
+    def noting() -> Iterator[int]:
+        yield from steps()
+        if not count(store, "studies"):
+            gone.set()
+
+    store.purge_steps = noting  # type: ignore[method-assign]
+    keeping.start()
+    store.delete_study(second.id)
+    assert gone.wait(SECONDS)
+    keeping.stop()
+    assert not keeping.is_alive()
+
+
+def test_a_purge_that_fails_is_tried_again(
+    store: Store, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store.delete_study(finished(store).id)
+    keeping = Housekeeping(store)
+
+    def busy() -> Iterator[int]:
+        raise DatabaseBusyError("busy")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(store, "purge_steps", busy)
+        keeping.purge()
+    assert "removed later: busy" in caplog.text
+    monkeypatch.setattr("service.jobs.housekeeping.LOOK_SECONDS", 0.0)
+    keeping.start()
+    for _ in range(1000):
+        if not count(store, "studies"):
+            break
+        threading.Event().wait(0.05)
+    keeping.stop()
+    assert count(store, "studies") == 0
+
+
+def test_a_file_copied_by_itself_is_whole_after_a_checkpoint(store: Store, tmp_path: Path) -> None:
+    record = finished(store)
+    path, copy = store.session.path, tmp_path / "copy.sqlite3"
+    Housekeeping(store).checkpoint()
+    shutil.copyfile(path, copy)
+    with Store.open(f"sqlite:///{copy}") as read:
+        assert read.get_study(record.id).done == 9
+
+
+def test_the_log_is_in_the_file_at_the_end(tmp_path: Path) -> None:
+    path = tmp_path / "sprag.sqlite3"
+    with Store.open(f"sqlite:///{path}") as store:
+        finished(store)
+        log = path.with_name(f"{path.name}-wal")
+        assert log.stat().st_size > 0
+    assert not log.exists()

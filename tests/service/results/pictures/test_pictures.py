@@ -1,0 +1,134 @@
+"""What pictures of curves and maps show: names, values and units of everything, and nothing that was not computed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from service.results.curves import CurveQuery, draw, draw_map, select
+from service.results.pictures import curves as pictures
+from service.spec.document import parse_spec
+from service.storage.records import CaseColumns
+from worker import models
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+TIED = ["excitation.amplitude_x", "excitation.amplitude_y"]
+SPEED = "shaft.speed.mean"
+
+
+@pytest.fixture
+def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """The figures that are drawn."""
+    drawn: list[Figure] = []
+
+    def render(paint: Callable[[Figure], None], picture: str, size: tuple[float, float]) -> bytes:
+        drawn.append(Figure(figsize=size, layout="constrained"))
+        paint(drawn[-1])
+        drawn[-1].draw_without_rendering()
+        return b""
+
+    monkeypatch.setattr(pictures, "render", render)
+    return drawn
+
+
+def fetch(cases: NDArray[np.int64], names: Any) -> CaseColumns:
+    """The number of the case as every result."""
+    return CaseColumns(cases, ["ok"] * cases.size, {name: cases.astype(float) for name in names})
+
+
+def curves(spec: dict[str, Any], *y: str, by: tuple[str, ...] = (), at: tuple[tuple[str, str], ...] = ()) -> None:
+    study = parse_spec(spec).study
+    query = CurveQuery("shaft.load", y or (SPEED,), by, at)
+    pictures.draw_curves(draw(select(study, models.study_results(study), query), fetch), "A study", "svg")
+
+
+def grid(spec: dict[str, Any], frequencies: int) -> dict[str, Any]:
+    return {
+        **spec,
+        "axes": [
+            {"path": "excitation.frequency", "linspace": [20, 35, frequencies]},
+            {"path": TIED, "values": ["1 mm", "2 mm"]},
+            {"path": "shaft.load", "values": [0, 0.1, 1.6]},
+        ],
+    }
+
+
+def test_values_that_are_held_stand_above_the_picture(spec: dict[str, Any], figures: list[Figure]) -> None:
+    curves(grid(spec, 16), at=(("excitation.amplitude_y", "2 mm"), ("excitation.frequency", "1500 rpm")))
+    assert figures[0].get_suptitle().splitlines() == [
+        "A study",
+        "excitation.amplitude_y = excitation.amplitude_x = 0.002 m; excitation.frequency = 25 Hz",
+    ]
+
+
+def test_long_titles_are_broken_between_values(spec: dict[str, Any], figures: list[Figure]) -> None:
+    paths = ["pendulums.0.mass", "pendulums.0.inertia", "pendulums.0.spring_rate", "pendulums.0.damping"]
+    spec["axes"] = [{"path": "shaft.load", "values": [0, 1]}, *({"path": path, "values": [1, 2]} for path in paths)]
+    curves(spec, at=tuple((path, "1") for path in paths))
+    first, *lines = figures[0].get_suptitle().splitlines()
+    assert first == "A study"
+    assert lines == [
+        "pendulums.0.mass = 1 kg; pendulums.0.inertia = 1 kg*m^2; pendulums.0.spring_rate = 1 N/m;",
+        "pendulums.0.damping = 1 N*m*s/rad; excitation.frequency = 25 Hz; excitation.amplitude_x = 0.002 m;",
+        "excitation.amplitude_y = 0.002 m",
+    ]
+
+
+def test_few_curves_have_a_legend_with_units(spec: dict[str, Any], figures: list[Figure]) -> None:
+    curves(grid(spec, 2), by=("excitation.amplitude_x",), at=(("excitation.frequency", "20 Hz"),))
+    (legend,) = figures[0].legends
+    assert legend.get_title().get_text().replace("\n", " ") == "excitation.amplitude_x = excitation.amplitude_y (m)"
+    assert [text.get_text() for text in legend.get_texts()] == ["0.001", "0.002"]
+
+
+def test_each_of_many_curves_is_named(spec: dict[str, Any], figures: list[Figure]) -> None:
+    curves(grid(spec, 16), by=("excitation.frequency",), at=(("excitation.amplitude_x", "1 mm"),))
+    curves(grid(spec, 16), SPEED, "efficiency", by=("excitation.frequency", "excitation.amplitude_x"))
+    one, two = (figure.axes[-1] for figure in figures)
+    assert one.get_ylabel() == "excitation.frequency (Hz)"
+    assert [text.get_text() for text in one.get_yticklabels()] == [str(frequency) for frequency in range(20, 36)]
+    assert "excitation.amplitude_x = excitation.amplitude_y (m)" in two.get_ylabel()
+    assert [text.get_text() for text in two.get_yticklabels()][:2] == ["20, 0.001", "21, 0.001"]
+
+
+def test_only_points_in_order_are_joined(spec: dict[str, Any], figures: list[Figure]) -> None:
+    loads = {"path": "shaft.load", "values": [0.3, 0.1, 0.1, 0.2]}
+    zipped = {"combine": "zip", "axes": [loads, {"path": "excitation.frequency", "values": [25, 16, 25, 16]}]}
+    curves({**spec, **zipped}, SPEED, "shaft.speed.max")
+    curves({**spec, **zipped}, by=("excitation.frequency",))
+    to_and_fro = figures[0].axes[0].lines
+    assert [line.get_linestyle() for line in to_and_fro] == ["None", "None"]
+    assert len({line.get_marker() for line in to_and_fro}) == 2
+    assert [line.get_linestyle() for line in figures[1].axes[0].lines] == ["-", "None"]
+
+
+def test_a_map_ends_where_its_values_end(spec: dict[str, Any], figures: list[Figure]) -> None:
+    study = parse_spec(grid(spec, 4)).study
+    at = (("excitation.amplitude_x", "2 mm"),)
+    infos = models.study_results(study)
+    for y in ("excitation.frequency", "excitation.amplitude_x"):
+        held = at if y == "excitation.frequency" else (("excitation.frequency", "20 Hz"),)
+        pictures.draw_map(draw_map(study, infos, "shaft.load", y, SPEED, held, fetch), "A study", "png")
+    axes, bar = figures[0].axes
+    assert axes.collections[0].get_datalim(axes.transData).extents.tolist() == [0.0, 20.0, 1.6, 35.0]
+    assert figures[0].get_suptitle() == "A study\nexcitation.amplitude_x = excitation.amplitude_y = 0.002 m"
+    assert bar.get_ylabel() == "shaft.speed.mean (rad/s)"
+    assert figures[1].axes[0].get_ylabel() == "excitation.amplitude_x = excitation.amplitude_y (m)"
+
+
+def test_cases_without_a_result_are_grey(spec: dict[str, Any], figures: list[Figure]) -> None:
+    def nothing(cases: NDArray[np.int64], names: Any) -> CaseColumns:
+        return CaseColumns(cases, [None] * cases.size, {name: np.full(cases.size, np.nan) for name in names})
+
+    spec["axes"] = [{"path": "shaft.load", "values": [0, 1]}, {"path": "excitation.frequency", "values": [25]}]
+    study = parse_spec(spec).study
+    made = draw_map(study, models.study_results(study), "shaft.load", "excitation.frequency", SPEED, (), nothing)
+    pictures.draw_map(made, "", "png")
+    assert figures[0].get_suptitle().endswith(" = 0.002 m; grey: 2 cases without a result")
+    assert figures[0].axes[0].get_yticks().tolist() == [25.0]

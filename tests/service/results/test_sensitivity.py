@@ -1,0 +1,186 @@
+"""Sensitivity: indices against functions whose indices are known in closed form; parameters that change nothing."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from service.http.api import models as m
+from service.results.curves import Fetch
+from service.results.selection import SelectionError
+from service.results.sensitivity import sensitivity
+from service.results.unaffected import unaffected
+from service.storage.records import CaseColumns
+from tests.service.spec_sample import parsed
+from worker import models
+from worker.models import ChunkResult
+from worker.study import Study
+
+if TYPE_CHECKING:
+    from tests.service.conftest import Service
+
+API = "/api/v1"
+SPEED = "shaft.speed.mean"
+Function = Callable[[dict[str, Any]], Any]
+
+
+def fetching(study: Study, function: Function) -> Fetch:
+    """A store whose every result is that function of the parameters."""
+
+    def fetch(cases: Any, names: Any) -> CaseColumns:
+        columns = {**study.base, **study.columns(cases)}
+        y = np.broadcast_to(function(columns), len(cases)).astype(np.float64)
+        return CaseColumns(cases, ["ok"] * len(cases), dict.fromkeys(names, y))
+
+    return fetch
+
+
+def effects(spec: dict[str, Any], function: Function) -> Any:
+    """Sensitivity of the speed, when it is that function."""
+    made = parsed({f"/{key}": value for key, value in spec.items()})
+    (found,) = sensitivity(made.study, made.spec, [SPEED], fetching(made.study, function))
+    return found
+
+
+def ranges(low: float, high: float) -> list[dict[str, Any]]:
+    paths = ("excitation.phase", "pendulums.0.initial_angle", "pendulums.0.arm")
+    return [{"path": path, "from": low, "to": high} for path in paths]
+
+
+def test_a_full_grid_gives_exact_shares() -> None:
+    grid = {
+        "axes": [
+            {"path": "excitation.phase", "values": [-1, 0, 1]},
+            {"path": "pendulums.0.initial_angle", "values": [-2, 2]},
+            {"path": "shaft.load", "values": [0.1, 0.2]},
+        ]
+    }
+    # Values are centred: of y = 3 u + v, the variances are 9 * 2/3 and 4; of a product nothing is first order.
+    linear = effects(grid, lambda p: 3.0 * p["excitation.phase"] + p["pendulums.0.initial_angle"])
+    assert [effect.first for effect in linear.effects] == pytest.approx([0.6, 0.4, 0.0], abs=1e-12)
+    assert [effect.total for effect in linear.effects] == pytest.approx([0.6, 0.4, 0.0], abs=1e-12)
+    assert linear.effects[0].means.tolist() == pytest.approx([-3.0, 0.0, 3.0])
+    assert (linear.method, linear.cases, linear.missing) == ("grid", 12, 0)
+    assert linear.variance == pytest.approx(10.0)
+    product = effects(grid, lambda p: p["excitation.phase"] * p["pendulums.0.initial_angle"])
+    assert [effect.first for effect in product.effects] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    assert [effect.total for effect in product.effects] == pytest.approx([1.0, 1.0, 0.0], abs=1e-12)
+
+
+def ishigami(p: dict[str, Any]) -> Any:
+    a, b, c = p["excitation.phase"], p["pendulums.0.initial_angle"], p["pendulums.0.arm"] * np.pi
+    return np.sin(a) + 7.0 * np.sin(b) ** 2 + 0.1 * c**4 * np.sin(a)
+
+
+def test_the_design_for_indices_gives_those_of_the_ishigami_function() -> None:
+    spans = ranges(-np.pi, np.pi)
+    spans[2] |= {"from": -1, "to": 1}
+    sample = {"sample": "saltelli", "count": 1024, "ranges": spans}
+    found = effects({"axes": [sample]}, ishigami)
+    assert (found.method, found.cases) == ("saltelli", 1024 * 5)
+    # Closed form for a = 7, b = 0.1 (Ishigami and Homma 1990).
+    for effect, first, total in zip(found.effects, (0.3139, 0.4424, 0.0), (0.5576, 0.4424, 0.2437), strict=True):
+        assert effect.first == pytest.approx(first, abs=0.03)
+        assert effect.total == pytest.approx(total, abs=0.03)
+        assert 0.0 < effect.total_error < 0.1
+
+
+def test_points_of_the_design_with_a_missing_case_are_left_out_whole() -> None:
+    sample = {"sample": "saltelli", "count": 256, "ranges": ranges(-1, 1)}
+
+    def function(p: dict[str, Any]) -> Any:
+        return np.where(p["excitation.phase"] > 0.9, np.nan, p["pendulums.0.initial_angle"])
+
+    found = effects({"axes": [sample]}, function)
+    assert found.missing > 0
+    assert found.effects[1].first == pytest.approx(1.0, abs=0.05)
+    assert any("points of the design are left out" in note for note in found.notes)
+
+
+def test_any_sample_gives_first_order_shares() -> None:
+    sample = {"sample": "latin_hypercube", "count": 2000, "seed": 5, "ranges": ranges(-1, 1)}
+    found = effects({"axes": [sample]}, lambda p: 2.0 * p["excitation.phase"] + p["pendulums.0.initial_angle"])
+    assert found.method == "rbd-fast"
+    assert [effect.first for effect in found.effects] == pytest.approx([0.8, 0.2, 0.0], abs=0.04)
+    assert {effect.total for effect in found.effects} == {None}
+    line = found.effects[0]
+    assert len(line.values) == 10
+    np.testing.assert_allclose(line.means, 2.0 * line.values, atol=0.15)
+
+
+def test_what_cannot_be_told_is_not_told() -> None:
+    few = {"sample": "sobol", "count": 16, "ranges": ranges(-1, 1)}
+    found = effects({"axes": [few]}, lambda p: p["excitation.phase"])
+    assert {effect.first for effect in found.effects} == {None}
+    constant = effects({"axes": [{**few, "count": 128}]}, lambda _: 5.0)
+    assert {effect.first for effect in constant.effects} == {None}
+    assert "the result is the same in every case" in constant.notes
+    with pytest.raises(SelectionError, match="nothing varies"):
+        effects({"axes": []}, lambda _: 5.0)
+
+
+def fill(service: Service, study_id: str, function: Function) -> None:
+    """Rows whose every result is that function of the parameters."""
+    store = service.store
+    record, study = store.get_study(study_id), store.study(study_id)
+    epoch = store.take_over("test")
+    for chunk in store.claim(epoch, store.open_chunks(record.number)):
+        columns = {**study.base, **study.columns(range(chunk.first, chunk.last + 1))}
+        y = np.broadcast_to(function(columns), chunk.count)
+        values = np.repeat(y[:, None], len(models.study_results(study)), axis=1)
+        store.commit(epoch, chunk, ChunkResult(chunk.first, ["ok"] * chunk.count, [""] * chunk.count, values))
+    store.settle(epoch, record.number)
+
+
+def test_the_interface_tells_effects_and_axes_without_any(service: Service, spec: dict[str, Any]) -> None:
+    study_id = service.submit(spec)
+    assert service.get(f"/studies/{study_id}")["warnings"] == []
+    fill(service, study_id, lambda p: p["shaft.load"])
+    found = service.get(f"/studies/{study_id}/sensitivity", y=[SPEED, "torque.max"])
+    m.SensitivityReport.model_validate(found)
+    assert [item["result"] for item in found["results"]] == [SPEED, "torque.max"]
+    effect = {effect["paths"][0]: effect for effect in found["results"][0]["effects"]}
+    assert effect["shaft.load"]["first_order"] == pytest.approx(1.0)
+    assert effect["excitation.frequency"]["total"] == pytest.approx(0.0)
+    sentence = "excitation.frequency was varied, but changes no result in any case"
+    assert found["warnings"] == [sentence]
+    assert service.get(f"/studies/{study_id}")["warnings"] == [sentence]
+    table = service.http.get(f"{API}/studies/{study_id}/sensitivity?y={SPEED}&format=csv").text
+    rows = list(csv.DictReader(io.StringIO(table)))
+    assert [row["paths"] for row in rows] == [
+        path for effect in found["results"][0]["effects"] for path in effect["paths"]
+    ]
+    for form, start in (("svg", b"<?xml"), ("png", b"\x89PNG"), ("pdf", b"%PDF")):
+        picture = service.http.get(f"{API}/studies/{study_id}/sensitivity?y={SPEED}&format={form}")
+        assert picture.content.startswith(start)
+    refused = service.http.get(f"{API}/studies/{study_id}/sensitivity?y=shaft.speed.men")
+    assert refused.status_code == 422
+    assert "did you mean 'shaft.speed.mean'" in refused.json()["errors"][0]["message"]
+
+
+@pytest.mark.parametrize(
+    "axes",
+    [
+        [{"path": "shaft.load", "linspace": [0, 1, 40]}, {"path": "excitation.frequency", "linspace": [16, 30, 300]}],
+        [{"sample": "saltelli", "count": 64, "ranges": [
+            {"path": "shaft.load", "from": 0, "to": 1}, {"path": "excitation.frequency", "from": 16, "to": 30}]}],
+    ],
+)  # fmt: skip
+def test_axes_without_any_effect_are_found_in_grids_and_samples(axes: list[Any]) -> None:
+    study = parsed({"/axes": axes}).study
+    (sentence,) = unaffected(study, fetching(study, lambda p: np.sqrt(p["excitation.frequency"])))
+    assert sentence.startswith("shaft.load was varied, but changes no result")
+    assert unaffected(study, fetching(study, lambda p: p["excitation.frequency"] + p["shaft.load"])) == ()
+    # An effect in a corner of the grid only is an effect.
+    late = fetching(study, lambda p: np.where(p["excitation.frequency"] > 29.0, p["shaft.load"], 0.0))
+    assert [text.split()[0] for text in unaffected(study, late)] == []
+
+
+def test_without_cases_that_differ_in_one_axis_nothing_is_said() -> None:
+    study = parsed({"/axes": [{"points": "shaft.load,excitation.frequency\n0.1,20\n0.2,30\n"}]}).study
+    assert unaffected(study, fetching(study, lambda _: 1.0)) == ()

@@ -1,0 +1,118 @@
+"""Runs of schedules that are refused for a while, and deadlines that come while a window is closed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from typing import Any
+
+import pytest
+
+from service.http.api.examples import SPEC
+from service.jobs.scheduler import Scheduler
+from service.schedules.fields import ScheduleFields, read_fields
+from service.settings import Settings
+from service.storage.schedules import RunState
+from service.storage.store import Store
+from tests.worker import fakes
+from worker.dispatcher import Dispatcher
+from worker.executors.inline import InlineExecutor
+from worker.states import StudyState
+
+NEW_YEAR = datetime(2026, 1, 1, tzinfo=UTC)  # where the clock of the tests begins
+
+
+class Clock(fakes.HandClock):
+    """A clock that is set by hand to a time of UTC."""
+
+    def set(self, text: str) -> None:
+        """Stand at that time."""
+        self.seconds = (datetime.fromisoformat(text).replace(tzinfo=UTC) - NEW_YEAR).total_seconds()
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def store(settings: Settings, clock: Clock) -> Iterator[Store]:
+    with Store.open(settings.database_url, clock=clock) as opened:
+        yield opened
+
+
+def fields(**given: Any) -> ScheduleFields:
+    return read_fields({"spec": SPEC, **given}, NEW_YEAR)
+
+
+def test_a_deadline_outside_the_window_is_kept(store: Store, clock: Clock) -> None:
+    look = Scheduler(store).look
+    store.create_schedule(fields(at="2026-01-01T00:26", window=["00:25", "00:27"], finish_by="00:28"))
+    clock.set("2026-01-01T00:26")
+    look()
+    (study,) = store.list_studies().studies
+    clock.set("2026-01-01T00:27")
+    look()
+    assert (store.get_study(study.id).reason or "").startswith("outside its window")
+    clock.set("2026-01-01T00:29")
+    look()
+    turns = iter(range(10))
+    Dispatcher(store, InlineExecutor(fakes.run), clock).run(lambda: next(turns) == 9)
+    held = store.get_study(study.id)
+    assert (held.state, held.time_over) == (StudyState.PAUSED, True)
+    assert (held.reason or "").startswith("its time was over at 2026-01-01T00:28:00+00:00: 0 of 9 cases are done")
+    assert store.waiting_studies() == 0
+    clock.set("2026-01-02T00:25")
+    look()
+    assert store.get_study(study.id) == held, "the window that opens again does not let it go on"
+    assert store.resume_study(study.id).state is StudyState.QUEUED
+
+
+def test_what_was_refused_for_a_reason_that_passes_is_tried_again(
+    store: Store, clock: Clock, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    look = Scheduler(store).look
+    kept = store.create_schedule(fields(at="2026-01-01T22:00", finish_by="06:00"))
+    clock.set("2026-01-01T22:00")
+    with monkeypatch.context() as patch:
+        patch.setattr("service.jobs.submission.MAX_WAITING_STUDIES", 0)
+        for _ in range(3):
+            look()
+        (run,) = store.schedule_runs(kept.id)
+        assert (run.state, run.problem) == (
+            RunState.TAKEN,
+            "0 studies have not ended yet. It is tried again until 2026-01-02T06:00:00+00:00.",
+        )
+        clock.set("2026-01-02T01:00")
+        look()
+    assert store.list_studies().studies == ()
+    assert caplog.text.count("no study came of it yet") == 1
+    clock.set("2026-01-02T01:01")
+    look()
+    (study,) = store.list_studies().studies
+    assert study.finish_by == datetime(2026, 1, 2, 6, tzinfo=UTC)
+    (run,) = store.schedule_runs(kept.id)
+    assert (run.state, run.problem) == (RunState.SUBMITTED, None)
+
+
+@pytest.mark.parametrize(
+    ("given", "end"),
+    [
+        ({"at": "2026-01-01T22:00"}, "2026-01-02T10:00"),
+        ({"at": "2026-01-01T22:00", "finish_by": "1 h"}, "2026-01-01T23:00"),
+        ({"cron": "0 * * * *"}, "2026-01-01T02:00"),
+    ],
+)
+def test_a_refusal_that_does_not_pass_within_the_grace_is_final(
+    store: Store, clock: Clock, monkeypatch: pytest.MonkeyPatch, given: dict[str, Any], end: str
+) -> None:
+    monkeypatch.setattr("service.jobs.submission.MAX_WAITING_STUDIES", 0)
+    look = Scheduler(store).look
+    kept = store.create_schedule(fields(**given))
+    clock.set(given.get("at", "2026-01-01T01:00"))
+    look()
+    assert store.schedule_runs(kept.id)[0].state is RunState.TAKEN
+    clock.set(end)
+    look()
+    assert store.schedule_runs(kept.id)[-1].state is RunState.REFUSED
+    assert store.list_studies().studies == ()

@@ -1,0 +1,197 @@
+"""The machine of a spec: parameters, ranges, pendulums, clutches."""
+
+from __future__ import annotations
+
+import copy
+import re
+from typing import Any
+
+import pytest
+
+from tests.service.spec_sample import SPEC, parsed, problems
+from worker.limits import MAX_CLUTCH_ROWS
+from worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, parameter_catalogue
+
+PENDULUM = SPEC["base"]["pendulums"][0]
+LAW = {"coefficients": [0, "300 N*m/rad"]}
+#: Torque 200 u + 20000 u^3 at 0 .. 0.05 rad, backlash not included.
+ROWS = [[0.01 * i, 200 * 0.01 * i + 20000 * (0.01 * i) ** 3] for i in range(6)]
+MEASURED = {"data": ROWS, "accuracy": "0.05 N*m"}
+
+
+def pendulums(*changes: dict[str, Any]) -> list[dict[str, Any]]:
+    return [copy.deepcopy(PENDULUM) | change for change in changes]
+
+
+@pytest.mark.parametrize("entry", parameter_catalogue("vibration-drive"), ids=lambda entry: entry.path)
+def test_every_parameter_keeps_its_range(entry: Any) -> None:
+    pointer = "/base/" + entry.path.replace(".N.", ".0.").replace(".K", ".1").replace(".", "/")
+    unit = entry.unit.replace("^K", "")
+    low = entry.low if entry.low_open else entry.low * 1.001 - 1e-9
+    for value in [*([low] if low > -1e300 else []), *([entry.high * 1.001] if entry.high < 1e300 else [])]:
+        found = problems({pointer: value, "/axes": []})
+        assert list(found) == [pointer]
+        assert found[pointer].message == "is out of range"
+        assert found[pointer].value == value
+        assert unit in str(found[pointer].allowed)
+        assert found[pointer].unit == unit
+
+
+@pytest.mark.parametrize(
+    "entry", [e for e in parameter_catalogue("vibration-drive") if "clutch" not in e.path], ids=lambda entry: entry.path
+)
+def test_a_parameter_is_required_or_has_its_default(entry: Any) -> None:
+    path = entry.path.replace(".N.", ".0.")
+    pointer = "/base/" + path.replace(".", "/")
+    change = {"/axes": []} if entry.path == "gravity" else {"/axes": [], pointer: ...}
+    if entry.default is None:
+        assert problems(change)[pointer].message.startswith("is required")
+    else:
+        assert parsed(change).study.base[path] == entry.default
+
+
+@pytest.mark.parametrize("value", [True, None, [], {}, "", "two", "2", float("inf"), 10**400])
+def test_what_is_no_quantity(value: object) -> None:
+    assert list(problems({"/base/shaft/inertia": value})) == ["/base/shaft/inertia"]
+
+
+def test_gravity_may_be_zero_and_arms_negative() -> None:
+    study = parsed({"/base/gravity": 0, "/base/pendulums/0/arm": "-30 mm", "/base/excitation/phase": -0.0}).study
+    assert (study.base["gravity"], study.base["pendulums.0.arm"]) == (0.0, -0.03)
+    assert str(study.base["excitation.phase"]) == "0.0"
+
+
+@pytest.mark.parametrize("value", [..., None, [], "base", 3])
+def test_a_base_that_cannot_be_read_brings_no_second_problem(value: object) -> None:
+    axis = {"path": "pendulums.7.clutch.coefficients.3", "values": [1]}
+    assert list(problems({"/base": value, "/axes/0": axis})) == ["/base"]
+
+
+@pytest.mark.parametrize("section", ["excitation", "shaft", "pendulums"])
+@pytest.mark.parametrize("value", [..., None, "text", 7])
+def test_sections(section: str, value: object) -> None:
+    assert list(problems({f"/base/{section}": value})) == [f"/base/{section}"]
+
+
+@pytest.mark.parametrize("value", [[], [PENDULUM] * (MAX_PENDULUMS + 1), {"0": PENDULUM}])
+def test_the_number_of_pendulums(value: object) -> None:
+    assert problems({"/base/pendulums": value})["/base/pendulums"].allowed == "a list of 1 to 8 pendulums"
+    study = parsed({"/base/pendulums": [PENDULUM] * MAX_PENDULUMS}).study
+    assert study.base["pendulums.7.mass"] == 0.5
+
+
+@pytest.mark.parametrize("value", [None, 1, "x", []])
+def test_a_pendulum_is_an_object(value: object) -> None:
+    assert list(problems({"/base/pendulums": [PENDULUM, value]})) == ["/base/pendulums/1"]
+
+
+def test_one_clutch_in_each_pendulum() -> None:
+    base = parsed(
+        {
+            "/base/clutch": ...,
+            "/base/pendulums": pendulums({"clutch": LAW}, {"clutch": LAW | {"windup_limit": "3 deg"}}),
+        }
+    ).study.base
+    assert {path: value for path, value in base.items() if "clutch" in path} == {
+        "pendulums.0.clutch.coefficients.0": 0.0,
+        "pendulums.0.clutch.coefficients.1": 300.0,
+        "pendulums.1.clutch.coefficients.0": 0.0,
+        "pendulums.1.clutch.coefficients.1": 300.0,
+        "pendulums.1.clutch.windup_limit": pytest.approx(0.05235987755982989, rel=1e-15),
+    }
+
+
+def test_a_clutch_is_given_once() -> None:
+    both = problems({"/base/pendulums": pendulums({"clutch": LAW}, {})})
+    assert list(both) == ["/base/clutch"]
+    assert "common to all" in both["/base/clutch"].message
+    none = problems({"/base/clutch": ...})
+    assert list(none) == ["/base/clutch"]
+    assert "is required" in none["/base/clutch"].message
+    some = problems({"/base/clutch": ..., "/base/pendulums": pendulums({}, {"clutch": LAW}, {})})
+    assert list(some) == ["/base/pendulums/0/clutch", "/base/pendulums/2/clutch"]
+    assert "pendulum 1 has its own" in some["/base/pendulums/0/clutch"].message
+
+
+@pytest.mark.parametrize(
+    ("clutch", "at", "says"),
+    [
+        ({"coefficients": []}, "/coefficients", "list of clutch coefficients"),
+        ({"coefficients": [0] * MAX_COEFFICIENTS + [1]}, "/coefficients", "list of clutch coefficients"),
+        ({"coefficients": 200}, "/coefficients", "list of clutch coefficients"),
+        ({}, "/coefficients", "is required"),
+        ({"windup_limit": 1}, "/coefficients", "is required"),
+        ({"coefficients": [0, "200 N*m"]}, "/coefficients/1", "expected N\\*m/rad"),
+        ({"coefficients": [0, 1, "2 N*m/rad"]}, "/coefficients/2", "expected N\\*m/rad\\^2"),
+        ({"coefficients": [0, 200], "windup_limit": 0}, "/windup_limit", "out of range"),
+        ({"coefficients": [0, 200], "windup_limit": "3 mm"}, "/windup_limit", "expected rad"),
+        ({"coefficients": [0, 0]}, "/coefficients", "every coefficient is zero"),
+        ({"coefficients": [0, -200]}, "/coefficients", "pull the shaft back"),
+        ({"coefficients": [-1, 200]}, "/coefficients", "pull the shaft back"),
+        ({"coefficients": [0, 200, 0, -20000]}, "/coefficients", "windup_limit"),
+        ({"coefficients": [0, 200, 0, -20000], "windup_limit": 0.2}, "/coefficients", "lower windup_limit"),
+        ({"coefficients": [0, 200], "data": ROWS}, "", "both as a law"),
+        ([0, 200], "", "must be an object"),
+        (None, "", "is required"),
+        ({"data": ROWS}, "/accuracy", "is required"),
+        ({"accuracy": 1}, "/data", "is required"),
+        ({"data": {}, "accuracy": 1}, "/data", "list of measured rows"),
+        ({"data": [[0, 0]], "accuracy": 1}, "/data", "list of measured rows"),
+        ({"data": [[0, 0]] * (MAX_CLUTCH_ROWS + 1), "accuracy": 1}, "/data", "list of measured rows"),
+        ({"data": [[0, 0], [1]], "accuracy": 1}, "/data/1", "row of two"),
+        ({"data": [[0, 0], 1], "accuracy": 1}, "/data/1", "row of two"),
+        ({"data": [[0, 0], ["1 m", 1]], "accuracy": 1}, "/data/1/0", "expected rad"),
+        ({"data": [[0, 0], [1, float("nan")]], "accuracy": 1}, "/data/1/1", "finite"),
+        ({"data": [[0, 0], [-1, 1]], "accuracy": 1}, "/data/1/0", "out of range"),
+        (MEASURED | {"accuracy": 0}, "/accuracy", "out of range"),
+        (MEASURED | {"accuracy": "1 m"}, "/accuracy", "expected N\\*m"),
+        (MEASURED | {"accuracy": 1e-9, "max_degree": 2}, "/accuracy", "not reached up to degree 2"),
+        (MEASURED | {"max_degree": 0}, "/max_degree", "out of range"),
+        (MEASURED | {"max_degree": 12}, "/max_degree", "out of range"),
+        (MEASURED | {"max_degree": 2.0}, "/max_degree", "whole number"),
+        (MEASURED | {"max_degree": True}, "/max_degree", "whole number"),
+        (MEASURED | {"through_origin": 1}, "/through_origin", "true or false"),
+        (MEASURED | {"angles_include_backlash": "no"}, "/angles_include_backlash", "true or false"),
+        ({"data": [[0, 0], [0.1, -1], [0.2, -2]], "accuracy": 1}, "/data", "pull the shaft back"),
+    ],
+)
+def test_clutches_that_are_refused(clutch: object, at: str, says: str) -> None:
+    found = problems({"/base/clutch": clutch})
+    assert list(found) == ["/base/clutch" + at]
+    assert re.search(says, found["/base/clutch" + at].message)
+
+
+def test_a_measured_clutch_is_fitted() -> None:
+    result = parsed({"/base/clutch": MEASURED})
+    assert list(result.fits) == ["/base/clutch"]
+    fit = result.fits["/base/clutch"]
+    assert fit.max_residual <= 0.05
+    base = result.study.base
+    assert tuple(base[f"clutch.coefficients.{k}"] for k in range(fit.degree + 1)) == fit.coefficients
+    assert base["clutch.coefficients.0"] == 0.0
+    assert base["clutch.windup_limit"] == fit.windup_limit == pytest.approx(0.05)
+
+
+def test_options_of_the_fit_reach_it() -> None:
+    loose = parsed({"/base/clutch": MEASURED | {"accuracy": 5, "max_degree": 1}}).fits["/base/clutch"]
+    assert loose.degree == 1
+    full = parsed({"/base/clutch": MEASURED | {"through_origin": False}}).fits["/base/clutch"]
+    assert len(full.eigenvalues) == full.degree + 1
+
+
+def test_angles_that_include_the_backlash() -> None:
+    shifted = [[angle + 0.005, torque] for angle, torque in ROWS]
+    clutch = {"data": shifted, "accuracy": 0.05, "angles_include_backlash": True}
+    plain = parsed({"/base/clutch": MEASURED}).study.base
+    taken_off = parsed({"/base/clutch": clutch}).study.base
+    assert taken_off == pytest.approx(plain, rel=1e-6, abs=1e-6)
+    alike = parsed({"/base/clutch": clutch, "/base/pendulums": pendulums({}, {})}).study.base
+    assert alike["clutch.windup_limit"] == pytest.approx(0.05)
+    different = problems({"/base/clutch": clutch, "/base/pendulums": pendulums({}, {"backlash": 0.006})})
+    assert list(different) == ["/base/clutch/angles_include_backlash"]
+    own = pendulums({"clutch": clutch}, {"backlash": 0.0049, "clutch": clutch | {"accuracy": 1}})
+    limits = parsed({"/base/clutch": ..., "/base/pendulums": own}).study.base
+    assert limits["pendulums.0.clutch.windup_limit"] == pytest.approx(0.05)
+    assert limits["pendulums.1.clutch.windup_limit"] == pytest.approx(0.0501)
+    unread = problems({"/base/clutch": clutch, "/base/pendulums/0/backlash": "much"})
+    assert list(unread) == ["/base/pendulums/0/backlash"]

@@ -1,0 +1,108 @@
+"""The JSON Schema of a spec: it accepts what is a spec and refuses what every reader can see is none."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from service.spec.document import SpecError, format_of, load_spec, parse_spec
+from service.spec.schema.document import axis_schema, base_schema, clutch_schema, run_schema, spec_schema
+from tests.service.spec_sample import SPEC, changed
+from worker.models import model_names, parameter_catalogue
+
+
+@pytest.fixture(scope="module")
+def validator() -> Any:
+    schema = spec_schema()
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(json.loads(json.dumps(schema)))
+
+
+def test_it_accepts_the_examples(validator: Any, examples: Path) -> None:
+    validator.validate(SPEC)
+    for name in ("one_pendulum.json", "two_pendulums.toml", "measured_clutch.json"):
+        validator.validate(load_spec((examples / name).read_bytes(), format_of(name)))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"/extra": 1},
+        {"/base/extra": 1},
+        {"/base/excitation/extra": 1},
+        {"/base/pendulums/0/extra": 1},
+        {"/base/shaft/extra": 1},
+        {"/base/clutch/extra": 1},
+        {"/run/max_steps": 1},
+        {"/axes/0/extra": 1},
+        {"/sprag": 2},
+        {"/model": "other"},
+        {"/name": ""},
+        {"/combine": "product"},
+        {"/base": ...},
+        {"/base/excitation": ...},
+        {"/base/shaft/inertia": ...},
+        {"/base/shaft/inertia": 0},
+        {"/base/shaft/inertia": True},
+        {"/base/shaft/load": -1},
+        {"/base/shaft/load": ["0.1 N*m"]},
+        {"/base/pendulums": []},
+        {"/base/pendulums": [SPEC["base"]["pendulums"][0]] * 9},
+        {"/base/clutch/coefficients": []},
+        {"/base/clutch/data": [[0, 1], [1, 2]]},
+        {"/base/clutch": {"data": [[0, 1], [1, 2]]}},
+        {"/base/clutch": {"data": [[0, 1], [1, 2, 3]], "accuracy": 1}},
+        {"/run/tolerance": 1},
+        {"/run/reset": "never"},
+        {"/run/window": ["1 periods"]},
+        {"/axes/0/linspace": [1, 2]},
+        {"/axes/0/linspace": [1, 2, 0]},
+        {"/axes/0/values": [1, 2]},
+        {"/axes/2/values": []},
+        {"/axes/2/values": ...},
+        {"/axes/1/path": []},
+    ],
+)
+def test_it_refuses_what_the_reader_refuses(validator: Any, changes: dict[str, Any]) -> None:
+    spec = changed(changes)
+    assert not validator.is_valid(spec)
+    with pytest.raises(SpecError):
+        parse_spec(spec)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"/base/gravity": 0},
+        {"/base/shaft/load": 0},
+        {"/base/clutch/windup_limit": "3 deg"},
+        {"/base/clutch": {"data": [[0, 0], ["1 deg", 2], ["2 deg", "4 N*m"]], "accuracy": 1, "max_degree": 2}},
+        {"/run": {"duration": 2}},
+        {"/axes/0": {"path": "gravity", "range": [0, 10, 1]}},
+        {"/axes/0": {"path": "gravity", "geomspace": [1, 10, 3]}},
+        {"/name": ..., "/axes": ..., "/run": ..., "/combine": ...},
+    ],
+)
+def test_it_accepts_what_the_reader_accepts(validator: Any, changes: dict[str, Any]) -> None:
+    validator.validate(changed(changes))
+    parse_spec(changed(changes))
+
+
+def test_it_follows_the_catalogue() -> None:
+    for model in model_names():
+        text = json.dumps(base_schema(model))
+        for entry in parameter_catalogue(model):
+            if not entry.path.startswith(("clutch.", "constants.")):
+                assert f'"{entry.path.split(".")[-1]}"' in text
+                assert json.dumps(entry.range_text())[1:-1] in text
+    with pytest.raises(ValueError, match="unknown model"):
+        base_schema("other")
+
+
+def test_the_parts_stand_alone() -> None:
+    for part in (axis_schema(), clutch_schema(), run_schema()):
+        jsonschema.Draft202012Validator.check_schema(part)

@@ -1,0 +1,145 @@
+"""The run of a spec: times in seconds and periods, the window inside the run, tolerance, reset."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from service.spec.run import in_periods, time_text
+from tests.service.spec_sample import parsed, problems
+from worker.limits import MAX_PROBLEMS
+
+
+@pytest.mark.parametrize(
+    ("value", "time"),
+    [
+        ("60 periods", [60.0, "periods"]),
+        ("1 period", [1.0, "periods"]),
+        ("0.5periods", [0.5, "periods"]),
+        ("60 cycles", [60.0, "periods"]),
+        ("1 cycle", [1.0, "periods"]),
+        ("2 s", [2.0, "s"]),
+        ("500 ms", [0.5, "s"]),
+        ("1 min", [60.0, "s"]),
+        (2.0, [2.0, "s"]),
+        (2, [2.0, "s"]),
+    ],
+)
+def test_durations(value: object, time: list[Any]) -> None:
+    assert parsed({"/run/duration": value, "/run/window": ...}).study.run["duration"] == time
+
+
+def test_times_in_periods_and_in_words() -> None:
+    assert in_periods([2.0, "s"], 25.0) == 50.0
+    assert in_periods([2.0, "periods"], 25.0) == 2.0
+    assert time_text([2.0, "s"]) == "2 s"
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        0,
+        -1,
+        "0 periods",
+        "-1 periods",
+        "60 turns",
+        "60",
+        "periods",
+        "1e999 s",
+        "60 Hz",
+        True,
+        None,
+        [60],
+        1e10,
+        float("inf"),
+    ],
+)
+def test_durations_that_are_refused(value: object) -> None:
+    found = problems({"/run/duration": value, "/run/window": ...})
+    assert list(found) == ["/run/duration"]
+    assert "periods" in str(found["/run/duration"].allowed)
+
+
+@pytest.mark.parametrize(
+    ("run", "window"),
+    [
+        ({"duration": "60 periods"}, None),
+        ({"window": [0, "60 periods"]}, [[0.0, "s"], [60.0, "periods"]]),
+        ({"duration": "2 s", "window": ["1 s", 2]}, [[1.0, "s"], [2.0, "s"]]),
+        ({"duration": "2 s", "window": ["1 period", "32 periods"]}, [[1.0, "periods"], [32.0, "periods"]]),
+        ({"duration": "60 periods", "window": ["1 s", "60 periods"]}, [[1.0, "s"], [60.0, "periods"]]),
+    ],
+)
+def test_windows(run: dict[str, Any], window: list[Any] | None) -> None:
+    assert parsed({"/run": run}).study.run["window"] == window
+
+
+@pytest.mark.parametrize(
+    ("run", "at", "says"),
+    [
+        ({"window": ["40 periods", "61 periods"]}, "/window/1", "ends after the run"),
+        ({"window": ["40 periods", "40 periods"]}, "/window", "at or after its end"),
+        ({"window": ["40 periods", "30 periods"]}, "/window", "at or after its end"),
+        ({"window": ["-1 periods", "30 periods"]}, "/window/0", "out of range"),
+        ({"window": ["0 periods", "30 m"]}, "/window/1", "no unit of this field"),
+        ({"window": "40 periods"}, "/window", "start and its end"),
+        ({"window": [1]}, "/window", "start and its end"),
+        ({"window": None}, "/window", "start and its end"),
+        # Across the axis of 16 .. 35 Hz only one end of it is wrong.
+        ({"duration": "2 s", "window": ["1 period", "33 periods"]}, "/window/1", "ends after the run at 16 Hz"),
+        ({"duration": "60 periods", "window": ["0 s", "2 s"]}, "/window/1", "ends after the run at 35 Hz"),
+        ({"duration": "60 periods", "window": ["1 s", "20 periods"]}, "/window", "after its end at 35 Hz"),
+        ({"duration": "30000 s"}, "/duration", "1.05e+06 excitation periods at 35 Hz"),
+        ({"duration": "1000001 periods"}, "/duration", "excitation periods"),
+        ({"tolerance": 1e-15}, "/tolerance", "out of range"),
+        ({"tolerance": 1e-3}, "/tolerance", "out of range"),
+        ({"tolerance": 0}, "/tolerance", "out of range"),
+        ({"tolerance": "1e-9"}, "/tolerance", "plain number"),
+        ({"tolerance": float("nan")}, "/tolerance", "out of range"),
+        ({"tolerance": True}, "/tolerance", "plain number"),
+        ({"reset": "contacts"}, "/reset", "did you mean 'contact'"),
+        ({"reset": None}, "/reset", "one of the two"),
+        ({"durration": 1}, "/durration", "did you mean 'duration'"),
+    ],
+)
+def test_runs_that_are_refused(run: dict[str, Any], at: str, says: str) -> None:
+    found = problems({"/run": run})
+    assert list(found) == ["/run" + at]
+    assert says in str(found["/run" + at])
+
+
+@pytest.mark.parametrize("value", [None, [], "60 periods", 60])
+def test_a_run_is_an_object(value: object) -> None:
+    assert list(problems({"/run": value})) == ["/run"]
+
+
+def test_a_window_that_ends_with_the_run_in_the_other_unit() -> None:
+    changes = {"/axes": [], "/base/excitation/frequency": "157 rad/s"}
+    seconds = 50 / parsed(changes).study.base["excitation.frequency"]
+    assert parsed(changes | {"/run": {"duration": seconds, "window": ["40 periods", "50 periods"]}}).warnings == ()
+
+
+def test_a_window_shorter_than_a_period_is_said() -> None:
+    (warning,) = parsed({"/run/window": ["59.5 periods", "60 periods"], "/axes": []}).warnings
+    assert "shorter than one excitation period at 25 Hz" in warning
+
+
+def test_a_run_whose_last_third_is_shorter_than_a_period_is_said() -> None:
+    (warning,) = parsed({"/run": {"duration": "0.5 periods"}, "/axes": []}).warnings
+    assert warning.startswith(
+        "/run/duration: the window, its last third, is shorter than one excitation period at 25 Hz"
+    )
+    assert parsed({"/run": {"duration": "3 periods"}, "/axes": []}).warnings == ()
+
+
+def test_the_extremes_of_tolerance_and_reset() -> None:
+    for tolerance in (1e-14, 1e-4):
+        assert parsed({"/run/tolerance": tolerance, "/run/reset": "literal"}).study.run["tolerance"] == tolerance
+
+
+def test_what_is_wrong_beyond_the_problems_that_are_told_is_not_taken_for_right() -> None:
+    """Found by made-up requests: a run that could not be read was compared with its window."""
+    unknown = {f"field{number}": 0 for number in range(MAX_PROBLEMS)}
+    told = problems({"/base/shaft": unknown, "/run": {"duration": "long", "window": ["x", 1]}})
+    assert len(told) == MAX_PROBLEMS + 1

@@ -1,0 +1,137 @@
+"""A clock that jumps: noticed, told, and nothing is deleted on its word; schedules recover."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import httpx
+import pytest
+
+from service.http.api.examples import SPEC
+from service.http.app import create_app
+from service.jobs.maintenance import Maintenance, MaintenancePlan, backups
+from service.jobs.scheduler import Scheduler
+from service.jobs.submission import accept
+from service.schedules.fields import read_fields
+from service.settings import Settings
+from service.spec.document import parse_spec
+from service.storage.clock_watch import ClockWatch
+from service.storage.errors import StudyNotFound
+from service.storage.store import Store
+from tests.worker.fakes import HandClock
+
+DAY = 86_400.0  # s
+NEW_YEAR = datetime(2026, 1, 1, tzinfo=UTC)
+
+
+class Wrong(HandClock):
+    """A clock that can be put ahead of the time that passes."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.ahead = timedelta()
+
+    def now(self) -> datetime:
+        return super().now() + self.ahead
+
+
+@pytest.fixture
+def clock() -> Wrong:
+    return Wrong()
+
+
+@pytest.fixture
+def store(settings: Settings, clock: Wrong) -> Iterator[Store]:
+    with Store.open(settings.database_url, clock=clock) as opened:
+        opened.take_over("here:1")
+        yield opened
+
+
+def ended(store: Store) -> str:
+    study = accept(store, parse_spec(SPEC))
+    store.cancel_study(study.id)
+    store.settle(store.take_over("here:1"), study.number)
+    return study.id
+
+
+def test_a_jump_deletes_nothing_and_is_told_and_survives_a_restart(
+    settings: Settings, store: Store, clock: Wrong, tmp_path: Path, caplog: pytest.LogCaptureFixture,
+    connect: Callable[..., httpx.Client],
+) -> None:  # fmt: skip
+    http = connect(create_app(settings, store=store))
+    study, plan = ended(store), MaintenancePlan(tmp_path / "b", keep=1, study_days=30)
+    maintenance = Maintenance(store, plan)
+    maintenance.begin()
+    clock.seconds = DAY / 2
+    maintenance.look()
+    clock.ahead = timedelta(days=3650)
+    clock.seconds += 20.0
+    for looker in (maintenance, Maintenance(store, plan)):  # as it runs on, and when it is started again
+        looker.begin()
+        looker.look()
+        clock.seconds += DAY
+        looker.look()
+        assert store.get_study(study).id == study
+    assert backups(plan.folder or tmp_path)[0][0] == NEW_YEAR + timedelta(hours=12), "kept, although keep is 1"
+    assert caplog.text.count("The clock jumped ahead, from 2026-01-01T12:00:20+00:00 to 2035-12-30T12:00:20") == 1
+    store.take_over("here:1")
+    answer = http.get("/readyz").json()
+    assert "nothing is deleted by age until it is set right" in answer["warnings"][0]
+    clock.ahead = timedelta()
+    looker.look()
+    assert "The clock is believed again: it is 2026-01-0" in caplog.text
+    assert store.get_study(study).id == study
+    clock.seconds = 31.5 * DAY
+    looker.look()
+    with pytest.raises(StudyNotFound):
+        store.get_study(study)
+
+
+def test_the_user_can_say_that_the_clock_is_right(store: Store, clock: Wrong) -> None:
+    watch = ClockWatch(store)
+    assert watch.believable()
+    clock.ahead = timedelta(days=100)
+    assert not watch.believable()
+    store.note_clock(clock.now())
+    assert watch.believable()
+    assert ClockWatch(store).believable()
+
+
+def test_a_pause_of_weeks_and_a_clock_that_is_put_back_are_no_jump(store: Store, clock: Wrong) -> None:
+    assert ClockWatch(store).believable()
+    clock.ahead = timedelta(days=59)
+    assert ClockWatch(store).believable()
+    clock.ahead = timedelta(days=-20_000)
+    watch = ClockWatch(store)
+    assert watch.believable()
+    clock.ahead = timedelta(days=59)  # it is set by the network a while after the start
+    assert watch.believable()
+
+
+def test_what_was_missed_is_deleted_at_the_start_and_while_backups_fail(
+    store: Store, clock: Wrong, tmp_path: Path
+) -> None:
+    study, folder = ended(store), tmp_path / "b"
+    folder.write_text("a file where the folder is to be")
+    clock.seconds = 31.4 * DAY  # the machine is off at 02:30, always
+    Maintenance(store, MaintenancePlan(folder, study_days=30)).begin()
+    with pytest.raises(StudyNotFound):
+        store.get_study(study)
+
+
+def test_schedules_are_due_again_when_a_clock_that_was_ahead_is_put_back(store: Store, clock: Wrong) -> None:
+    kept = store.create_schedule(read_fields({"spec": SPEC, "cron": "0 22 * * *"}, NEW_YEAR))
+    look = Scheduler(store).look
+    look()
+    clock.ahead = timedelta(days=3650)
+    clock.seconds = 60.0
+    look()
+    due = store.get_schedule(kept.id).next_due
+    assert due is not None
+    assert due.year == 2035
+    clock.ahead = timedelta()
+    clock.seconds = 120.0
+    look()
+    assert store.get_schedule(kept.id).next_due == datetime(2026, 1, 1, 22, tzinfo=UTC)

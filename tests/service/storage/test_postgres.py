@@ -1,0 +1,345 @@
+"""A PostgreSQL server in the place of the file: the lock, hand-over, news, and what is said when something is wrong."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import psycopg
+import pytest
+import sqlalchemy as sa
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+
+from service.http.app import chunking, create_app
+from service.settings import Settings
+from service.storage import postgres as storage
+from service.storage import session as session_module
+from service.storage.errors import DatabaseBusyError, DatabaseError, SchemaError
+from service.storage.session import Session, lock_of
+from service.storage.store import Store
+from service.storage.tables import HEAD_REVISION, STUDIES, all_tables
+from tests import postgres
+from tests.conftest import ROOT, Finished
+from tests.service.conftest import API, InThread, Service
+from tests.worker import fakes
+from worker import models
+from worker.chunking import Chunking
+from worker.states import StudyState
+
+DEADLINE = 120.0
+
+
+def eventually(true: Callable[[], Any], seconds: float = DEADLINE) -> float:
+    """Seconds until ``true()``; fails when that takes too long."""
+    begin = time.monotonic()
+    while not true():
+        assert time.monotonic() - begin < seconds
+        threading.Event().wait(0.02)
+    return time.monotonic() - begin
+
+
+# What is refused, before a server is asked
+
+
+@pytest.mark.parametrize(
+    ("url", "message"),
+    [
+        ("postgresql+psycopg2://host/db", "driver 'psycopg2' is not supported"),
+        ("postgresql://host/db?sslmode=require&options=-c", "takes no option options here"),
+        ("postgresql://me:secret@host/", r"^postgresql://me@host.* names no database"),
+        ("mysql://host/db", "kind 'mysql' are not supported"),
+    ],
+)
+def test_urls_that_are_not_understood_are_refused_in_one_sentence(url: str, message: str) -> None:
+    with pytest.raises(DatabaseError, match=message) as caught:
+        Session(url)
+    assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("url", "mode"),
+    [
+        ("postgresql://me@db.example/sprag", "require"),
+        ("postgresql://me@db.example/sprag?sslmode=verify-full", "verify-full"),
+        ("postgresql://localhost/sprag", None),
+        ("postgresql://[::1]:5433/sprag", None),
+        ("postgresql:///sprag?host=/run/postgresql", None),
+        ("postgresql:///sprag?host=db.example", "require"),
+    ],
+)
+def test_other_machines_are_spoken_to_in_secret(url: str, mode: str | None) -> None:
+    assert storage.checked(sa.make_url(url)).query.get("sslmode") == mode
+
+
+def test_without_the_driver_the_command_that_brings_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "service.storage.postgres")
+    monkeypatch.delattr("service.storage.postgres")
+    monkeypatch.setitem(sys.modules, "psycopg", None)
+    with pytest.raises(DatabaseError, match=r"pip install 'sprag\[postgres\]'"):
+        Session("postgresql://localhost/sprag")
+
+
+def test_a_server_that_is_not_there_is_told_in_one_line_without_the_password(tmp_path: Path) -> None:
+    url = f"postgresql://me:secret@/sprag?host={tmp_path}"
+    with pytest.raises(DatabaseError, match=r"postgresql://me@/sprag cannot be reached: .*No such file") as caught:
+        Store.open(url)
+    assert "secret" not in str(caught.value)
+    assert "\n" not in str(caught.value)
+    lock = storage.ServerLock(storage.checked(sa.make_url(url)), "a", 1.0)
+    with pytest.raises(DatabaseError, match="cannot be reached"):
+        lock.take()
+
+
+class _Error(psycopg.Error):
+    def __init__(self, state: str, text: str) -> None:
+        self._state = state
+        super().__init__(text)
+
+    @property
+    def sqlstate(self) -> str:  # type: ignore[override]
+        return self._state
+
+
+@pytest.mark.parametrize(
+    ("state", "kind", "text"),
+    [
+        ("55P03", "DatabaseBusyError", "try again"),
+        ("53100", "DatabaseFullError", "disk of the server"),
+        ("53300", "DatabaseBusyError", "in trouble: first line$"),
+        ("42501", "DatabaseError", "the user may not do that"),
+        ("25006", "DatabaseError", "read-only"),
+        ("57P01", "DatabaseError", "cannot be reached: first line$"),
+    ],
+)
+def test_errors_of_the_server_are_told_by_what_they_mean(state: str, kind: str, text: str) -> None:
+    found = storage.explained(_Error(state, "first line\nsecond line"), "here")
+    assert type(found).__name__ == kind
+    with pytest.raises(DatabaseError, match=text):
+        raise found or AssertionError
+
+
+def test_what_the_program_did_wrong_is_not_explained_away() -> None:
+    assert storage.explained(_Error("42601", "syntax error"), "here") is None
+
+
+# The server
+
+
+def test_an_empty_database_gets_the_tables_of_the_code(postgres_server: postgres.Server) -> None:
+    url = postgres_server.url(postgres_server.new_database())
+    with Store.open(url) as store:
+        assert store.list_studies().studies == ()
+        with store.session.read() as connection:
+            context = MigrationContext.configure(connection, opts={"compare_type": True})
+            assert compare_metadata(context, all_tables()) == []
+        report = store.check()
+    assert (report.backend, report.revision, report.problems) == ("PostgreSQL", HEAD_REVISION, ())
+    assert report.location == f"postgresql://sprag@/{url.partition('@/')[2].partition('?')[0]}"
+
+
+def test_a_database_of_another_program_is_left_alone(postgres_server: postgres.Server) -> None:
+    url = postgres_server.url(postgres_server.new_database())
+    session = Session(url)
+    with session.write() as connection:
+        connection.exec_driver_sql("CREATE TABLE birds (name text)")
+    session.close()
+    with pytest.raises(SchemaError, match="another program"):
+        Store.open(url)
+
+
+def test_one_writer_at_a_time_and_readers_of_one_moment(postgres_url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(session_module, "BUSY_SECONDS", 0.05)
+    with Store.open(postgres_url) as store, Store.open(postgres_url) as other:
+        with store.session.write():
+            assert other.list_studies().studies == ()
+            with pytest.raises(DatabaseBusyError, match="try again"), other.session.write():
+                pass
+        with store.session.read() as connection:
+            count = sa.select(sa.func.count()).select_from(STUDIES)
+            assert connection.execute(count).scalar_one() == 0
+            other.create_study({}, fakes.study(3))
+            assert connection.execute(count).scalar_one() == 0
+
+
+def test_one_dispatcher_at_a_time(postgres_url: str) -> None:
+    with Store.open(postgres_url) as store:
+        first, second, third = (lock_of(store.session, f"host:{number}") for number in (1, 2, 3))
+        assert second.holder() == ""
+        assert first.take()
+        assert first.take()
+        assert not second.take()
+        assert second.holder() == "host:1"
+        first.release()
+        first.release()
+        assert second.take()
+        first.seize()
+        assert first.holder() == "host:1"
+        assert not third.take()
+        with pytest.raises(DatabaseError, match="cannot be reached"):
+            second.holder()  # its connection was ended
+        first.release()
+        second.release()
+        third.release()
+
+
+def test_news_come_with_every_wish_and_not_without(postgres_url: str) -> None:
+    with Store.open(postgres_url) as store:
+        news = store.session.news()
+        assert news is not None
+        assert news.wait(0.0)  # whatever happened before it began to listen
+        assert not news.wait(0.0)
+        record = store.create_study({}, fakes.study(3))
+        for wish in (store.pause_study, store.resume_study, lambda of: store.prioritize_study(of, 3)):
+            assert news.wait(DEADLINE)
+            assert not news.wait(0.0)
+            wish(record.id)
+        assert news.wait(DEADLINE)
+        with store.session.plain() as connection:
+            connection.exec_driver_sql(
+                "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE query = 'LISTEN sprag' "
+                "AND datname = current_database()"
+            )
+        eventually(lambda: news.wait(0.0))  # lost, which may mean anything
+        eventually(lambda: not news.wait(0.0))
+        store.cancel_study(record.id)
+        assert news.wait(DEADLINE)
+        news.close()
+
+
+def test_the_service_answers_as_it_does_with_a_file(
+    postgres_url: str, connect: Callable[..., httpx.Client], spec: dict[str, Any]
+) -> None:
+    settings = Settings(database=postgres_url, chunk_cases=2, processes=2)
+    computer = InThread()
+    with Store.open(settings.database_url, chunking=chunking(settings)) as store:
+        app = create_app(settings, store=store, computer=computer, checker=InThread())
+        service = Service(app, connect(app), store, computer)
+        study = service.submit(spec)
+        rows = service.fill(study)
+        found = service.get(f"/studies/{study}/cases")["cases"]
+        assert [row["ending"] for row in found] == rows.endings
+        assert found[0]["results"]["shaft.speed.mean"] == rows.values[0, 0]
+        for address, status in {
+            f"/studies/{study}/results?format=csv": 200,
+            f"/studies/{study}/results?format=parquet": 200,
+            "/studies?page_token=" + "9" * 18: 200,
+            f"/studies/{study}/cases?page_token=" + "9" * 18: 200,
+            f"/studies/{study}/cases?ending=a%00b": 422,
+            f"/studies/{study}/cases/999999999999999999": 404,
+            "/studies/a%00b": 404,
+            "/schedules/a%00b": 404,
+        }.items():
+            answer = service.http.get(API + address)
+            assert answer.status_code == status, (address, answer.text)
+        assert service.http.get("/readyz").status_code == 200
+
+
+def test_commands_about_the_database(
+    postgres_server: postgres.Server, sprag: Callable[..., Finished], tmp_path: Path
+) -> None:
+    url = postgres_server.url(postgres_server.new_database())
+    made = sprag("db", "upgrade", "--db", url)
+    assert (made.code, f"from revision none to {HEAD_REVISION}" in made.out) == (0, True)
+    checked = sprag("db", "check", "--db", url)
+    assert (checked.code, checked.out.splitlines()[1]) == (0, "  sound")
+    assert "PostgreSQL 1" in checked.out
+    refused = sprag("db", "backup", tmp_path / "copy", "--db", url)
+    assert refused.code == 3
+    assert "pg_dump" in refused.err
+    looked = sprag("doctor", "--db", url, "--json")
+    subjects = {finding["subject"]: finding for finding in looked.data["findings"]}
+    assert subjects["database"]["ok"]
+    assert "SQLite" not in subjects
+
+
+# Hand-over, with real processes
+
+
+def worker(url: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "service.cli", "worker", "--db", url, "--processes", "1"]
+    return subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
+
+
+def epoch(store: Store) -> int:
+    record = store.dispatcher()
+    return 0 if record is None else record.epoch
+
+
+def test_a_standby_takes_over_in_seconds_when_the_dispatcher_is_killed_or_loses_its_lock(postgres_url: str) -> None:
+    with Store.open(postgres_url, chunking=Chunking(cases=4)) as store:
+        workers = [worker(postgres_url)]
+        try:
+            eventually(lambda: epoch(store) == 1)
+            workers.append(worker(postgres_url))
+            standby = workers[1].stderr
+            assert standby is not None
+            assert f":{workers[0].pid}) is at work on postgresql://sprag@/" in standby.readline()
+            record = store.create_study({}, fakes.study(40))
+            eventually(lambda: store.get_study(record.id).done > 0)
+            workers[0].send_signal(signal.SIGKILL)
+            assert eventually(lambda: epoch(store) == 2) < 10.0
+            second = store.dispatcher()
+            assert second is not None
+            assert second.owner.endswith(f":{workers[1].pid}")
+            eventually(lambda: store.get_study(record.id).state is StudyState.FINISHED)
+            expected = models.run_chunk(fakes.study(40), 0, 40).values
+            np.testing.assert_array_equal(store.case_rows(record.id).values, expected)
+
+            # Its connection is cut and it does not know: the next one's epoch stops it.
+            workers.append(worker(postgres_url))
+            third = workers[2].stderr
+            assert third is not None
+            assert "waiting for its end" in third.readline()
+            with store.session.plain() as connection:
+                connection.exec_driver_sql(
+                    "SELECT pg_terminate_backend(pid) FROM pg_locks WHERE locktype = 'advisory' AND objid = 2 "
+                    "AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
+                )
+            assert eventually(lambda: epoch(store) == 3) < 10.0
+            assert workers[1].wait(DEADLINE) == 3
+            assert "another dispatcher has taken over" in standby.read()
+            more = store.create_study({}, fakes.study(9), fresh=True)
+            eventually(lambda: store.get_study(more.id).state is StudyState.FINISHED)
+        finally:
+            for process in workers:
+                process.terminate()
+            codes = [process.wait(DEADLINE) for process in workers]
+            for process in workers:
+                assert process.stderr is not None
+                process.stderr.close()
+        assert codes == [-signal.SIGKILL, 3, 0]
+
+
+def test_a_server_that_crashes_ends_the_worker_with_a_sentence_and_loses_nothing(tmp_path: Path) -> None:
+    with postgres.running() as server:
+        url = server.url(server.new_database())
+        with Store.open(url, chunking=Chunking(cases=4)) as store:
+            study = fakes.study(1000)  # enough that the first worker is not through before the server crashes
+            record = store.create_study({}, study)
+            with worker(url) as process:
+                eventually(lambda: store.get_study(record.id).done > 0)
+                server.stop()
+                assert process.wait(DEADLINE) == 3
+                assert process.stderr is not None
+                said = process.stderr.read()
+            assert "cannot be reached" in said
+            assert "Traceback" not in said
+            with pytest.raises(DatabaseError, match="cannot be reached"):
+                store.get_study(record.id)
+            server.start()
+            with worker(url) as process:
+                eventually(lambda: store.get_study(record.id).state is StudyState.FINISHED)
+                process.terminate()
+            assert process.returncode == 0
+            block = store.case_rows(record.id, limit=1000)
+            assert block.cases.tolist() == list(range(1000))
+            np.testing.assert_array_equal(block.values, models.run_chunk(study, 0, 1000).values)

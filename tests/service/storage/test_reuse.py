@@ -1,0 +1,244 @@
+"""A case that is stored already is not run again: what is taken from where, by database, dispatcher and interface."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from service.storage.part import SystemClock
+from service.storage.records import StudyRecord
+from service.storage.store import Store
+from tests.worker.fakes import BASE, RUN
+from worker import fingerprint, models
+from worker.chunking import Chunking
+from worker.dispatcher import Dispatcher
+from worker.executors.inline import InlineExecutor
+from worker.models import ChunkResult, ChunkTask
+from worker.study import Axis, Study
+
+if TYPE_CHECKING:
+    from tests.service.conftest import Service
+
+API = "/api/v1"
+RESULTS = len(models.result_infos("vibration-drive", 1))
+
+
+def grid(frequencies: list[float], loads: list[float], **run: Any) -> Study:
+    axes = (Axis(("excitation.frequency",), tuple(frequencies)), Axis(("shaft.load",), tuple(loads)))
+    return Study("vibration-drive", "", dict(BASE), RUN | run, axes)
+
+
+def physics(columns: dict[str, Any], count: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Made-up results that depend on the parameters only: what an engine gives for them."""
+    frequency, load = (np.broadcast_to(columns[path], count) for path in ("excitation.frequency", "shaft.load"))
+    values = np.sqrt(frequency)[:, None] * np.arange(RESULTS) + load[:, None] / 3.0
+    counts = [info.kind == "count" for info in models.result_infos("vibration-drive", 1)]
+    values[:, counts] = np.floor(values[:, counts])
+    return np.ascontiguousarray(values)
+
+
+class Engine:
+    """Runs tasks and counts the cases."""
+
+    def __init__(self) -> None:
+        self.ran: list[tuple[float, float]] = []
+
+    def __call__(self, task: ChunkTask) -> ChunkResult:
+        columns = task.columns
+        pairs = zip(
+            np.broadcast_to(columns["excitation.frequency"], task.count).tolist(),
+            np.broadcast_to(columns["shaft.load"], task.count).tolist(),
+            strict=True,
+        )
+        self.ran += pairs
+        endings = ["chatter" if load == 0.7 else "ok" for _, load in self.ran[-task.count :]]
+        values = physics(columns, task.count)
+        values[[ending != "ok" for ending in endings]] = np.nan
+        return ChunkResult(task.first, endings, [""] * task.count, values)
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    with Store.open(f"sqlite:///{tmp_path / 'sprag.sqlite3'}", chunking=Chunking(cases=4)) as store:
+        yield store
+
+
+def run(store: Store, study: Study, engine: Engine, **options: Any) -> StudyRecord:
+    """Submit a study and run it to its end."""
+    record = store.create_study({}, study, **options)
+    executor = InlineExecutor(engine)
+    Dispatcher(store, executor, SystemClock()).run(lambda: store.get_study(record.id).state.terminal)
+    return store.get_study(record.id)
+
+
+def rows_are_right(store: Store, record: StudyRecord, study: Study) -> None:
+    """Every row is that of a run of its own, and every count is that of the rows."""
+    block = store.case_rows(record.id)
+    assert block.cases.tolist() == list(range(study.cases))
+    expected = Engine()(models.chunk_task(study, 0, study.cases))
+    np.testing.assert_array_equal(block.values, expected.values)
+    assert block.endings == expected.endings
+    ok = expected.endings.count("ok")
+    assert (record.done, record.ok) == (study.cases, ok)
+    progress = store.progress(record.id)
+    assert {name: count for name, count in progress.endings.items() if count} == {
+        name: expected.endings.count(name) for name in set(expected.endings)
+    }
+
+
+def test_the_same_study_runs_nothing_a_second_time(store: Store) -> None:
+    study, engine = grid([20.0, 25.0, 30.0], [0.1, 0.3, 0.7]), Engine()
+    first = run(store, study, engine)
+    assert (first.reused, len(engine.ran)) == (0, 9)
+    assert store.reusable(study) == 9
+    again = run(store, study, engine)
+    assert (again.reused, len(engine.ran)) == (9, 9)
+    rows_are_right(store, again, study)
+
+
+def test_new_values_anywhere_on_an_axis_are_all_that_is_run(store: Store) -> None:
+    engine = Engine()
+    run(store, grid([20.0, 30.0], [0.1, 0.3, 0.5]), engine)
+    engine.ran.clear()
+    # The axis that varies fastest gets values at both ends and in the middle, so that no chunk is all old or all new.
+    study = grid([30.0, 20.0, 25.0], [0.0, 0.1, 0.2, 0.3, 0.5, 0.7])
+    assert store.reusable(study) == 6
+    record = run(store, study, engine)
+    assert record.reused == 6
+    assert sorted(engine.ran) == sorted(
+        (frequency, load)
+        for frequency in (20.0, 25.0, 30.0)
+        for load in (0.0, 0.1, 0.2, 0.3, 0.5, 0.7)
+        if frequency == 25.0 or load not in (0.1, 0.3, 0.5)
+    )
+    rows_are_right(store, record, study)
+
+
+def test_cases_come_from_several_studies_and_from_those_side_by_side(store: Store) -> None:
+    engine = Engine()
+    run(store, grid([20.0], [0.1, 0.3]), engine)
+    zipped = (Axis(("excitation.frequency",), (25.0, 30.0)), Axis(("shaft.load",), (0.3, 0.1)))
+    run(store, Study("vibration-drive", "", dict(BASE), dict(RUN), zipped, "zip"), engine)
+    engine.ran.clear()
+    study = grid([20.0, 25.0, 30.0], [0.1, 0.3])
+    record = run(store, study, engine)
+    assert record.reused == 4
+    assert sorted(engine.ran) == [(25.0, 0.1), (30.0, 0.3)]
+    rows_are_right(store, record, study)
+
+
+def test_other_physics_is_never_taken(store: Store) -> None:
+    engine = Engine()
+    run(store, grid([20.0], [0.1, 0.3]), engine)
+    assert store.reusable(grid([20.0], [0.1, 0.3], tolerance=1e-8)) == 0
+    assert store.reusable(grid([20.0], [0.1, 0.3], duration=[4.0, "periods"])) == 0
+    other = grid([20.0], [0.1, 0.3])
+    assert store.reusable(Study(other.model, "", {**BASE, "shaft.inertia": 3e-3}, other.run, other.axes)) == 0
+    record = run(store, grid([20.0], [0.1, 0.3], tolerance=1e-8), engine)
+    assert (record.reused, len(engine.ran)) == (0, 4)
+
+
+def test_rows_of_another_engine_library_or_processor_are_never_taken(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, engine = grid([20.0], [0.1, 0.3]), Engine()
+    run(store, study, engine)
+    with monkeypatch.context() as patch:
+        patch.setattr(fingerprint, "digest", lambda: "another")
+        assert store.reusable(study) == 0
+        record = run(store, study, engine)
+        assert (record.reused, len(engine.ran)) == (0, 4)
+        assert store.reusable(study) == 2
+    assert run(store, study, engine).reused == 2
+
+
+def test_a_study_whose_rows_have_several_origins_says_so_and_is_no_source(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, engine = grid([20.0, 25.0], [0.1, 0.3, 0.5]), Engine()
+    record = store.create_study({}, study, warnings=["odd"])
+    epoch = store.take_over("test")
+    first = store.open_chunks(record.number)[0]
+    store.claim(epoch, [first])
+    store.commit(epoch, first, engine(models.chunk_task(study, first.first, first.count)))
+    assert store.get_study(record.id).warnings == ("odd",)
+    monkeypatch.setattr(fingerprint, "digest", lambda: "another")
+    Dispatcher(store, InlineExecutor(engine), SystemClock()).run(lambda: store.get_study(record.id).state.terminal)
+    odd, mixed = store.get_study(record.id).warnings
+    assert odd == "odd"
+    assert mixed.startswith("The cases of this study were not all computed by one version of Sprag")
+    assert store.reusable(study) == 0
+    monkeypatch.undo()
+    assert store.reusable(study) == 0
+
+
+def test_a_fresh_study_runs_everything(store: Store) -> None:
+    study, engine = grid([20.0], [0.1, 0.3]), Engine()
+    run(store, study, engine)
+    record = run(store, study, engine, fresh=True)
+    assert (record.reused, len(engine.ran)) == (0, 4)
+
+
+def test_what_crashed_or_was_never_run_is_run(store: Store) -> None:
+    study, engine = grid([20.0, 25.0, 30.0], [0.1, 0.3, 0.5, 0.7]), Engine()
+    half = store.create_study({}, study)
+    epoch = store.take_over("test")
+    first, second, _ = store.open_chunks(half.number)
+    store.claim(epoch, [first, second])
+    store.commit(epoch, first, Engine()(models.chunk_task(study, first.first, first.count)))
+    store.quarantine(epoch, second, "crashed", "its process died")
+    store.cancel_study(half.id)
+    store.settle(epoch, half.number)
+    assert store.reusable(study) == 4
+    record = run(store, study, engine)
+    assert (record.reused, len(engine.ran)) == (4, 8)
+    rows_are_right(store, record, study)
+
+
+def test_a_source_that_is_deleted_meanwhile_costs_a_run_and_no_row(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, engine = grid([20.0, 25.0], [0.1, 0.3, 0.5, 0.7]), Engine()
+    source = run(store, study, engine)
+    commit = store.commit
+
+    def deleted_first(*args: Any) -> bool:
+        if store.list_studies().studies[-1].id == source.id:
+            store.delete_study(source.id)
+            store.purge()
+        return commit(*args)
+
+    monkeypatch.setattr(store, "commit", deleted_first)
+    record = run(store, study, engine)
+    assert (record.reused, len(engine.ran)) == (0, 16)
+    rows_are_right(store, record, study)
+
+
+def test_cases_that_are_run_again_are_run(store: Store) -> None:
+    study, engine = grid([20.0], [0.3, 0.7]), Engine()
+    run(store, study, engine)
+    record = run(store, study, engine)
+    assert (record.reused, len(engine.ran)) == (2, 2)
+    store.retry_study(record.id)
+    Dispatcher(store, InlineExecutor(engine), SystemClock()).run(lambda: store.get_study(record.id).state.terminal)
+    assert engine.ran[2:] == [(20.0, 0.7)]
+    rows_are_right(store, store.get_study(record.id), study)
+
+
+def test_the_interface_tells_how_many_cases_are_known(service: Service, spec: dict[str, Any]) -> None:
+    first = service.submit(spec)
+    service.fill(first)
+    preview = service.http.post(f"{API}/studies:preview", json=spec).json()
+    assert preview["reusable"] == preview["cases"]
+    assert preview["estimated_seconds"] == 0.0
+    executor = InlineExecutor(Engine())
+    for query, reused in (("?fresh=true", 0), ("", preview["cases"])):
+        study = service.http.post(f"{API}/studies{query}", json=spec).json()
+        Dispatcher(service.store, executor, SystemClock(), only=service.store.get_study(study["id"]).number).run(
+            lambda study_id=study["id"]: service.store.get_study(study_id).state.terminal  # type: ignore[misc]
+        )
+        assert service.get(f"/studies/{study['id']}")["reused"] == reused

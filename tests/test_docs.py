@@ -1,0 +1,162 @@
+"""The documentation names what the program has, and nothing that it has not."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import typer
+
+from engine.machine_shaft.results import MACHINE_RESULTS
+from engine.vibration_drive.regimes import settled_infos
+from service.cli.app import app
+from service.presets import ABOUT, preset_names, preset_text
+from service.settings import table
+from worker import limits, models
+from worker.models.codes import ENDING_CODES, FLAG_MASKS
+from worker.states import StudyState
+
+ROOT = Path(__file__).resolve().parents[1]
+REFERENCE = (ROOT / "docs" / "reference.md").read_text()
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+
+def commands() -> dict[str, set[str]]:
+    """Every command, such as "db upgrade", and its options."""
+    found: dict[str, set[str]] = {}
+
+    def collect(command: object, name: str) -> None:
+        subcommands = getattr(command, "commands", None)
+        if getattr(command, "invoke_without_command", False):
+            found[name] = {option for parameter in command.params for option in parameter.opts}  # type: ignore[attr-defined]
+        if subcommands is None:
+            found[name] = {option for parameter in command.params for option in parameter.opts}  # type: ignore[attr-defined]
+            return
+        for key, inner in subcommands.items():
+            collect(inner, f"{name} {key}".strip())
+
+    collect(typer.main.get_command(app), "")
+    return found
+
+
+def mentioned(text: str) -> Iterator[tuple[str, list[str]]]:
+    """Every ``sprag ...`` of a page with the options that follow it on its line."""
+    text = text.replace("\\\n", " ")
+    for match in re.finditer(
+        r"(?:^|[`$/ ])sprag ((?:(?:db|schedule|token(?= (?:create|list|revoke)\b)) )?[a-z]+)\b([^`\n]*)", text
+    ):
+        line = match[0]
+        if "`" in line or match.string[match.start()] in "$/" or _in_code(text, match.start()):
+            yield match[1], re.findall(r"(?<![\w-])(--?[a-z][a-z-]*)", match[2].split("#")[0])
+
+
+def _in_code(text: str, position: int) -> bool:
+    return text.count("```", 0, position) % 2 == 1
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_every_command_and_option_of_the_pages_exists(page: Path) -> None:
+    known = commands()
+    for name, options in mentioned(page.read_text()):
+        assert name in known or name in {"db", "schedule", "token"}, f"{page.name}: sprag {name}"
+        for option in options:
+            assert option in known[name], f"{page.name}: sprag {name} {option}"
+
+
+def test_the_pages_mention_commands() -> None:
+    found = {name for page in PAGES for name, _ in mentioned(page.read_text())}
+    assert {"run", "serve", "fit", "db upgrade"} <= found
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+        file, _, anchor = target.partition("#")
+        if "://" in file:
+            continue
+        path = page.parent / file if file else page
+        assert path.exists(), f"{page.name}: {target}"
+        if anchor:
+            headings = re.findall(r"^#+ (.+)$", path.read_text(), re.MULTILINE)
+            assert anchor in {re.sub(r"[^\w-]", "", h.lower().replace(" ", "-")) for h in headings}, target
+
+
+def test_the_reference_lists_every_command() -> None:
+    for name in commands():
+        assert f"| `sprag {name}` | " in REFERENCE
+
+
+def test_the_reference_lists_every_setting_with_default_and_help() -> None:
+    for row in table():
+        default = f"`{row.default}`" if row.default else ""
+        assert f"| `{row.variable}` | {default} | {row.help} |" in REFERENCE
+
+
+@pytest.mark.parametrize("model", models.model_names())
+def test_the_reference_lists_every_parameter(model: str) -> None:
+    for entry in models.parameter_catalogue(model):
+        default = "" if entry.default is None else f"{entry.default:g}"
+        assert f"| `{entry.path}` | {entry.unit} | {entry.range_text()} | {default} | {entry.help} |" in REFERENCE
+
+
+@pytest.mark.parametrize("model", models.model_names())
+def test_the_reference_lists_every_result(model: str) -> None:
+    for info in models.result_infos(model, 1):
+        name = info.name.replace("pendulums.0", "pendulums.N")
+        assert f"| `{name}` | {info.unit} | {info.description} |" in REFERENCE
+
+
+def test_results_that_the_pages_name_exist() -> None:
+    names = {info.name for info in (*settled_infos(8), *MACHINE_RESULTS)}
+    names |= {re.sub(r"\d", "N", name) for name in names}
+    pattern = r"\b((?:shaft|torque|power|fraction|balance|reset|runup|clutches)\.(?!md\b)[a-z_]+(?:\.[a-z_]+)*)\b"
+    paths = {entry.path for entry in models.parameter_catalogue("vibration-drive")}
+    for page in PAGES:
+        for name in re.findall(pattern, page.read_text()):
+            # A page may name a family of results, or leave out the pendulum that a table's heading names.
+            family = any(known.startswith(f"{name}.") or known.endswith(f".{name}") for known in names)
+            assert name in names | paths or family, f"{page.name}: {name}"
+
+
+def test_the_reference_lists_every_ending_flag_and_state() -> None:
+    sentences = {**models.ENDING_SENTENCES, **models.FLAG_SENTENCES}
+    sentences |= {state.value: state.sentence for state in StudyState}
+    for key, sentence in sentences.items():
+        assert f"| `{key}` | {sentence} |" in REFERENCE
+
+
+def test_the_page_of_exports_has_the_number_of_every_ending_and_flag() -> None:
+    page = (ROOT / "docs" / "exports.md").read_text()
+    told = {name: int(number) for name, number in re.findall(r"\| `(\w+)`(?: \(not run\))? \| (-?\d+) ", page)}
+    assert told == {**ENDING_CODES, **FLAG_MASKS}
+
+
+def test_the_reference_tells_the_limits() -> None:
+    told = ("MAX_AXES", "MAX_COLUMNS", "MAX_CASES", "MAX_AXIS_VALUES", "MAX_BODY_BYTES", "MAX_DEPTH")
+    for limit in (getattr(limits, name) for name in told):
+        assert f" {limit:,} " in REFERENCE
+
+
+def test_the_studies_that_come_with_the_program_are_the_examples() -> None:
+    for name in preset_names():
+        file, text = preset_text(name)
+        assert (ROOT / "examples" / file).read_text() == text
+
+
+def test_the_presets_are_described_with_their_sources() -> None:
+    page = (ROOT / "docs" / "presets.md").read_text()
+    for name, about in ABOUT.items():
+        (row,) = [line for line in page.splitlines() if line.startswith(f"| `{name}` |")]
+        assert row.endswith(f"| {about.shows} | {about.values} |")
+
+
+def test_the_waiting_loop_of_the_readme_ends_in_every_state_that_a_study_does_not_leave_by_itself() -> None:
+    (pattern,) = re.findall(r"grep -qE '(.+?)'", (ROOT / "README.md").read_text())
+    for state in StudyState:
+        stays = state.terminal or state is StudyState.PAUSED
+        assert (re.search(pattern, f'{{"id":"x","state":"{state}","model":"m"}}') is not None) is stays, state
+
+
+def test_benchmarks_are_called_as_modules() -> None:
+    for page in [*PAGES, *(ROOT / "benchmarks").rglob("*.py")]:
+        assert not re.search(r"python benchmarks/", page.read_text()), page

@@ -1,0 +1,397 @@
+"""The Dask executor: the same bits as the others, one chunk to a death, and a cluster whose parts come and go."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from threading import Event
+
+import numpy as np
+import pytest
+from distributed import Client, Future
+from pydantic import ValidationError
+
+from service.jobs.dispatching import WorkerSettings, pool
+from service.settings import Settings
+from service.storage.part import SystemClock
+from service.storage.store import Store
+from tests.conftest import ROOT
+from tests.worker import fakes
+from tests.worker.executors.clusters import DEADLINE, Cluster, clusters
+from worker import fingerprint, models
+from worker.chunking import Chunking
+from worker.dispatcher import Dispatcher
+from worker.executors.dask import DaskExecutor
+from worker.executors.dask_tasks import scheduler_address
+from worker.executors.inline import InlineExecutor
+from worker.executors.process_pool import SPARE_CHUNKS, ProcessPoolExecutor
+from worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
+from worker.states import StudyState
+from worker.study import Study
+
+
+def eventually(true: Callable[[], object]) -> None:
+    begin = time.monotonic()
+    while not true():
+        assert time.monotonic() - begin < DEADLINE
+        time.sleep(0.02)
+
+
+def ready(executor: Executor, study: Study) -> None:
+    begin = time.monotonic()
+    while not executor.ready(study):
+        assert time.monotonic() - begin < DEADLINE
+        executor.wait(0.05)
+
+
+def gather(executor: Executor, count: int) -> dict[int, Outcome]:
+    found: dict[int, Outcome] = {}
+    begin = time.monotonic()
+    while len(found) < count:
+        assert time.monotonic() - begin < DEADLINE
+        for outcome in executor.wait(0.1):
+            assert outcome.ticket not in found
+            found[outcome.ticket] = outcome
+    return found
+
+
+def run_all(executor: Executor, study: Study, size: int) -> dict[int, Outcome]:
+    ready(executor, study)
+    spans = range(0, study.cases, size)
+    for ticket, first in enumerate(spans):
+        executor.submit(ticket, study, Chunk(1, first, min(size, study.cases - first)))
+    return gather(executor, len(spans))
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Cluster]:
+    """A scheduler and two workers, as processes."""
+    with clusters() as made:
+        made.start_scheduler()
+        made.start_worker()
+        made.start_worker()
+        yield made
+
+
+@pytest.fixture
+def start(cluster: Cluster) -> Iterator[Callable[..., DaskExecutor]]:
+    made: list[DaskExecutor] = []
+
+    def begin(**options: object) -> DaskExecutor:
+        given = {"chunk_timeout": 60.0, "run": fakes.run, "load": fakes.load} | options
+        made.append(DaskExecutor(cluster.url, 0, **given))  # type: ignore[arg-type]
+        return made[-1]
+
+    yield begin
+    for executor in made:
+        executor.close()
+
+
+def test_inline_pool_and_dask_give_the_same_bits(start: Callable[..., DaskExecutor]) -> None:
+    study = fakes.study(30)
+    dask = start(run=models.run_task, load=models.load)
+    processes = ProcessPoolExecutor(2, chunk_timeout=60.0)
+    cuts = ((InlineExecutor(), 30), (processes, 4), (dask, 7))
+    try:
+        found = [run_all(executor, study, size) for executor, size in cuts]
+    finally:
+        processes.close()
+    rows = []
+    for outcomes in found:
+        results = [outcomes[ticket].result for ticket in sorted(outcomes)]
+        rows.append(
+            (
+                np.concatenate([result.values for result in results if result]).tobytes(),
+                [ending for result in results if result for ending in result.endings],
+                [flag for result in results if result for flag in result.flags],
+            )
+        )
+    assert rows[0] == rows[1] == rows[2]
+    assert len(rows[0][1]) == 30
+
+
+def test_a_death_costs_one_chunk_and_the_worker_comes_back(start: Callable[..., DaskExecutor]) -> None:
+    executor = start(run=fakes.faulty(crash=frozenset({9})))
+    eventually(lambda: executor.wait(0.05) or executor.capacity == 2 + SPARE_CHUNKS)
+    outcomes = run_all(executor, fakes.study(40), 4)
+    assert {ticket: outcome.fate for ticket, outcome in outcomes.items() if outcome.fate is not Fate.DONE} == {
+        2: Fate.CRASHED
+    }
+    for ticket, outcome in outcomes.items():
+        if ticket != 2:
+            assert outcome.result is not None
+            np.testing.assert_array_equal(outcome.result.values, fakes.values(ticket * 4, 4))
+    eventually(lambda: executor.wait(0.05) or executor.capacity == 2 + SPARE_CHUNKS)
+
+
+def test_what_never_returns_ends_with_its_worker(start: Callable[..., DaskExecutor]) -> None:
+    executor = start(run=fakes.faulty(hang=frozenset({0})), chunk_timeout=1.0)
+    outcomes = run_all(executor, fakes.study(12), 4)
+    assert {ticket: outcome.fate for ticket, outcome in outcomes.items()} == {
+        0: Fate.TIMED_OUT, 1: Fate.DONE, 2: Fate.DONE,
+    }  # fmt: skip
+    assert outcomes[0].detail == "killed after 1 s"
+
+
+def test_a_fault_of_the_program_is_told_by_its_name(start: Callable[..., DaskExecutor]) -> None:
+    outcomes = run_all(start(run=fakes.raising), fakes.study(4), 4)
+    assert (outcomes[0].fate, outcomes[0].detail) == (Fate.CRASHED, "ZeroDivisionError: no such thing")
+
+
+def test_chunks_are_stopped_whether_they_run_or_not(
+    start: Callable[..., DaskExecutor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("worker.executors.dask.STOP_SECONDS", 0.2)
+    executor = start(run=fakes.faulty(hang=frozenset(range(8))), chunk_timeout=10 * DEADLINE)
+    study = fakes.study(12)
+    ready(executor, study)
+    for ticket in range(3):
+        executor.submit(ticket, study, Chunk(1, 4 * ticket, 4))
+    for ticket in range(2):
+        executor.stop(ticket)
+        executor.stop(ticket)
+    executor.stop(99)
+    outcomes = gather(executor, 3)  # the third one runs when a worker was ended, and is back
+    assert [outcomes[ticket].fate for ticket in range(3)] == [Fate.STOPPED, Fate.STOPPED, Fate.DONE]
+    assert executor.wait(0.0) == []
+
+
+@pytest.mark.parametrize("fate", ["finished", "lost"])
+def test_the_connection_stays_until_what_came_of_a_job_is_fetched(
+    start: Callable[..., DaskExecutor], monkeypatch: pytest.MonkeyPatch, fate: str
+) -> None:
+    fetching, closing, seen, own = Event(), Event(), [], []
+    name = "result" if fate == "finished" else "exception"
+    fetch, close = getattr(Future, name), Client.close
+
+    def slow(future: Future, *args: object, **options: object) -> object:
+        if not future.key.startswith("sprag-1-"):
+            return fetch(future, *args, **options)
+        own.append(future.client)
+        fetching.set()
+        seen.append(closing.wait(0.5))  # which only a connection that is closed too soon ends
+        found = fetch(future, *args, **options)
+        seen.append(future.client.status)
+        return found
+
+    def closed(client: Client, *args: object, **options: object) -> object:
+        if client in own:  # not one that an earlier test left to be collected
+            closing.set()
+        return close(client, *args, **options)
+
+    executor = start(run=fakes.run if fate == "finished" else fakes.raising)
+    study = fakes.study(4)
+    ready(executor, study)
+    monkeypatch.setattr(Future, name, slow)
+    monkeypatch.setattr(Client, "close", closed)
+    executor.submit(0, study, Chunk(1, 0, 4))
+    assert fetching.wait(DEADLINE)
+    executor.close()
+    assert seen == [False, "running"]
+    assert closing.is_set()
+
+
+def test_nothing_is_asked_of_a_connection_that_was_closed(
+    start: Callable[..., DaskExecutor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+    executor = start(run=fakes.faulty(hang=frozenset({0})), chunk_timeout=3.0)
+    study = fakes.study(4)
+    ready(executor, study)
+    executor.submit(0, study, Chunk(1, 0, 4))
+    monkeypatch.setattr(Future, "exception", lambda future, **_: asked.append(future.key))
+    monkeypatch.setattr(Future, "result", lambda future, **_: asked.append(future.key))
+    executor.close()
+    # One thread calls back after the other, so that of the chunk is through when this one is.
+    if Future._cb_executor is not None:
+        Future._cb_executor.submit(int).result(DEADLINE)
+    assert asked == []
+
+
+def test_a_worker_with_another_numpy_is_refused(
+    start: Callable[..., DaskExecutor], caplog: pytest.LogCaptureFixture
+) -> None:
+    executor = start(expected={**fingerprint.own(), "numpy": "0.9"})
+    eventually(lambda: executor.wait(0.05) or caplog.text.count("is refused") == 2)
+    reason = f"is refused: numpy: {np.__version__} instead of 0.9"
+    assert reason in caplog.text
+    assert executor.capacity == SPARE_CHUNKS
+    assert not executor.ready(fakes.study(1))
+    assert (executor.shortage or "").startswith("No usable worker has joined the scheduler tcp://127.0.0.1:")
+    assert f"{reason} (and 1 more)." in (executor.shortage or "")
+
+
+def edited_engine(folder: Path) -> dict[str, str]:
+    """A copy of the sources whose engine is a hundred times less accurate, under the same version."""
+    for package in ("engine", "worker"):
+        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))
+    cases = folder / "engine" / "vibration_drive" / "cases.py"
+    cases.write_text(cases.read_text(encoding="utf-8") + "\nTOLERANCE_FACTOR = 100.0\n", encoding="utf-8")
+    return {}
+
+
+def no_sprag(folder: Path) -> dict[str, str]:
+    """No package of Sprag that could be imported."""
+    (folder / "engine.py").write_text("raise ImportError('there is no Sprag here')\n", encoding="utf-8")
+    return {}
+
+
+def no_fma(folder: Path) -> dict[str, str]:
+    """The same sources on a processor without fused multiplication and addition."""
+    for package in ("engine", "worker"):
+        (folder / package).symlink_to(ROOT / package)
+    features = fingerprint.own()["processor features"].split()
+    return {"NUMBA_CPU_FEATURES": ",".join(("-" if name == "fma" else "+") + name for name in features)}
+
+
+@pytest.mark.parametrize(
+    ("other", "reason"),
+    [
+        (edited_engine, "engine sources: "),
+        (no_sprag, "it cannot run Sprag (ImportError: there is no Sprag here)"),
+        (no_fma, "processor features: without fma"),
+    ],
+)
+def test_a_worker_that_would_give_other_values_runs_nothing_and_the_study_says_so(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, other: Callable[[Path], dict[str, str]], reason: str
+) -> None:
+    folder = tmp_path / "other"
+    folder.mkdir()
+    with clusters() as made, Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}", chunking=Chunking(cases=4)) as store:
+        record = store.create_study({}, fakes.study(20))
+        made.start_scheduler()
+        made.start_worker(folder=folder, **other(folder))
+        executor = DaskExecutor(made.url, 0, chunk_timeout=60.0, run=fakes.run, load=fakes.load)
+
+        def told() -> bool:
+            return reason in (store.get_study(record.id).reason or "")
+
+        begin = time.monotonic()
+        Dispatcher(store, executor, SystemClock()).run(lambda: told() or time.monotonic() - begin > DEADLINE)
+        assert told()
+        assert store.get_study(record.id).done == 0
+        assert reason in caplog.text
+
+
+def test_a_kernel_that_cannot_be_had_is_told(start: Callable[..., DaskExecutor]) -> None:
+    executor = start(load=fakes.raising)
+    with pytest.raises(KernelError, match=r"cannot be compiled \(ZeroDivisionError: no such thing\)"):
+        ready(executor, fakes.study(1))
+
+
+def test_damaged_kernels_are_compiled_anew(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    study = fakes.study(80)
+    with clusters() as made, Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}", chunking=Chunking(cases=4)) as store:
+        made.start_scheduler()
+        made.start_worker(3, SPRAG_KERNEL_CACHE=str(tmp_path))
+        # One after the other dies while it loads; the last one finds the damaged file gone.
+        executor = DaskExecutor(made.url, 0, chunk_timeout=60.0, run=fakes.run, load=fakes.load_or_die)
+        eventually(lambda: executor.wait(0.05) or executor.capacity == 3 + SPARE_CHUNKS)
+        damaged = tmp_path / "kernels" / models.cache_folder().name / fakes.DAMAGED
+        damaged.parent.mkdir(parents=True, exist_ok=True)
+        damaged.touch()
+        assert {outcome.fate for outcome in run_all(executor, study, 20).values()} == {Fate.DONE}
+        assert caplog.text.count("died of a kernel; their host compiles its kernels anew") == 1
+        assert not damaged.exists()
+        executor.close()
+        # Every chunk crashes, of workers that have the damaged kernel in hand; nobody is quarantined.
+        damaged.touch()
+        given = {"chunk_timeout": 60.0, "run": fakes.run_or_die, "load": fakes.load_damaged}
+        first = DaskExecutor(made.url, 0, **given)  # type: ignore[arg-type]
+        record = store.create_study({}, study)
+        dispatcher = Dispatcher(
+            store, first, SystemClock(),
+            renew=lambda: DaskExecutor(made.url, 0, renew=True, **given),  # type: ignore[arg-type]
+        )  # fmt: skip
+        dispatcher.run(lambda: not store.active_studies())
+        ended = store.get_study(record.id)
+        assert (ended.state, ended.ok) == (StudyState.FINISHED, 80)
+        assert caplog.text.count("The kernels are compiled anew, and its cases run again.") == 1
+        assert not damaged.exists()
+
+
+def test_other_machines_need_certificates(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ExecutorError, match="TLS is required: set DASK_DISTRIBUTED__COMM__TLS__CA_FILE"):
+        scheduler_address("dask://cluster.example:8786")
+    assert scheduler_address("dask://localhost:8786") == ("tcp://localhost:8786", None)
+    assert scheduler_address("dask://[::1]:8786") == ("tcp://[::1]:8786", None)
+
+
+def test_a_scheduler_that_stays_away_ends_the_executor_with_a_sentence() -> None:
+    with clusters() as made:
+        executor = DaskExecutor(made.url, 0, chunk_timeout=1.0, scheduler_seconds=0.0)
+        assert executor.shortage == f"The scheduler tcp://127.0.0.1:{made.port} is not there; it is tried again."
+        with pytest.raises(ExecutorError, match=rf"127.0.0.1:{made.port} was not there for 0 s"):
+            eventually(lambda: executor.wait(0.05))
+        executor.close()
+
+
+def test_a_cluster_of_its_own_runs_chunks() -> None:
+    executor = pool(WorkerSettings("", 1, 60.0, executor="dask"))
+    try:
+        study = fakes.study(3)
+        result = run_all(executor, study, 3)[0].result
+        assert result is not None
+        assert result.values.tobytes() == models.run_chunk(study, 0, 3).values.tobytes()
+    finally:
+        executor.close()
+
+
+def test_a_study_survives_what_happens_to_a_cluster(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Workers are killed and join, the scheduler is killed with all it knows; no row is lost, doubled or wrong."""
+    cases = int(os.environ.get("SPRAG_TEST_CASES", "3000"))
+    chosen = random.Random(3)
+    kills: list[str] = []
+    with clusters() as made, Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}", chunking=Chunking(cases=20)) as store:
+        made.start_scheduler()
+        made.start_worker()
+        record = store.create_study({}, fakes.study(cases))
+        executor = DaskExecutor(made.url, 0, chunk_timeout=60.0, run=fakes.run, load=fakes.load)
+        marks = sorted(chosen.sample(range(cases // 20, cases - cases // 10), 2 + cases // 1500))
+
+        def stopping() -> bool:
+            now = store.get_study(record.id)
+            if len(kills) < len(marks) and now.done >= marks[len(kills)]:
+                if len(kills) % 3 == 1 and made.scheduler is not None:
+                    made.scheduler.kill()
+                    made.scheduler.wait()
+                    for worker in made.workers:  # which end without it, in their own time
+                        worker.kill()
+                        worker.wait()
+                    made.workers.clear()
+                    made.start_scheduler()
+                    made.start_worker()
+                    kills.append("scheduler")
+                elif victims := made.computing():
+                    chosen.choice(victims).kill()
+                    made.start_worker()  # another joins
+                    kills.append("worker")
+            return now.state.terminal
+
+        Dispatcher(store, executor, SystemClock()).run(stopping)
+        ended = store.get_study(record.id)
+        assert (ended.state, ended.done, ended.ok) == (StudyState.FINISHED, cases, cases)
+        assert set(kills) == {"worker", "scheduler"}
+        blocks = list(store.iter_rows(record.id))
+        assert np.concatenate([block.cases for block in blocks]).tolist() == list(range(cases))
+        np.testing.assert_array_equal(np.concatenate([block.values for block in blocks]), fakes.values(0, cases))
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_the_setting_is_checked() -> None:
+    for good in ("pool", "dask", "dask://head.example:8786", "dask://[::1]:8786"):
+        assert Settings(executor=good).executor == good
+    for wrong in ("dusk", "dask://", "dask://head.example", "dask://head.example:0", "tcp://head.example:8786"):
+        with pytest.raises(ValidationError, match="it is pool, dask, or dask://host:port"):
+            Settings(executor=wrong)
+
+
+def test_without_dask_the_command_that_brings_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "worker.executors.dask", None)
+    with pytest.raises(ExecutorError, match=r"pip install 'sprag\[cluster\]'"):
+        pool(WorkerSettings("", 1, 60.0, executor="dask"))

@@ -1,0 +1,37 @@
+"""Numbers of endings and flags: files written long ago still mean the same."""
+
+from worker import models
+from worker.models.codes import ENDING_CODES, FLAG_MASKS, PENDING
+
+#: What files that exist hold. Lines are added here, never changed or taken away.
+GIVEN = {
+    "pending": -1,
+    "ok": 0,
+    "accuracy_not_reached": 1,
+    "chatter": 2,
+    "step_budget": 3,
+    "diverged": 4,
+    "inertia_insufficient": 5,
+    "unbalanced_work": 6,
+    "cannot_assemble": 7,
+    "negative_inertia": 8,
+    "motor_stalled": 9,
+    "quadrature_not_reached": 10,
+    "crashed": 100,
+    "timed_out": 101,
+    "cancelled": 102,
+}
+GIVEN_FLAGS = {"windup_out_of_data": 1, "not_settled": 2}
+
+
+def test_numbers_once_given_stay() -> None:
+    assert {name: ENDING_CODES[name] for name in GIVEN} == GIVEN
+    assert {name: FLAG_MASKS[name] for name in GIVEN_FLAGS} == GIVEN_FLAGS
+
+
+def test_every_ending_and_flag_has_a_number_of_its_own() -> None:
+    assert ENDING_CODES.keys() >= {PENDING, *models.ENDING_SENTENCES}
+    assert len(set(ENDING_CODES.values())) == len(ENDING_CODES)
+    assert all(-1 <= code < 1 << 15 for code in ENDING_CODES.values())
+    assert FLAG_MASKS.keys() >= set(models.FLAG_SENTENCES)
+    assert sorted(FLAG_MASKS.values()) == [1 << bit for bit in range(len(FLAG_MASKS))]

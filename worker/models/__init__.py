@@ -1,0 +1,324 @@
+"""The one part of the worker that knows the engine: a study and a range of cases in, plain arrays out.
+
+What is particular to a model (its catalogues, the shape of its results, how a study's columns become a call of the
+engine) stands in a module of its own behind the functions of this one. The numerical kernels are imported where they
+are run, so reading a catalogue loads no compiler.
+"""
+
+from __future__ import annotations
+
+import platform
+from contextlib import suppress
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+from engine import ENGINE_VERSION, Ending, Run, Span
+from engine.machine_shaft.problems import ExpressionError, InsufficientInertiaError, MachineError
+from engine.sources import engine_folder, source_hash
+from engine.vibration_drive.clutch import (
+    ClutchFit,
+    ClutchFitError,
+    ClutchLaw,
+    ClutchLawError,
+    DegreeReport,
+    check_law,
+    fit_clutch,
+)
+from engine.vibration_drive.parameters import (
+    CLUTCH_COEFFICIENT,
+    CLUTCH_WINDUP_LIMIT,
+    MAX_COEFFICIENTS,
+    MAX_PENDULUMS,
+    Parameter,
+)
+from engine.vibration_drive.results import ResultInfo
+from worker.models import machine_shaft, vibration_drive
+from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, Trajectory
+from worker.models.vibration_drive import (
+    FLAG_SENTENCES,
+    NOT_SETTLED,
+    WINDUP_OUT_OF_DATA,
+    coefficients,
+    duration_seconds,
+    kernel_source,
+    run_of,
+)
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from worker.study import Study
+
+__all__ = [
+    "CLUTCH_COEFFICIENT",
+    "CLUTCH_WINDUP_LIMIT",
+    "ENDING_SENTENCES",
+    "ENGINE_VERSION",
+    "FLAG_SENTENCES",
+    "MACHINE_SHAFT",
+    "MAX_COEFFICIENTS",
+    "MAX_PENDULUMS",
+    "MODELS",
+    "NOT_SETTLED",
+    "OK",
+    "VIBRATION_DRIVE",
+    "WINDUP_OUT_OF_DATA",
+    "ChunkResult",
+    "ChunkTask",
+    "ClutchFit",
+    "ClutchFitError",
+    "ClutchLaw",
+    "ClutchLawError",
+    "DegreeReport",
+    "Ending",
+    "ExpressionError",
+    "Extent",
+    "InsufficientInertiaError",
+    "KernelShape",
+    "MachineError",
+    "Parameter",
+    "ResultInfo",
+    "Run",
+    "Span",
+    "Trajectory",
+    "WorkerEnding",
+    "cache_folder",
+    "cache_is_wanted",
+    "check_law",
+    "chunk_task",
+    "coefficients",
+    "discard_compiled",
+    "duration_seconds",
+    "endings_of",
+    "engine_folder",
+    "estimate_compile_seconds",
+    "estimate_seconds_per_case",
+    "extent",
+    "fit_clutch",
+    "flags_of",
+    "is_compiled",
+    "kernel_source",
+    "load",
+    "model_names",
+    "parameter_catalogue",
+    "parameters_of",
+    "pendulums",
+    "prepare",
+    "result_infos",
+    "result_shapes",
+    "run_chunk",
+    "run_of",
+    "run_task",
+    "run_trajectory",
+    "shape_of",
+    "source_hash",
+    "study_results",
+    "warm_up",
+]
+
+VIBRATION_DRIVE = vibration_drive.MODEL
+MACHINE_SHAFT = machine_shaft.MODEL
+MODELS: tuple[str, ...] = (VIBRATION_DRIVE, MACHINE_SHAFT)
+
+OK = Ending.OK.value
+
+
+class WorkerEnding(StrEnum):
+    """Endings that the worker gives to a case, because the engine did not come back from it."""
+
+    CRASHED = "crashed"
+    TIMED_OUT = "timed_out"
+    CANCELLED = "cancelled"
+
+
+#: Every ending of a case, stored as its key, and the sentence a user reads.
+ENDING_SENTENCES: dict[str, str] = {
+    **{ending.value: ending.sentence for ending in Ending},
+    WorkerEnding.CRASHED.value: (
+        "The process that ran this case died, twice, with no other case beside it: the case is set aside and can be "
+        "run again."
+    ),
+    WorkerEnding.TIMED_OUT.value: "The case did not come back within the time allowed for it, alone and twice.",
+    WorkerEnding.CANCELLED.value: "The study was cancelled before this case was run.",
+}
+
+#: Endings that only the one or the other model knows.
+_OWN_ENDINGS: dict[str, frozenset[Ending]] = {
+    VIBRATION_DRIVE: frozenset({Ending.ACCURACY_NOT_REACHED, Ending.CHATTER, Ending.STEP_BUDGET, Ending.DIVERGED}),
+    MACHINE_SHAFT: frozenset(
+        {
+            Ending.INERTIA_INSUFFICIENT,
+            Ending.UNBALANCED_WORK,
+            Ending.CANNOT_ASSEMBLE,
+            Ending.NEGATIVE_INERTIA,
+            Ending.MOTOR_STALLED,
+            Ending.QUADRATURE_NOT_REACHED,
+        }
+    ),
+}
+
+
+def model_names() -> tuple[str, ...]:
+    """Names of the models a study may ask for."""
+    return MODELS
+
+
+def _is_shaft(model: str) -> bool:
+    if model not in MODELS:
+        raise ValueError(f"unknown model {model!r}; there is: {', '.join(MODELS)}")
+    return model == MACHINE_SHAFT
+
+
+def endings_of(model: str) -> dict[str, str]:
+    """The endings that a case of ``model`` can have, with their sentences."""
+    foreign = {ending.value for name, own in _OWN_ENDINGS.items() if name != model for ending in own}
+    return {name: sentence for name, sentence in ENDING_SENTENCES.items() if name not in foreign}
+
+
+def flags_of(model: str) -> dict[str, str]:
+    """The flags that a case of ``model`` can have, with their sentences."""
+    return {} if _is_shaft(model) else dict(FLAG_SENTENCES)
+
+
+def parameter_catalogue(model: str) -> tuple[Parameter, ...]:
+    """Every numeric parameter of ``model``: SPEC paths with letters for what counts.
+
+    ``N`` is a pendulum, ``K`` a coefficient or a step, ``NAME`` a constant. The two entries of the clutch stand under
+    ``clutch.``; they may also stand in each pendulum (``pendulums.N.clutch.``). Raises ValueError for an unknown model.
+    """
+    return machine_shaft.catalogue() if _is_shaft(model) else vibration_drive.catalogue()
+
+
+def parameters_of(study: Study) -> dict[str, Parameter]:
+    """The parameters of a study's own machine by flat path; empty where its model's catalogue says all."""
+    return {} if study.structure is None else machine_shaft.parameters_of(study.structure)
+
+
+def result_shapes(model: str) -> range:
+    """The numbers of pendulums for which ``model`` has a set of results; 0 alone where it has no pendulums."""
+    return range(1) if _is_shaft(model) else vibration_drive.shapes()
+
+
+def result_infos(model: str, pendulums: int) -> tuple[ResultInfo, ...]:
+    """Every result of ``model`` with that many pendulums, in the order of the columns of `ChunkResult.values`."""
+    return machine_shaft.result_infos() if _is_shaft(model) else vibration_drive.result_infos(pendulums)
+
+
+def pendulums(study: Study) -> int:
+    """Number of pendulums of the machine; 0 where its model has none."""
+    return 0 if _is_shaft(study.model) else vibration_drive.pendulums(study)
+
+
+def study_results(study: Study) -> tuple[ResultInfo, ...]:
+    """Every result of the cases of ``study``."""
+    return result_infos(study.model, pendulums(study))
+
+
+def shape_of(study: Study) -> KernelShape:
+    """The kernel that the cases of ``study`` need."""
+    return machine_shaft.shape_of() if _is_shaft(study.model) else vibration_drive.shape_of(study)
+
+
+def chunk_task(study: Study, first: int, count: int) -> ChunkTask:
+    """The cases ``first`` .. ``first + count - 1`` of ``study``, ready for `run_task`."""
+    columns: dict[str, Any] = {**study.base, **study.columns(range(first, first + count))}
+    run = None if _is_shaft(study.model) else run_of(study)
+    return ChunkTask(first, count, shape_of(study), run, columns, study.structure)
+
+
+def run_task(task: ChunkTask) -> ChunkResult:
+    """Run the cases of a task.
+
+    A physical failure is an ending in the result, never an exception; what is raised here is a fault of the program.
+    """
+    from engine.faults import inject
+
+    inject(task.columns, task.count)
+    return machine_shaft.run_task(task) if _is_shaft(task.shape.model) else vibration_drive.run_task(task)
+
+
+def run_chunk(study: Study, first: int, count: int) -> ChunkResult:
+    """Run the cases ``first`` .. ``first + count - 1`` of ``study`` here."""
+    return run_task(chunk_task(study, first, count))
+
+
+def extent(study: Study, case: int) -> Extent:
+    """What the instantaneous values of a case go along: the time of its run, or the angle of its shaft."""
+    return machine_shaft.extent(study) if _is_shaft(study.model) else vibration_drive.extent(study, case)
+
+
+def run_trajectory(study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
+    """Instantaneous values of one case at ``points`` equally spaced places of its `extent`."""
+    if _is_shaft(study.model):
+        return machine_shaft.run_trajectory(study, case, start, end, points)
+    return vibration_drive.run_trajectory(study, case, start, end, points)
+
+
+def estimate_seconds_per_case(study: Study) -> float:
+    """Rough time of one case of ``study`` on one core, in s."""
+    if _is_shaft(study.model):
+        return machine_shaft.estimate_seconds_per_case(study)
+    return vibration_drive.estimate_seconds_per_case(study)
+
+
+def estimate_compile_seconds(study: Study) -> float:
+    """Rough time until the kernel of ``study`` is there, in s; 0 where it lies compiled in the cache on disk."""
+    shape = shape_of(study)
+    if is_compiled(shape):
+        return 0.0
+    if _is_shaft(study.model):
+        return machine_shaft.estimate_compile_seconds()
+    return vibration_drive.estimate_compile_seconds(shape)
+
+
+def prepare() -> None:
+    """Load the engine with its compiler, so that the first cases do not wait for that."""
+    vibration_drive.prepare()
+    machine_shaft.prepare()
+
+
+def load(shape: KernelShape) -> None:
+    """Compile the kernel of that shape into the on-disk cache, or load it from there."""
+    if _is_shaft(shape.model):
+        machine_shaft.load()
+    else:
+        vibration_drive.load(shape)
+    with suppress(OSError):
+        _mark(shape).touch()
+
+
+def is_compiled(shape: KernelShape) -> bool:
+    """Whether `load` has put the kernel of that shape into the on-disk cache, on this machine and for this engine."""
+    return _mark(shape).exists()
+
+
+def _mark(shape: KernelShape) -> Path:
+    # Code for one machine is none for another with the same home.
+    parts = (shape.model, shape.pendulums, shape.coefficients, repr(shape.tolerance), platform.node())
+    return cache_folder() / f"{'-'.join(map(str, parts))}.ready"
+
+
+def warm_up(study: Study) -> None:
+    """Compile the kernel that ``study`` needs into the on-disk cache, or load it from there."""
+    load(shape_of(study))
+
+
+def cache_folder() -> Path:
+    """Folder of the compiled kernels, made if need be."""
+    from engine.compile.cache import cache_folder as engine_cache_folder
+
+    return engine_cache_folder()
+
+
+def discard_compiled() -> None:
+    """Throw away every compiled kernel of this engine that lies in the cache on disk, because some may be damaged."""
+    from engine.compile.cache import discard
+
+    discard()
+
+
+def cache_is_wanted() -> bool:
+    """Whether that folder is the one the user wants, not the stand-in for one that cannot be written."""
+    from engine.compile.cache import is_wanted
+
+    return is_wanted(cache_folder())

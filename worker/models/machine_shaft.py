@@ -1,0 +1,219 @@
+"""What is particular to machine shafts: how a study's structure and columns become a call of their engine."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from functools import cache
+from itertools import product
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from engine.machine_shaft.parameters import parameters as _engine_parameters
+from engine.machine_shaft.problems import ExpressionError, MachineError, RelationError
+from engine.machine_shaft.results import result_infos as _engine_results
+from engine.machine_shaft.spec import (
+    LINKED,
+    MAX_CONSTANTS,
+    MAX_STEPS,
+    REVOLUTIONS,
+    Drive,
+    MachineSpec,
+    MechanismChoice,
+    OperationChoice,
+)
+from engine.machine_shaft.tables import MAX_ROWS
+from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, Trajectory
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from engine.machine_shaft.spec import MechanismKind
+    from engine.vibration_drive.parameters import Parameter
+    from engine.vibration_drive.results import ResultInfo
+    from worker.study import Study
+
+__all__ = [
+    "LINKED",
+    "MAX_CONSTANTS",
+    "MAX_ROWS",
+    "MAX_STEPS",
+    "REVOLUTIONS",
+    "ExpressionError",
+    "MachineError",
+    "RelationError",
+    "base_results",
+    "check",
+    "check_structure",
+    "parameters_of",
+    "reachable_pressure",
+]
+
+MODEL = "machine-shaft"
+_SHAPE = KernelShape(MODEL, 0, 0, 0.0)
+Structure = dict[str, Any]
+
+
+def spec_of(structure: Mapping[str, Any] | None) -> MachineSpec:
+    """The engine's structure of a study's plain data."""
+    if structure is None:
+        raise ValueError("a machine shaft needs its structure")
+    return MachineSpec.from_json(structure)
+
+
+@cache
+def catalogue() -> tuple[Parameter, ...]:
+    """Every parameter that some machine has, ``K`` for the number of a step and ``NAME`` for that of a constant.
+
+    Where the unit depends on the machine it is that of a force, or of the shaft's angle.
+    """
+    kinds: tuple[MechanismKind, ...] = ("slider_crank", "four_bar", "quick_return", "cam")
+    every: list[MachineSpec] = [MachineSpec(cycle=max(REVOLUTIONS), constants=("NAME",))]
+    every += [MachineSpec(drive=Drive("formula")), MachineSpec(balance="motor", drive=Drive(motor="linear"))]
+    every += [MachineSpec(balance="motor", drive=Drive(motor="kloss"))]
+    every += [MachineSpec(mechanism=MechanismChoice(kind)) for kind in kinds]
+    forms = (OperationChoice("force"), OperationChoice("force", "steps", steps=1), OperationChoice("gas"))
+    every += [MachineSpec(cycle=max(REVOLUTIONS), operation=form) for form in forms]
+    found: dict[str, Parameter] = {}
+    for spec in every:
+        for entry in _engine_parameters(spec):
+            path = entry.path.replace(".steps.0.", ".steps.K.")
+            found.setdefault(path, replace(entry, path=path, help=entry.help + _REMARKS.get(path, "")))
+    order = ("mean_speed", "wanted_irregularity", "gravity", "drive", "mechanism", "operation", "constants")
+    return tuple(sorted(found.values(), key=lambda entry: order.index(entry.path.split(".")[0])))
+
+
+_OF_FORCE = "; N*m for a torque"
+_OF_ANGLE = "; a fraction from 0 to 1 over the stroke, else no further than the cycle"
+_REMARKS = {
+    "operation.value": _OF_FORCE,
+    "operation.steps.K.value": _OF_FORCE,
+    "operation.steps.K.from": _OF_ANGLE,
+    "operation.steps.K.to": _OF_ANGLE,
+}
+
+
+def parameters_of(structure: Mapping[str, Any]) -> dict[str, Parameter]:
+    """Every numeric parameter of a machine of this structure, by path."""
+    # Rows of tables are no parameters, and many.
+    bare = {name: {**part, "table": None} if isinstance(part, dict) else part for name, part in structure.items()}
+    return dict(_parameters(json.dumps(bare, sort_keys=True)))
+
+
+@cache
+def _parameters(structure: str) -> dict[str, Parameter]:
+    return {entry.path: entry for entry in _engine_parameters(spec_of(json.loads(structure)))}
+
+
+def result_infos() -> tuple[ResultInfo, ...]:
+    """Every result of a machine shaft."""
+    return _engine_results()
+
+
+def shape_of() -> KernelShape:
+    """All machines share their compiled code."""
+    return _SHAPE
+
+
+def check_structure(structure: Mapping[str, Any]) -> None:
+    """Raise MachineError where the structure makes no machine."""
+    from engine.machine_shaft.machine import check_structure as engine_check
+
+    engine_check(spec_of(structure))
+
+
+def check(structure: Mapping[str, Any], values: Mapping[str, float]) -> None:
+    """Raise MachineError where the machine has no steady motion, with all that is known about why."""
+    from engine.machine_shaft.simulate import check as engine_check
+
+    engine_check(spec_of(structure), values)
+
+
+def base_results(structure: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, float]:
+    """Results of the machine with these numbers, by name; NaN for those that it does not have."""
+    from engine.machine_shaft.simulate import simulate
+
+    found = simulate(spec_of(structure), values, cases=1).values[0]
+    return {info.name: float(value) for info, value in zip(result_infos(), found, strict=True)}
+
+
+def reachable_pressure(suction: ArrayLike, clearance: ArrayLike, exponent: ArrayLike) -> NDArray[np.float64]:
+    """Pressure in Pa to which a compressor can bring its gas."""
+    from engine.machine_shaft.operations import reachable_pressure as engine_pressure
+
+    return engine_pressure(*(np.asarray(part, dtype=np.float64) for part in (suction, clearance, exponent)))
+
+
+def run_task(task: ChunkTask) -> ChunkResult:
+    """Run the cases of a task."""
+    from engine.endings import ENDING_CODES
+    from engine.machine_shaft.simulate import simulate
+
+    batch = simulate(spec_of(task.structure), task.columns, cases=task.count)
+    names = [ending.value for ending in ENDING_CODES]
+    return ChunkResult(
+        first=task.first,
+        endings=[names[code] for code in batch.endings.tolist()],
+        flags=[""] * task.count,
+        # Adding zero makes a negative zero positive: databases do not keep its sign.
+        values=np.ascontiguousarray(batch.values, dtype=np.float64) + 0.0,
+    )
+
+
+def extent(study: Study) -> Extent:
+    """The cycle of the shaft."""
+    cycle = 2.0 * math.pi * spec_of(study.structure).cycle
+    return Extent("angle", "rad", cycle, cycle)
+
+
+def run_trajectory(study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
+    """Tables over ``points`` equally spaced angles of the shaft from ``start`` to ``end`` (rad)."""
+    from engine.machine_shaft.trajectory import trajectory
+
+    columns = {**study.base, **study.case_parameters(case)}
+    made = trajectory(spec_of(study.structure), columns, np.linspace(start, end, points))
+    return Trajectory(
+        made.angles, made.names, made.units, made.values, {}, made.ending.value, "angle", "rad", made.phi_c
+    )
+
+
+def estimate_seconds_per_case(study: Study) -> float:
+    """Rough time of one case of ``study`` on one core, in s."""
+    from engine.machine_shaft.simulate import estimate_seconds
+
+    return estimate_seconds(spec_of(study.structure))
+
+
+def estimate_compile_seconds() -> float:
+    """Rough time of compiling what all machines share, in s."""
+    return 5.0
+
+
+def prepare() -> None:
+    """Load the engine with its compiler."""
+    import engine.machine_shaft.simulate  # noqa: F401
+
+
+def load() -> None:
+    """Compile what all machines share into the on-disk cache, or load it from there: a case of each kind is run."""
+    from engine.machine_shaft.simulate import simulate
+    from engine.machine_shaft.trajectory import trajectory
+
+    for mean, balance in product(("midrange", "angle", "time"), ("scale", "motor")):
+        spec = MachineSpec(
+            mean_speed_is=cast("Any", mean), balance=cast("Any", balance),
+            drive=Drive("formula", formula="2 + cos(phi)", motor="linear"),
+            mechanism=MechanismChoice("formula", formula="1 + 0.1*sin(phi)^2"),
+            operation=OperationChoice("torque", "formula", formula="1 + sin(phi)"),
+        )  # fmt: skip
+        numbers = {"drive.inertia": 1.0}
+        if balance == "motor":
+            numbers |= {"drive.motor.no_load_speed": 10.0, "drive.motor.stall_torque": 20.0}
+        else:
+            numbers |= {"mean_speed": 10.0, "wanted_irregularity": 0.01}
+        simulate(spec, numbers, cases=2)
+        trajectory(spec, numbers, [0.0, 1.0])

@@ -1,0 +1,149 @@
+"""Functions run in several processes side by side: each thread looks after one `ChildProcess`."""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Generic, TypeVar, TypeVarTuple
+
+from worker.pool.child_process import ChildProcess, ProcessDiedError, ProcessStartError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+Args = TypeVarTuple("Args")
+R = TypeVar("R")
+
+
+class JobStoppedError(Exception):
+    """The job was stopped before it was done."""
+
+
+class Job(Generic[R]):
+    """A function that waits for a process, or runs in one.
+
+    Attributes
+    ----------
+    future : Future
+        Its value, or TimeoutError, ProcessDiedError, ProcessStartError, JobStoppedError, or what it raised; cancelled
+        when it was stopped before a process took it.
+    """
+
+    future: Future[R]
+
+    def __init__(self) -> None:
+        self._child: ChildProcess | None = None
+        self._stopped = False
+        self._lock = threading.Lock()
+
+    def stop(self) -> None:
+        """End it, with its process when it runs. What is just through stays done."""
+        if self.future.cancel():
+            return
+        with self._lock:
+            self._stopped = True
+            if self._child is not None:
+                self._child.kill()
+
+    def _enter(self, child: ChildProcess) -> None:
+        """Have the process there that `stop` would kill."""
+        with self._lock:
+            if self._stopped:
+                raise JobStoppedError
+            self._child = child
+            child.start()
+
+    def _leave(self) -> bool:
+        """From now on the process is not this job's any more; whether it was stopped."""
+        with self._lock:
+            self._child = None
+            return self._stopped
+
+
+class ChildPool:
+    """A number of processes, started at once; one that dies is replaced and costs only the function it ran.
+
+    Parameters
+    ----------
+    processes : int
+        At least 1.
+    prepare : function
+        What a new process does first; importable by name.
+    """
+
+    def __init__(self, processes: int, prepare: Callable[[], None]) -> None:
+        self._children = [ChildProcess(prepare) for _ in range(processes)]
+        self._idle: SimpleQueue[ChildProcess] = SimpleQueue()
+        for child in self._children:
+            child.start()
+            self._idle.put(child)
+        self._threads = ThreadPoolExecutor(processes, thread_name_prefix="child")
+        self._failed_starts = 0
+        self._closed = False
+
+    @property
+    def failed_starts(self) -> int:
+        """Processes that died before they were ready, one after the other with no function done between."""
+        return self._failed_starts
+
+    def schedule(self, timeout: float, function: Callable[[*Args], R], *args: *Args) -> Job[R]:
+        """Run a function in the next free process, for at most ``timeout`` s; returns at once."""
+        job: Job[R] = Job()
+        job.future = self._threads.submit(self._run, job, timeout, function, args)
+        return job
+
+    def _run(self, job: Job[R], timeout: float, function: Callable[..., R], args: tuple[object, ...]) -> R:
+        child = self._idle.get()
+        try:
+            return self._run_in(child, job, timeout, function, args)
+        finally:
+            with suppress(ProcessStartError):  # the next job tries again, and tells
+                child.start()
+            self._idle.put(child)
+
+    def _run_in(
+        self, child: ChildProcess, job: Job[R], timeout: float, function: Callable[..., R], args: tuple[object, ...]
+    ) -> R:
+        for last in (False, False, True):
+            try:
+                job._enter(child)
+                value: R = child.run(function, args, timeout)
+                break
+            except (ProcessDiedError, ProcessStartError) as error:
+                if job._leave() or self._closed:
+                    raise JobStoppedError from error
+                if isinstance(error, ProcessDiedError):
+                    raise
+                self._failed_starts += 1
+                if last:
+                    raise
+            finally:
+                job._leave()
+        self._failed_starts = 0
+        return value
+
+    def tend(self) -> None:
+        """Put new processes in the place of those that died idle; to be called now and then."""
+        for _ in self._children:
+            try:
+                child = self._idle.get_nowait()
+            except Empty:  # all are at work
+                return
+            try:
+                child.tend()
+            except ProcessStartError:
+                self._failed_starts += 1
+            finally:
+                self._idle.put(child)
+
+    def close(self) -> None:
+        """Kill what runs, drop what waits and leave no process behind."""
+        self._closed = True
+        self._threads.shutdown(wait=False, cancel_futures=True)
+        for child in self._children:
+            child.close()
+        self._threads.shutdown()
+        for child in self._children:
+            child.join()
