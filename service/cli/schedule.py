@@ -61,6 +61,9 @@ def add(
     priority: PriorityOption = 0,
     fresh: Fresh = False,
     finish_by: RunFinish = None,
+    key: Annotated[
+        str | None, typer.Option("--key", metavar="KEY", help="Idempotency key: the same key keeps the schedule once.")
+    ] = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
@@ -73,7 +76,7 @@ def add(
         "fresh": fresh,
     }
     with connection(server, token) as client:
-        _show(client.create_schedule(fields), as_json)
+        _show(client.create_schedule(fields, key), as_json)
 
 
 @app.command("list")

@@ -257,9 +257,11 @@ class AsyncStudy:
         *,
         cases: Sequence[Mapping[str, Any]] | None = None,
         name: str | None = None,
+        key: str | None = None,
     ) -> AsyncStudy:
-        """Submit a study that has this one's cases and more."""
-        made = await self._client.request("POST", f"{self._path}:extend", json=extension(axes, cases, name))
+        """Submit a study that has this one's cases and more; the same ``key`` submits it once."""
+        addition, headers = extension(axes, cases, name), {"Idempotency-Key": key or uuid.uuid4().hex}
+        made = await self._client.request("POST", f"{self._path}:extend", json=addition, headers=headers)
         return AsyncStudy(self._client, made["id"])
 
     async def act(self, verb: str) -> StudySummary:

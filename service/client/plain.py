@@ -67,15 +67,17 @@ class ServiceClient:
         Of a ``fresh`` study every case is run, also those that other studies have already. With ``finish_by``, a time
         with its offset or a duration such as "8 h", it is run coarse to fine and held then.
         """
-        headers = {"Idempotency-Key": key or uuid.uuid4().hex}
         query = [("priority", str(priority))] if priority else []
         query += [("fresh", "true")] if fresh else []
         query += [("finish_by", finish_by)] if finish_by is not None else []
-        return self._json("POST", "/studies", json=spec, headers=headers, params=query)
+        return self._json("POST", "/studies", json=spec, headers=_once(key), params=query)
 
-    def extend(self, study_id: str, addition: object) -> dict[str, Any]:
-        """Submit a study with more values on the axes of an old one (``axes``), or more cases (``cases``)."""
-        return self._json("POST", f"{study_path(study_id)}:extend", json=addition)
+    def extend(self, study_id: str, addition: object, key: str | None = None) -> dict[str, Any]:
+        """Submit a study with more values on the axes of an old one (``axes``), or more cases (``cases``).
+
+        The same ``key`` submits it once, however often it is sent.
+        """
+        return self._json("POST", f"{study_path(study_id)}:extend", json=addition, headers=_once(key))
 
     def preview(self, spec: object) -> dict[str, Any]:
         """Number of cases, estimated time and size of a study that is not submitted."""
@@ -158,9 +160,9 @@ class ServiceClient:
         """One schedule with its spec and its latest runs."""
         return self._json("GET", schedule_path(schedule_id))
 
-    def create_schedule(self, fields: Mapping[str, Any]) -> dict[str, Any]:
-        """Keep a new schedule: a study that is submitted by itself."""
-        return self._json("POST", "/schedules", json=dict(fields))
+    def create_schedule(self, fields: Mapping[str, Any], key: str | None = None) -> dict[str, Any]:
+        """Keep a new schedule, a study that is submitted by itself; the same ``key`` keeps it once."""
+        return self._json("POST", "/schedules", json=dict(fields), headers=_once(key))
 
     def change_schedule(self, schedule_id: str, fields: Mapping[str, Any]) -> dict[str, Any]:
         """Change some fields of a schedule."""
@@ -181,3 +183,7 @@ class ServiceClient:
 
     def _json(self, method: str, path: str, **arguments: Any) -> dict[str, Any]:
         return document(self.server, self._request(method, path, **arguments))
+
+
+def _once(key: str | None) -> dict[str, str]:
+    return {"Idempotency-Key": key or uuid.uuid4().hex}

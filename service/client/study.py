@@ -204,9 +204,13 @@ class Study:
         *,
         cases: Sequence[Mapping[str, Any]] | None = None,
         name: str | None = None,
+        key: str | None = None,
     ) -> Study:
-        """Submit a study that has this one's cases and more, of which only what is new is run."""
-        return Study(self._client, self._client.plain.extend(self.id, extension(axes, cases, name))["id"])
+        """Submit a study that has this one's cases and more, of which only what is new is run.
+
+        The same ``key`` submits it once, however often it is sent.
+        """
+        return Study(self._client, self._client.plain.extend(self.id, extension(axes, cases, name), key)["id"])
 
     def act(self, verb: str) -> StudySummary:
         """Ask for "pause", "resume", "cancel" or "retry"."""

@@ -40,7 +40,7 @@ PROBLEM_TYPES: dict[str, ProblemType] = _catalogue(
     _P("invalid-body", 422, "The request body is not valid", _FIELDS_HELP),
     _P("invalid-parameter", 422, "A request parameter is not valid", "`errors` names each and what it may be."),
     _P("invalid-selection", 422, "The cases asked for cannot be drawn", "A curve needs a value for every axis."),
-    _P("idempotency-conflict", 422, "The Idempotency-Key was used with another body", "A new study needs a new key."),
+    _P("idempotency-conflict", 422, "The Idempotency-Key was used with another body", "Something new needs a new key."),
     _P("study-not-found", 404, "There is no such study", "It never existed or was deleted."),
     _P("schedule-not-found", 404, "There is no such schedule", "It never existed or was deleted."),
     _P("case-not-found", 404, "There is no such case in the study", "Cases are numbered from 0."),

@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from service.jobs.preview import preview_json
-from service.jobs.submission import Submission, submission
+from service.jobs.submission import Submission, hash_of, submission
 from service.json_text import to_bytes
 from service.results.fits import fit_json, read_fit
 from service.schedules.fields import ScheduleFields, change_fields, read_fields
@@ -99,6 +99,11 @@ def clutch_fit(content: bytes, form: Format) -> bytes:
 def schedule_body(content: bytes, form: Format, now: datetime, old: ScheduleFields | None = None) -> ScheduleFields:
     """`schedule_fields` of the body of a request."""
     return schedule_fields(load_spec(content, form), now, old)
+
+
+def body_hash(content: bytes, form: Format) -> str:
+    """`hash_of` the body of a request; raises SpecError when it cannot be read at all."""
+    return hash_of(load_spec(content, form))
 
 
 def schedule_fields(data: object, now: datetime, old: ScheduleFields | None = None) -> ScheduleFields:

@@ -48,6 +48,11 @@ class Submission:
     finish_by: datetime | None = None
 
 
+def hash_of(asked: object) -> str:
+    """Of what a request asks for, as plain data, for its idempotency key: the order of names does not matter."""
+    return hashlib.sha256(json.dumps(asked, sort_keys=True).encode("ascii")).hexdigest()
+
+
 def submission(
     parsed: ParsedSpec,
     chunking: Chunking,
@@ -70,7 +75,7 @@ def submission(
         warnings += finish_warnings(parsed.study, seconds, (finish_by - now).total_seconds())
     return Submission(
         study_row(parsed.spec, parsed.study, chunking, warnings),
-        hashlib.sha256(json.dumps(asked, sort_keys=True).encode("ascii")).hexdigest(),
+        hash_of(asked),
         estimated_bytes(parsed.study),
         fresh,
         finish_by,

@@ -28,6 +28,10 @@ SCHEDULES = sa.Table(
     sa.Column("deleted_at", sa.BigInteger),
     # "06:00" on the wall clock of the zone, or a duration such as "8 h"; NULL where a run has no deadline.
     sa.Column("finish_by", sa.String(80)),
+    # Of the request that it came with; NULL where that had no key, or the schedule is deleted.
+    sa.Column("idempotency_key", sa.String(255)),
+    sa.Column("body_hash", sa.String(64)),
+    sa.Index("ix_schedules_idempotency_key", "idempotency_key", unique=True),
     sqlite_autoincrement=True,
 )
 

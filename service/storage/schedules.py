@@ -13,7 +13,7 @@ import sqlalchemy as sa
 
 from service.schedules.fields import ScheduleFields
 from service.schedules.times import Timing, Window, read_time_of_day
-from service.storage.errors import ScheduleNotFound, TooManySchedules
+from service.storage.errors import IdempotencyConflict, ScheduleNotFound, TooManySchedules
 from service.storage.part import EPOCH, Part, moment, optional_moment
 from service.storage.schedule_tables import SCHEDULE_RUNS, SCHEDULES
 from service.storage.tables import STUDIES, WAITS_FOR_WINDOW
@@ -85,17 +85,41 @@ class BoundStudy:
 class Schedules(Part):
     """Schedules as the service and the scheduler see them."""
 
-    def create_schedule(self, fields: ScheduleFields) -> ScheduleRecord:
-        """Keep a new schedule; raises TooManySchedules."""
+    def create_schedule(
+        self, fields: ScheduleFields, *, idempotency_key: str | None = None, body_hash: str = ""
+    ) -> ScheduleRecord:
+        """Keep a new schedule; raises TooManySchedules.
+
+        A key that was used before with the same ``body_hash`` gives the schedule of that time; with another one raises
+        IdempotencyConflict.
+        """
         schedule_id = f"sc_{secrets.token_hex(8)}"
+        asked = {"idempotency_key": idempotency_key, "body_hash": body_hash} if idempotency_key is not None else {}
         with self.session.write() as connection:
+            if idempotency_key is not None:
+                earlier = self._schedule_of_key(connection, idempotency_key, body_hash)
+                if earlier is not None:
+                    return earlier
             alive = sa.select(sa.func.count()).select_from(SCHEDULES).where(_S.deleted_at.is_(None))
             if connection.execute(alive).scalar_one() >= MAX_SCHEDULES:
                 raise TooManySchedules(f"there are {MAX_SCHEDULES} schedules already; delete one first")
             connection.execute(
-                sa.insert(SCHEDULES).values(id=schedule_id, created_at=self._now(), **self._values(fields))
+                sa.insert(SCHEDULES).values(id=schedule_id, created_at=self._now(), **asked, **self._values(fields))
             )
             return self._schedule(connection, schedule_id)
+
+    def schedule_of_key(self, idempotency_key: str, body_hash: str) -> ScheduleRecord | None:
+        """The schedule that was sent with that key; raises IdempotencyConflict when its body was another."""
+        with self.session.read() as connection:
+            return self._schedule_of_key(connection, idempotency_key, body_hash)
+
+    def _schedule_of_key(self, connection: sa.Connection, key: str, body_hash: str) -> ScheduleRecord | None:
+        row = connection.execute(sa.select(SCHEDULES).where(_S.idempotency_key == key)).one_or_none()
+        if row is None:
+            return None
+        if row.body_hash != body_hash:
+            raise IdempotencyConflict(f"the idempotency key {key!r} was already used with another body")
+        return self._record(connection, row)
 
     def get_schedule(self, schedule_id: str) -> ScheduleRecord:
         """The schedule of that id; raises ScheduleNotFound."""
@@ -128,7 +152,7 @@ class Schedules(Part):
             connection.execute(
                 sa.update(SCHEDULES)
                 .where(_S.number == number)
-                .values(deleted_at=self._now(), next_due=None, enabled=0, spec="{}")
+                .values(deleted_at=self._now(), next_due=None, enabled=0, spec="{}", idempotency_key=None)
             )
 
     def due_schedules(self, now: datetime) -> list[ScheduleRecord]:

@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from worker import models
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0011"
+HEAD_REVISION = "0012"
 
 METADATA = sa.MetaData(
     naming_convention={

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from http import HTTPStatus
 from typing import Any, Final
 
-from fastapi import FastAPI, Query
+from fastapi import FastAPI, Header, Query
 from fastapi.openapi.utils import get_openapi
 
 from service.faults import ErrorItem
@@ -54,6 +54,18 @@ _EXAMPLE_ERRORS: Final = {
         ErrorItem("the axis has no such value", None, "at", "shaft.load=0.7", "0.02, 0.1, 0.3", "N*m"),
     ),
 }
+
+
+def key_header(example: str, once: str) -> Any:
+    """The header that makes sure that something is made once; ``once`` says so."""
+    return Header(
+        alias="Idempotency-Key",
+        min_length=1,
+        max_length=200,
+        pattern=r"^[!-~]+$",
+        description=once,
+        examples=[example],
+    )
 
 
 def body(examples: dict[str, Any], schema: dict[str, Any], toml: str | None = None) -> dict[str, Any]:

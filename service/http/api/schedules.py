@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Depends, Path
@@ -11,7 +13,7 @@ from starlette.responses import Response
 
 from service.http.api import examples
 from service.http.api import schedule_models as m
-from service.http.api.document import body, located, problems
+from service.http.api.document import body, key_header, located, problems
 from service.http.context import ID_PATTERN, Context, Ctx, StudyIdConvertor
 from service.http.problems import ApiError
 from service.http.requests import Body, read_body, strict_query
@@ -22,6 +24,7 @@ from service.jobs import checks
 from service.schedules.deadline import ALLOWED_OF_RUNS
 from service.schedules.fields import ScheduleFields
 from service.spec.report import SpecError, spec_items
+from service.storage.schedules import ScheduleRecord
 from worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
 
 router = APIRouter(tags=["schedules"], dependencies=[Depends(strict_query)])
@@ -94,25 +97,54 @@ ScheduleId = Annotated[
     str, Path(description="id of the schedule", pattern=ID_PATTERN, examples=["sc_0123456789abcdef"])
 ]
 Fields = Annotated[Body, Depends(read_body)]
+IdempotencyKey = Annotated[
+    str | None,
+    key_header("0b6e9a52-nights", "the same key with the same body keeps the schedule once, however often it is sent"),
+]
 
 
 @router.post(
     "/schedules",
     status_code=201,
     response_model=m.ScheduleDetail,
-    responses=located(201) | problems(*_PROBLEMS, *CHECK_PROBLEMS, "wrong-state"),
+    responses=located(201) | problems(*_PROBLEMS, *CHECK_PROBLEMS, "idempotency-conflict", "wrong-state"),
     openapi_extra=body({"every working night": EXAMPLE}, {"$ref": "#/components/schemas/ScheduleRequest"}),
 )
-async def create_schedule(context: Ctx, work: Attended, received: Fields) -> Response:
+async def create_schedule(
+    context: Ctx, work: Attended, received: Fields, idempotency_key: IdempotencyKey = None
+) -> Response:
     """Keep a schedule: its study is submitted whenever it is due. Due times that were missed are made up for once."""
-    fields = await _fields(context, work, received, None)
-    record = await run_in_threadpool(context.store.create_schedule, fields)
-    return json_response(detail(record, ()), 201, {"Location": schedule_address(record.id)})
+    store = context.store
+
+    def keep(fields: ScheduleFields, key: str | None, body_hash: str) -> Response:
+        return _made(context, store.create_schedule(fields, idempotency_key=key, body_hash=body_hash))
+
+    if idempotency_key is None:
+        return await run_in_threadpool(keep, await _fields(context, work, received, None), None, "")
+    # Before the fields are read: what was a time to come may have passed since the key was sent first.
+    with _told():
+        body_hash = await work.check(checks.body_hash, received.content, received.format)
+    known = await run_in_threadpool(store.schedule_of_key, idempotency_key, body_hash)
+    if known is not None:
+        return await run_in_threadpool(_made, context, known)
+    return await run_in_threadpool(keep, await _fields(context, work, received, None), idempotency_key, body_hash)
+
+
+def _made(context: Context, record: ScheduleRecord) -> Response:
+    content = detail(record, context.store.schedule_runs(record.id))
+    return json_response(content, 201, {"Location": schedule_address(record.id)})
 
 
 async def _fields(context: Context, work: Work, received: Body, old: ScheduleFields | None) -> ScheduleFields:
-    try:
+    with _told():
         return await work.check(checks.schedule_body, received.content, received.format, context.store.clock.now(), old)
+
+
+@contextmanager
+def _told() -> Iterator[None]:
+    """What is wrong with a body becomes an ApiError."""
+    try:
+        yield
     except SpecError as error:
         raise ApiError("invalid-body", str(error), spec_items(error.problems)) from error
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Any
+from typing import Annotated
 
-from fastapi import APIRouter, Depends, Header, Query, Request
+from fastapi import APIRouter, Depends, Query, Request
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
@@ -14,7 +14,7 @@ from service.faults import parameter_error
 from service.http import views
 from service.http.api import examples
 from service.http.api import models as m
-from service.http.api.document import body, located, one_of, problems
+from service.http.api.document import body, key_header, located, one_of, problems
 from service.http.api.document import not_modified as documented_304
 from service.http.context import Context, Ctx, StudyId
 from service.http.requests import Body, read_body, strict_query
@@ -36,19 +36,9 @@ _BODY_PROBLEMS = ("invalid-parameter", "invalid-spec", "body-too-large", "unsupp
 SpecBody = Annotated[Body, Depends(read_body)]
 
 
-def _key(example: str) -> Any:
-    return Header(
-        alias="Idempotency-Key",
-        min_length=1,
-        max_length=200,
-        pattern=r"^[!-~]+$",
-        description="the same key with the same body and parameters submits the study once, however often it is sent",
-        examples=[example],
-    )
-
-
-IdempotencyKey = Annotated[str | None, _key("0b6e9a52-feeder")]
-ExtensionKey = Annotated[str | None, _key("0b6e9a52-further")]
+_ONCE = "the same key with the same body and parameters submits the study once, however often it is sent"
+IdempotencyKey = Annotated[str | None, key_header("0b6e9a52-feeder", _ONCE)]
+ExtensionKey = Annotated[str | None, key_header("0b6e9a52-further", _ONCE)]
 Priority = Annotated[
     int,
     Query(

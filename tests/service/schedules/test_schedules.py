@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Any
 
@@ -129,6 +130,20 @@ def test_two_schedulers_at_once_submit_one_study(settings: Settings, clock: Cloc
                 thread.join(60)
             assert faults == []
         assert sorted(names(one)) == sorted(["0", "1", "2", "3"] * 5)
+
+
+def test_one_key_from_many_threads_keeps_one_schedule(settings: Settings, clock: Clock) -> None:
+    with Store.open(settings.database_url, chunking=chunking(settings), clock=clock) as store:
+        kept = fields(cron="0 * * * *")
+        with ThreadPoolExecutor(8) as threads:
+            made = {
+                record.id
+                for record in threads.map(
+                    lambda _: store.create_schedule(kept, idempotency_key="k", body_hash="a"), range(16)
+                )
+            }
+        assert made == {record.id for record in store.list_schedules()}
+        assert len(made) == 1
 
 
 def test_who_saw_it_due_before_another_took_it_takes_nothing(service: Service, clock: Clock) -> None:
@@ -309,6 +324,25 @@ def test_the_interface_keeps_changes_disables_and_deletes(service: Service, cloc
     assert service.http.get(address).status_code == 404
     assert service.http.patch(address, json={}).status_code == 404
     assert service.get("/schedules") == {"schedules": []}
+
+
+def test_the_same_key_keeps_a_schedule_once(service: Service, clock: Clock) -> None:
+    key, body = {"Idempotency-Key": "nights"}, {"spec": SPEC, "at": "2026-01-01T02:00"}
+    first = service.http.post(API, json=body, headers=key)
+    assert first.status_code == 201, first.text
+    turned = dict(reversed(body.items()))
+    again = service.http.post(API, json=turned, headers=key)
+    assert (again.status_code, again.json()) == (201, first.json())
+    assert again.headers["location"] == first.headers["location"]
+    other = service.http.post(API, json={**body, "at": "2026-01-01T03:00"}, headers=key)
+    assert (other.status_code, other.json()["type"]) == (422, "/problems/idempotency-conflict")
+    clock.set("2026-01-01T05:00")  # who asks again after the time has passed is told of the same schedule
+    assert service.http.post(API, json=body, headers=key).json()["id"] == first.json()["id"]
+    assert [kept["id"] for kept in service.get("/schedules")["schedules"]] == [first.json()["id"]]
+    assert service.http.delete(first.headers["location"]).status_code == 204
+    late = service.http.post(API, json=body, headers=key)
+    assert (late.status_code, late.json()["errors"][0]["pointer"]) == (422, "/at"), "the key went with its schedule"
+    assert service.http.post(API, content=b"{", headers={**key, "Content-Type": "application/json"}).status_code == 422
 
 
 @pytest.mark.parametrize(
