@@ -138,3 +138,11 @@ def test_the_step_budget_follows_the_duration() -> None:
     assert periods(1e6, 0.0, 1.0).step_budget == 100_000_000
     assert Run(duration=Span(100.0, "s")).step_budget == 100_000_000
     assert periods(1e6, 0.0, 1.0, max_steps=7).step_budget == 7
+
+
+def test_a_run_with_more_steps_than_the_least_budget_ends_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a run of 300,000 periods does, which takes 7.2 million steps: the duration gives the budget, not the floor."""
+    monkeypatch.setattr("engine.run._LEAST_STEPS", 200)
+    row = one(drive(1), periods(30.0, 10.0, 30.0))
+    assert row["run.steps"] > 400
+    assert Results(drive(1), periods(30.0, 10.0, 30.0, max_steps=200), 1).endings == [Ending.STEP_BUDGET]
