@@ -22,6 +22,8 @@ class Ending(StrEnum):
     NEGATIVE_INERTIA = "negative_inertia"
     MOTOR_STALLED = "motor_stalled"
     QUADRATURE_NOT_REACHED = "quadrature_not_reached"
+    MOTOR_OVERRUN = "motor_overrun"
+    NEAR_SINGULAR = "near_singular"
 
     @property
     def sentence(self) -> str:
@@ -60,13 +62,20 @@ _SENTENCES = {
     ),
     Ending.NEGATIVE_INERTIA: "The reduced inertia is not positive at every angle of the shaft.",
     Ending.MOTOR_STALLED: (
-        "The motor has no steady cycle with this load: the resistance stalls it, or a load that drives overruns it. "
-        "Choose a stronger motor or more inertia, or turn the load's sign."
+        "The motor has no steady cycle with this load: the resistance stalls it. Choose a stronger motor or more "
+        "inertia."
     ),
     Ending.QUADRATURE_NOT_REACHED: (
         "A torque or the inertia changes too abruptly for its integral to be found to 1e-10: split a formula where it "
-        "jumps or widen its peaks, smooth a table, or take a linkage away from the position in which its links are all "
-        "but in line; an inertia may not jump at all."
+        "jumps or widen its peaks, or smooth a table; an inertia may not jump at all."
+    ),
+    Ending.MOTOR_OVERRUN: (
+        "The motor has no steady cycle with this load: the load drives the shaft harder than the motor can brake it, "
+        "and the shaft runs away. Choose a motor with a larger breakdown torque, or correct the load's sign."
+    ),
+    Ending.NEAR_SINGULAR: (
+        "The mechanism passes so near to a singular position (links all but in line, or a pivot all but on the crank's "
+        "circle) that double precision cannot resolve its inertia or its way: change the dimensions."
     ),
 }
 

@@ -41,6 +41,7 @@ class Cam(Mechanism):
     """
 
     ram_mass = "follower_mass"
+    has_singular_positions = False
 
     def __init__(self, rise: CamLaw, fall: CamLaw) -> None:
         self._rise, self._fall = LAWS[rise], LAWS[fall]

@@ -71,6 +71,8 @@ class Mechanism(ABC):
 
     #: Name of the parameter that is the mass of the working part; None where it has no straight way.
     ram_mass: str | None = None
+    #: Whether there are positions near which its motion has no bound: links in line, a pivot on the crank's circle.
+    has_singular_positions = True
 
     @abstractmethod
     def motion(self, values: Values, phi: Floats) -> Motion:

@@ -12,6 +12,8 @@ from engine.machine_shaft.spec import Motor
 Floats = NDArray[np.float64]
 
 _MAX_ITERATIONS = 80
+#: Cycles of a march that tells whether a shaft stops: what peaks stop, they stop in the first few.
+_CYCLES = 20
 
 
 def motor_torque(motor: Motor, values: Mapping[str, Floats], omega: Floats) -> tuple[Floats, Floats]:
@@ -51,13 +53,14 @@ class LimitCycle:
         Kinetic energy T_0 at the angle 0, in J.
     drive : array, shape (cases, panels, nodes)
         The motor's torque in N*m.
-    stalled : array of bool, shape (cases,)
-        Where no stable periodic motion was found.
+    stalled, overrun : arrays of bool, shape (cases,)
+        Where there is no stable periodic motion, because the shaft stops or because it runs away.
     """
 
     start: Floats
     drive: Floats
     stalled: NDArray[np.bool_]
+    overrun: NDArray[np.bool_]
 
 
 def limit_cycle(
@@ -108,8 +111,62 @@ def limit_cycle(
         drive, by_energy = _torque_and_slope(motor, values, inertia, energy)
         final, _ = _linear_step(motor, values, panels, inertia, resistance, energy)
         error = panels.largest(final - energy) / panels.largest(energy)
-        stalled = ~((error < 1e-9) & (start > 0.0) & (panels.integral(by_energy) < 0.0))
-    return LimitCycle(start, drive, stalled)
+        none = ~((error < 1e-9) & (start > 0.0) & (panels.integral(by_energy) < 0.0))
+        overrun = none & _overruns(motor, values, panels, inertia, resistance, -needed[:, 0, 0] * cycle, none)
+    return LimitCycle(start, drive, none & ~overrun, overrun)
+
+
+def _overruns(
+    motor: Motor,
+    values: Mapping[str, Floats],
+    panels: Panels,
+    inertia: Floats,
+    resistance: Floats,
+    work: Floats,
+    cases: NDArray[np.bool_],
+) -> NDArray[np.bool_]:
+    """Whether the load makes those of the ``cases`` run away that have no steady cycle, and does not stop them.
+
+    The braking torque of a linear motor grows with the speed without bound, and a load that takes energy over a cycle
+    slows every fast shaft down: neither is overrun. Kloss's motor is by a load that gives more than the motor can take
+    at most; between these, a shaft that starts at the synchronous speed is followed.
+    """  # fmt: skip
+    out = np.zeros(len(inertia), dtype=np.bool_)
+    if motor == "linear":
+        return out
+    for case in np.nonzero(cases & (work > 0.0))[0]:
+        own = {name: float(value[case if len(value) > 1 else 0, 0, 0]) for name, value in values.items()}
+        row = case if len(panels.half) > 1 else 0
+        real = panels.half[row] > 0.0
+        if work[case] > own["breakdown_torque"] * panels.weights[row][real].sum():
+            out[case] = True
+        else:
+            nodes = (panels.weights[row][real].ravel(), inertia[case][real].ravel(), resistance[case][real].ravel())
+            out[case] = _runs_away(motor, own, *nodes)
+    return out
+
+
+def _runs_away(motor: Motor, values: Mapping[str, float], steps: Floats, inertia: Floats, resistance: Floats) -> bool:
+    """March one case from the synchronous speed, from node to node; False where the shaft stops.
+
+    The steps are implicit in the motor's torque where that falls with the speed, so that a stiff motor is no trouble.
+    """
+    fast = values["synchronous_speed"] * (1.0 + values["breakdown_slip"])
+    own = {name: np.asarray(value) for name, value in values.items()}
+    energy = 0.5 * float(inertia[0]) * values["synchronous_speed"] ** 2
+    for _ in range(_CYCLES):
+        before, slowest = energy, np.inf
+        for step, moment, load in zip(steps.tolist(), inertia.tolist(), resistance.tolist(), strict=True):
+            omega = np.sqrt(2.0 * energy / moment)
+            slowest = min(slowest, omega)
+            torque, slope = motor_torque(motor, own, np.asarray(omega))
+            energy += step * float(torque + load) / (1.0 - step * min(float(slope) / (moment * omega), 0.0))
+            if not energy > 0.0:
+                return False
+        if slowest > fast and energy > before:
+            # Beyond its largest braking torque the motor brakes the less the faster the shaft is.
+            return True
+    return True
 
 
 def _torque_and_slope(

@@ -120,12 +120,30 @@ class InsufficientInertiaError(MachineError):
 
 
 class MotorStalledError(MachineError):
-    """The motor has no steady cycle with this load."""
+    """The motor has no steady cycle with this load, which stalls it."""
 
     ending = Ending.MOTOR_STALLED
 
     def __init__(self) -> None:
         super().__init__(Ending.MOTOR_STALLED.sentence)
+
+
+class MotorOverrunError(MachineError):
+    """The load drives the shaft harder than the motor can brake it."""
+
+    ending = Ending.MOTOR_OVERRUN
+
+    def __init__(self) -> None:
+        super().__init__(Ending.MOTOR_OVERRUN.sentence)
+
+
+class NearSingularError(MachineError):
+    """The mechanism passes a position so near to a singular one that its motion is not resolved."""
+
+    ending = Ending.NEAR_SINGULAR
+
+    def __init__(self) -> None:
+        super().__init__(Ending.NEAR_SINGULAR.sentence)
 
 
 class QuadratureError(MachineError):

@@ -37,6 +37,24 @@ def rough_pace(d: Decomposition) -> Bools:
     return np.asarray(~(fine | np.isnan(d.start)[:, None]))
 
 
+def near_singular(machine: Machine, d: Decomposition, rough: Bools) -> Bools:
+    """Cases with a panel among the ``rough`` ones in which the linkage's own motion is not resolved, (cases,).
+
+    Away from its singular positions a linkage moves smoothly: panels that were halved for anything else resolve it.
+    """
+    mechanism = machine.mechanism
+    if mechanism is None or not mechanism.has_singular_positions:
+        return np.zeros(len(rough), dtype=np.bool_)
+    with np.errstate(all="ignore"):
+        motion = mechanism.motion(machine.mechanism_values, d.panels.angles)
+    shape = d.fields.inertia.shape
+    wild = np.zeros(rough.shape, dtype=np.bool_)
+    for values in (np.broadcast_to(motion.inertia, shape), np.broadcast_to(motion.way_slope, shape)):
+        with np.errstate(all="ignore"):
+            wild |= ~_resolved(d.panels, values, 1e-11)
+    return np.asarray((wild & rough & (d.panels.half > 0.0)).any(axis=1))
+
+
 def _resolved(panels: Panels, values: Floats, limit: float) -> Bools:
     return np.asarray(panels.roughness(values) <= limit * panels.largest(values)[:, None])
 

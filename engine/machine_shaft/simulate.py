@@ -11,20 +11,22 @@ from engine.machine_shaft.balance import balanced, largest_work
 from engine.machine_shaft.decomposition import Decomposition, characteristics
 from engine.machine_shaft.flywheel import required_inertia
 from engine.machine_shaft.machine import Columns, Fields, Machine, check_structure
-from engine.machine_shaft.motor import limit_cycle
+from engine.machine_shaft.motor import LimitCycle, limit_cycle
 from engine.machine_shaft.panels import Panels
 from engine.machine_shaft.pieces import Pieces, pieces
 from engine.machine_shaft.problems import (
     AssemblyError,
     InsufficientInertiaError,
     MachineError,
+    MotorOverrunError,
     MotorStalledError,
+    NearSingularError,
     NegativeInertiaError,
     QuadratureError,
     UnbalancedWorkError,
 )
 from engine.machine_shaft.relations import check_relations
-from engine.machine_shaft.resolution import compare, rough_pace, rough_panels
+from engine.machine_shaft.resolution import compare, near_singular, rough_pace, rough_panels
 from engine.machine_shaft.results import result_infos
 from engine.machine_shaft.spec import MachineSpec
 from engine.machine_shaft.start import Shape, Stop, least_mean_speed, start_energy
@@ -152,9 +154,15 @@ def settle(spec: MachineSpec, columns: Columns, solved: Solved) -> Bools:
     lost = solved.rough.any(axis=1) | solved.unknown | (slow & (spec.balance == "motor"))
     if spec.mechanism.kind == "formula":
         lost |= ~np.isnan(Machine(spec, columns).inertia_jumps().angle)
-    lost &= solved.endings != _CODE[Ending.NEGATIVE_INERTIA]
+    negative = solved.endings == _CODE[Ending.NEGATIVE_INERTIA]
+    singular = np.zeros_like(lost)
+    if (lost | negative).any():
+        # Beside a singular position an inertia is so large that any other looks like nothing but rounding.
+        singular = near_singular(Machine(spec, columns), solved.decomposition, solved.rough) & ~solved.unknown
+    lost = (lost & ~negative) | singular
     _stop(solved, slow & ~lost)
     solved.endings[lost] = _CODE[Ending.QUADRATURE_NOT_REACHED]
+    solved.endings[singular] = _CODE[Ending.NEAR_SINGULAR]
     return np.asarray(lost)
 
 
@@ -170,8 +178,10 @@ def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
     negative = ~(least_inertia > 1e-12 * panels.largest(fields.inertia))
     endings[negative] = _CODE[Ending.NEGATIVE_INERTIA]
     if spec.balance == "motor":
-        drive, start, stalled = _motored(spec, columns, panels, cycle, fields)
-        endings[stalled & ~negative] = _CODE[Ending.MOTOR_STALLED]
+        found = _motored(spec, columns, panels, cycle, fields)
+        drive, start = found.drive, found.start
+        endings[found.stalled & ~negative] = _CODE[Ending.MOTOR_STALLED]
+        endings[found.overrun & ~negative] = _CODE[Ending.MOTOR_OVERRUN]
         least = np.full(columns.cases, np.nan)
     else:
         balance = balanced(spec.balance, panels, cycle, fields.drive, fields.resistance)
@@ -188,24 +198,21 @@ def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
     results["inertia.min"] = np.where(negative, least_inertia, results["inertia.min"])
     _by_definition(spec, d, results)
     results["required_inertia"] = _required(spec, columns, d, endings)
-    stalled = endings == _CODE[Ending.MOTOR_STALLED]
-    if stalled.any():
+    no_cycle = (endings == _CODE[Ending.MOTOR_STALLED]) | (endings == _CODE[Ending.MOTOR_OVERRUN])
+    if no_cycle.any():
         for name, values in results.items():
             if name.startswith(_OF_MOTOR):
-                results[name] = np.where(stalled, np.nan, values)
+                results[name] = np.where(no_cycle, np.nan, values)
     (rough, slow), pace = rough_panels(d), rough_pace(d)
     slow = slow | pace if spec.mean_speed_is == "time" else slow
     return Solved(d, results, endings, rough, slow, pace, np.zeros(columns.cases, dtype=np.bool_))
 
 
-def _motored(
-    spec: MachineSpec, columns: Columns, panels: Panels, cycle: float, fields: Fields
-) -> tuple[Floats, Floats, Bools]:
+def _motored(spec: MachineSpec, columns: Columns, panels: Panels, cycle: float, fields: Fields) -> LimitCycle:
     if spec.drive.motor is None:
         raise AssertionError("check_structure lets no motor be missing")
     values = columns.under("drive.motor.")
-    found = limit_cycle(spec.drive.motor, values, panels, cycle, fields.inertia, fields.resistance)
-    return found.drive, found.start, found.stalled
+    return limit_cycle(spec.drive.motor, values, panels, cycle, fields.inertia, fields.resistance)
 
 
 def _started(
@@ -353,10 +360,14 @@ def _problem(ending: Ending, result: Mapping[str, float], row: Columns, rule: st
         return UnbalancedWorkError(float(result["work.drive"]), float(result["work.resistance"]))
     if ending is Ending.INERTIA_INSUFFICIENT:
         return InsufficientInertiaError(float(row.row("mean_speed")[0]), float(result["least_mean_speed"]))
-    if ending is Ending.MOTOR_STALLED:
-        return MotorStalledError()
-    return QuadratureError() if ending is Ending.QUADRATURE_NOT_REACHED else None
+    plain = _PLAIN_PROBLEMS.get(ending)
+    return None if plain is None else plain()
 
+
+#: Problems of which nothing is known but the ending.
+_PLAIN_PROBLEMS: dict[Ending, type[MotorStalledError | MotorOverrunError | NearSingularError | QuadratureError]] = {
+    problem.ending: problem for problem in (MotorStalledError, MotorOverrunError, NearSingularError, QuadratureError)
+}
 
 #: Times of a case by the benchmark, over that with the mean as midrange.
 _COST = {"midrange": 1.0, "angle": 2.2, "time": 1.7}

@@ -153,6 +153,8 @@ _OWN_ENDINGS: dict[str, frozenset[Ending]] = {
             Ending.NEGATIVE_INERTIA,
             Ending.MOTOR_STALLED,
             Ending.QUADRATURE_NOT_REACHED,
+            Ending.MOTOR_OVERRUN,
+            Ending.NEAR_SINGULAR,
         }
     ),
 }

@@ -22,6 +22,7 @@ _POINTERS: Final[dict[Ending | None, str]] = {
     Ending.UNBALANCED_WORK: "/base/balance",
     Ending.NEGATIVE_INERTIA: "/base/drive/inertia",
     Ending.MOTOR_STALLED: "/base/drive/motor",
+    Ending.MOTOR_OVERRUN: "/base/drive/motor",
 }
 _PARTS: Final = ("mechanism", "drive", "operation")
 _NEUTRAL: Final[dict[str, dict[str, Any]]] = {"drive": {}, "mechanism": {"kind": "none"}, "operation": {}}
@@ -82,7 +83,7 @@ def check_machine(
         report.problem("/base/" + error.path.replace(".", "/"), str(error), error.value, allowed=error.allowed)
     except MachineError as error:
         pointer = _POINTERS.get(error.ending)
-        if error.ending is Ending.CANNOT_ASSEMBLE:
+        if error.ending in {Ending.CANNOT_ASSEMBLE, Ending.NEAR_SINGULAR}:
             pointer = places["mechanism"]
         if error.ending is Ending.NEGATIVE_INERTIA and structure["mechanism"]["kind"] in {"table", "formula"}:
             pointer = places["mechanism"]

@@ -17,6 +17,8 @@ GIVEN = {
     "negative_inertia": 8,
     "motor_stalled": 9,
     "quadrature_not_reached": 10,
+    "motor_overrun": 11,
+    "near_singular": 12,
     "crashed": 100,
     "timed_out": 101,
     "cancelled": 102,
