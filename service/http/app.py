@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from importlib.metadata import version
@@ -35,6 +37,13 @@ from service.storage.readiness import Readiness
 from service.storage.store import Store
 from worker.chunking import Chunking
 from worker.limits import COMPUTATION_BYTES, MAX_CHECKS, MAX_CHECKS_EACH, MAX_COMPUTATIONS
+from worker.pool.child_pool import JobStoppedError
+from worker.pool.child_process import ProcessDiedError, ProcessStartError
+from worker.ports import StoreError
+
+_LOG = logging.getLogger("sprag.service")
+#: Seconds before processes that did not start are tried again.
+_AGAIN_SECONDS = 5.0
 
 DESCRIPTION = """\
 Design studies of vibration drives with freewheel clutches and of main shafts of machines:
@@ -111,11 +120,15 @@ def create_app(
 
     @asynccontextmanager
     async def lifespan(running: FastAPI) -> AsyncIterator[None]:
+        preparing = None
         if isinstance(used_checker, ProcessComputer) and checker is None:
             used_checker.start()
+            preparing = asyncio.create_task(_make_ready(used_checker, context))
         housekeeping = Housekeeping(used_store)
         housekeeping.start()
         yield
+        if preparing is not None:
+            preparing.cancel()
         if isinstance(running, Application) and running.drain is not None:
             await running.drain.idle()
         await run_in_threadpool(housekeeping.stop)
@@ -146,7 +159,7 @@ def create_app(
     app.state.access = access
     app.state.metrics = metrics
     app.state.readiness = Readiness(used_store)
-    app.state.context = Context(
+    app.state.context = context = Context(
         settings,
         used_store,
         used_computer,
@@ -154,6 +167,8 @@ def create_app(
         checks.Library(used_store),
         check_shares=Shares(max(settings.check_processes - 1, 1), MAX_CHECKS_EACH),
     )
+    if checker is not None:
+        context.ready.set()
     api = APIRouter(prefix=API_PREFIX)
     for module in (studies, events, curves, sensitivity, cases, clutch_fits, schedules, catalogues):
         api.include_router(module.router)
@@ -163,6 +178,21 @@ def create_app(
         app.include_router(page.router)
     handlers.install(app)
     return app
+
+
+async def _make_ready(checker: ProcessComputer, context: Context) -> None:
+    """Tell `Context.ready` when every process that checks can take work; where one cannot be started, try again."""
+    while True:
+        try:
+            await checker.ready(checks.begin, context.library)
+        except JobStoppedError:
+            return
+        except (ProcessStartError, ProcessDiedError, StoreError) as error:
+            _LOG.error("The processes that check what is submitted do not start (%s); they are tried again.", error)
+            await asyncio.sleep(_AGAIN_SECONDS)
+        else:
+            context.ready.set()
+            return
 
 
 def _computer(settings: Settings) -> ProcessComputer:

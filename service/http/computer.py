@@ -99,6 +99,19 @@ class ProcessComputer:
         with self._lock:
             self._started()
 
+    async def ready(self, function: Callable[[*Args], object], *args: *Args) -> None:
+        """Run a function in each process as the first, however long they take to start.
+
+        Raises ProcessStartError and ProcessDiedError where one cannot be started, JobStoppedError after `close`, or
+        what the function raises.
+        """
+        # As many at once as there are processes, which are taken in turn: each gets one of its own.
+        jobs = [self._schedule(LOAD_SECONDS, function, *args) for _ in range(self._processes)]
+        found = await asyncio.gather(*(asyncio.wrap_future(job.future) for job in jobs), return_exceptions=True)
+        for fault in found:
+            if isinstance(fault, BaseException):
+                raise fault
+
     async def run(self, function: Callable[[*Args], R], *args: *Args) -> R:
         """The function's value. Function, arguments and value must be picklable."""
         with self._turn(self._limits.seconds):

@@ -57,7 +57,8 @@ class Context:
 
     ``checker`` runs what reads, expands, fits or draws what users wrote, and ``library`` is the store for it; requests
     use it and the computer through `service.http.work`, which keeps to the shares of each token. ``unaffected`` tells
-    of parameters that change nothing; ``streams`` are the places for streams of events.
+    of parameters that change nothing; ``streams`` are the places for streams of events. ``ready`` is set when the
+    checker can take work.
     """
 
     settings: Settings
@@ -66,6 +67,7 @@ class Context:
     checker: Computes
     library: Library
     ending: Event = field(default_factory=Event)
+    ready: Event = field(default_factory=Event)
     streams: Places = field(default_factory=lambda: Places(MAX_STREAMS))
     unaffected: Unaffected = field(default_factory=Unaffected)
     compute_shares: Shares = field(default_factory=lambda: Shares(1, MAX_COMPUTATIONS_EACH))

@@ -11,8 +11,9 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from types import FrameType
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import psutil
 import uvicorn
@@ -124,6 +125,13 @@ class Supervisor(threading.Thread):
         self.join()
 
 
+class Starting(NamedTuple):
+    """When the service can take work, and who is told then."""
+
+    ready: threading.Event
+    announce: Callable[[], None]
+
+
 class Server(uvicorn.Server):
     """A server that tells the application when it is about to end, so that open streams end too.
 
@@ -136,6 +144,8 @@ class Server(uvicorn.Server):
         Called when the grace of the requests is over, in a thread: has them come to an answer.
     give_up : function
         Called when the service has not ended long after the signal.
+    starting : Starting
+        What is to be told when the service can take work.
     """
 
     def __init__(
@@ -144,12 +154,21 @@ class Server(uvicorn.Server):
         ending: threading.Event,
         cut: Callable[[], None],
         give_up: Callable[[], None],
+        starting: Starting,
     ) -> None:
         super().__init__(config)
+        self._starting: Starting | None = starting
         self._told = ending
         self._cut = cut
         self._last = threading.Timer(_LAST_SECONDS, give_up)
         self._last.daemon = True
+
+    async def on_tick(self, counter: int) -> bool:
+        """Now and then, while the server runs."""
+        if self._starting is not None and self._starting.ready.is_set():
+            starting, self._starting = self._starting, None
+            starting.announce()
+        return await super().on_tick(counter)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """A signal asks for the end."""
@@ -180,7 +199,8 @@ def _give_up() -> None:
 def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) -> None:
     """Serve until SIGINT or SIGTERM; service and dispatcher have ended when this returns.
 
-    ``announce`` is called with the address once it is listened on (by default a line of the log tells it). Raises
+    ``announce`` is called with the address once the service can take work there (by default a line of the log tells
+    it). Raises
     UnsafeSettingsError, DatabaseError and AddressError, each with one sentence, before anything is started.
     """
     logs.configure(settings.log_format, requests=settings.log_requests)
@@ -206,10 +226,10 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
     with listener, _outlived_signals():
         supervisor.start()
         try:
-            (announce or _say)(address)
             with suppress(KeyboardInterrupt):
                 context = app.state.context
-                Server(config, context.ending, context.cut, _give_up).run(sockets=[listener])
+                starting = Starting(context.ready, partial(announce or _say, address))
+                Server(config, context.ending, context.cut, _give_up, starting).run(sockets=[listener])
         finally:
             supervisor.stop()
 

@@ -17,6 +17,8 @@ from service.spec.document import load_spec, parse_spec
 from service.spec.extend import parse_extended
 from service.spec.machine.shaft_check import compile_elsewhere
 from service.storage.store import Store
+from worker import models
+from worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -29,8 +31,8 @@ if TYPE_CHECKING:
 def prepare() -> None:
     """First thing in a process that checks: this module is loaded, and what is not compiled is left to others.
 
-    matplotlib and the machine shaft's kernels are loaded by the first who needs them: a study that is submitted right
-    after the start of the service need not wait for them.
+    matplotlib and the machine shaft's kernels are loaded for the first who needs them, in time that does not count
+    against his limit: a process that takes the place of one that was ended is there sooner without them.
     """
     compile_elsewhere()
 
@@ -52,7 +54,14 @@ class Library:
 
 @lru_cache(maxsize=1)
 def _library(url: str, chunking: Chunking) -> Library:
-    return Library(Store.open(url, chunking=chunking))
+    with uncounted():
+        return Library(Store.open(url, chunking=chunking))
+
+
+def begin(library: Library) -> None:
+    """The first work of a process that checks: open the ``library`` and load the engine, so that no client waits."""
+    library.store.ping()
+    models.prepare()
 
 
 def preview(library: Library, content: bytes, form: Format, finish: datetime | None, now: datetime) -> bytes:

@@ -7,6 +7,7 @@ import signal
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from worker import models
 from worker.executors.process_pool import ProcessPoolExecutor
 from worker.models import ChunkResult, ChunkTask, KernelShape
+from worker.pool.child_process import uncounted
 from worker.study import Axis, Study
 
 BASE = {
@@ -205,3 +207,14 @@ def tell_and_wait(told: str) -> None:
         pipe.write(str(os.getpid()))
     while True:
         signal.pause()
+
+
+def leave_a_trace(folder: str) -> None:
+    """A file of the name of the process."""
+    (Path(folder) / str(os.getpid())).touch()
+
+
+def fail_while_loading() -> None:
+    """What is to be loaded is damaged."""
+    with uncounted():
+        raise ZeroDivisionError

@@ -9,8 +9,9 @@ from __future__ import annotations
 import os
 import pickle
 import threading
+import time
 import traceback
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from multiprocessing.connection import wait
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from worker.pool.processes import interrupts_held_back, start_pool_process
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from multiprocessing.connection import Connection
     from multiprocessing.context import SpawnProcess
 
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
 START_SECONDS = 300.0
 #: Seconds for a killed process to be gone.
 KILL_SECONDS = 10.0
+
+#: What a process says before and after time that does not count.
+_LOADING, _LOADED = "loading", "loaded"
 
 # multiprocessing collects dead children of any thread whenever one is started or joined, and is not made for two
 # threads doing so at once: the slower would find no exit code.
@@ -91,15 +95,12 @@ class ChildProcess:
     def run(self, function: Callable[..., Any], args: tuple[Any, ...], timeout: float) -> Any:
         """The value of ``function(*args)``, computed by the process that was started; everything has to be picklable.
 
-        Raises TimeoutError after ``timeout`` s, when the process has been killed, ProcessDiedError when it died,
-        ProcessStartError when it died before it began, or what the function raised.
+        Raises TimeoutError after ``timeout`` s without those of `uncounted`, when the process has been killed,
+        ProcessDiedError when it died, ProcessStartError when it died before it began, or what the function raised.
         """
         pipe = self._give(pickle.dumps((function, args), protocol=pickle.HIGHEST_PROTOCOL))
         try:
-            if not wait([pipe], timeout):
-                self._bury()
-                raise TimeoutError(f"not done within {timeout:g} s")
-            is_value, found = pipe.recv()
+            is_value, found = self._answer_of(pipe, timeout)
         except (EOFError, OSError) as error:
             if isinstance(error, TimeoutError):
                 raise
@@ -107,6 +108,23 @@ class ChildProcess:
         if not is_value:
             raise found
         return found
+
+    def _answer_of(self, pipe: Connection, timeout: float) -> tuple[bool, Any]:
+        """What came of the function; raises TimeoutError, when the process has been killed, EOFError and OSError."""
+        left = timeout
+        while True:
+            begun = time.monotonic()
+            in_time = bool(wait([pipe], left))
+            left = max(left - (time.monotonic() - begun), 0.0)
+            if in_time:
+                said: Any = pipe.recv()
+                if said != _LOADING:
+                    answer: tuple[bool, Any] = said
+                    return answer
+                in_time = bool(wait([pipe], START_SECONDS)) and pipe.recv() == _LOADED
+            if not in_time:
+                self._bury()
+                raise TimeoutError(f"not done within {timeout:g} s")
 
     def _give(self, message: bytes) -> Connection:
         """Have the process begin with the function of ``message``; the pipe that its value comes through."""
@@ -175,8 +193,30 @@ class ChildProcess:
         self._bury()
 
 
+_owner: Connection | None = None
+
+
+@contextmanager
+def uncounted() -> Iterator[None]:
+    """Loading what a process needs once, such as a library: its time does not count against the limit of the function.
+
+    Not to be nested. Changes nothing outside a `ChildProcess`.
+    """
+    pipe = _owner
+    if pipe is None:
+        yield
+        return
+    pipe.send(_LOADING)
+    try:
+        yield
+    finally:
+        pipe.send(_LOADED)
+
+
 def _serve(pipe: Connection, parent: int, prepare: Callable[[], None]) -> None:
     """What the process does: take a function and its arguments, give back its value, until the pipe ends."""
+    global _owner  # noqa: PLW0603 - there is one in a process
+    _owner = pipe
     start_pool_process(parent, prepare)
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):
         pipe.send(True)

@@ -9,6 +9,7 @@ from starlette.responses import Response
 
 from service.http.api.document import files, problems
 from service.http.api.models import Health
+from service.http.context import Context
 from service.http.metrics import CONTENT_TYPE, Metrics
 from service.http.problems import ApiError
 from service.http.requests import strict_query
@@ -26,9 +27,10 @@ async def livez() -> Any:
 
 @router.get("/readyz", response_model=Health, responses=problems("invalid-parameter", "unavailable"))
 def readyz(request: Request) -> Any:
-    """Whether studies can be submitted, read and run: database, its schema, file and write lock, the worker."""
-    readiness = cast("Readiness", request.app.state.readiness)
-    if found := readiness.problems():
+    """Whether studies can be submitted, read and run: checks, database, its schema, file and write lock, the worker."""
+    readiness, context = cast("Readiness", request.app.state.readiness), cast("Context", request.app.state.context)
+    starting = () if context.ready.is_set() else ("The processes that check what is submitted are starting.",)
+    if found := (*starting, *readiness.problems()):
         raise ApiError("unavailable", " ".join(found), headers={"Retry-After": "5"})
     warnings = readiness.warnings()
     return json_response({"status": "ok", **({"warnings": list(warnings)} if warnings else {})})

@@ -7,13 +7,14 @@ import itertools
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 
 from service.faults import ErrorItem
 from service.results.selection import SelectionError
+from worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -132,9 +133,21 @@ def check_size(what: str, count: int, most: int) -> None:
         raise SelectionError([ErrorItem(message, parameter="format", allowed=f"<= {most} {what}")])
 
 
+@cache
+def load_matplotlib() -> None:
+    """Load all of matplotlib that pictures need, once in a process: no picture is to be blamed for the time of that."""
+    with uncounted():
+        import matplotlib.backends.backend_agg
+        import matplotlib.backends.backend_pdf
+        import matplotlib.backends.backend_svg
+        import matplotlib.figure
+        import matplotlib.font_manager  # noqa: F401
+
+
 @contextmanager
 def painting() -> Iterator[None]:
     """The style of every picture. matplotlib keeps it in globals, so that a process draws one picture at a time."""
+    load_matplotlib()
     import matplotlib as mpl
 
     with mpl.rc_context(_STYLE):
@@ -143,6 +156,7 @@ def painting() -> Iterator[None]:
 
 def render(paint: Callable[[Figure], None], picture: Picture, size: tuple[float, float]) -> bytes:
     """The picture that ``paint`` makes of a figure of that size (inches), in the style of all pictures."""
+    load_matplotlib()
     from matplotlib.figure import Figure
 
     buffer = io.BytesIO()
@@ -260,6 +274,7 @@ def _short(title: str) -> str:
 
 def writable(text: str, family: str | None = None) -> str:
     """``text`` with a square for every character that the font does not have; lines stay lines."""
+    load_matplotlib()
     from matplotlib.font_manager import FontProperties, findfont, get_font
 
     glyphs = get_font(findfont(FontProperties(family=family))).get_charmap()

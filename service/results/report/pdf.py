@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
-from service.results.pictures.curves import paint_curves, painting, writable
+from service.results.pictures.curves import load_matplotlib, paint_curves, painting, writable
 from service.results.report.html import input_text, number_text
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ _METADATA: Final = {"CreationDate": None, "Creator": "Sprag", "Producer": "Sprag
 
 def pdf_report(report: Report) -> bytes:
     """The document: the same bytes for the same study."""
+    load_matplotlib()
     from matplotlib.backends.backend_pdf import PdfPages
 
     buffer = io.BytesIO()

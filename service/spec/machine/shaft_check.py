@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cache, partial
 from typing import Any, Final
 
 from service.spec.report import Report
@@ -14,8 +14,10 @@ from worker.models import (
     KernelShape,
     MachineError,
     is_compiled,
+    load,
     machine_shaft,
 )
+from worker.pool.child_process import uncounted
 
 #: Where the fault of a machine that ends so is told.
 _POINTERS: Final[dict[Ending | None, str]] = {
@@ -45,6 +47,13 @@ def compile_elsewhere() -> None:
     _compiles_here = False
 
 
+@cache
+def _load(shape: KernelShape) -> None:
+    """Take the kernels from the cache on disk, once in a process: no spec is to be blamed for the time of that."""
+    with uncounted():
+        load(shape)
+
+
 def check_machine(
     report: Report, structure: Mapping[str, Any], values: Mapping[str, float], places: Mapping[str, str]
 ) -> None:
@@ -57,8 +66,10 @@ def check_machine(
     places : part -> JSON Pointer of its formula, its table, or all of it
     """
     shape = machine_shaft.shape_of()
-    if not _compiles_here and not is_compiled(shape):
-        raise NotCompiledError(shape)
+    if not _compiles_here:
+        if not is_compiled(shape):
+            raise NotCompiledError(shape)
+        _load(shape)
     before = report.found
     for part in _PARTS:
         # Alone but for the mechanism, which an operation needs, so that a fault is told where it is.

@@ -17,6 +17,7 @@ from service.http.problems import ApiError
 from tests.worker import fakes
 from worker import models
 from worker.limits import COMPUTATION_BYTES
+from worker.pool.child_process import ProcessStartError
 
 if TYPE_CHECKING:
     from anyio.from_thread import BlockingPortal
@@ -63,6 +64,40 @@ def test_a_kernel_takes_longer_than_a_computation_may_and_outlives_its_request(
         told.write_text("now")
         assert again.result(timeout=60) is None
         portal.call(computer.load, SHAPE)  # compiling again would wait for ever
+    finally:
+        computer.close()
+
+
+def test_it_is_ready_when_its_processes_are(tmp_path: Path, portal: BlockingPortal) -> None:
+    begun, told = tmp_path / "begun", tmp_path / "told"
+    os.mkfifo(begun)
+    os.mkfifo(told)
+    prepare = partial(fakes.load_between, SHAPE, begun=str(begun), told=str(told))
+    computer = ProcessComputer(Limits(0.01, COMPUTATION_BYTES), prepare=prepare)
+    try:
+        ready = portal.start_task_soon(computer.ready, os.getpid)
+        begun.read_text()  # waits until the process is being made ready
+        assert not ready.done()
+        told.write_text("now")
+        assert ready.result(timeout=300) is None
+    finally:
+        computer.close()
+
+
+def test_each_process_is_made_ready(tmp_path: Path, portal: BlockingPortal) -> None:
+    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES), processes=3)
+    try:
+        portal.call(computer.ready, fakes.leave_a_trace, str(tmp_path))
+        assert len(list(tmp_path.iterdir())) == 3
+    finally:
+        computer.close()
+
+
+def test_a_process_that_cannot_be_made_ready_is_told(portal: BlockingPortal) -> None:
+    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES), prepare=partial(os._exit, 3))
+    try:
+        with pytest.raises(ProcessStartError):
+            portal.call(computer.ready, os.getpid)
     finally:
         computer.close()
 

@@ -6,11 +6,15 @@ import threading
 from typing import TYPE_CHECKING
 
 import pytest
+import uvicorn
 
-from service.http.server import AddressError, Supervisor, serve
+from service.http.server import AddressError, Server, Starting, Supervisor, serve
 
 if TYPE_CHECKING:
+    from anyio.from_thread import BlockingPortal
+
     from service.settings import Settings
+    from tests.service.conftest import Service
 
 
 class FakeChild:
@@ -104,3 +108,26 @@ def test_an_address_in_use_is_told(settings: Settings) -> None:
             serve(busy)
     with pytest.raises(AddressError):
         serve(settings.model_copy(update={"host": "[::1%none]"}))
+
+
+def test_the_address_is_told_once_work_can_be_taken(portal: BlockingPortal) -> None:
+    ready, told = threading.Event(), []
+    starting = Starting(ready, lambda: told.append("here"))
+    server = Server(uvicorn.Config("none:app"), threading.Event(), list, list, starting)
+    assert portal.call(server.on_tick, 1) is False
+    assert told == []
+    ready.set()
+    for tick in range(2, 5):
+        portal.call(server.on_tick, tick)
+    assert told == ["here"]
+
+
+def test_readyz_waits_for_the_processes_that_check(service: Service) -> None:
+    assert service.http.get("/readyz").status_code == 200
+    service.app.state.context.ready.clear()
+    answer = service.http.get("/readyz")
+    assert (answer.status_code, answer.json()["detail"]) == (
+        503,
+        "The processes that check what is submitted are starting.",
+    )
+    assert service.http.get("/livez").status_code == 200

@@ -20,6 +20,7 @@ from service.spec.document import parse_spec
 from service.storage.clock_watch import ClockWatch
 from service.storage.errors import StudyNotFound
 from service.storage.store import Store
+from tests.service.conftest import InThread
 from tests.worker.fakes import HandClock
 
 DAY = 86_400.0  # s
@@ -60,7 +61,7 @@ def test_a_jump_deletes_nothing_and_is_told_and_survives_a_restart(
     settings: Settings, store: Store, clock: Wrong, tmp_path: Path, caplog: pytest.LogCaptureFixture,
     connect: Callable[..., httpx.Client],
 ) -> None:  # fmt: skip
-    http = connect(create_app(settings, store=store))
+    http = connect(create_app(settings, store=store, checker=InThread()))
     study, plan = ended(store), MaintenancePlan(tmp_path / "b", keep=1, study_days=30)
     maintenance = Maintenance(store, plan)
     maintenance.begin()

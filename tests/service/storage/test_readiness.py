@@ -24,6 +24,7 @@ from service.storage.readiness import Readiness
 from service.storage.session import sqlite_driver
 from service.storage.store import Store
 from tests.conftest import ROOT
+from tests.service.conftest import InThread
 from tests.worker import fakes
 from worker.executors.inline import InlineExecutor
 from worker.pool.process_table import processor_seconds, start_time
@@ -72,7 +73,7 @@ def stopped(store: Store) -> Iterator[subprocess.Popen[str]]:
 def test_a_silent_worker_is_told_by_readyz_and_by_studies(
     settings: Settings, store: Store, clock: fakes.HandClock, connect: Callable[..., httpx.Client]
 ) -> None:
-    http = connect(create_app(settings, store=store))
+    http = connect(create_app(settings, store=store, checker=InThread()))
     study = store.create_study({}, fakes.study(4))
     assert http.get("/readyz").status_code == 200, "no worker has begun yet"
     epoch = store.take_over("here:1")
