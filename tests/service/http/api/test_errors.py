@@ -216,10 +216,10 @@ def test_trouble_with_the_database_is_told(
     def fail(*_: Any, **__: Any) -> Any:
         raise error
 
-    for name in ("create_study", "ping", "list_studies"):
+    for name in ("insert_study", "ping", "list_studies"):
         monkeypatch.setattr(service.store, name, fail)
     assert_problem(service.http.post(f"{API}/studies", json=SPEC), status)
-    assert_problem(service.http.get("/readyz"), status)
+    assert_problem(service.http.get("/readyz"), 503)  # not ready, whatever the trouble
     assert service.http.get("/livez").status_code == 200
 
 
