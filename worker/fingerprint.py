@@ -12,6 +12,7 @@ import json
 import os
 import platform
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -22,10 +23,18 @@ from worker import models
 _SOURCES: Final = "engine sources"
 _FEATURES: Final = "processor features"
 _PACKAGES: Final = ("sprag", "numpy", "numba", "llvmlite", "scipy")
-#: Settings of numba that change the code it makes; those of the processor are in the features.
-_NUMBA_SETTINGS: Final = (
-    "NUMBA_DISABLE_JIT", "NUMBA_OPT", "NUMBA_LOOP_VECTORIZE", "NUMBA_SLP_VECTORIZE", "NUMBA_DISABLE_INTEL_SVML",
-)  # fmt: skip
+#: Settings of numba that do not change the code it makes, or are told by the processor features.
+_NUMBA_HARMLESS: Final = frozenset(
+    {
+        "NUMBA_CACHE_DIR",
+        "NUMBA_NUM_THREADS",
+        "NUMBA_CPU_FEATURES",
+        "NUMBA_ENABLE_AVX",
+        "NUMBA_DISABLE_PERFORMANCE_WARNINGS",
+    }
+)
+#: Where numba reads settings too, in the folder in which it is imported.
+_NUMBA_FILE: Final = Path(".numba_config.yaml")
 #: Differences of one subject that are named one by one.
 _NAMED: Final = 6
 
@@ -52,8 +61,19 @@ def collect() -> dict[str, str]:
         "C library": " ".join(platform.libc_ver()),
         "machine": platform.machine(),
         _FEATURES: _features(),
-        "numba settings": " ".join(f"{name}={os.environ[name]}" for name in _NUMBA_SETTINGS if name in os.environ),
+        "numba settings": _numba_settings(),
     }
+
+
+def _numba_settings() -> str:
+    settings = [
+        f"{name}={value}"
+        for name, value in sorted(os.environ.items())
+        if name.startswith("NUMBA_") and name not in _NUMBA_HARMLESS
+    ]
+    with suppress(OSError):
+        settings.append(f"{_NUMBA_FILE}={hashlib.sha256(_NUMBA_FILE.read_bytes()).hexdigest()[:16]}")
+    return " ".join(settings)
 
 
 def _version(package: str) -> str:

@@ -233,6 +233,11 @@ class _Parser:
             if not fewest <= len(parts) <= most:
                 wanted = str(fewest) if fewest == most else f"{fewest} to {most}"
                 raise ExpressionError(f"{name} takes {wanted} arguments, not {len(parts)}", position)
+            if name in {"min", "max"}:
+                # Equal arguments are tied everywhere, which is neither a jump nor a kink.
+                parts = list({_content(part): part for part in reversed(parts)}.values())[::-1]
+                if len(parts) == 1:
+                    return parts[0]
             return self.node(name, position, *parts)
         if name in CONSTANTS:
             return self.node("number", position, number=CONSTANTS[name])
@@ -312,6 +317,11 @@ class Expression:
             self._switches.append(lambda v: _turn(_evaluate(parts[0], v)[0], _evaluate(parts[1], v)[0]))
         elif node.kind == "if" and parts[0].kind not in _COMPARE:
             self._switches.append(lambda v: np.abs(np.sign(_evaluate(parts[0], v)[0])) - 0.5)
+
+
+def _content(node: Node) -> tuple[object, ...]:
+    """What a node says, wherever it stands in the text."""
+    return (node.kind, node.number, *map(_content, node.parts))
 
 
 def _names(node: Node) -> set[str]:

@@ -7,8 +7,12 @@ from typing import NoReturn
 
 def main() -> NoReturn:
     """Run the command of the process' arguments and end the process with its exit code."""
-    # A termination ends a command in order, as Ctrl-C does: files and processes are cleared away.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # A termination and the end of the terminal end a command in order, as Ctrl-C does: files, processes and studies
+    # are cleared away. What nohup ignores stays ignored.
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.default_int_handler)
     try:
         from service.cli.app import execute
 

@@ -212,7 +212,7 @@ def test_a_reader_that_goes_away_is_no_failure_to_talk_about() -> None:
         assert process.wait(SECONDS) == 141
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupted_run_leaves_nothing_behind(tmp_path: Path, number: signal.Signals) -> None:
     spec = json.loads(SPEC.read_text())
     spec["run"] = {"duration": "100000 periods"}

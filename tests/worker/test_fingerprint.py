@@ -27,7 +27,9 @@ def test_every_process_of_one_installation_has_the_same() -> None:
     assert collected() == fingerprint.digest() == collected(NUMBA_NUM_THREADS="1", SPRAG_PROCESSES="3")
 
 
-@pytest.mark.parametrize("setting", ["NUMBA_CPU_FEATURES=+sse2", "NUMBA_ENABLE_AVX=0", "NUMBA_OPT=0"])
+@pytest.mark.parametrize(
+    "setting", ["NUMBA_CPU_FEATURES=+sse2", "NUMBA_ENABLE_AVX=0", "NUMBA_OPT=0", "NUMBA_CPU_NAME=generic"]
+)
 def test_settings_that_change_the_code_change_it(setting: str) -> None:
     name, value = setting.split("=")
     assert collected(**{name: value}) != fingerprint.digest()

@@ -130,8 +130,8 @@ def test_names_that_mean_something_are_reserved() -> None:
 
 
 def test_switches_grow_with_the_arguments_and_not_with_their_square() -> None:
-    inner = f"min({','.join(['phi'] * 16)})"
-    assert Expression(f"max({','.join([inner] * 16)})").switch_count == 16 * 15 + 15
+    inner = [f"min({','.join(f'{k}-{j}*phi' for j in range(16))})" for k in range(16)]
+    assert Expression(f"max({','.join(inner)})").switch_count == 16 * 15 + 15
 
 
 def test_the_kinks_of_many_arguments_are_those_of_their_extreme() -> None:
@@ -142,3 +142,17 @@ def test_the_kinks_of_many_arguments_are_those_of_their_extreme() -> None:
     kinks = [math.acos(0.8), math.asin(0.8), math.pi - math.asin(0.8), 2.0 * math.pi - math.acos(0.8)]
     for kink in kinks:
         assert np.abs(shown - kink).min() < 1e-12
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "min(phi, phi)",
+        "max(min(phi, phi), min(phi,phi))",
+        "max(" + ",".join(["min(" + ",".join(["phi"] * 16) + ")"] * 16) + ")",
+    ],
+)
+def test_equal_arguments_are_no_switch(text: str) -> None:
+    formula = Expression(text)
+    assert formula.switch_count == 0
+    np.testing.assert_array_equal(formula(phi=PHI), PHI)
