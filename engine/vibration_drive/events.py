@@ -252,6 +252,29 @@ def _at_rest(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> bool:
 
 
 @part
+def _let_go_too(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, target: int) -> None:
+    """Let the locked clutches go that come to the same edge at the same instant as clutch ``i``, as copies of it do.
+
+    One after the other they would leave each other a step of rounding, in which nothing tells the trend any more.
+    """
+    lanes = lay.lanes
+    for j in range(lay.n):
+        base = lay.pendulums + j * lay.stride
+        if j == i or Z[lane, j] != LOCKED:
+            continue
+        share = lock_share(W, Z, lay, lane, j)
+        rate = W[(base + lay.p_torque + 1) * lanes + lane]
+        winds = target == ENGAGED and abs(share - 1.0) < EDGE and rate > 0.0
+        opens = target == FREE and abs(share) < EDGE and rate < 0.0
+        if winds or opens:
+            W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
+            W[(base + lay.p_u) * lanes + lane] = 0.0
+            Z[lane, SKIP_W + j] = 2
+            Z[lane, SKIP_U + j] = 3
+            set_clutch(W, Z, lay, lane, j, target)
+
+
+@part
 def transit(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
     """Carry out the event that ended a lane's step: exact values at the crossing, then the new state.
 
@@ -298,7 +321,10 @@ def transit(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
         if smooth:
             Z[lane, SKIP_W + i] = 2
             Z[lane, SKIP_U + i] = 3
-    elif source == TAKE_UP and target == FREE:
+        set_clutch(W, Z, lay, lane, i, target)
+        _let_go_too(W, Z, lay, lane, i, target)
+        return
+    if source == TAKE_UP and target == FREE:
         if smooth:
             W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
     elif BEYOND in (source, target):
