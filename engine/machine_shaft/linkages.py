@@ -88,6 +88,10 @@ class SliderCrank(Mechanism):
         """See Mechanism."""
         return _slider_margin(values["crank"], values, phi)
 
+    def broken_rule(self, values: Values) -> str | None:
+        """See Mechanism."""
+        return _slider_fold("crank", "crank", values)
+
     def worst_angles(self, values: Values) -> Sequence[Floats]:
         """See Mechanism."""
         one = np.ones_like(values["crank"])
@@ -103,6 +107,14 @@ def _slider_dead_centres(radius: Floats, values: Values) -> tuple[Floats, Floats
 
 def _slider_margin(radius: Floats, values: Values, theta: Floats) -> Floats:
     return np.asarray(1.0 - np.abs((radius * np.sin(theta) - values["offset"]) / values["rod"]))
+
+
+def _slider_fold(arm: str, part: str, values: Values) -> str | None:
+    """What is wrong where the rod, pulled in farthest, is exactly long enough: it lies on its arm; None otherwise."""
+    length, rod = number_of(values, arm) + abs(number_of(values, "offset")), number_of(values, "rod")
+    if abs(length - rod) > 1e-9 * rod:
+        return None
+    return f"the rod folds onto the {part} there, and the ram could go on either way"
 
 
 class FourBar(Mechanism):
@@ -245,7 +257,7 @@ class Whitworth(_QuickReturn):
         """See Mechanism."""
         crank, distance = number_of(values, "crank"), number_of(values, "pivot_distance")
         if crank > distance:
-            return None
+            return _slider_fold("link_arm", "link", values)
         return (
             f"the pivot_distance ({distance:.6g} m) of a whitworth is less than the crank ({crank:.6g} m), its pivot "
             "lying within the crank's circle, and here it is not"

@@ -103,8 +103,8 @@ class Mechanism(ABC):
         return None, None
 
     def broken_rule(self, values: Values) -> str | None:
-        """What the dimensions of a case that cannot be assembled break, as half a sentence; None where links are
-        too short to reach each other.
+        """Why the dimensions of a case cannot be assembled, as half a sentence; None where links are too short to reach
+        each other.
         """
         del values
         return None

@@ -189,6 +189,32 @@ def test_catalogues_are_sound() -> None:
         assert ending.sentence
 
 
+@pytest.mark.parametrize(
+    ("quick", "arm", "offset", "degrees", "part"),
+    [
+        (None, "crank", 0.0, 90.0, "crank"),
+        (None, "crank", 0.04, 270.0, "crank"),
+        (None, "crank", -0.04, 90.0, "crank"),
+        ("whitworth", "link_arm", 0.0, 90.0, "link"),
+        ("whitworth", "link_arm", 0.04, 270.0, "link"),
+    ],
+)
+def test_a_rod_that_folds_onto_its_crank_is_told(
+    quick: Any, arm: str, offset: float, degrees: float, part: str
+) -> None:
+    kind = "quick_return" if quick else "slider_crank"
+    choice = MechanismChoice("quick_return", quick_return=quick) if quick else MechanismChoice("slider_crank")
+    lengths = {"crank": 0.1, arm: 0.1, "rod": 0.1 + abs(offset), "offset": offset}
+    if quick:
+        lengths["pivot_distance"] = 0.05
+    numbers = FLAT | {f"mechanism.{kind}.{name}": length for name, length in lengths.items()}
+    with pytest.raises(AssemblyError, match=f"the rod folds onto the {part} there") as error:
+        check(MachineSpec(mechanism=choice), numbers)
+    assert math.degrees(error.value.angle) == pytest.approx(degrees, abs=1e-3)
+    with pytest.raises(AssemblyError, match="do not reach each other there"):
+        check(MachineSpec(mechanism=choice), numbers | {f"mechanism.{kind}.rod": 0.099 + abs(offset)})
+
+
 def test_a_parallelogram_is_told_that_it_folds() -> None:
     spec = MachineSpec(mechanism=MechanismChoice("four_bar"))
     lengths = {"crank": 0.1, "coupler": 0.3, "rocker": 0.1, "frame": 0.3}
