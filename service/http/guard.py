@@ -1,5 +1,6 @@
 """The outermost layer of the service: who may send what. Nothing behind it runs for a request that it refuses."""
 
+import logging
 import re
 from typing import Final
 
@@ -17,6 +18,8 @@ from service.settings import Settings
 from service.storage.errors import StoreError
 from service.storage.tokens import TokenScope
 from worker.limits import BODY_SECONDS, MAX_BODY_BYTES
+
+_LOG = logging.getLogger("sprag.service")
 
 #: What anybody may ask for, token or not: whether the service is up, and the way in.
 OPEN_PATHS: Final = frozenset({"/livez", "/readyz", LOGIN_PATH, "/static/sprag.css", "/static/sprag.svg"})
@@ -89,6 +92,8 @@ class Guard:
             answer, error = None, unreadable
         except ClientDisconnect:
             answer = None
+        if error.type.status >= 500:
+            _LOG.warning("%s %s: %s", request.method, request.url.path, error.detail)
         return answer or problem_page(request, error) or problem_response(error)
 
     async def _check(self, scope: Scope) -> None:

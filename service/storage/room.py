@@ -39,10 +39,12 @@ GOES_ON = "the study goes on by itself when there is room"
 def room(session: Session) -> tuple[int, str]:
     """Bytes that the database can still take, and what sets the limit: the disk, or the largest file allowed.
 
-    The disk of a server cannot be asked from here: it is full when the server says so at a write.
+    The disk of a server cannot be asked from here: it is full when the server says so at a write. Raises DatabaseError
+    when the file was moved, replaced or deleted while in use.
     """
     if session.on_server:
         return UNKNOWN_BYTES, f"the server of {session.location} does not tell"
+    session.require_same_file()
     free = shutil.disk_usage(session.path.parent).free
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
     size, log = _size(session.path), _size(session.path.with_name(f"{session.path.name}-wal"))

@@ -153,7 +153,11 @@ class Session:
         return engine
 
     def _create_file(self, *_: object) -> None:
-        """Create the database file before SQLite would, which lets others read it; the log beside it follows suit."""
+        """Create the database file before SQLite would, which lets others read it; the log beside it follows suit.
+
+        Raises DatabaseError where the file that was opened first is gone: it is never replaced by an empty one.
+        """
+        self.require_same_file()
         with suppress(OSError):  # it exists, or SQLite tells what is wrong
             os.close(create_private(self.path))
 
@@ -233,7 +237,7 @@ class Session:
             finally:
                 connection.close()
         except driver.Error as error:
-            found = explained(sa.exc.DBAPIError("", None, error), self.path)
+            found = self._explained(sa.exc.DBAPIError("", None, error))
             if isinstance(found, DatabaseBusyError):
                 return False
             raise (found if isinstance(found, StoreError) else DatabaseError(str(error))) from error
@@ -319,6 +323,11 @@ class Session:
     def _explained(self, error: sa.exc.DBAPIError) -> Exception:
         if self.on_server:
             return (_postgres().explained(error.orig, self.location) if error.orig else None) or error
+        # SQLite reports all kinds of errors when the file and its log no longer belong together.
+        try:
+            self.require_same_file()
+        except DatabaseError as moved:
+            return moved
         if "malformed" in str(error.orig):
             self.damage = damaged(self.path)
         return explained(error, self.path)

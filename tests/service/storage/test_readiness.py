@@ -13,18 +13,19 @@ from pathlib import Path
 import httpx
 import psutil
 import pytest
+import sqlalchemy as sa
 
 from service.http.app import create_app
 from service.jobs import dispatching
 from service.jobs.dispatching import WorkerSettings, run_dispatcher
 from service.settings import Settings
-from service.storage.errors import DatabaseError
+from service.storage.errors import DatabaseError, DatabaseFullError
 from service.storage.lock import DispatcherLock
 from service.storage.readiness import Readiness
 from service.storage.session import sqlite_driver
 from service.storage.store import Store
 from tests.conftest import ROOT
-from tests.service.conftest import InThread
+from tests.service.conftest import SPEC, InThread
 from tests.worker import fakes
 from worker.executors.inline import InlineExecutor
 from worker.pool.process_table import processor_seconds, start_time
@@ -121,6 +122,51 @@ def test_what_would_be_lost_with_a_file_is_not_taken(
     assert reason in problem
     with pytest.raises(DatabaseError, match=reason):
         store.create_study({}, fakes.study(4))
+
+
+def _replace(path: Path) -> None:
+    shutil.copy(path, path.with_name("copy"))
+    os.replace(path.with_name("copy"), path)
+
+
+def _move(path: Path) -> None:
+    path.rename(path.with_name("away"))
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [(_move, "was deleted or moved"), (Path.unlink, "was deleted or moved"), (_replace, "was replaced")],
+)
+def test_submissions_tell_that_the_file_is_gone(
+    settings: Settings,
+    store: Store,
+    connect: Callable[..., httpx.Client],
+    change: Callable[[Path], None],
+    reason: str,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    http = connect(create_app(settings, store=store, checker=InThread()))
+    path = store.session.path
+    change(path)
+    there = path.exists()
+    store.session.close()  # so that the next request opens the file anew
+    answer = http.post("/api/v1/studies", json=SPEC)
+    assert (answer.status_code, answer.json()["type"]) == (503, "/problems/unavailable")
+    assert f"the database file {path} {reason} while it was in use" in answer.json()["detail"]
+    assert f"POST /api/v1/studies: {answer.json()['detail']}" in caplog.text
+    assert path.exists() == there, "no empty file takes its place"
+    with pytest.raises(DatabaseError, match=reason):
+        store.room()
+
+
+def test_errors_of_the_disk_are_those_of_a_file_that_is_gone(store: Store) -> None:
+    error = sa.exc.OperationalError("SELECT 1", None, sqlite_driver().OperationalError("disk I/O error"))
+    with pytest.raises(DatabaseFullError, match="reports an error"), store.session.read():
+        raise error
+    _move(store.session.path)
+    with pytest.raises(DatabaseError, match="was deleted or moved") as raised, store.session.read():
+        raise error
+    assert not isinstance(raised.value, DatabaseFullError)
 
 
 def test_damage_is_found_and_told(store: Store, clock: fakes.HandClock) -> None:
