@@ -266,7 +266,7 @@ def test_doctor_finds_the_installation_sound(tmp_path: Path) -> None:
     done = sprag("doctor", "--json", "--db", tmp_path / "x.sqlite3")
     assert done.code == 0, done.data
     assert done.data["sound"] is True
-    assert {"versions", "SQLite", "database", "rights", "disk", "backups", "kernel cache", "engine"} == {
+    assert {"versions", "SQLite", "database", "rights", "disk", "backups", "clock", "kernel cache", "engine"} == {
         finding["subject"] for finding in done.data["findings"]
     }
 
