@@ -105,7 +105,8 @@ class Service:
     def dispatcher(self) -> psutil.Process | None:
         """The process of its dispatcher, if it has taken the lock."""
         with suppress(OSError, ValueError, psutil.Error):
-            holder = psutil.Process(int(self.database.with_name("sprag.sqlite3.lock").read_text()))
+            noted = self.database.with_name("sprag.sqlite3.lock").read_text(encoding="utf-8")
+            holder = psutil.Process(int(noted.split(" ")[0]))
             if holder.ppid() == self.process.pid and holder.status() != psutil.STATUS_ZOMBIE:
                 return holder
         return None
