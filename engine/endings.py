@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class Ending(StrEnum):
-    """Ending of one case as the engine sees it (MODEL.md A5). The member's value is what is stored and shown.
+    """Ending of one case as the engine sees it (docs/theory.md). The member's value is what is stored and shown.
 
     New members go to the end: positions are stored in compiled code.
     """

@@ -28,7 +28,7 @@ def inject(columns: Mapping[str, ArrayLike], cases: int) -> None:
     Parameters
     ----------
     columns : mapping
-        SPEC paths to scalars or arrays of shape (cases,), in SI units.
+        Paths in a spec to scalars or arrays of shape (cases,), in SI units.
     cases : int
 
     Raises

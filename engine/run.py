@@ -36,7 +36,7 @@ class Run:
     tolerance : float
         Local relative error of a step, 1e-14 .. 1e-4.
     reset : {"contact", "literal"}
-        Reading of equation (5) while torque is transmitted (MODEL.md A2).
+        Reading of equation (5) while torque is transmitted (docs/theory.md, "The automaton").
     max_steps : int, optional
     max_events_per_period : int
         Budgets that end a case as ``step_budget`` or ``chatter`` instead of letting it hang.

@@ -28,7 +28,7 @@ class Axis:
     Attributes
     ----------
     paths : tuple of str
-        Flat SPEC paths that share the values, for instance ``("excitation.amplitude_x", "excitation.amplitude_y")``.
+        Flat spec paths that share the values, for instance ``("excitation.amplitude_x", "excitation.amplitude_y")``.
     values : tuple of float
         SI numbers, finite, each once, in the user's order.
     """
@@ -75,7 +75,7 @@ class Study:
     name : str
         The user's name for it; not part of `physics_hash`.
     base : dict
-        Flat SPEC path -> SI number, every parameter, defaults filled in.
+        Flat path in a spec -> SI number, every parameter, defaults filled in.
     run : dict
         ``{"duration": [60.0, "periods"], "window": [[40.0, "periods"], [60.0, "periods"]] or None, "tolerance": 1e-9,
         "reset": "contact"}``; times in "periods" or "s". Empty for a model without a run.

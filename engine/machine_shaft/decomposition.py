@@ -3,7 +3,7 @@
 With T the kinetic energy, A_d and A_r the works of drive and resistance since an angle phi_c at which T is its mean,
 
     omega^2 = 2 T/I = S1 + S2 + S3 + S4,
-    S1 = 2 T_min/I,   S2 = 2 (T_mean - T_min)/I,   S3 = 2 A_d/I,   S4 = 2 A_r/I             (MODEL.md B (9)-(13))
+    S1 = 2 T_min/I,   S2 = 2 (T_mean - T_min)/I,   S3 = 2 A_d/I,   S4 = 2 A_r/I    (docs/theory-machine-shaft.md)
 """
 
 from dataclasses import dataclass

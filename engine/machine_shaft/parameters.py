@@ -1,4 +1,4 @@
-"""Numeric parameters of a machine: paths, SI units, ranges, defaults, by the parts it is made of (MODEL.md Part B)."""
+"""Numeric parameters of a machine: paths, SI units, ranges, defaults, by its parts (docs/theory-machine-shaft.md)."""
 
 import math
 from collections.abc import Mapping

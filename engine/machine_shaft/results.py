@@ -1,4 +1,4 @@
-"""The results of a machine shaft: names, units, meaning (MODEL.md Part B, SPEC.md "Result names")."""
+"""The results of a machine shaft: names, units, meaning (docs/theory-machine-shaft.md)."""
 
 from engine.vibration_drive.results import ResultInfo
 

@@ -295,7 +295,7 @@ def simulate(model: MachineSpec, columns: Mapping[str, ArrayLike], *, cases: int
     model : MachineSpec
         The structure all cases share.
     columns : mapping
-        SPEC paths (``parameters(model)``) to scalars or arrays of shape (cases,), SI units. Missing ones take the
+        Paths in a spec (``parameters(model)``) to scalars or arrays of shape (cases,), SI units. Missing ones take the
         catalogue's default.
     cases : int
         Number of cases, at least 0.

@@ -1,4 +1,4 @@
-"""What a machine is made of: everything about it that is no number. Numbers come as columns, by SPEC path."""
+"""What a machine is made of: everything about it that is no number. Numbers come as columns, by path in a spec."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field

@@ -1,3 +1,3 @@
-"""The vibration drive: pendulums on a vibrating axis that turn an output shaft through freewheel clutches (MODEL.md
-Part A).
+"""The vibration drive: pendulums on a vibrating axis that turn an output shaft through freewheel clutches
+(docs/theory.md).
 """

@@ -1,4 +1,4 @@
-"""The hybrid automaton of MODEL.md A2 as one table: what each state watches, and where a crossing leads.
+"""The hybrid automaton (docs/theory.md) as one table: what each state watches, and where a crossing leads.
 
 Compiled code reads the arrays made from ``TRANSITIONS`` at the end of this module; documentation and tests read the
 table.
@@ -54,7 +54,7 @@ class Transition:
     to ``target``.
 
     ``reset`` says what is set at the crossing. ``literal_only`` rows hold under ``reset = "literal"`` alone
-    (MODEL.md (5)): there an engaged clutch restarts when w rises through 0. Since w is positive when it engages, the
+    (docs/theory.md)): there an engaged clutch restarts when w rises through 0. Since w is positive when it engages, the
     row that leads back to the same state notes the fall of w through 0 that has to come first; it changes nothing and
     counts as no event.
     """

@@ -61,7 +61,7 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     Parameters
     ----------
     columns : mapping
-        SPEC paths to scalars or arrays of shape (cases,), in SI units (frequency in Hz).
+        Paths in a spec to scalars or arrays of shape (cases,), in SI units (frequency in Hz).
     run : Run
     cases : int
 

@@ -1,4 +1,4 @@
-"""From the sums, marks and extrema of a run to the named characteristics of MODEL.md A4."""
+"""From the sums, marks and extrema of a run to the named characteristics (docs/theory.md)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +76,7 @@ def characteristics(lay: Layout, matrix: Floats, sums: Floats) -> Floats:
     Returns
     -------
     array, shape (cases, results)
-        In the order of ``result_infos(lay.n)``; NaN where a value could not be computed (MODEL.md A4).
+        In the order of ``result_infos(lay.n)``; NaN where a value could not be computed (docs/theory.md).
     """
     cases = _Cases(lay, matrix, sums)
     out: dict[str, Floats] = {}
@@ -198,7 +198,7 @@ def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
 
 
 def _balances(cases: _Cases, out: dict[str, Floats]) -> None:
-    """Residuals of both balances of MODEL.md A4, each over the largest of its own terms.
+    """Residuals of both balances (docs/theory.md, "Balances"), each over the largest of its own terms.
 
     The terms include the largest kinetic energy and the largest angular momentum of the shaft in the window, so that a
     machine that only swings or coasts, with next to no work done, is not judged against zero.

@@ -1,4 +1,4 @@
-"""Least-squares clutch characteristic from measured torque over angle (MODEL.md A3, equations (6), (7) of source 1).
+"""Least-squares clutch characteristic from measured torque over angle (docs/theory.md).
 
 The polynomial is solved from the scaled matrix of powers by QR and SVD; the normal equations (7) are never formed.
 What the source's program reports of their matrix, eigenvalues and condition number, is found from singular values.

@@ -1,4 +1,4 @@
-"""Measured clutch data and the fit's options, checked: rows of angle and torque become windups (MODEL.md A3)."""
+"""Measured clutch data and the fit's options, checked: rows of angle and torque become windups (docs/theory.md)."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The clutch's torque over its windup as a given law: check, torque, stiffness, stored energy (MODEL.md (3), A2).
+"""The clutch's torque over its windup as a given law: check, torque, stiffness, stored energy (docs/theory.md)).
 
 A law is the list ``c_1 .. c_p`` of T(u) = sum c_k u^(k-1), valid up to ``windup_limit`` (rad); beyond it goes on
 straight with its end slope (state BEYOND). Below zero windup no torque is transmitted.
@@ -72,7 +72,7 @@ def stiffness(coefficients: ArrayLike, windup_limit: float, u: ArrayLike) -> _Ar
 
 
 def stored_energy(coefficients: ArrayLike, windup_limit: float, u: ArrayLike) -> _Array:
-    """Energy stored in the clutch, J: Pi(u) = integral of T from 0 to u = sum c_k u^k/k (MODEL.md A4).
+    """Energy stored in the clutch, J: Pi(u) = integral of T from 0 to u = sum c_k u^k/k (docs/theory.md).
 
     Parameters as in :func:`torque`; beyond ``windup_limit`` the energy of the straight continuation is added.
     """

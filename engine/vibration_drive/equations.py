@@ -1,4 +1,4 @@
-"""The equations of motion (MODEL.md A1) as recurrences of Taylor coefficients, written once for every kernel.
+"""The equations of motion (docs/theory.md) as recurrences of Taylor coefficients, written once for every kernel.
 
 Notation of one order k: ``phi, w, u, T`` are angle, speed, windup and clutch torque of a pendulum, ``W_`` and ``S``
 speed and total clutch torque of the shaft, ``X, Y`` the base's accelerations x'' and y''. Equation (1) is used divided

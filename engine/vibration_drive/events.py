@@ -1,4 +1,4 @@
-"""Events of one lane: finding the first one inside a step, and changing the state when it is reached (MODEL.md A2)."""
+"""Events of one lane: finding the first one inside a step, and changing the state there (docs/theory.md)."""
 
 import numpy as np
 from numpy.typing import NDArray

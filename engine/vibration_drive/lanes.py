@@ -52,7 +52,7 @@ OUT_ENDING, OUT_STEPS, OUT_EVENTS, OUT_RUNUP, OUT_SUMS = 0, 1, 2, 3, 4
 def load_case(
     W: Floats, Z: Ints, lay: Layout, lane: int, case: int, cases: Floats, starts: Floats, literal: int
 ) -> None:
-    """Put a case into a lane at t = 0 (MODEL.md A2, "Start") or at the strobe in its row of ``starts``.
+    """Put a case into a lane at t = 0 (docs/theory.md, "The automaton") or at the strobe in its row of ``starts``.
 
     ``cases`` has the columns of ``cases.case_matrix``.
     """

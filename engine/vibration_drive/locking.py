@@ -1,4 +1,4 @@
-"""Clutches that lock: delta = 0 and c_1 > 0 at the start of interaction (MODEL.md A2, Filippov's choice)."""
+"""Clutches that lock: delta = 0 and c_1 > 0 at the start of interaction (docs/theory.md, "The automaton")."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Parameters of a vibration drive: paths, SI units, ranges, defaults (MODEL.md A1, SPEC.md)."""
+"""Parameters of a vibration drive: paths, SI units, ranges, defaults (docs/theory.md, "The machine")."""
 
 import math
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ STANDARD_GRAVITY = 9.80665
 class Parameter:
     """One numeric parameter.
 
-    ``path`` is the SPEC path with ``N`` for a pendulum's index. ``symbol`` is MODEL.md's letter. The allowed range is
+    ``path`` is the spec path with ``N`` for a pendulum's index. ``symbol`` is as in docs/theory.md. The range is
     ``low`` .. ``high`` in ``unit``; an open end excludes the bound itself. ``default`` None means the value is
     required.
     """
@@ -61,7 +61,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter("shaft.initial_speed", "phi_e'(0)", "rad/s", 0.0, 1e6, False, 0.0, "shaft speed at t = 0"),
 )
 
-#: Coefficients of the clutch polynomial (MODEL.md (3)); ``K`` counts from 0, so K = 0 is c_1. Unit N*m/rad^K.
+#: Coefficients of the clutch polynomial (docs/theory.md)); ``K`` counts from 0, so K = 0 is c_1. Unit N*m/rad^K.
 CLUTCH_COEFFICIENT = Parameter(
     "clutch.coefficients.K", "c_(K+1)", "N*m/rad^K", -1e30, 1e30, False, None, "clutch polynomial"
 )

@@ -1,4 +1,4 @@
-"""The characteristics of a vibration drive: names, units, meaning (MODEL.md A4, SPEC.md "Result names")."""
+"""The characteristics of a vibration drive: names, units, meaning (docs/theory.md, "Characteristics")."""
 
 from dataclasses import dataclass
 from typing import Literal

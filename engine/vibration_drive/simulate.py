@@ -77,7 +77,7 @@ def simulate(columns: Mapping[str, ArrayLike], run: Run, *, cases: int) -> Batch
     Parameters
     ----------
     columns : mapping
-        SPEC paths to scalars or arrays of shape (cases,), in SI units, frequency in Hz. The clutch is given as
+        Paths in a spec to scalars or arrays of shape (cases,), in SI units, frequency in Hz. The clutch is given as
         ``clutch.coefficients.0`` (c_1) and so on, with an optional ``clutch.windup_limit``, for all pendulums, or as
         ``pendulums.N.clutch...`` for one. Missing paths take the default of ``PARAMETERS``.
     run : Run

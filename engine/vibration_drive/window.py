@@ -179,7 +179,7 @@ def watch_extrema(W: Floats, lay: Layout, lane: int, active: bool) -> None:
 
 @part
 def energy(W: Floats, Z: Ints, lay: Layout, lane: int) -> float:
-    """Mechanical energy of a lane (MODEL.md A4): pendulums, springs, weight, shaft and wound-up clutches."""
+    """Mechanical energy of a lane (docs/theory.md): pendulums, springs, weight, shaft and wound-up clutches."""
     lanes = lay.lanes
     speed = W[lay.speed * lanes + lane]
     total = 0.5 * W[lay.inertia * lanes + lane] * speed * speed

@@ -1,4 +1,4 @@
-"""``sprag fit``: the clutch polynomial of measured data, with its report (MODEL.md A3)."""
+"""``sprag fit``: the clutch polynomial of measured data, with its report (docs/theory.md)."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ def _study(name: str, base: dict[str, float]) -> Study:
 
 
 def _quiet() -> tuple[Study, dict[str, float]]:
-    """Small forced oscillation within the lost motion: amplitude and loss in closed form (MODEL.md A6, 1)."""
+    """Small forced oscillation within the lost motion: amplitude and loss in closed form (docs/theory.md)."""
     frequency, amplitude, damping = 25.0, 1e-7, 0.05
     nu = 2.0 * math.pi * frequency
     stiffness = (
@@ -87,7 +87,7 @@ def _driven() -> tuple[Study, dict[str, float]]:
 
 
 def _free_shaft() -> tuple[Study, dict[str, float]]:
-    """A machine shaft that nothing drives or brakes: its irregularity in closed form (MODEL.md Part B)."""
+    """A machine shaft that nothing drives or brakes: its irregularity in closed form (docs/theory-machine-shaft.md)."""
     own, swinging = 2.0, 3.0
     q = math.sqrt(own / (own + swinging))
     base = {"mean_speed": 10.0, "drive.inertia": own, "constants.m": swinging}

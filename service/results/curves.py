@@ -39,7 +39,7 @@ Fetch = Callable[[NDArray[np.int64], Sequence[str]], "CaseColumns"]
 
 @dataclass(frozen=True, slots=True)
 class CurveQuery:
-    """What to draw: paths and result names as SPEC.md writes them; values of ``at`` as text with or without a unit."""
+    """What to draw: paths and result names as in docs/reference.md; values of ``at`` as text with or without a unit."""
 
     x: str
     y: tuple[str, ...]
@@ -95,7 +95,7 @@ class Curves:
     curves: tuple[Curve, ...]
 
     def to_json(self) -> dict[str, Any]:
-        """SPEC.md's document: null for a missing number, with the ending that explains it."""
+        """The document of docs/http.md: null for a missing number, with the ending that explains it."""
         chosen = self.selection
         return {
             "x": {"path": chosen.x, "unit": chosen.units[chosen.x], "values": list(chosen.x_values)},

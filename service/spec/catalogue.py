@@ -23,7 +23,7 @@ def general_path(path: str) -> str:
 
 
 def model_parameter(model: str, path: str) -> Parameter | None:
-    """The entry of a flat SPEC path in the catalogue of ``model``; None when it has no such parameter."""
+    """The entry of a flat path in a spec in the catalogue of ``model``; None when it has no such parameter."""
     general = general_path(path)
     # A clutch of one pendulum has the parameters of the common one.
     wanted = {general, general.removeprefix("pendulums.N.")} if ".clutch." in general else {general}
@@ -31,13 +31,13 @@ def model_parameter(model: str, path: str) -> Parameter | None:
 
 
 def parameter_of(study: Study, path: str) -> Parameter | None:
-    """The parameter at a flat SPEC path of the machine of ``study``; None when it has none there."""
+    """The parameter at a flat path in a spec of the machine of ``study``; None when it has none there."""
     own = models.parameters_of(study)
     return own.get(path) if own else model_parameter(study.model, path)
 
 
 def unit_of(study: Study, path: str) -> str:
-    """SI unit of a flat SPEC path, "1" where it has none."""
+    """SI unit of a flat path in a spec, "1" where it has none."""
     entry = parameter_of(study, path)
     return "1" if entry is None else placed(entry, path).unit
 

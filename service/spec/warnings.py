@@ -169,7 +169,7 @@ def _pointer(study: Study, path: str) -> str:
 
 
 def _stability(report: Report, study: Study, index: int) -> None:
-    """c a^2 against M g l: below it the upright (for l > 0) position is unstable without vibration (MODEL.md A1)."""
+    """c a^2 against M g l: below it the upright (for l > 0) position is unstable without vibration (docs/theory.md)."""
     names = ("spring_rate", "spring_arm", "mass", "arm")
     c, a, mass, arm, g, weight = _columns(study, [*(f"pendulums.{index}.{name}" for name in names), "gravity"])
     spring, gravity = np.broadcast_arrays(c * a**2, mass * g * arm)

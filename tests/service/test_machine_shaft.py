@@ -27,7 +27,7 @@ from worker.executors.inline import InlineExecutor
 if TYPE_CHECKING:
     from tests.service.conftest import Service
 
-#: The press of MODEL.md's reference, without units: what the engine is called with here knows nothing of specs.
+#: The press of the reference values, without units: what the engine is called with here knows nothing of specs.
 NUMBERS = {
     "mechanism.slider_crank.crank": 0.1,
     "mechanism.slider_crank.rod": 0.4,

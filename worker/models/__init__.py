@@ -183,7 +183,7 @@ def flags_of(model: str) -> dict[str, str]:
 
 
 def parameter_catalogue(model: str) -> tuple[Parameter, ...]:
-    """Every numeric parameter of ``model``: SPEC paths with letters for what counts.
+    """Every numeric parameter of ``model``: paths in a spec with letters for what counts.
 
     ``N`` is a pendulum, ``K`` a coefficient or a step, ``NAME`` a constant. The two entries of the clutch stand under
     ``clutch.``; they may also stand in each pendulum (``pendulums.N.clutch.``). Raises ValueError for an unknown model.

@@ -53,7 +53,7 @@ class KernelShape:
 class ChunkTask:
     """Consecutive cases as they travel to a process: their own columns only, however large the study is.
 
-    ``columns`` maps flat SPEC paths to SI numbers, or to arrays of shape (count,) where they vary. ``run`` is None for
+    ``columns`` maps flat spec paths to SI numbers, or to arrays of shape (count,) where they vary. ``run`` is None for
     a model without a run, ``structure`` None for one whose machines have none (`Study.structure`).
     """
 

@@ -310,7 +310,7 @@ class ParameterInfo(Body):
     """A parameter of a model."""
 
     path: str = Field(
-        description="SPEC path; N stands for a pendulum's index, K for a coefficient's or a step's, NAME for a constant"
+        description="path in a spec; N is the index of a pendulum, K of a coefficient or a step, NAME a constant"
     )
     symbol: str
     unit: str

@@ -66,7 +66,7 @@ class Input:
 
 
 def description_of(study: Study, path: str) -> str:
-    """What a flat SPEC path means, as a few words; "" where the catalogue does not have it."""
+    """What a flat path in a spec means, as a few words; "" where the catalogue does not have it."""
     entry = parameter_of(study, path)
     return "" if entry is None else entry.help
 

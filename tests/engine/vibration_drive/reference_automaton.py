@@ -33,7 +33,7 @@ class Accumulating(Exception):  # noqa: N818 - not a failure
 
 @dataclass(frozen=True)
 class Pendulum:
-    """MODEL.md A1: J, M l, c a^2, lambda, delta, law and end of its data."""
+    """docs/theory.md: J, M l, c a^2, lambda, delta, law and end of its data."""
 
     inertia: float
     moment: float
@@ -171,7 +171,7 @@ class Drive:
     # -- automaton ---------------------------------------------------------------------------------------------------
 
     def guards(self) -> Iterator[tuple[Callable[[Any, Any], Any], Callable[[Floats, float], None]]]:
-        """Functions that are positive until their event, each with what the event does (the table of MODEL.md A2)."""
+        """Functions that are positive until their event, each with what the event does (docs/theory.md)."""
         n = self.n
         if self.shaft_state == "held":
             yield lambda t, y: self.load - sum(self.torques(t, y)[0]), lambda y, t: self.turn("rotating")

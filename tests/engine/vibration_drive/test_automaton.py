@@ -1,4 +1,4 @@
-"""The automaton's table (MODEL.md A2), and its rarer states on machines that can be worked out by hand."""
+"""The automaton's table (docs/theory.md), and its rarer states on machines that can be worked out by hand."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tests.engine.vibration_drive.drive import Columns, clutch, column, drive, o
 
 UP, DOWN = +1, -1
 
-#: The table of MODEL.md A2, row by row: state, what it watches, direction, threshold, next state; START stands for
+#: The table of docs/theory.md row by row: state, what it watches, direction, threshold, next state; START stands for
 #: "xi := 0, then TAKE-UP; if delta = 0: ENGAGED, or LOCKED".
 MODEL_TABLE = {
     (Clutch.FREE, Quantity.RELATIVE_SPEED, UP, Threshold.ZERO, Clutch.START),

@@ -1,4 +1,4 @@
-"""Energy and momentum balances (MODEL.md A4): they close, and they are computed from the run."""
+"""Energy and momentum balances (docs/theory.md, "Characteristics"): they close, and they are computed from the run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cases with a known answer (MODEL.md A6), worked out by hand."""
+"""Cases with a known answer (docs/theory.md, "Checks with known answers"), worked out by hand."""
 
 from __future__ import annotations
 
