@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Any
@@ -11,46 +10,19 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from service.http.api.examples import SPEC
-from service.http.api.schedules import EXAMPLE
-from service.http.app import chunking, create_app
+from service.http.app import chunking
 from service.jobs import scheduler as module
 from service.jobs.scheduler import Scheduler
 from service.schedules.fields import ScheduleFields, read_fields
 from service.storage.errors import DatabaseBusyError, ScheduleNotFound
 from service.storage.schedules import RunState
 from service.storage.store import Store
-from tests.service.conftest import InThread, Service
-from tests.worker.fakes import HandClock
+from tests.service.conftest import Service
+from tests.service.schedules.conftest import NEW_YEAR, Clock
 from worker.states import StudyState
 
 if TYPE_CHECKING:
-    import httpx
-
     from service.settings import Settings
-
-NEW_YEAR = datetime(2026, 1, 1, tzinfo=UTC)  # where the clock of the tests begins: a Thursday
-
-
-class Clock(HandClock):
-    """A clock that is set by hand to a time of UTC."""
-
-    def set(self, text: str) -> None:
-        """Stand at that time."""
-        self.seconds = (datetime.fromisoformat(text).replace(tzinfo=UTC) - NEW_YEAR).total_seconds()
-
-
-@pytest.fixture
-def clock() -> Clock:
-    return Clock()
-
-
-@pytest.fixture
-def service(settings: Settings, clock: Clock, connect: Callable[..., httpx.Client]) -> Iterator[Service]:
-    """A service by the clock of the test."""
-    computer = InThread()
-    with Store.open(settings.database_url, chunking=chunking(settings), clock=clock) as store:
-        app = create_app(settings, store=store, computer=computer, checker=InThread())
-        yield Service(app, connect(app), store, computer)
 
 
 def fields(**given: Any) -> ScheduleFields:
@@ -299,136 +271,3 @@ def test_the_thread_looks_again_after_trouble(
     scheduler.stop()
     assert not scheduler.is_alive()
     assert caplog.messages == ["The schedules cannot be kept: the database is busy"]
-
-
-API = "/api/v1/schedules"
-
-
-def test_the_interface_keeps_changes_disables_and_deletes(service: Service, clock: Clock) -> None:
-    made = service.http.post(API, json=EXAMPLE)
-    assert made.status_code == 201, made.text
-    address = made.headers["location"]
-    found = service.http.get(address).json()
-    assert found == made.json()
-    assert found["next_due"] == "2026-01-01T21:00:00Z"
-    assert (found["window"], found["spec"]) == (["22:00", "06:00"], SPEC)
-    changed = service.http.patch(address, json={"at": "2026-02-01T09:00", "window": None, "name": "once"}).json()
-    assert (changed["cron"], changed["at"]) == (None, "2026-02-01T09:00:00+01:00")
-    assert (changed["window"], changed["name"], changed["next_due"]) == (None, "once", "2026-02-01T08:00:00Z")
-    assert service.http.patch(address, json={"enabled": False}).json()["next_due"] is None
-    clock.set("2026-03-01T00:00")
-    late = service.http.patch(address, json={"enabled": True, "name": "too late"})  # its time has passed
-    assert (late.status_code, late.json()["next_due"]) == (200, None)
-    assert [s["name"] for s in service.get("/schedules")["schedules"]] == ["too late"]
-    assert service.http.delete(address).status_code == 204
-    assert service.http.get(address).status_code == 404
-    assert service.http.patch(address, json={}).status_code == 404
-    assert service.get("/schedules") == {"schedules": []}
-
-
-def test_the_same_key_keeps_a_schedule_once(service: Service, clock: Clock) -> None:
-    key, body = {"Idempotency-Key": "nights"}, {"spec": SPEC, "at": "2026-01-01T02:00"}
-    first = service.http.post(API, json=body, headers=key)
-    assert first.status_code == 201, first.text
-    turned = dict(reversed(body.items()))
-    again = service.http.post(API, json=turned, headers=key)
-    assert (again.status_code, again.json()) == (201, first.json())
-    assert again.headers["location"] == first.headers["location"]
-    other = service.http.post(API, json={**body, "at": "2026-01-01T03:00"}, headers=key)
-    assert (other.status_code, other.json()["type"]) == (422, "/problems/idempotency-conflict")
-    clock.set("2026-01-01T05:00")  # who asks again after the time has passed is told of the same schedule
-    assert service.http.post(API, json=body, headers=key).json()["id"] == first.json()["id"]
-    assert [kept["id"] for kept in service.get("/schedules")["schedules"]] == [first.json()["id"]]
-    assert service.http.delete(first.headers["location"]).status_code == 204
-    late = service.http.post(API, json=body, headers=key)
-    assert (late.status_code, late.json()["errors"][0]["pointer"]) == (422, "/at"), "the key went with its schedule"
-    assert service.http.post(API, content=b"{", headers={**key, "Content-Type": "application/json"}).status_code == 422
-
-
-@pytest.mark.parametrize(
-    ("given", "pointer"),
-    [
-        ({"cron": "0 25 * * *"}, "/cron"),
-        ({"cron": 5}, "/cron"),
-        ({}, "/cron"),
-        ({"cron": "0 1 * * *", "at": "2027-01-01T00:00"}, "/cron"),
-        ({"at": "2025-01-01T00:00"}, "/at"),
-        ({"at": 1}, "/at"),
-        ({"cron": "0 1 * * *", "zone": "Europe/Berlim"}, "/zone"),
-        ({"cron": "0 1 * * *", "zone": "../../etc/passwd"}, "/zone"),
-        ({"cron": "0 1 * * *", "window": ["22:00", "22:00"]}, "/window"),
-        ({"cron": "0 1 * * *", "window": "22:00-06:00"}, "/window"),
-        ({"cron": "0 1 * * *", "priority": 1e9}, "/priority"),
-        ({"cron": "0 1 * * *", "fresh": 1}, "/fresh"),
-        ({"cron": "0 1 * * *", "name": ["x"]}, "/name"),
-        ({"cron": "0 1 * * *", "name": "a\r\nb"}, "/name"),
-        ({"cron": "0 1 * * *", "name": ""}, "/name"),
-        ({"cron": "0 1 * * *", "spec": {**SPEC, "model": "x"}}, "/spec/model"),
-        ({"cron": "0 1 * * *", "wndow": None}, "/wndow"),
-    ],
-)
-def test_what_is_wrong_is_named(service: Service, given: dict[str, Any], pointer: str) -> None:
-    answer = service.http.post(API, json={"spec": SPEC, **given})
-    assert answer.status_code == 422, answer.text
-    assert pointer in [error["pointer"] for error in answer.json()["errors"]]
-    assert all(error["allowed"] for error in answer.json()["errors"])
-
-
-def test_a_near_name_of_a_zone_is_offered(service: Service) -> None:
-    answer = service.http.post(API, json={"spec": SPEC, "cron": "0 1 * * *", "zone": "Europe/Berlim"})
-    assert "did you mean 'Europe/Berlin'?" in answer.text
-
-
-def fill_in(**given: str) -> dict[str, str]:
-    """A form as a browser sends it."""
-    empty = {"name": "", "at": "", "window_begin": "", "window_end": "", "priority": "0", "zone": "UTC"}
-    return {**empty, "when": "cron", "cron": "0 22 * * *", "source": "preset one_pendulum", **given}
-
-
-def test_a_schedule_is_kept_changed_and_deleted_by_the_pages(service: Service, clock: Clock) -> None:
-    study_id = service.submit()
-    assert f'value="study {study_id}" selected' in service.http.get(f"/schedules/new?study={study_id}").text
-    form = fill_in(source=f"study {study_id}", window_begin="22:00", window_end="06:00", name="<b>by form</b>")
-    assert service.http.post("/schedules/new", data=form).status_code == 303
-    (kept,) = service.store.list_schedules()
-    assert (kept.fields.spec, kept.fields.name) == (SPEC, "<b>by form</b>")
-    listed = service.http.get("/schedules").text
-    assert "&lt;b&gt;by form" in listed
-    assert "22:00 to 06:00" in listed
-    assert "2026-01-01 22:00:00 UTC" in listed
-    assert 'value="22:00"' in service.http.get(f"/schedules/{kept.id}").text
-    change = fill_in(source="", when="at", at="2026-01-05T07:30", zone="Europe/Berlin", fresh="on", priority="-2")
-    assert service.http.post(f"/schedules/{kept.id}", data=change).status_code == 303
-    (changed,) = service.store.list_schedules()
-    assert changed.next_due == datetime(2026, 1, 5, 6, 30, tzinfo=UTC)
-    assert (changed.fields.spec, changed.fields.fresh, changed.fields.priority) == (SPEC, True, -2)
-    clock.set("2026-01-06T00:00")
-    Scheduler(service.store).look()
-    assert ">its study</a>" in service.http.get("/schedules").text
-    assert service.http.post(f"/schedules/{kept.id}", data={**change, "name": "later"}).status_code == 303
-    service.http.post(f"/schedules/{kept.id}/disable")
-    assert "disabled" in service.http.get("/schedules").text
-    assert service.http.post(f"/schedules/{kept.id}/explode").status_code == 404
-    assert service.http.post(f"/schedules/{kept.id}/delete").status_code == 303
-    assert service.store.list_schedules() == ()
-
-
-@pytest.mark.parametrize(
-    ("given", "field"),
-    [
-        ({"source": ""}, "source"),
-        ({"source": "study st_0"}, "source"),
-        ({"source": "preset ../../x"}, "source"),
-        ({"cron": "0 25 * * *"}, "cron"),
-        ({"when": "at", "at": "2020-01-01T00:00"}, "at"),
-        ({"zone": "Mars"}, "zone"),
-        ({"window_begin": "22:00"}, "window_begin"),
-        ({"priority": "high"}, "priority"),
-        ({"name": "n" * 201}, "name"),
-    ],
-)
-def test_the_form_tells_what_is_wrong_beside_the_field(service: Service, given: dict[str, str], field: str) -> None:
-    answer = service.http.post("/schedules/new", data=fill_in(**given))
-    assert answer.status_code == 422
-    assert f'id="wrong-{field}" role="alert">' in answer.text
-    assert service.store.list_schedules() == ()
