@@ -55,7 +55,7 @@ BASE: dict[str, Any] = {
 
 
 def studies(cases: int) -> dict[str, tuple[MachineSpec, Mapping[str, Any]]]:
-    """The course's three questions, and what makes a case dearer."""
+    """The presets' three questions, and what makes a case dearer."""
     inertia = NUMBERS | {"drive.inertia": np.linspace(5.0, 50.0, cases)}
     ram = NUMBERS | {"mechanism.slider_crank.ram_mass": np.linspace(1.0, 60.0, cases)}
     ram["mechanism.slider_crank.crank"] = np.linspace(0.08, 0.12, cases)

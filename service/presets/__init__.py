@@ -53,13 +53,13 @@ ABOUT: Final[dict[str, About]] = {
         "a packaging machine of 120 strokes a minute with 40 mm of lift",
     ),
     "question_drive_inertia": About(
-        "first question of the course: irregularity against the inertia of the drive", "the crank press"
+        "irregularity against the inertia of the drive", "the crank press"
     ),
     "question_masses": About(
-        "second question of the course: irregularity against masses and geometry of the actuator", "the crank press"
+        "irregularity against masses and geometry of the actuator", "the crank press"
     ),
     "question_operation": About(
-        "third question of the course: irregularity against the diagram of the operation", "the crank press"
+        "irregularity against the diagram of the operation", "the crank press"
     ),
 }
 

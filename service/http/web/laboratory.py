@@ -49,7 +49,7 @@ _TOLD: Final = (
     "energy.fluctuation", "energy.mean", "drive_torque.mean", "power.mean", "acceleration.max",
     "s1.amplitude", "s2.amplitude", "s3.amplitude", "s4.amplitude", "required_inertia",
 )  # fmt: skip
-#: The questions of the course, each a study: word, and what it varies.
+#: Questions about a machine, each a study: word, and what it varies.
 QUESTIONS: Final = {"inertia": "the drive's inertia", "masses": "the masses", "load": "the operation's load"}
 _QUESTION_VALUES: Final = 25
 _QUESTION: Final = "question_"
@@ -95,7 +95,7 @@ class Setting:
 
 @lru_cache(maxsize=1)
 def machines() -> tuple[str, ...]:
-    """Names of the machines that come with the program; those of the course's questions are among them already."""
+    """Names of the machines that come with the program; those of the questions are among them already."""
     shafts = (name for name in preset_names() if preset_of(name)["spec"]["model"] == models.MACHINE_SHAFT)
     return tuple(name for name in shafts if not name.startswith(_QUESTION))
 
@@ -240,7 +240,7 @@ async def laboratory_picture(work: Attended, request: Request) -> Response:
 
 @router.get("/laboratory/study")
 async def laboratory_study(context: Ctx, work: Attended, request: Request, question: str = "inertia") -> Response:
-    """One of the course's questions about the machine as it is set, as a study to be looked over and submitted."""
+    """One of the questions about the machine as it is set, as a study to be looked over and submitted."""
     chosen = await work.check(setting, dict(request.query_params))
     if question not in QUESTIONS:
         raise ApiError("not-found", f"There is no such question; there are: {', '.join(QUESTIONS)}.")
