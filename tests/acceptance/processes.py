@@ -35,9 +35,12 @@ class Ended:
 
 
 def environment(**more: str) -> dict[str, str]:
-    """The environment without the user's settings of the program, except where compiled kernels lie."""
+    """The environment without the user's settings of the program, except where compiled kernels lie.
+
+    One process checks specs: each loads the engine when a service starts, and tests start many services.
+    """
     kept = {k: v for k, v in os.environ.items() if not k.startswith("SPRAG_") or k == "SPRAG_KERNEL_CACHE"}
-    return {**kept, "PYTHONPATH": str(ROOT), **more}
+    return {**kept, "PYTHONPATH": str(ROOT), "SPRAG_CHECK_PROCESSES": "1", **more}
 
 
 def sprag(*arguments: object, cwd: Path | None = None, stdin: bytes | None = None, **more: str) -> Ended:
