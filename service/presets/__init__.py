@@ -52,15 +52,9 @@ ABOUT: Final[dict[str, About]] = {
         "a cam that lifts a tool against a spring: work that goes to and fro",
         "a packaging machine of 120 strokes a minute with 40 mm of lift",
     ),
-    "question_drive_inertia": About(
-        "irregularity against the inertia of the drive", "the crank press"
-    ),
-    "question_masses": About(
-        "irregularity against masses and geometry of the actuator", "the crank press"
-    ),
-    "question_operation": About(
-        "irregularity against the diagram of the operation", "the crank press"
-    ),
+    "question_drive_inertia": About("irregularity against the inertia of the drive", "the crank press"),
+    "question_masses": About("irregularity against masses and geometry of the actuator", "the crank press"),
+    "question_operation": About("irregularity against the diagram of the operation", "the crank press"),
 }
 
 
