@@ -11,9 +11,8 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
 from types import FrameType
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import psutil
 import uvicorn
@@ -120,16 +119,10 @@ class Supervisor(threading.Thread):
             child.join()
 
     def stop(self) -> None:
-        """End the child and this thread; returns when both are gone."""
+        """End the child and this thread; returns when both are gone, or never were there."""
         self._ending.set()
-        self.join()
-
-
-class Starting(NamedTuple):
-    """When the service can take work, and who is told then."""
-
-    ready: threading.Event
-    announce: Callable[[], None]
+        if self.ident is not None:
+            self.join()
 
 
 class Server(uvicorn.Server):
@@ -144,8 +137,8 @@ class Server(uvicorn.Server):
         Called when the grace of the requests is over, in a thread: has them come to an answer.
     give_up : function
         Called when the service has not ended long after the signal.
-    starting : Starting
-        What is to be told when the service can take work.
+    listening : function
+        Called once, when the service listens.
     """
 
     def __init__(
@@ -154,21 +147,20 @@ class Server(uvicorn.Server):
         ending: threading.Event,
         cut: Callable[[], None],
         give_up: Callable[[], None],
-        starting: Starting,
+        listening: Callable[[], None],
     ) -> None:
         super().__init__(config)
-        self._starting: Starting | None = starting
+        self._listening = listening
         self._told = ending
         self._cut = cut
         self._last = threading.Timer(_LAST_SECONDS, give_up)
         self._last.daemon = True
 
-    async def on_tick(self, counter: int) -> bool:
-        """Now and then, while the server runs."""
-        if self._starting is not None and self._starting.ready.is_set():
-            starting, self._starting = self._starting, None
-            starting.announce()
-        return await super().on_tick(counter)
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Begin to listen."""
+        await super().startup(sockets)
+        if self.started:
+            self._listening()
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """A signal asks for the end."""
@@ -199,9 +191,9 @@ def _give_up() -> None:
 def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) -> None:
     """Serve until SIGINT or SIGTERM; service and dispatcher have ended when this returns.
 
-    ``announce`` is called with the address once the service can take work there (by default a line of the log tells
-    it). Raises
-    UnsafeSettingsError, DatabaseError and AddressError, each with one sentence, before anything is started.
+    ``announce`` is called with the address once the service listens there (by default a line of the log tells it); the
+    dispatcher starts then, so that its imports do not hold up the address. Raises UnsafeSettingsError, DatabaseError
+    and AddressError, each with one sentence, before anything is started.
     """
     logs.configure(settings.log_format, requests=settings.log_requests)
     app = create_app(settings)  # makes the database ready before the dispatcher looks for it
@@ -224,12 +216,15 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
         lambda: start_dispatcher_process(worker_settings(settings)), leaving=app.state.context.ending
     )
     with listener, _outlived_signals():
-        supervisor.start()
+
+        def listening() -> None:
+            (announce or _say)(address)
+            supervisor.start()
+
         try:
             with suppress(KeyboardInterrupt):
                 context = app.state.context
-                starting = Starting(context.ready, partial(announce or _say, address))
-                Server(config, context.ending, context.cut, _give_up, starting).run(sockets=[listener])
+                Server(config, context.ending, context.cut, _give_up, listening).run(sockets=[listener])
         finally:
             supervisor.stop()
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import threading
 from typing import TYPE_CHECKING
 
+import httpx
 import pytest
-import uvicorn
 
-from service.http.server import AddressError, Server, Starting, Supervisor, serve
+from service.http.server import AddressError, Supervisor, serve
 
 if TYPE_CHECKING:
-    from anyio.from_thread import BlockingPortal
-
     from service.settings import Settings
     from tests.service.conftest import Service
 
@@ -110,16 +110,41 @@ def test_an_address_in_use_is_told(settings: Settings) -> None:
         serve(settings.model_copy(update={"host": "[::1%none]"}))
 
 
-def test_the_address_is_told_once_work_can_be_taken(portal: BlockingPortal) -> None:
-    ready, told = threading.Event(), []
-    starting = Starting(ready, lambda: told.append("here"))
-    server = Server(uvicorn.Config("none:app"), threading.Event(), list, list, starting)
-    assert portal.call(server.on_tick, 1) is False
-    assert told == []
-    ready.set()
-    for tick in range(2, 5):
-        portal.call(server.on_tick, tick)
-    assert told == ["here"]
+def test_the_address_is_told_while_the_processes_that_check_still_start(
+    settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers: list[int] = []
+    workers: list[FakeChild] = []
+    workers_at_announcement: list[int] = []
+
+    async def never_ready(*_: object) -> None:
+        """The processes that check never come up."""
+
+    def start(_: object) -> FakeChild:
+        workers.append(FakeChild())
+        return workers[-1]
+
+    def ask(address: str) -> None:
+        with httpx.Client(base_url=address, trust_env=False, timeout=60.0) as http:
+            answers.extend(http.get(path).status_code for path in ("/livez", "/readyz"))
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    def announce(address: str) -> None:
+        workers_at_announcement.append(len(workers))
+        threading.Thread(target=ask, args=(address,)).start()
+
+    monkeypatch.setattr("service.http.app._make_ready", never_ready)
+    monkeypatch.setattr("service.http.server.start_dispatcher_process", start)
+    serve(settings.model_copy(update={"port": 0}), announce=announce)
+    assert answers == [200, 503]
+    assert workers_at_announcement == [0]
+    assert [worker.asked for worker in workers] == [["terminate"]]
+
+
+def test_a_supervisor_that_never_started_can_be_stopped() -> None:
+    nursery = Nursery()
+    Supervisor(nursery).stop()
+    assert nursery.children == []
 
 
 def test_readyz_waits_for_the_processes_that_check(service: Service) -> None:
