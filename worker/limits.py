@@ -28,6 +28,9 @@ MAX_PROBLEMS: Final = 100
 
 #: Excitation periods of any case of a study.
 MAX_RUN_PERIODS: Final = 1e6
+#: Excitation periods that the search for a settled motion may be given.
+MIN_SETTLED_PERIODS: Final = 100
+MAX_SETTLED_PERIODS: Final = 100_000
 #: Range of the integrator's local relative error.
 MIN_TOLERANCE: Final = 1e-14
 MAX_TOLERANCE: Final = 1e-4

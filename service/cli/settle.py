@@ -15,7 +15,7 @@ from service.cli.console import ExitCode, WrongInputError, progress_bar, say, sh
 from service.cli.files import output, read_study, to_file
 from service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
 from service.spec.report import Problem
-from worker.models.settled import MAX_PERIODS, MIN_PERIODS
+from worker.limits import MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
 
 if TYPE_CHECKING:
     from worker.models.settled import SettledCases
@@ -34,7 +34,10 @@ def settle(
     points: PointsFile = None,
     file: OutputFile = None,
     at_most: Annotated[
-        int, typer.Option(min=MIN_PERIODS, max=MAX_PERIODS, help="Excitation periods after which a search ends.")
+        int,
+        typer.Option(
+            min=MIN_SETTLED_PERIODS, max=MAX_SETTLED_PERIODS, help="Excitation periods after which a search ends."
+        ),
     ] = 1000,
     as_json: JsonFlag = False,
 ) -> None:

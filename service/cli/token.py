@@ -11,7 +11,7 @@ import typer
 from service.cli.console import WrongInputError, say, show_table, write_json
 from service.cli.options import Database, JsonFlag
 from service.cli.settings import read_settings
-from service.storage.tokens import TokenScope
+from service.storage.scopes import TokenScope
 
 if TYPE_CHECKING:
     from datetime import datetime

@@ -19,8 +19,9 @@ from typing import TYPE_CHECKING, Final, Protocol
 from starlette.concurrency import run_in_threadpool
 
 from service.http.attempts import Attempts
+from service.storage.scopes import TokenScope
 from service.storage.sessions import SessionSecrets
-from service.storage.tokens import TokenRecord, TokenScope, digest_of
+from service.storage.tokens import TokenRecord, digest_of
 
 if TYPE_CHECKING:
     from service.settings import Settings

@@ -16,7 +16,7 @@ from service.http.web.problem_page import problem_page
 from service.http.web.way_in import LOGIN_PATH, way_in
 from service.settings import Settings
 from service.storage.errors import StoreError
-from service.storage.tokens import TokenScope
+from service.storage.scopes import TokenScope
 from worker.limits import BODY_SECONDS, MAX_BODY_BYTES
 
 _LOG = logging.getLogger("sprag.service")

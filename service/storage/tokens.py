@@ -8,13 +8,13 @@ from __future__ import annotations
 import hashlib
 import secrets
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import TYPE_CHECKING, Final
 
 import sqlalchemy as sa
 
 from service.storage.errors import TokenNotFound
 from service.storage.part import Part, moment, optional_moment
+from service.storage.scopes import TokenScope
 from service.storage.tables import METADATA
 
 if TYPE_CHECKING:
@@ -38,13 +38,6 @@ TOKENS = sa.Table(
     sa.Column("revoked_at", sa.BigInteger),
     sqlite_autoincrement=True,
 )
-
-
-class TokenScope(StrEnum):
-    """What a token allows: to look at everything, or also to change it."""
-
-    READ = "read"
-    WRITE = "write"
 
 
 @dataclass(frozen=True, slots=True)

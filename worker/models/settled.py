@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
     from worker.study import Study
 
-#: Excitation periods that a search may be given.
-MIN_PERIODS, MAX_PERIODS = 100, 100_000
-
 #: Each regime, as it is told, and what it means.
 REGIME_SENTENCES: dict[str, str] = {regime.name.lower(): regime.sentence for regime in Regime}
 

@@ -9,7 +9,7 @@ from service.http.access import COOKIE, SESSION_SECONDS
 from service.http.problems import ApiError
 from service.http.web.form.values import Form
 from service.http.web.way_in import LOGIN_PATH, access_of, kept_form, kept_page, login_page, within
-from service.storage.tokens import TokenScope
+from service.storage.scopes import TokenScope
 
 router = APIRouter(include_in_schema=False)
 

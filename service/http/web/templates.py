@@ -14,7 +14,7 @@ from starlette.responses import Response
 
 from service.http.access import ASKING
 from service.results.wording import number, symbol, unit_text, words
-from service.storage.tokens import TokenScope
+from service.storage.scopes import TokenScope
 
 
 @lru_cache(maxsize=1)

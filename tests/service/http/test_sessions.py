@@ -19,8 +19,8 @@ from service.http.api.examples import SPEC
 from service.http.app import create_app
 from service.settings import Settings
 from service.storage.errors import TokenNotFound
+from service.storage.scopes import TokenScope
 from service.storage.store import Store
-from service.storage.tokens import TokenScope
 from tests.service.http.routes import every_route
 from worker.states import StudyState
 

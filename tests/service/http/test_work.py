@@ -18,7 +18,7 @@ from service.http.computer import Limits, ProcessComputer
 from service.http.problems import ApiError
 from service.http.shares import Shares
 from service.http.work import Work
-from service.storage.tokens import TokenScope
+from service.storage.scopes import TokenScope
 from tests.service.conftest import API, InThread, Service
 from tests.worker import fakes
 

@@ -14,8 +14,8 @@ from service.http.api.examples import SPEC
 from service.http.app import chunking, create_app
 from service.jobs.scheduler import Scheduler
 from service.settings import Settings
+from service.storage.scopes import TokenScope
 from service.storage.store import Store
-from service.storage.tokens import TokenScope
 from tests.service.conftest import InThread, made_up
 from tests.serving import served
 from worker.models import ChunkResult
