@@ -56,7 +56,7 @@ def study_of(cases: int) -> Study:
 
 def made_up(first: int, count: int) -> ChunkResult:
     """A result whose numbers have all their digits."""
-    values = np.random.default_rng(first).random((count, len(models.result_infos("vibration-drive", 1))))
+    values = np.random.default_rng(first).random((count, len(models.result_infos("vibration-drive", "1"))))
     return ChunkResult(first, ["ok"] * count, [""] * count, values)
 
 

@@ -101,9 +101,8 @@ def test_the_reference_lists_every_parameter(model: str) -> None:
 
 @pytest.mark.parametrize("model", models.model_names())
 def test_the_reference_lists_every_result(model: str) -> None:
-    for info in models.result_infos(model, 1):
-        name = info.name.replace("pendulums.0", "pendulums.N")
-        assert f"| `{name}` | {info.unit} | {info.description} |" in REFERENCE
+    for info in models.result_catalogue(model):
+        assert f"| `{info.name}` | {info.unit} | {info.description} |" in REFERENCE
 
 
 def test_results_that_the_pages_name_exist() -> None:

@@ -44,11 +44,11 @@ class Cases(Orders):
 
     def _rows(self, connection: sa.Connection, study_id: str) -> _Rows:
         c = STUDIES.c
-        row = self._row(connection, study_id, c.number, c.model, c.pendulums, c.cases, c.state)
+        row = self._row(connection, study_id, c.number, c.model, c.variant, c.cases, c.state)
         return _Rows(
             row.number,
-            results_table(row.model, row.pendulums),
-            models.result_infos(row.model, row.pendulums),
+            results_table(row.model, row.variant),
+            models.result_infos(row.model, row.variant),
             row.cases,
             row.state == StudyState.CANCELLED.value,
         )

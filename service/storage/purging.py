@@ -28,9 +28,9 @@ class Purging(Part):
         """Remove it in short transactions; the rows that each of them deleted."""
         c = STUDIES.c
         with self.session.read() as connection:
-            gone = connection.execute(sa.select(c.number, c.model, c.pendulums).where(c.deleted_at.is_not(None))).all()
-        for number, model, pendulums in gone:
-            rows = results_table(model, pendulums)
+            gone = connection.execute(sa.select(c.number, c.model, c.variant).where(c.deleted_at.is_not(None))).all()
+        for number, model, variant in gone:
+            rows = results_table(model, variant)
             yield from self._emptied(rows, rows.c.case_number, number)
             yield from self._emptied(CHUNKS, CHUNKS.c["first"], number)
             with self.session.write() as connection:

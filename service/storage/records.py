@@ -39,7 +39,7 @@ class StudyRecord:
     id: str
     name: str
     model: str
-    pendulums: int
+    variant: str
     state: StudyState
     reason: str | None
     cases: int
@@ -226,7 +226,7 @@ def record_of(row: sa.Row[Any]) -> StudyRecord:
         id=row.id,
         name=row.name,
         model=row.model,
-        pendulums=row.pendulums,
+        variant=row.variant,
         state=StudyState(row.state),
         reason=row.reason,
         cases=row.cases,

@@ -49,7 +49,7 @@ class Retries(Orders):
         c = STUDIES.c
         while True:
             with self.session.read() as connection:
-                row = self._row(connection, study_id, c.number, c.model, c.pendulums, c.state, c.revision, c.cases)
+                row = self._row(connection, study_id, c.number, c.model, c.variant, c.state, c.revision, c.cases)
                 follow(StudyState(row.state), StudyEvent.RETRY)
                 counts = _failed(connection, row.number, endings)
                 if not counts:
@@ -84,7 +84,7 @@ def _failed(connection: sa.Connection, number: int, endings: Collection[str] | N
 
 def _runs(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...]) -> list[Run]:
     """The cases with those endings as runs, in order."""
-    c = results_table(row.model, row.pendulums).c
+    c = results_table(row.model, row.variant).c
     # Cases that follow one another have the same difference to their place among the cases found.
     place = sa.func.row_number().over(order_by=c.case_number)
     found = (
@@ -99,7 +99,7 @@ def _runs(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...])
 
 def _places(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...], order: Order) -> list[Run]:
     """The same of a study that is run coarse to fine: runs of positions in its order."""
-    c = results_table(row.model, row.pendulums).c
+    c = results_table(row.model, row.variant).c
     query = sa.select(c.case_number).where(c.study == row.number, c.ending.in_(endings))
     places = np.sort(order.positions(np.fromiter(connection.execute(query).scalars(), dtype=np.int64)))
     edges = np.flatnonzero(np.diff(places) > 1) + 1
@@ -117,7 +117,7 @@ def _few(runs: list[Run]) -> list[Run]:
 
 def _give_back(connection: sa.Connection, row: sa.Row[Any], runs: Sequence[Run], counts: dict[str, int]) -> None:
     """Take the rows of those endings away and cut the chunks so that exactly their cases are waiting."""
-    table = results_table(row.model, row.pendulums)
+    table = results_table(row.model, row.variant)
     connection.execute(sa.delete(table).where(table.c.study == row.number, table.c.ending.in_(tuple(counts))))
     _cut(connection, row.number, runs)
     connection.execute(sa.delete(ENDINGS).where(ENDINGS.c.study == row.number, ENDINGS.c.ending.in_(tuple(counts))))

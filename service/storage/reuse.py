@@ -39,7 +39,7 @@ _SOURCE: Final[tuple[sa.ColumnElement[Any], ...]] = (
     STUDIES.c.number,
     STUDIES.c.state,
     STUDIES.c.model,
-    STUDIES.c.pendulums,
+    STUDIES.c.variant,
     STUDIES.c.coarse,
     STUDIES.c.study,
 )
@@ -212,7 +212,7 @@ def _has_rows(connection: sa.Connection, source: sa.Row[Any], study: Study, case
         sa.select(sa.func.sum(e.cases)).where(e.study == source.number, e.ending.in_(_NO_RESULT))
     ).scalar_one()
     if odd:
-        rows = results_table(source.model, source.pendulums).c
+        rows = results_table(source.model, source.variant).c
         without = connection.execute(
             sa.select(rows.case_number).where(rows.study == source.number, rows.ending.in_(_NO_RESULT))
         ).scalars()
@@ -231,9 +231,9 @@ def mark_origin(connection: sa.Connection, number: int) -> None:
         connection.execute(sa.update(STUDIES).where(this).values(values))
 
 
-def copy_rows(connection: sa.Connection, model: str, pendulums: int, chunk: Chunk, known: Known) -> bool:
+def copy_rows(connection: sa.Connection, model: str, variant: str, chunk: Chunk, known: Known) -> bool:
     """Copy the known rows of a chunk; False when some are not there any more."""
-    table = results_table(model, pendulums)
+    table = results_table(model, variant)
     rest = ", ".join(column.name for column in table.c if column.name not in KEY_COLUMNS[:2])
     mark = "?" if connection.dialect.name == "sqlite" else "%s"
     statement = (
@@ -245,9 +245,9 @@ def copy_rows(connection: sa.Connection, model: str, pendulums: int, chunk: Chun
     return done.rowcount == known.cases.size
 
 
-def endings_of(connection: sa.Connection, model: str, pendulums: int, study: int, cases: Cases) -> Counter[str]:
+def endings_of(connection: sa.Connection, model: str, variant: str, study: int, cases: Cases) -> Counter[str]:
     """How many of the cases (ascending) of a study ended how."""
-    c = results_table(model, pendulums).c
+    c = results_table(model, variant).c
     found: Counter[str] = Counter()
     for condition in conditions(c.case_number, cases):
         query = sa.select(c.ending, sa.func.count()).where(c.study == study, condition).group_by(c.ending)

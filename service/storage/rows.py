@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 
 @lru_cache(maxsize=64)
-def target(model: str, pendulums: int) -> tuple[str, tuple[str, ...]]:
+def target(model: str, variant: str) -> tuple[str, tuple[str, ...]]:
     """A results table and its columns in the order of `tuples`."""
-    names = (*KEY_COLUMNS, *(info.column for info in models.result_infos(model, pendulums)))
-    return results_table(model, pendulums).name, names
+    names = (*KEY_COLUMNS, *(info.column for info in models.result_infos(model, variant)))
+    return results_table(model, variant).name, names
 
 
 def tuples(

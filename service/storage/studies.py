@@ -331,7 +331,7 @@ def study_row(
     return {
         "name": study.name,
         "model": study.model,
-        "pendulums": models.pendulums(study),
+        "variant": models.variant_of(study),
         "cases": study.cases,
         "chunk_cases": chunking.cases_of(study),
         "engine_version": models.ENGINE_VERSION,

@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from worker import models
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0012"
+HEAD_REVISION = "0013"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -25,7 +25,8 @@ STUDIES = sa.Table(
     sa.Column("id", sa.String(40), nullable=False, unique=True),
     sa.Column("name", sa.Text, nullable=False),
     sa.Column("model", sa.String(40), nullable=False),
-    sa.Column("pendulums", sa.Integer, nullable=False),
+    # Of its model: studies of one variant share a table of results. The model alone knows what it means.
+    sa.Column("variant", sa.String(40), nullable=False, server_default=""),
     sa.Column("state", sa.String(12), nullable=False, index=True),
     sa.Column("reason", sa.Text),
     sa.Column("cases", sa.Integer, nullable=False),
@@ -132,20 +133,20 @@ DISPATCHER = sa.Table(
 KEY_COLUMNS = ("study", "case_number", "ending", "flags")
 
 
-def results_name(model: str, pendulums: int) -> str:
-    """Name of the table with the results of ``model`` with that many pendulums; 0 where it has none."""
-    return model.replace("-", "_") + (f"_{pendulums}" if pendulums else "")
+def results_name(model: str, variant: str) -> str:
+    """Name of the table with the results of that variant of ``model``."""
+    return "_".join(filter(None, (model, variant))).replace("-", "_")
 
 
 @cache
-def results_table(model: str, pendulums: int) -> sa.Table:
-    """The table with the results of ``model`` with that many pendulums: a row for each finished case."""
-    name = results_name(model, pendulums)
+def results_table(model: str, variant: str) -> sa.Table:
+    """The table with the results of that variant of ``model``: a row for each finished case."""
+    name = results_name(model, variant)
     if name in METADATA.tables:
         return METADATA.tables[name]
     results = (
         sa.Column(info.column, sa.Integer if info.kind == "count" else sa.Double)
-        for info in models.result_infos(model, pendulums)
+        for info in models.result_infos(model, variant)
     )
     return sa.Table(
         name,
@@ -160,8 +161,8 @@ def results_table(model: str, pendulums: int) -> sa.Table:
 
 
 def all_tables() -> sa.MetaData:
-    """The metadata with the results tables of every model and shape in it."""
+    """The metadata with the results tables of every variant of every model."""
     for model in models.model_names():
-        for pendulums in models.result_shapes(model):
-            results_table(model, pendulums)
+        for variant in models.variants(model):
+            results_table(model, variant)
     return METADATA

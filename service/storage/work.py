@@ -210,20 +210,20 @@ class Work(Reuse):
         detail: str | None,
         known: Known | None = None,
     ) -> None:
-        model, pendulums = connection.execute(
-            sa.select(STUDIES.c.model, STUDIES.c.pendulums).where(STUDIES.c.number == chunk.study)
+        model, variant = connection.execute(
+            sa.select(STUDIES.c.model, STUDIES.c.variant).where(STUDIES.c.number == chunk.study)
         ).one()
         mark_origin(connection, chunk.study)
         numbers = (self._cases(chunk, connection) if known is None else known.missing).tolist()
         if result.count:
             with without_collector():
-                rows = tuples(chunk.study, numbers, result, models.result_infos(model, pendulums))
-                self.session.insert_rows(connection, *target(model, pendulums), rows)
+                rows = tuples(chunk.study, numbers, result, models.result_infos(model, variant))
+                self.session.insert_rows(connection, *target(model, variant), rows)
         endings = Counter(result.endings)
         if known is not None and known.cases.size:
-            if not copy_rows(connection, model, pendulums, chunk, known):
+            if not copy_rows(connection, model, variant, chunk, known):
                 raise _SourceGoneError
-            endings += endings_of(connection, model, pendulums, chunk.study, known.cases)
+            endings += endings_of(connection, model, variant, chunk.study, known.cases)
         connection.execute(
             sa.update(CHUNKS)
             .where(_is(chunk))
@@ -279,10 +279,10 @@ class Work(Reuse):
         with self.session.write() as connection:
             if not self._claimed(connection, epoch, chunk):
                 return
-            model, pendulums = connection.execute(
-                sa.select(STUDIES.c.model, STUDIES.c.pendulums).where(STUDIES.c.number == chunk.study)
+            model, variant = connection.execute(
+                sa.select(STUDIES.c.model, STUDIES.c.variant).where(STUDIES.c.number == chunk.study)
             ).one()
-            nothing = np.full((chunk.count, len(models.result_infos(model, pendulums))), np.nan)
+            nothing = np.full((chunk.count, len(models.result_infos(model, variant))), np.nan)
             result = ChunkResult(chunk.first, [ending] * chunk.count, [""] * chunk.count, nothing)
             self._store(connection, chunk, result, detail)
 

@@ -19,7 +19,7 @@ def test_rows_come_back_bit_for_bit(store: Store) -> None:
     odd.values[:, :] = (
         np.random.default_rng(1).standard_normal(odd.values.shape) * 10.0 ** np.arange(-300, 300, 60)[:, None]
     )
-    counts = [index for index, info in enumerate(models.result_infos("vibration-drive", 1)) if info.kind == "count"]
+    counts = [index for index, info in enumerate(models.result_infos("vibration-drive", "1")) if info.kind == "count"]
     odd.values[:, counts] = np.arange(10)[:, None]
     odd.values[3, 0], odd.values[4, counts[0]] = np.nan, np.nan
     odd.flags[2] = "windup_out_of_data"

@@ -24,7 +24,7 @@ def test_a_study_comes_back_as_it_was_given(store: Store) -> None:
     assert store.spec(record.id) == SPEC
     assert store.study(record.id) == study
     assert (record.state, record.cases, record.done, record.ok) == (StudyState.QUEUED, 25, 0, 0)
-    assert (record.chunk_cases, record.pendulums, record.model) == (10, 1, "vibration-drive")
+    assert (record.chunk_cases, record.variant, record.model) == (10, "1", "vibration-drive")
     assert record.warnings == ("odd, but allowed",)
     assert record.created_at.tzinfo is not None
     assert record.physics_hash == study.physics_hash(models.ENGINE_VERSION)

@@ -90,6 +90,18 @@ def test_a_frozen_database_is_upgraded_and_then_used(
         assert store.create_study({}, fakes.study(3)).number > queued.number
 
 
+def test_the_number_of_pendulums_became_the_variant(file: Path, url: str) -> None:
+    thaw(FOLDER / "0012.sql", file)
+    connection = sqlite_driver().connect(file)
+    connection.execute("UPDATE studies SET pendulums = 3 WHERE name = 'running'")
+    connection.execute("UPDATE studies SET pendulums = 0, model = 'machine-shaft' WHERE name = 'queued'")
+    connection.commit()
+    connection.close()
+    upgrade(url)
+    with Store.open(url) as store:
+        assert [study.variant for study in store.list_studies().studies] == ["", "3", "1"]
+
+
 def test_code_and_migrations_have_the_same_tables(url: str) -> None:
     with Store.open(url) as store, store.session.read() as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": True})

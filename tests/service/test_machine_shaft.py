@@ -47,7 +47,7 @@ STRUCTURE = MachineSpec.from_json(
         "operation": {"quantity": "force", "form": "steps", "steps": 1},
     }
 )
-RESULTS = [info.name for info in models.result_infos("machine-shaft", 0)]
+RESULTS = [info.name for info in models.result_infos("machine-shaft", "")]
 
 
 @pytest.fixture

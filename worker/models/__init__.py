@@ -1,8 +1,7 @@
 """The one part of the worker that knows the engine: a study and a range of cases in, plain arrays out.
 
-What is particular to a model (its catalogues, the shape of its results, how a study's columns become a call of the
-engine) stands in a module of its own behind the functions of this one. The numerical kernels are imported where they
-are run, so reading a catalogue loads no compiler.
+What is particular to a model stands in a module of its own, behind `Model`; the functions of this module look the
+model up by its name. The numerical kernels are imported where they are run, so reading a catalogue loads no compiler.
 """
 
 from __future__ import annotations
@@ -34,6 +33,7 @@ from engine.vibration_drive.parameters import (
 from engine.vibration_drive.results import ResultInfo
 from worker.models import machine_shaft, vibration_drive
 from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, Trajectory
+from worker.models.model import Model, all_models, model_names, model_of, register, unregister
 from worker.models.vibration_drive import (
     FLAG_SENTENCES,
     NOT_SETTLED,
@@ -58,7 +58,6 @@ __all__ = [
     "MACHINE_SHAFT",
     "MAX_COEFFICIENTS",
     "MAX_PENDULUMS",
-    "MODELS",
     "NOT_SETTLED",
     "OK",
     "VIBRATION_DRIVE",
@@ -76,6 +75,7 @@ __all__ = [
     "InsufficientInertiaError",
     "KernelShape",
     "MachineError",
+    "Model",
     "Parameter",
     "ResultInfo",
     "Run",
@@ -100,12 +100,13 @@ __all__ = [
     "kernel_source",
     "load",
     "model_names",
+    "model_of",
     "parameter_catalogue",
     "parameters_of",
-    "pendulums",
     "prepare",
+    "register",
+    "result_catalogue",
     "result_infos",
-    "result_shapes",
     "run_chunk",
     "run_of",
     "run_task",
@@ -113,12 +114,17 @@ __all__ = [
     "shape_of",
     "source_hash",
     "study_results",
+    "unregister",
+    "variant_of",
+    "variants",
     "warm_up",
 ]
 
 VIBRATION_DRIVE = vibration_drive.MODEL
 MACHINE_SHAFT = machine_shaft.MODEL
-MODELS: tuple[str, ...] = (VIBRATION_DRIVE, MACHINE_SHAFT)
+
+register(vibration_drive.VibrationDrive())
+register(machine_shaft.MachineShaft())
 
 OK = Ending.OK.value
 
@@ -142,44 +148,16 @@ ENDING_SENTENCES: dict[str, str] = {
     WorkerEnding.CANCELLED.value: "The study was cancelled before this case was run.",
 }
 
-#: Endings that only the one or the other model knows.
-_OWN_ENDINGS: dict[str, frozenset[Ending]] = {
-    VIBRATION_DRIVE: frozenset({Ending.ACCURACY_NOT_REACHED, Ending.CHATTER, Ending.STEP_BUDGET, Ending.DIVERGED}),
-    MACHINE_SHAFT: frozenset(
-        {
-            Ending.INERTIA_INSUFFICIENT,
-            Ending.UNBALANCED_WORK,
-            Ending.CANNOT_ASSEMBLE,
-            Ending.NEGATIVE_INERTIA,
-            Ending.MOTOR_STALLED,
-            Ending.QUADRATURE_NOT_REACHED,
-            Ending.MOTOR_OVERRUN,
-            Ending.NEAR_SINGULAR,
-        }
-    ),
-}
-
-
-def model_names() -> tuple[str, ...]:
-    """Names of the models a study may ask for."""
-    return MODELS
-
-
-def _is_shaft(model: str) -> bool:
-    if model not in MODELS:
-        raise ValueError(f"unknown model {model!r}; there is: {', '.join(MODELS)}")
-    return model == MACHINE_SHAFT
-
 
 def endings_of(model: str) -> dict[str, str]:
     """The endings that a case of ``model`` can have, with their sentences."""
-    foreign = {ending.value for name, own in _OWN_ENDINGS.items() if name != model for ending in own}
+    foreign = {ending.value for other in all_models() if other.name != model for ending in other.own_endings}
     return {name: sentence for name, sentence in ENDING_SENTENCES.items() if name not in foreign}
 
 
 def flags_of(model: str) -> dict[str, str]:
     """The flags that a case of ``model`` can have, with their sentences."""
-    return {} if _is_shaft(model) else dict(FLAG_SENTENCES)
+    return dict(model_of(model).flags)
 
 
 def parameter_catalogue(model: str) -> tuple[Parameter, ...]:
@@ -188,44 +166,48 @@ def parameter_catalogue(model: str) -> tuple[Parameter, ...]:
     ``N`` is a pendulum, ``K`` a coefficient or a step, ``NAME`` a constant. The two entries of the clutch stand under
     ``clutch.``; they may also stand in each pendulum (``pendulums.N.clutch.``). Raises ValueError for an unknown model.
     """
-    return machine_shaft.catalogue() if _is_shaft(model) else vibration_drive.catalogue()
+    return model_of(model).parameters()
 
 
 def parameters_of(study: Study) -> dict[str, Parameter]:
     """The parameters of a study's own machine by flat path; empty where its model's catalogue says all."""
-    return {} if study.structure is None else machine_shaft.parameters_of(study.structure)
+    return model_of(study.model).parameters_of(study)
 
 
-def result_shapes(model: str) -> range:
-    """The numbers of pendulums for which ``model`` has a set of results; 0 alone where it has no pendulums."""
-    return range(1) if _is_shaft(model) else vibration_drive.shapes()
+def variants(model: str) -> tuple[str, ...]:
+    """The variants of ``model``: each has a set of results of its own."""
+    return model_of(model).variants()
 
 
-def result_infos(model: str, pendulums: int) -> tuple[ResultInfo, ...]:
-    """Every result of ``model`` with that many pendulums, in the order of the columns of `ChunkResult.values`."""
-    return machine_shaft.result_infos() if _is_shaft(model) else vibration_drive.result_infos(pendulums)
+def variant_of(study: Study) -> str:
+    """The variant of its model that ``study`` is of."""
+    return model_of(study.model).variant_of(study)
 
 
-def pendulums(study: Study) -> int:
-    """Number of pendulums of the machine; 0 where its model has none."""
-    return 0 if _is_shaft(study.model) else vibration_drive.pendulums(study)
+def result_infos(model: str, variant: str) -> tuple[ResultInfo, ...]:
+    """Every result of that variant of ``model``, in the order of the columns of `ChunkResult.values`."""
+    return model_of(model).results(variant)
+
+
+def result_catalogue(model: str) -> tuple[ResultInfo, ...]:
+    """Every result of ``model``, with letters for what counts as in `parameter_catalogue`."""
+    return model_of(model).result_catalogue()
 
 
 def study_results(study: Study) -> tuple[ResultInfo, ...]:
     """Every result of the cases of ``study``."""
-    return result_infos(study.model, pendulums(study))
+    return result_infos(study.model, variant_of(study))
 
 
 def shape_of(study: Study) -> KernelShape:
     """The kernel that the cases of ``study`` need."""
-    return machine_shaft.shape_of() if _is_shaft(study.model) else vibration_drive.shape_of(study)
+    return model_of(study.model).shape_of(study)
 
 
 def chunk_task(study: Study, first: int, count: int) -> ChunkTask:
     """The cases ``first`` .. ``first + count - 1`` of ``study``, ready for `run_task`."""
     columns: dict[str, Any] = {**study.base, **study.columns(range(first, first + count))}
-    run = None if _is_shaft(study.model) else run_of(study)
-    return ChunkTask(first, count, shape_of(study), run, columns, study.structure)
+    return ChunkTask(first, count, shape_of(study), study.run, columns, study.structure)
 
 
 def run_task(task: ChunkTask) -> ChunkResult:
@@ -236,7 +218,7 @@ def run_task(task: ChunkTask) -> ChunkResult:
     from engine.faults import inject
 
     inject(task.columns, task.count)
-    return machine_shaft.run_task(task) if _is_shaft(task.shape.model) else vibration_drive.run_task(task)
+    return model_of(task.shape.model).run(task)
 
 
 def run_chunk(study: Study, first: int, count: int) -> ChunkResult:
@@ -246,45 +228,34 @@ def run_chunk(study: Study, first: int, count: int) -> ChunkResult:
 
 def extent(study: Study, case: int) -> Extent:
     """What the instantaneous values of a case go along: the time of its run, or the angle of its shaft."""
-    return machine_shaft.extent(study) if _is_shaft(study.model) else vibration_drive.extent(study, case)
+    return model_of(study.model).extent(study, case)
 
 
 def run_trajectory(study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
     """Instantaneous values of one case at ``points`` equally spaced places of its `extent`."""
-    if _is_shaft(study.model):
-        return machine_shaft.run_trajectory(study, case, start, end, points)
-    return vibration_drive.run_trajectory(study, case, start, end, points)
+    return model_of(study.model).trajectory(study, case, start, end, points)
 
 
 def estimate_seconds_per_case(study: Study) -> float:
     """Rough time of one case of ``study`` on one core, in s."""
-    if _is_shaft(study.model):
-        return machine_shaft.estimate_seconds_per_case(study)
-    return vibration_drive.estimate_seconds_per_case(study)
+    return model_of(study.model).estimate_seconds_per_case(study)
 
 
 def estimate_compile_seconds(study: Study) -> float:
     """Rough time until the kernel of ``study`` is there, in s; 0 where it lies compiled in the cache on disk."""
     shape = shape_of(study)
-    if is_compiled(shape):
-        return 0.0
-    if _is_shaft(study.model):
-        return machine_shaft.estimate_compile_seconds()
-    return vibration_drive.estimate_compile_seconds(shape)
+    return 0.0 if is_compiled(shape) else model_of(study.model).estimate_compile_seconds(shape)
 
 
 def prepare() -> None:
     """Load the engine with its compiler, so that the first cases do not wait for that."""
-    vibration_drive.prepare()
-    machine_shaft.prepare()
+    for model in all_models():
+        model.prepare()
 
 
 def load(shape: KernelShape) -> None:
     """Compile the kernel of that shape into the on-disk cache, or load it from there."""
-    if _is_shaft(shape.model):
-        machine_shaft.load()
-    else:
-        vibration_drive.load(shape)
+    model_of(shape.model).load(shape)
     with suppress(OSError):
         _mark(shape).touch()
 
@@ -296,7 +267,7 @@ def is_compiled(shape: KernelShape) -> bool:
 
 def _mark(shape: KernelShape) -> Path:
     # Code for one machine is none for another with the same home.
-    parts = (shape.model, shape.pendulums, shape.coefficients, repr(shape.tolerance), platform.node())
+    parts = (shape.model, *shape.key, platform.node())
     return cache_folder() / f"{'-'.join(map(str, parts))}.ready"
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from engine import Run
+import numpy as np
+
+from engine.endings import ENDING_CODES
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
 
@@ -39,28 +40,33 @@ class ChunkResult:
         return len(self.endings)
 
 
+def chunk_result(first: int, codes: NDArray[np.int8], flags: list[str], values: NDArray[np.float64]) -> ChunkResult:
+    """The result of cases that the engine has run: ``codes`` (count,) into its endings, ``values`` (count, results)."""
+    endings = [ENDING_CODES[code].value for code in codes.tolist()]
+    # Adding zero makes a negative zero positive: databases do not keep its sign.
+    return ChunkResult(first, endings, flags, np.ascontiguousarray(values, dtype=np.float64) + 0.0)
+
+
 @dataclass(frozen=True, slots=True)
 class KernelShape:
-    """What decides which compiled kernel a case needs; zeros where a model knows no such thing."""
+    """What decides which compiled kernel a case needs: its model, and plain values that only the model reads."""
 
     model: str
-    pendulums: int
-    coefficients: int
-    tolerance: float
+    key: tuple[int | float | str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class ChunkTask:
     """Consecutive cases as they travel to a process: their own columns only, however large the study is.
 
-    ``columns`` maps flat spec paths to SI numbers, or to arrays of shape (count,) where they vary. ``run`` is None for
-    a model without a run, ``structure`` None for one whose machines have none (`Study.structure`).
+    ``columns`` maps flat spec paths to SI numbers, or to arrays of shape (count,) where they vary. ``run`` and
+    ``structure`` are those of the study.
     """
 
     first: int
     count: int
     shape: KernelShape
-    run: Run | None
+    run: dict[str, Any]
     columns: dict[str, float | NDArray[np.float64]]
     structure: dict[str, Any] | None = None
 

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from engine import Ending
 from engine.machine_shaft.parameters import parameters as _engine_parameters
 from engine.machine_shaft.problems import ExpressionError, MachineError, RelationError
-from engine.machine_shaft.results import result_infos as _engine_results
+from engine.machine_shaft.results import result_infos
 from engine.machine_shaft.spec import (
     LINKED,
     MAX_CONSTANTS,
@@ -25,7 +26,8 @@ from engine.machine_shaft.spec import (
     OperationChoice,
 )
 from engine.machine_shaft.tables import MAX_ROWS
-from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, Trajectory
+from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, Trajectory, chunk_result
+from worker.models.model import Model
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -54,7 +56,8 @@ __all__ = [
 ]
 
 MODEL = "machine-shaft"
-_SHAPE = KernelShape(MODEL, 0, 0, 0.0)
+#: All machines share their compiled code.
+SHAPE = KernelShape(MODEL)
 Structure = dict[str, Any]
 
 
@@ -109,16 +112,6 @@ def _parameters(structure: str) -> dict[str, Parameter]:
     return {entry.path: entry for entry in _engine_parameters(spec_of(json.loads(structure)))}
 
 
-def result_infos() -> tuple[ResultInfo, ...]:
-    """Every result of a machine shaft."""
-    return _engine_results()
-
-
-def shape_of() -> KernelShape:
-    """All machines share their compiled code."""
-    return _SHAPE
-
-
 def check_structure(structure: Mapping[str, Any]) -> None:
     """Raise MachineError where the structure makes no machine."""
     from engine.machine_shaft.machine import check_structure as engine_check
@@ -148,58 +141,73 @@ def reachable_pressure(suction: ArrayLike, clearance: ArrayLike, exponent: Array
     return engine_pressure(*(np.asarray(part, dtype=np.float64) for part in (suction, clearance, exponent)))
 
 
-def run_task(task: ChunkTask) -> ChunkResult:
-    """Run the cases of a task."""
-    from engine.endings import ENDING_CODES
-    from engine.machine_shaft.simulate import simulate
+class MachineShaft(Model):
+    """A shaft that a drive turns steadily against a mechanism and its resistance, over one cycle."""
 
-    batch = simulate(spec_of(task.structure), task.columns, cases=task.count)
-    names = [ending.value for ending in ENDING_CODES]
-    return ChunkResult(
-        first=task.first,
-        endings=[names[code] for code in batch.endings.tolist()],
-        flags=[""] * task.count,
-        # Adding zero makes a negative zero positive: databases do not keep its sign.
-        values=np.ascontiguousarray(batch.values, dtype=np.float64) + 0.0,
+    name = MODEL
+    own_endings = frozenset(
+        {
+            Ending.INERTIA_INSUFFICIENT,
+            Ending.UNBALANCED_WORK,
+            Ending.CANNOT_ASSEMBLE,
+            Ending.NEGATIVE_INERTIA,
+            Ending.MOTOR_STALLED,
+            Ending.QUADRATURE_NOT_REACHED,
+            Ending.MOTOR_OVERRUN,
+            Ending.NEAR_SINGULAR,
+        }
     )
 
+    def parameters(self) -> tuple[Parameter, ...]:
+        return catalogue()
 
-def extent(study: Study) -> Extent:
-    """The cycle of the shaft."""
-    cycle = 2.0 * math.pi * spec_of(study.structure).cycle
-    return Extent("angle", "rad", cycle, cycle)
+    def parameters_of(self, study: Study) -> dict[str, Parameter]:
+        return {} if study.structure is None else parameters_of(study.structure)
+
+    def results(self, variant: str) -> tuple[ResultInfo, ...]:
+        return result_infos()
+
+    def shape_of(self, study: Study) -> KernelShape:
+        return SHAPE
+
+    def run(self, task: ChunkTask) -> ChunkResult:
+        from engine.machine_shaft.simulate import simulate
+
+        batch = simulate(spec_of(task.structure), task.columns, cases=task.count)
+        return chunk_result(task.first, batch.endings, [""] * task.count, batch.values)
+
+    def extent(self, study: Study, case: int) -> Extent:
+        """The cycle of the shaft."""
+        cycle = 2.0 * math.pi * spec_of(study.structure).cycle
+        return Extent("angle", "rad", cycle, cycle)
+
+    def trajectory(self, study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
+        """Tables over ``points`` equally spaced angles of the shaft from ``start`` to ``end`` (rad)."""
+        from engine.machine_shaft.trajectory import trajectory
+
+        columns = {**study.base, **study.case_parameters(case)}
+        table = trajectory(spec_of(study.structure), columns, np.linspace(start, end, points))
+        return Trajectory(
+            table.angles, table.names, table.units, table.values, {}, table.ending.value, "angle", "rad", table.phi_c
+        )
+
+    def estimate_seconds_per_case(self, study: Study) -> float:
+        from engine.machine_shaft.simulate import estimate_seconds
+
+        return estimate_seconds(spec_of(study.structure))
+
+    def estimate_compile_seconds(self, shape: KernelShape) -> float:
+        return 5.0
+
+    def prepare(self) -> None:
+        import engine.machine_shaft.simulate  # noqa: F401
+
+    def load(self, shape: KernelShape) -> None:
+        _run_each_kind()
 
 
-def run_trajectory(study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
-    """Tables over ``points`` equally spaced angles of the shaft from ``start`` to ``end`` (rad)."""
-    from engine.machine_shaft.trajectory import trajectory
-
-    columns = {**study.base, **study.case_parameters(case)}
-    made = trajectory(spec_of(study.structure), columns, np.linspace(start, end, points))
-    return Trajectory(
-        made.angles, made.names, made.units, made.values, {}, made.ending.value, "angle", "rad", made.phi_c
-    )
-
-
-def estimate_seconds_per_case(study: Study) -> float:
-    """Rough time of one case of ``study`` on one core, in s."""
-    from engine.machine_shaft.simulate import estimate_seconds
-
-    return estimate_seconds(spec_of(study.structure))
-
-
-def estimate_compile_seconds() -> float:
-    """Rough time of compiling what all machines share, in s."""
-    return 5.0
-
-
-def prepare() -> None:
-    """Load the engine with its compiler."""
-    import engine.machine_shaft.simulate  # noqa: F401
-
-
-def load() -> None:
-    """Compile what all machines share into the on-disk cache, or load it from there: a case of each kind is run."""
+def _run_each_kind() -> None:
+    """Run a case of each kind, which compiles what all machines share."""
     from engine.machine_shaft.simulate import simulate
     from engine.machine_shaft.trajectory import trajectory
 

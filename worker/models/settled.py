@@ -58,7 +58,7 @@ def settle_cases(study: Study, cases: Sequence[int], at_most: int) -> SettledCas
     from engine.endings import ENDING_CODES
     from engine.vibration_drive.settle import settle
 
-    own = run_of(study)
+    own = run_of(study.run)
     columns: dict[str, Any] = {**study.base, **study.columns(list(cases))}
     settings = SettledRun(at_most=at_most, tolerance=own.tolerance, reset=own.reset)
     batch = settle(columns, settings, cases=len(cases))

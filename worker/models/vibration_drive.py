@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, cast
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
-from engine import Run, Span
+from engine import Ending, Run, Span
 from engine.vibration_drive.parameters import (
     CLUTCH_COEFFICIENT,
     CLUTCH_WINDUP_LIMIT,
@@ -16,12 +17,12 @@ from engine.vibration_drive.parameters import (
     PARAMETERS,
     Parameter,
 )
-from engine.vibration_drive.results import ResultInfo
-from engine.vibration_drive.results import result_infos as _engine_results
-from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, Trajectory
+from engine.vibration_drive.results import ResultInfo, result_infos
+from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, Trajectory, chunk_result
+from worker.models.model import Model
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from numpy.typing import NDArray
 
@@ -47,19 +48,12 @@ _PENDULUM = re.compile(r"pendulums\.(\d+)\.")
 _COEFFICIENT = re.compile(r"(?:^|\.)clutch\.coefficients\.(\d+)$")
 
 
-def catalogue() -> tuple[Parameter, ...]:
-    """See `worker.models.parameter_catalogue`."""
-    return (*PARAMETERS, CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT)
+class DriveKey(NamedTuple):
+    """What decides the kernel of a vibration drive."""
 
-
-def shapes() -> range:
-    """The numbers of pendulums for which there is a set of results."""
-    return range(1, MAX_PENDULUMS + 1)
-
-
-def result_infos(pendulums: int) -> tuple[ResultInfo, ...]:
-    """Every result of a drive with that many pendulums."""
-    return _engine_results(pendulums)
+    pendulums: int
+    coefficients: int
+    tolerance: float
 
 
 def _paths(study: Study) -> Iterable[str]:
@@ -83,9 +77,8 @@ def _span(value: object) -> Span:
     return Span(float(number), unit)
 
 
-def run_of(study: Study) -> Run:
-    """The engine's settings of the run, from the plain data of the study."""
-    run = study.run
+def run_of(run: Mapping[str, Any]) -> Run:
+    """The engine's settings of the run, from the plain data of a study."""
     window = cast("list[object] | None", run.get("window"))
     return Run(
         duration=_span(run["duration"]),
@@ -93,11 +86,6 @@ def run_of(study: Study) -> Run:
         tolerance=float(cast("float", run["tolerance"])),
         reset=cast("Reset", run["reset"]),
     )
-
-
-def shape_of(study: Study) -> KernelShape:
-    """The kernel that the cases of ``study`` need."""
-    return KernelShape(MODEL, pendulums(study), coefficients(study), run_of(study).tolerance)
 
 
 def _flags(names: list[str], values: NDArray[np.float64]) -> list[str]:
@@ -112,36 +100,9 @@ def _flags(names: list[str], values: NDArray[np.float64]) -> list[str]:
     return [",".join(name for name, cases in raised.items() if cases[case]) for case in range(len(values))]
 
 
-def run_task(task: ChunkTask) -> ChunkResult:
-    """Run the cases of a task."""
-    from engine.endings import ENDING_CODES
-    from engine.vibration_drive.simulate import simulate
-
-    assert task.run is not None
-    batch = simulate(task.columns, task.run, cases=task.count)
-    names = [ending.value for ending in ENDING_CODES]
-    infos = result_infos(task.shape.pendulums)
-    return ChunkResult(
-        first=task.first,
-        endings=[names[code] for code in batch.endings.tolist()],
-        flags=_flags([info.name for info in infos], batch.values),
-        # Adding zero makes a negative zero positive: databases do not keep its sign.
-        values=np.ascontiguousarray(batch.values, dtype=np.float64) + 0.0,
-    )
-
-
-def run_trajectory(study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
-    """Instantaneous values at ``points`` equally spaced times from ``start`` to ``end`` (s)."""
-    from engine.vibration_drive.simulate import trajectory
-
-    columns = {**study.base, **study.case_parameters(case)}
-    made = trajectory(columns, run_of(study), np.linspace(start, end, points))
-    return Trajectory(made.times, made.names, made.units, made.values, made.states, made.ending.value)
-
-
 def duration_seconds(study: Study, case: int) -> float:
     """Duration of the run of one case, in s."""
-    duration = run_of(study).duration
+    duration = run_of(study.run).duration
     return duration.value if duration.unit == "s" else duration.value / _frequency(study, case)
 
 
@@ -149,14 +110,9 @@ def _frequency(study: Study, case: int) -> float:
     return {**study.base, **study.case_parameters(case)}["excitation.frequency"]
 
 
-def extent(study: Study, case: int) -> Extent:
-    """The run of one case; its periods are those of the excitation."""
-    return Extent("time", "s", duration_seconds(study, case), 1.0 / _frequency(study, case))
-
-
 def _mean_periods(study: Study) -> float:
     """Excitation periods of a run, averaged over the cases of the study."""
-    duration = run_of(study).duration
+    duration = run_of(study.run).duration
     for axis in study.axes:
         if "excitation.frequency" in axis.paths:
             frequency = math.fsum(axis.values) / len(axis.values)
@@ -166,34 +122,78 @@ def _mean_periods(study: Study) -> float:
     return duration.in_periods(frequency)
 
 
-def estimate_seconds_per_case(study: Study) -> float:
-    """Rough time of one case of ``study`` on one core, in s."""
-    from engine.vibration_drive.simulate import estimate_seconds
-
-    shape = shape_of(study)
-    return estimate_seconds(shape.pendulums, shape.coefficients, shape.tolerance, _mean_periods(study))
-
-
-def estimate_compile_seconds(shape: KernelShape) -> float:
-    """Rough time of compiling the kernel of that shape, in s: 7 s for one pendulum, 13 s for eight on one core."""
-    return 7.0 + 0.9 * (shape.pendulums - 1)
-
-
-def prepare() -> None:
-    """Load the engine with its compiler."""
-    import engine.vibration_drive.simulate  # noqa: F401
-
-
-def load(shape: KernelShape) -> None:
-    """Compile the kernel of that shape into the on-disk cache, or load it from there."""
-    from engine.vibration_drive.simulate import warm_up
-
-    warm_up(shape.pendulums, shape.coefficients, shape.tolerance)
-
-
 def kernel_source(pendulums: int, coefficients: int, tolerance: float) -> str:
     """Text of the generated kernel of vibration drives of that shape, for this machine; nothing is compiled."""
     from engine.vibration_drive.kernel import lane_count, order_for, source
     from engine.vibration_drive.layout import make_layout
 
     return source(make_layout(pendulums, coefficients, order_for(tolerance), lane_count()))
+
+
+class VibrationDrive(Model):
+    """Pendulums on a vibrating base that turn a shaft through freewheels; a variant for each number of pendulums."""
+
+    name = MODEL
+    own_endings = frozenset({Ending.ACCURACY_NOT_REACHED, Ending.CHATTER, Ending.STEP_BUDGET, Ending.DIVERGED})
+    flags = FLAG_SENTENCES
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (*PARAMETERS, CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT)
+
+    def variants(self) -> tuple[str, ...]:
+        return tuple(map(str, range(1, MAX_PENDULUMS + 1)))
+
+    def variant_of(self, study: Study) -> str:
+        return str(pendulums(study))
+
+    def results(self, variant: str) -> tuple[ResultInfo, ...]:
+        return result_infos(int(variant))
+
+    def result_catalogue(self) -> tuple[ResultInfo, ...]:
+        # One pendulum stands for all.
+        one = "pendulums.0."
+        return tuple(replace(info, name=info.name.replace(one, "pendulums.N.")) for info in result_infos(1))
+
+    def shape_of(self, study: Study) -> KernelShape:
+        return KernelShape(MODEL, DriveKey(pendulums(study), coefficients(study), run_of(study.run).tolerance))
+
+    def run(self, task: ChunkTask) -> ChunkResult:
+        from engine.vibration_drive.simulate import simulate
+
+        batch = simulate(task.columns, run_of(task.run), cases=task.count)
+        infos = result_infos(_key_of(task.shape).pendulums)
+        flags = _flags([info.name for info in infos], batch.values)
+        return chunk_result(task.first, batch.endings, flags, batch.values)
+
+    def extent(self, study: Study, case: int) -> Extent:
+        """The run of one case; its periods are those of the excitation."""
+        return Extent("time", "s", duration_seconds(study, case), 1.0 / _frequency(study, case))
+
+    def trajectory(self, study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
+        """Instantaneous values at ``points`` equally spaced times from ``start`` to ``end`` (s)."""
+        from engine.vibration_drive.simulate import trajectory
+
+        columns = {**study.base, **study.case_parameters(case)}
+        motion = trajectory(columns, run_of(study.run), np.linspace(start, end, points))
+        return Trajectory(motion.times, motion.names, motion.units, motion.values, motion.states, motion.ending.value)
+
+    def estimate_seconds_per_case(self, study: Study) -> float:
+        from engine.vibration_drive.simulate import estimate_seconds
+
+        return estimate_seconds(*_key_of(self.shape_of(study)), _mean_periods(study))
+
+    def estimate_compile_seconds(self, shape: KernelShape) -> float:
+        """On one core: 7 s for one pendulum, 13 s for eight."""
+        return 7.0 + 0.9 * (_key_of(shape).pendulums - 1)
+
+    def prepare(self) -> None:
+        import engine.vibration_drive.simulate  # noqa: F401
+
+    def load(self, shape: KernelShape) -> None:
+        from engine.vibration_drive.simulate import warm_up
+
+        warm_up(*_key_of(shape))
+
+
+def _key_of(shape: KernelShape) -> DriveKey:
+    return DriveKey(*cast("tuple[int, int, float]", shape.key))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Path, Request
@@ -69,13 +68,12 @@ def _model(name: str) -> dict[str, Any]:
         "parameters": [_parameter(entry) for entry in models.parameter_catalogue(name)],
         "results": [
             {
-                # One pendulum stands for all.
-                "name": re.sub(r"^pendulums\.0\.", "pendulums.N.", info.name),
+                "name": info.name,
                 "unit": info.unit,
                 "kind": info.kind,
                 "description": info.description,
             }
-            for info in models.result_infos(name, 1)
+            for info in models.result_catalogue(name)
         ],
         "endings": models.endings_of(name),
         "flags": models.flags_of(name),

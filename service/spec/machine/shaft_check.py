@@ -65,7 +65,7 @@ def check_machine(
     values : flat path -> SI number, all that the structure needs
     places : part -> JSON Pointer of its formula, its table, or all of it
     """
-    shape = machine_shaft.shape_of()
+    shape = machine_shaft.SHAPE
     if not _compiles_here:
         if not is_compiled(shape):
             raise NotCompiledError(shape)

@@ -44,7 +44,7 @@ def test_it_computes_elsewhere_and_survives_crashes(computer: ProcessComputer, p
     assert portal.call(computer.run, math.sqrt, 4.0) == 2.0
 
 
-SHAPE = models.KernelShape("vibration-drive", 1, 2, 1e-9)
+SHAPE = models.KernelShape("vibration-drive", (1, 2, 1e-9))
 
 
 def test_a_kernel_takes_longer_than_a_computation_may_and_outlives_its_request(

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tests.service.conftest import Service
 
 API = "/api/v1"
-RESULTS = len(models.result_infos("vibration-drive", 1))
+RESULTS = len(models.result_infos("vibration-drive", "1"))
 
 
 def grid(frequencies: list[float], loads: list[float], **run: Any) -> Study:
@@ -36,7 +36,7 @@ def physics(columns: dict[str, Any], count: int) -> np.ndarray[Any, np.dtype[np.
     """Made-up results that depend on the parameters only: what an engine gives for them."""
     frequency, load = (np.broadcast_to(columns[path], count) for path in ("excitation.frequency", "shaft.load"))
     values = np.sqrt(frequency)[:, None] * np.arange(RESULTS) + load[:, None] / 3.0
-    counts = [info.kind == "count" for info in models.result_infos("vibration-drive", 1)]
+    counts = [info.kind == "count" for info in models.result_infos("vibration-drive", "1")]
     values[:, counts] = np.floor(values[:, counts])
     return np.ascontiguousarray(values)
 

@@ -167,7 +167,7 @@ def test_chunks_are_run_while_a_kernel_compiles(start: Callable[..., ProcessPool
 
 
 def test_a_kernel_in_the_cache_waits_for_no_other(start: Callable[..., ProcessPoolExecutor]) -> None:
-    pool = start(2, load=fakes.load_never, compiled=lambda shape: shape.tolerance == 1e-9)
+    pool = start(2, load=fakes.load_never, compiled=lambda shape: shape.key[-1] == 1e-9)
     assert not pool.ready(fakes.study(4, tolerance=1e-6))
     assert pool.ready(fakes.study(4))
     submit(pool, 4)

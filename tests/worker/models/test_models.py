@@ -23,28 +23,33 @@ def test_every_ending_has_a_sentence() -> None:
 
 def test_unknown_models_are_named() -> None:
     assert models.model_names() == ("vibration-drive", "machine-shaft")
-    for ask in (models.parameter_catalogue, models.result_shapes, lambda model: models.result_infos(model, 1)):
+    for ask in (models.parameter_catalogue, models.variants, lambda model: models.result_infos(model, "")):
         with pytest.raises(ValueError, match="unknown model 'steam-engine'; there is: vibration-drive, machine-shaft"):
             ask("steam-engine")
+
+
+def test_two_models_cannot_have_one_name() -> None:
+    with pytest.raises(ValueError, match="there already is a model 'machine-shaft'"):
+        models.register(models.model_of("machine-shaft"))
 
 
 def test_the_catalogues_are_complete() -> None:
     paths = [parameter.path for parameter in models.parameter_catalogue("vibration-drive")]
     assert len(set(paths)) == len(paths)
     assert {"shaft.load", "pendulums.N.mass", "clutch.coefficients.K", "clutch.windup_limit"} <= set(paths)
-    for pendulums in models.result_shapes("vibration-drive"):
-        infos = models.result_infos("vibration-drive", pendulums)
+    for variant in models.variants("vibration-drive"):
+        infos = models.result_infos("vibration-drive", variant)
         assert len({info.column for info in infos}) == len(infos)
 
 
 def test_the_shape_of_a_machine_comes_from_its_paths() -> None:
     study = fakes.study(3)
-    assert models.shape_of(study) == models.KernelShape("vibration-drive", 1, 2, 1e-9)
+    assert models.shape_of(study) == models.KernelShape("vibration-drive", (1, 2, 1e-9))
     own_clutch = {"pendulums.2.clutch.coefficients.4": 1.0}
-    assert models.pendulums(replace(study, base=study.base | own_clutch)) == 3
+    assert models.variant_of(replace(study, base=study.base | own_clutch)) == "3"
     assert models.coefficients(replace(study, base=study.base | own_clutch)) == 5
     on_axis = Axis(("pendulums.1.mass", "clutch.coefficients.2"), (0.5,))
-    assert models.pendulums(replace(study, axes=(on_axis,))) == 2
+    assert models.variant_of(replace(study, axes=(on_axis,))) == "2"
     assert models.coefficients(replace(study, axes=(on_axis,))) == 3
     assert len(models.study_results(study)) == fakes.RESULTS
 
@@ -91,7 +96,7 @@ def test_runs_are_given_in_periods_or_seconds() -> None:
     assert models.duration_seconds(study, 0) == pytest.approx(3.0 / 25.0)
     seconds = replace(study, run=study.run | {"duration": [2.0, "s"], "window": [[1.0, "s"], [2.0, "s"]]})
     assert models.duration_seconds(seconds, 0) == 2.0
-    run = models.run_of(seconds)
+    run = models.run_of(seconds.run)
     assert run.window_in_periods(25.0) == (25.0, 50.0)
     fast = Axis(("excitation.frequency",), (10.0, 50.0))
     assert models.duration_seconds(replace(study, axes=(fast,)), 1) == pytest.approx(3.0 / 50.0)
@@ -128,5 +133,5 @@ def test_a_kernel_counts_as_compiled_once_it_was_loaded(monkeypatch: pytest.Monk
     models.load(shape)
     assert models.is_compiled(shape)
     assert models.estimate_compile_seconds(study) == 0.0
-    assert not models.is_compiled(replace(shape, tolerance=1e-8))
-    assert not models.is_compiled(replace(shape, coefficients=shape.coefficients + 1))
+    assert not models.is_compiled(replace(shape, key=(*shape.key[:-1], 1e-8)))
+    assert not models.is_compiled(replace(shape, key=(1, 3, 1e-9)))

@@ -176,7 +176,7 @@ def test_zipped_axes_give_points_in_order_of_cases(service: Service, spec: dict[
         (20.0, [0.1], [3]),
         (25.0, [0.3, 0.2], [0, 2]),
     ]
-    column = [info.name for info in models.result_infos("vibration-drive", 1)].index("torque.max")
+    column = [info.name for info in models.result_infos("vibration-drive", "1")].index("torque.max")
     assert grouped[2]["y"]["torque.max"] == [rows.values[0, column], rows.values[2, column]]
     at = ask(service, study_id, "x=shaft.load&y=torque.max&at=excitation.frequency=25").json()
     assert at["curves"][0]["cases"] == [0, 2]

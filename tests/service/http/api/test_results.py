@@ -28,7 +28,7 @@ API = "/api/v1"
 
 def results_of(rows: ChunkResult, case: int) -> dict[str, float | None]:
     """The made-up results of one case."""
-    infos = models.result_infos("vibration-drive", 1)
+    infos = models.result_infos("vibration-drive", "1")
     values = rows.values[case].tolist()
     return {info.name: None if math.isnan(value) else value for info, value in zip(infos, values, strict=True)}
 
@@ -135,7 +135,7 @@ def test_results_as_csv_read_back_exactly(service: Service) -> None:
     response = service.http.get(f"{API}/studies/{study_id}/results", headers={"Accept": "text/csv"})
     assert response.headers["content-type"] == "text/csv; charset=utf-8"
     table = list(csv.reader(io.StringIO(response.text)))
-    names = [info.name for info in models.result_infos("vibration-drive", 1)]
+    names = [info.name for info in models.result_infos("vibration-drive", "1")]
     assert table[0] == ["case", "excitation.frequency", "shaft.load", "ending", "flags", *names]
     study = service.store.study(study_id)
     for case, row in enumerate(table[1:]):
@@ -309,7 +309,7 @@ def test_instantaneous_values_are_written_where_they_are_computed(service: Servi
     service.computer.answer = lambda *args: compute(service.computer.calls[-1][0], *args)
     response = trajectory(service, one_case, f"?points=3&format={form}")
     assert response.content == made[0]
-    assert service.computer.loads == [models.KernelShape("vibration-drive", 1, 4, 1e-9)]
+    assert service.computer.loads == [models.KernelShape("vibration-drive", (1, 4, 1e-9))]
 
 
 def test_numbers_that_are_none_are_null(service: Service, one_case: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,124 @@
+"""What a model has to offer, and the registry of the models that there are."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from engine import Ending
+    from engine.vibration_drive.parameters import Parameter
+    from engine.vibration_drive.results import ResultInfo
+    from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, Trajectory
+    from worker.study import Study
+
+
+class Model(Protocol):
+    """A model: how a study's columns become a call of the engine, and what comes back.
+
+    A subclass says ``name`` and whatever has no body here. ``own_endings`` are endings that no other model has;
+    ``flags`` maps each flag to the sentence that a user reads.
+    """
+
+    @property
+    def name(self) -> str:
+        """What a spec calls the model, such as "vibration-drive"."""
+        ...
+
+    @property
+    def own_endings(self) -> frozenset[Ending]:
+        """Endings that this model alone gives."""
+        return frozenset()
+
+    @property
+    def flags(self) -> Mapping[str, str]:
+        """The flags that a case can have, with their sentences."""
+        return {}
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Every numeric parameter: paths in a spec, with letters for indices and names."""
+        ...
+
+    def parameters_of(self, study: Study) -> dict[str, Parameter]:
+        """The parameters of the study's own machine by path; empty where `parameters` says all."""
+        return {}
+
+    def variants(self) -> tuple[str, ...]:
+        """Every variant; studies of one variant have the same results, and one table for them."""
+        return ("",)
+
+    def variant_of(self, study: Study) -> str:
+        """The variant of a study: at most 40 lower-case letters, digits and hyphens."""
+        return ""
+
+    def results(self, variant: str) -> tuple[ResultInfo, ...]:
+        """Every result of a variant, in the order of the columns of `ChunkResult.values`."""
+        ...
+
+    def result_catalogue(self) -> tuple[ResultInfo, ...]:
+        """Every result as a catalogue lists it, with letters for indices."""
+        return self.results(self.variants()[0])
+
+    def shape_of(self, study: Study) -> KernelShape:
+        """The compiled kernel that the cases of the study need."""
+        ...
+
+    def run(self, task: ChunkTask) -> ChunkResult:
+        """Run the cases of a task; a physical failure is an ending in the result, never an exception."""
+        ...
+
+    def extent(self, study: Study, case: int) -> Extent:
+        """What the instantaneous values of a case go along."""
+        ...
+
+    def trajectory(self, study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
+        """Instantaneous values of one case at ``points`` equally spaced places of its `extent`."""
+        ...
+
+    def estimate_seconds_per_case(self, study: Study) -> float:
+        """Rough time of one case on one core, in s."""
+        ...
+
+    def estimate_compile_seconds(self, shape: KernelShape) -> float:
+        """Rough time of compiling the kernel of that shape, in s."""
+        return 0.0
+
+    def prepare(self) -> None:
+        """Load the model's engine with its compiler."""
+
+    def load(self, shape: KernelShape) -> None:
+        """Compile the kernel of that shape into the on-disk cache, or load it from there."""
+
+
+_MODELS: dict[str, Model] = {}
+
+
+def register(model: Model) -> None:
+    """Offer a model to every study. Raises ValueError where another one has its name."""
+    if model.name in _MODELS:
+        raise ValueError(f"there already is a model {model.name!r}")
+    _MODELS[model.name] = model
+
+
+def unregister(name: str) -> None:
+    """Withdraw a model; KeyError where there is none."""
+    del _MODELS[name]
+
+
+def model_of(name: str) -> Model:
+    """The model of that name; ValueError where there is none."""
+    try:
+        return _MODELS[name]
+    except KeyError:
+        raise ValueError(f"unknown model {name!r}; there is: {', '.join(_MODELS)}") from None
+
+
+def model_names() -> tuple[str, ...]:
+    """Names of the models that a study may ask for."""
+    return tuple(_MODELS)
+
+
+def all_models() -> tuple[Model, ...]:
+    """Every model."""
+    return tuple(_MODELS.values())
