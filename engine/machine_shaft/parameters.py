@@ -4,8 +4,8 @@ import math
 from collections.abc import Mapping
 from itertools import chain
 
+from engine.catalogue import STANDARD_GRAVITY, Parameter
 from engine.machine_shaft.spec import MachineSpec, MechanismKind
-from engine.vibration_drive.parameters import STANDARD_GRAVITY, Parameter
 
 _INF = math.inf
 _TURN = 2.0 * math.pi

@@ -30,6 +30,7 @@ from engine.machine_shaft.resolution import compare, near_singular, rough_pace, 
 from engine.machine_shaft.results import result_infos
 from engine.machine_shaft.spec import MachineSpec
 from engine.machine_shaft.start import Shape, Stop, least_mean_speed, start_energy
+from engine.outcome import Batch
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -48,22 +49,6 @@ _OF_MOTION = ("omega.", "irregularity", "acceleration.", "s1.", "s2.", "power.",
 #: The same for a motor that has no steady torque.
 _OF_MOTOR = ("drive_torque.", "work.drive", "balance.work", "energy.", "s3.", "s4.", "phi_c")
 _CODE = {ending: np.int8(code) for code, ending in enumerate(ENDING_CODES)}
-
-
-@dataclass(frozen=True, slots=True)
-class Batch:
-    """Results of a batch.
-
-    Attributes
-    ----------
-    values : array, shape (cases, results)
-        In the order of ``result_infos()``; NaN where a value could not be computed.
-    endings : int8 array, shape (cases,)
-        Index into ``engine.endings.ENDING_CODES``.
-    """
-
-    values: Floats
-    endings: Codes
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,6 @@
 """The tables of one case over the angle."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +11,7 @@ from engine.machine_shaft.machine import Columns, Machine, check_structure
 from engine.machine_shaft.panels import Points
 from engine.machine_shaft.simulate import attempts, settle
 from engine.machine_shaft.spec import MachineSpec
+from engine.outcome import Trajectory
 
 Floats = NDArray[np.float64]
 
@@ -31,30 +31,6 @@ COLUMNS: tuple[tuple[str, str], ...] = (
     ("s3", "rad^2/s^2"),
     ("s4", "rad^2/s^2"),
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Trajectory:
-    """Values of one case over the angle.
-
-    Attributes
-    ----------
-    angles : array, shape (m,)
-        Angles in rad that were asked for; none if the case has no motion.
-    names, units : tuples
-        Name and SI unit of each column.
-    values : array, shape (m, columns)
-    phi_c : tuple of float
-        All angles in rad at which T = T_mean, ascending.
-    ending : Ending
-    """
-
-    angles: Floats
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    values: Floats
-    phi_c: tuple[float, ...]
-    ending: Ending
 
 
 def trajectory(model: MachineSpec, columns: Mapping[str, ArrayLike], angles: ArrayLike) -> Trajectory:
@@ -87,19 +63,23 @@ def trajectory(model: MachineSpec, columns: Mapping[str, ArrayLike], angles: Arr
     if asked.size and not (asked.min() >= 0.0 and asked.max() <= cycle * (1.0 + 1e-12)):
         raise ValueError(f"angles must be within 0 .. {cycle:g} rad")
     row = Columns.of(model, columns, 1)
-    none = Trajectory(np.empty(0), names, units, np.empty((0, len(names))), (), Ending.CANNOT_ASSEMBLE)
+
+    def made(angles: Floats, values: Floats, ending: Ending, phi_c: tuple[float, ...] = ()) -> Trajectory:
+        return Trajectory(angles, names, units, values, {}, ending, "angle", "rad", phi_c)
+
+    nothing = np.empty((0, len(names)))
     if not np.isnan(Machine(model, row).unassembled()[0]):
-        return none
+        return made(nothing[:, 0], nothing, Ending.CANNOT_ASSEMBLE)
     with np.errstate(all="ignore"):
         *_, (_, solved) = attempts(model, row)
         settle(model, row, solved)
     ending = ENDING_CODES[int(solved.endings[0])]
     if ending is not Ending.OK:
-        return Trajectory(none.angles, names, units, none.values, (), ending)
+        return made(nothing[:, 0], nothing, ending)
     table = _table(solved.decomposition, model.phi_c, np.minimum(asked, cycle))
     values = np.column_stack([table[name] for name in names])
     every = np.sort(np.mod(solved.decomposition.crossings.angle, cycle))
-    return Trajectory(asked, names, units, values, tuple(float(angle) for angle in every), ending)
+    return made(asked, values, ending, tuple(float(angle) for angle in every))
 
 
 def _table(d: Decomposition, chosen: int | None, angles: Floats) -> dict[str, Floats]:

@@ -1,42 +1,11 @@
 """Parameters of a vibration drive: paths, SI units, ranges, defaults (docs/theory.md, "The machine")."""
 
 import math
-from dataclasses import dataclass
+
+from engine.catalogue import STANDARD_GRAVITY, Parameter
 
 MAX_PENDULUMS = 8
 MAX_COEFFICIENTS = 12
-STANDARD_GRAVITY = 9.80665
-
-
-@dataclass(frozen=True, slots=True)
-class Parameter:
-    """One numeric parameter.
-
-    ``path`` is the spec path with ``N`` for a pendulum's index. ``symbol`` is as in docs/theory.md. The range is
-    ``low`` .. ``high`` in ``unit``; an open end excludes the bound itself. ``default`` None means the value is
-    required.
-    """
-
-    path: str
-    symbol: str
-    unit: str
-    low: float
-    high: float
-    low_open: bool
-    default: float | None
-    help: str
-
-    def range_text(self) -> str:
-        """The allowed range as people write it."""
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        low = "" if self.low == -math.inf else f"{'>' if self.low_open else '>='} {self.low:g}{unit}"
-        high = "" if self.high == math.inf else f"<= {self.high:g}{unit}"
-        return " and ".join(part for part in (low, high) if part) or "any finite number"
-
-    def accepts(self, value: float) -> bool:
-        """Whether ``value`` (SI) is finite and in range."""
-        above = value > self.low if self.low_open else value >= self.low
-        return math.isfinite(value) and above and value <= self.high
 
 
 _INF = math.inf

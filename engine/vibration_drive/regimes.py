@@ -2,7 +2,8 @@
 
 from enum import IntEnum
 
-from engine.vibration_drive.results import ResultInfo, result_infos
+from engine.catalogue import ResultInfo
+from engine.vibration_drive.results import result_infos
 
 
 class Regime(IntEnum):

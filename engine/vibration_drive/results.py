@@ -1,24 +1,6 @@
 """The characteristics of a vibration drive: names, units, meaning (docs/theory.md, "Characteristics")."""
 
-from dataclasses import dataclass
-from typing import Literal
-
-Kind = Literal["real", "count"]
-
-
-@dataclass(frozen=True, slots=True)
-class ResultInfo:
-    """One result: SPEC name, SI unit ("1" where it has none), sentence for people, and whether it is a count."""
-
-    name: str
-    unit: str
-    description: str
-    kind: Kind = "real"
-
-    @property
-    def column(self) -> str:
-        """The name as a database column."""
-        return self.name.replace(".", "_")
+from engine.catalogue import Kind, ResultInfo
 
 
 def _shaft() -> tuple[ResultInfo, ...]:

@@ -4,12 +4,12 @@ trajectory.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from engine.endings import ENDING_CODES, Ending
+from engine.endings import ENDING_CODES
+from engine.outcome import Batch, Trajectory
 from engine.run import Run
 from engine.vibration_drive.automaton import Clutch, Shaft
 from engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count
@@ -23,46 +23,6 @@ Floats = NDArray[np.float64]
 
 _CLUTCH_NAMES = {int(state): state.name.lower() for state in Clutch}
 _SHAFT_NAMES = {int(state): state.name.lower() for state in Shaft}
-
-
-@dataclass(frozen=True, slots=True)
-class Batch:
-    """Results of a batch.
-
-    Attributes
-    ----------
-    values : array, shape (cases, results)
-        Characteristics in the order of ``result_infos(pendulums)``; NaN where a value could not be computed.
-    endings : int8 array, shape (cases,)
-        Index into ``engine.endings.ENDING_CODES``.
-    """
-
-    values: Floats
-    endings: NDArray[np.int8]
-
-
-@dataclass(frozen=True, slots=True)
-class Trajectory:
-    """Instantaneous values of one case.
-
-    Attributes
-    ----------
-    times : array, shape (m,)
-        Times in s that were reached (all asked for, unless the case ended early).
-    names, units : tuples
-        Name and SI unit of each column.
-    values : array, shape (m, columns)
-    states : dict
-        State of "shaft" ("held", "rotating") and of "pendulums.N" (states of its clutch), one string a time.
-    ending : Ending
-    """
-
-    times: Floats
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    values: Floats
-    states: dict[str, list[str]]
-    ending: Ending
 
 
 def _kernel(columns: Mapping[str, ArrayLike], run: Run) -> Kernel:

@@ -12,7 +12,9 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from engine import ENGINE_VERSION, Ending, Run, Span
+from engine.catalogue import Parameter, ResultInfo
 from engine.machine_shaft.problems import ExpressionError, InsufficientInertiaError, MachineError
+from engine.outcome import Trajectory
 from engine.sources import engine_folder, source_hash
 from engine.vibration_drive.clutch import (
     ClutchFit,
@@ -28,11 +30,9 @@ from engine.vibration_drive.parameters import (
     CLUTCH_WINDUP_LIMIT,
     MAX_COEFFICIENTS,
     MAX_PENDULUMS,
-    Parameter,
 )
-from engine.vibration_drive.results import ResultInfo
 from worker.models import machine_shaft, vibration_drive
-from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, Trajectory
+from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
 from worker.models.model import Model, all_models, model_names, model_of, register, unregister
 from worker.models.vibration_drive import (
     FLAG_SENTENCES,

@@ -90,34 +90,3 @@ class Extent:
     unit: str
     end: float
     period: float
-
-
-@dataclass(frozen=True, slots=True)
-class Trajectory:
-    """Instantaneous values of one case.
-
-    Attributes
-    ----------
-    times : float64 array, shape (points,)
-        Times, or angles of the shaft: whatever ``along`` says, in its SI unit. None of them where a case has no motion.
-    names, units : tuples, length V
-        Name and SI unit of each variable.
-    values : float64 array, shape (points, V)
-    states : dict
-        States of parts of the machine by name, each of length points.
-    ending : str
-    along, unit : str
-        "time" in "s", or "angle" in "rad".
-    phi_c : tuple of float
-        Angles (rad) at which the energy of a machine shaft is its mean.
-    """
-
-    times: NDArray[np.float64]
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    values: NDArray[np.float64]
-    states: dict[str, list[str]]
-    ending: str
-    along: str = "time"
-    unit: str = "s"
-    phi_c: tuple[float, ...] = ()

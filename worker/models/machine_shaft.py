@@ -26,7 +26,7 @@ from engine.machine_shaft.spec import (
     OperationChoice,
 )
 from engine.machine_shaft.tables import MAX_ROWS
-from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, Trajectory, chunk_result
+from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
 from worker.models.model import Model
 
 if TYPE_CHECKING:
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from engine.catalogue import Parameter, ResultInfo
     from engine.machine_shaft.spec import MechanismKind
-    from engine.vibration_drive.parameters import Parameter
-    from engine.vibration_drive.results import ResultInfo
+    from engine.outcome import Trajectory
     from worker.study import Study
 
 __all__ = [
@@ -186,10 +186,7 @@ class MachineShaft(Model):
         from engine.machine_shaft.trajectory import trajectory
 
         columns = {**study.base, **study.case_parameters(case)}
-        table = trajectory(spec_of(study.structure), columns, np.linspace(start, end, points))
-        return Trajectory(
-            table.angles, table.names, table.units, table.values, {}, table.ending.value, "angle", "rad", table.phi_c
-        )
+        return trajectory(spec_of(study.structure), columns, np.linspace(start, end, points))
 
     def estimate_seconds_per_case(self, study: Study) -> float:
         from engine.machine_shaft.simulate import estimate_seconds

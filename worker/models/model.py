@@ -8,9 +8,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from engine import Ending
-    from engine.vibration_drive.parameters import Parameter
-    from engine.vibration_drive.results import ResultInfo
-    from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, Trajectory
+    from engine.catalogue import Parameter, ResultInfo
+    from engine.outcome import Trajectory
+    from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
     from worker.study import Study
 
 

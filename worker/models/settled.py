@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from engine.catalogue import ResultInfo
 from engine.run import SettledRun
 from engine.vibration_drive.regimes import Regime, settled_infos
-from engine.vibration_drive.results import ResultInfo
 from worker.models.vibration_drive import MODEL, pendulums, run_of
 
 if TYPE_CHECKING:

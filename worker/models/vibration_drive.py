@@ -15,10 +15,9 @@ from engine.vibration_drive.parameters import (
     CLUTCH_WINDUP_LIMIT,
     MAX_PENDULUMS,
     PARAMETERS,
-    Parameter,
 )
-from engine.vibration_drive.results import ResultInfo, result_infos
-from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, Trajectory, chunk_result
+from engine.vibration_drive.results import result_infos
+from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
 from worker.models.model import Model
 
 if TYPE_CHECKING:
@@ -26,6 +25,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from engine.catalogue import Parameter, ResultInfo
+    from engine.outcome import Trajectory
     from engine.run import Reset, Unit
     from worker.study import Study
 
@@ -174,8 +175,7 @@ class VibrationDrive(Model):
         from engine.vibration_drive.simulate import trajectory
 
         columns = {**study.base, **study.case_parameters(case)}
-        motion = trajectory(columns, run_of(study.run), np.linspace(start, end, points))
-        return Trajectory(motion.times, motion.names, motion.units, motion.values, motion.states, motion.ending.value)
+        return trajectory(columns, run_of(study.run), np.linspace(start, end, points))
 
     def estimate_seconds_per_case(self, study: Study) -> float:
         from engine.vibration_drive.simulate import estimate_seconds

@@ -18,7 +18,8 @@ from engine.machine_shaft.machine import Columns, Machine
 from engine.machine_shaft.simulate import simulate
 from engine.machine_shaft.spec import Drive, MachineSpec, MeanSpeed, MechanismChoice, OperationChoice
 from engine.machine_shaft.tables import Table
-from engine.machine_shaft.trajectory import Trajectory, trajectory
+from engine.machine_shaft.trajectory import trajectory
+from engine.outcome import Trajectory
 from tests.engine.machine_shaft.machines import NAMES, PRESS, PRESS_NUMBERS, RPM, one, results_of
 
 ANGLES = np.linspace(0.0, 2.0 * math.pi, 257)

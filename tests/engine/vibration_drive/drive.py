@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.endings import ENDING_CODES, Ending
+from engine.outcome import Trajectory
 from engine.run import Run, Span
 from engine.vibration_drive.results import result_infos
-from engine.vibration_drive.simulate import Trajectory, simulate
+from engine.vibration_drive.simulate import simulate
 
 Columns = dict[str, Any]
 

@@ -1,0 +1,56 @@
+"""What every model says of its numbers: the parameters that it takes and the results that it gives."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+STANDARD_GRAVITY = 9.80665
+
+Kind = Literal["real", "count"]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One numeric parameter.
+
+    ``path`` is the spec path with letters for indices and names, such as ``N`` for a pendulum's index. ``symbol`` is
+    as in docs/theory.md. The range is
+    ``low`` .. ``high`` in ``unit``; an open end excludes the bound itself. ``default`` None means the value is
+    required.
+    """
+
+    path: str
+    symbol: str
+    unit: str
+    low: float
+    high: float
+    low_open: bool
+    default: float | None
+    help: str
+
+    def range_text(self) -> str:
+        """The allowed range as people write it."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        low = "" if self.low == -math.inf else f"{'>' if self.low_open else '>='} {self.low:g}{unit}"
+        high = "" if self.high == math.inf else f"<= {self.high:g}{unit}"
+        return " and ".join(part for part in (low, high) if part) or "any finite number"
+
+    def accepts(self, value: float) -> bool:
+        """Whether ``value`` (SI) is finite and in range."""
+        above = value > self.low if self.low_open else value >= self.low
+        return math.isfinite(value) and above and value <= self.high
+
+
+@dataclass(frozen=True, slots=True)
+class ResultInfo:
+    """One result: name, SI unit ("1" where it has none), sentence for people, and whether it is a count."""
+
+    name: str
+    unit: str
+    description: str
+    kind: Kind = "real"
+
+    @property
+    def column(self) -> str:
+        """The name as a database column."""
+        return self.name.replace(".", "_")
