@@ -17,7 +17,7 @@ from worker import models
 from worker.study import Axis
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -151,18 +151,17 @@ def shared_cases(new: Study | Wanted, old: Study) -> tuple[Cases, Cases]:
     return our_cases[at_ours[order]], their_cases[at_theirs[order]]
 
 
-def span(study: Mapping[str, Any]) -> Values:
-    """Least and largest value (SI) of every parameter of a study, which is given as plain data (`Study.to_json`).
+def span(study: Study) -> Values:
+    """Least and largest value (SI) of every parameter of a study.
 
     Returns
     -------
     float64 array, shape (2, paths)
         The paths in the order of their names, which is one for all studies of a `kin_hash`.
     """
-    spans = {path: (value, value) for path, value in study["base"].items()}
-    for axis in study["axes"]:
-        ends = min(axis["values"]), max(axis["values"])
-        spans.update(dict.fromkeys(axis["paths"], ends))
+    spans = {path: (value, value) for path, value in study.base.items()}
+    for axis in study.axes:
+        spans.update(dict.fromkeys(axis.paths, (float(axis.array.min()), float(axis.array.max()))))
     return np.array([spans[path] for path in sorted(spans)], dtype=np.float64).reshape(-1, 2).T
 
 
@@ -222,10 +221,7 @@ def _positions(study: Study, axis: int, cases: Cases) -> Cases:
 
 def taken(study: Study, cases: Cases) -> Study:
     """A study of just these cases of ``study``, in this order, numbered from 0."""
-    axes = tuple(
-        Axis(axis.paths, tuple(axis.array[_positions(study, index, cases)].tolist()))
-        for index, axis in enumerate(study.axes)
-    )
+    axes = tuple(Axis(axis.paths, axis.array[_positions(study, index, cases)]) for index, axis in enumerate(study.axes))
     return replace(study, axes=axes, combine="zip")
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from typing import Any, Literal, cast, get_args
 
 import numpy as np
@@ -19,49 +19,68 @@ Combine = Literal["grid", "zip"]
 
 #: Two numbers closer than this (relative to the larger one) name the same value of an axis.
 SAME_VALUE = 1e-9
+#: Longer axes are stored as the bytes of their doubles: a million of them as decimals take half a second to read.
+_MOST_DECIMALS = 1000
 
 
-@dataclass(frozen=True)
 class Axis:
-    """Values that one parameter, or several tied ones, take in turn.
+    """Values that one parameter, or several tied ones, take in turn. Never changed once made.
 
-    Attributes
+    Parameters
     ----------
     paths : tuple of str
         Flat spec paths that share the values, for instance ``("excitation.amplitude_x", "excitation.amplitude_y")``.
-    values : tuple of float
-        SI numbers, finite, each once, in the user's order.
+    values : sequence of float
+        SI numbers, finite, in the user's order.
+
+    Attributes
+    ----------
+    array : float64 array, shape (values,)
+        The values, read-only. A million of them take 8 MB here and 40 MB as Python numbers.
     """
 
-    paths: tuple[str, ...]
-    values: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        if not self.paths or not self.values:
+    def __init__(self, paths: tuple[str, ...], values: Sequence[float] | NDArray[np.float64]) -> None:
+        array = np.array(values, dtype=np.float64)
+        if not paths or not array.size:
             raise ValueError("an axis needs at least one path and one value")
-        if not all(map(math.isfinite, self.values)):
-            raise ValueError(f"axis {self.paths[0]}: every value must be a finite number")
+        if not np.isfinite(array).all():
+            raise ValueError(f"axis {paths[0]}: every value must be a finite number")
+        array.flags.writeable = False
+        self.paths = paths
+        self.array = array
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """All values as Python numbers, made anew each time; `value` gives a single one."""
+        return tuple(self.array.tolist())
+
+    def value(self, index: int) -> float:
+        """The value at a position."""
+        return float(self.array[index])
 
     def __reduce__(self) -> tuple[type[Axis], tuple[Any, ...]]:
-        # Without the arrays cached below, which would double what travels to the processes.
-        return Axis, (self.paths, self.values)
+        return Axis, (self.paths, self.array)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Axis):
+            return NotImplemented
+        return self.paths == other.paths and np.array_equal(self.array, other.array)
+
+    def __hash__(self) -> int:
+        return hash((self.paths, self.array.tobytes()))
+
+    def __repr__(self) -> str:
+        return f"Axis({self.paths!r}, {len(self)} values)"
 
     def __len__(self) -> int:
-        return len(self.values)
-
-    @cached_property
-    def array(self) -> NDArray[np.float64]:
-        """The values as a read-only array, shape (values,)."""
-        array = np.array(self.values, dtype=np.float64)
-        array.flags.writeable = False
-        return array
+        return int(self.array.size)
 
     def index_of(self, value: float) -> int | None:
         """Position of the axis' value that is ``value`` (SI) within `SAME_VALUE`; None when there is none."""
         if not math.isfinite(value):
             return None
         nearest = int(np.argmin(np.abs(self.array - value)))
-        return nearest if math.isclose(self.values[nearest], value, rel_tol=SAME_VALUE) else None
+        return nearest if math.isclose(float(self.array[nearest]), value, rel_tol=SAME_VALUE) else None
 
 
 @dataclass(frozen=True)
@@ -242,21 +261,31 @@ class Study:
             "name": self.name,
             "base": dict(self.base),
             "run": dict(self.run),
-            "axes": [{"paths": list(axis.paths), "values": list(axis.values)} for axis in self.axes],
+            "axes": [{"paths": list(axis.paths), "values": axis.array.tolist()} for axis in self.axes],
             "combine": self.combine,
             # Left out where there is none: studies of before it, and their hashes, stay as they are.
             **({} if self.structure is None else {"structure": self.structure}),
         }
 
+    def to_text(self) -> str:
+        """The study as it is stored, JSON text; long axes are packed, so that reading them takes little time."""
+        axes = [{"paths": list(axis.paths), "values": _packed(axis.array)} for axis in self.axes]
+        return json.dumps(replace(self, axes=()).to_json() | {"axes": axes}, allow_nan=False)
+
+    @classmethod
+    def from_text(cls, text: str) -> Study:
+        """The study that `to_text` wrote; KeyError, TypeError or ValueError when it is not one."""
+        return cls.from_json(json.loads(text))
+
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Study:
-        """The study that `to_json` wrote; KeyError, TypeError or ValueError when it is not one."""
+        """The study that `to_json` or `to_text` wrote; KeyError, TypeError or ValueError when it is not one."""
         return cls(
             model=str(data["model"]),
             name=str(data["name"]),
             base={str(path): float(value) for path, value in data["base"].items()},
             run=dict(data["run"]),
-            axes=tuple(Axis(tuple(axis["paths"]), tuple(map(float, axis["values"]))) for axis in data["axes"]),
+            axes=tuple(Axis(tuple(axis["paths"]), _unpacked(axis["values"])) for axis in data["axes"]),
             combine=cast("Combine", data["combine"]),
             structure=data.get("structure"),
         )
@@ -272,3 +301,17 @@ class Study:
             allow_nan=False,
         )
         return hashlib.sha256(text.encode("ascii")).hexdigest()
+
+
+def _packed(values: NDArray[np.float64]) -> list[float] | str:
+    """The values for a JSON text: as numbers, or many as the base64 text of their bytes (float64, little-endian)."""
+    if values.size <= _MOST_DECIMALS:
+        return cast("list[float]", values.tolist())
+    return base64.b64encode(values.astype("<f8").tobytes()).decode("ascii")
+
+
+def _unpacked(stored: Sequence[float] | str) -> Sequence[float] | NDArray[np.float64]:
+    """The values that `_packed` wrote."""
+    if not isinstance(stored, str):
+        return stored
+    return np.frombuffer(base64.b64decode(stored, validate=True), dtype="<f8")

@@ -324,8 +324,8 @@ def _grid_lines(
     _check_size(math.prod([len(axes[i]) for i in (x_axis, *by.values())]), results)
 
     strides = [math.prod(study.shape[i + 1 :]) for i in range(len(axes))]
-    at = {path: axes[i].values[index] for i, (path, index) in fixed.items()}
-    at |= {axes[i].paths[0]: axes[i].values[0] for i in range(len(axes)) if i not in named}
+    at = {path: axes[i].value(index) for i, (path, index) in fixed.items()}
+    at |= {axes[i].paths[0]: axes[i].value(0) for i in range(len(axes)) if i not in named}
     origin = sum(index * strides[i] for i, (_, index) in fixed.items())
     x_order = np.argsort(axes[x_axis].array, kind="stable")
     x_values = tuple(axes[x_axis].array[x_order].tolist())
@@ -335,7 +335,7 @@ def _grid_lines(
         for indices in itertools.product(*orders):
             chosen = list(zip(by.items(), indices, strict=True))
             first = origin + sum(index * strides[i] for (_, i), index in chosen)
-            values = {path: axes[i].values[index] for (path, i), index in chosen}
+            values = {path: axes[i].value(index) for (path, i), index in chosen}
             yield Line(values, at, x_values, (first + x_order * strides[x_axis]).astype(np.int64))
 
     return x_values, lines()
@@ -347,13 +347,13 @@ def _zip_lines(
     axes = study.axes
     chosen = np.ones(study.cases, dtype=np.bool_)
     for i, (_, index) in fixed.items():
-        chosen &= axes[i].array == axes[i].values[index]
+        chosen &= axes[i].array == axes[i].value(index)
     cases = np.flatnonzero(chosen).astype(np.int64)
     if cases.size == 0:
         message = "no case has all these values together"
         raise SelectionError([ErrorItem(message, parameter="at", value=listed(p for p, _ in fixed.values()))])
     _check_size(cases.size, results)
-    at = {path: axes[i].values[index] for i, (path, index) in fixed.items()}
+    at = {path: axes[i].value(index) for i, (path, index) in fixed.items()}
     x_all = axes[x_axis].array
 
     def lines() -> Iterator[Line]:

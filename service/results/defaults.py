@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from service.results.curves import CurveQuery
 from service.results.selection import axis_name, held_text
 from service.spec.catalogue import unit_of
@@ -59,7 +61,7 @@ def usual_value(study: Study, axis: Axis) -> float:
     """The value at which an axis that is not drawn is held: the base's where the axis has it, else its middle one."""
     base = study.base.get(axis.paths[0])
     index = None if base is None else axis.index_of(base)
-    return sorted(axis.values)[len(axis) // 2] if index is None else axis.values[index]
+    return float(np.sort(axis.array)[len(axis) // 2]) if index is None else axis.value(index)
 
 
 def drawn_numbers(study: Study, query: CurveQuery) -> int:

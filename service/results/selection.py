@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from service.faults import ErrorItem, shown
 from service.spec.catalogue import unit_of
 from service.spec.report import did_you_mean, quantity_text
@@ -115,7 +117,7 @@ def _no_such_value(path: str, text: str, axis: Axis, unit: str) -> SelectionErro
                 "the axis has no such value",
                 parameter="at",
                 value=shown(f"{path}={text}"),
-                allowed=listed(sorted(axis.values)),
+                allowed=listed(np.sort(axis.array).tolist()),
                 unit=unit,
             )
         ]

@@ -126,7 +126,7 @@ def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fet
         for name in names
         if result_of(infos, name) is None
     ]
-    varying = [axis for axis in study.axes if len(set(axis.values)) > 1]
+    varying = [axis for axis in study.axes if np.any(axis.array != axis.array[0])]
     if not varying and not faults:
         faults = [ErrorItem("nothing varies in this study", parameter="y")]
     if study.cases > MOST_CASES:

@@ -59,8 +59,8 @@ def axes_json(study: Study) -> list[dict[str, Any]]:
             "paths": list(axis.paths),
             "unit": unit_of(study, axis.paths[0]),
             "values": len(axis),
-            "first": axis.values[0],
-            "last": axis.values[-1],
+            "first": float(axis.array[0]),
+            "last": float(axis.array[-1]),
         }
         for axis in study.axes
     ]

@@ -96,10 +96,10 @@ def _add(
     if len(positions) > 1:
         report.problem(join(pointer, "path"), "names parameters of several axes", list(paths), allowed="one axis")
     elif position is not None:
-        axes[position]["values"] = list(dict.fromkeys([*axes[position]["values"], *values]))
+        axes[position]["values"] = list(dict.fromkeys([*axes[position]["values"], *values.tolist()]))
     else:
         bases = list(dict.fromkeys(study.base[path] for path in paths))
         if len(bases) > 1:
             told = [quantity_text(base, machine.parameters[paths[0]].unit) for base in bases]
             report.problem(join(pointer, "path"), "ties parameters whose values in the base differ", told)
-        axes.append({"path": list(paths), "values": list(dict.fromkeys([*bases, *values]))})
+        axes.append({"path": list(paths), "values": list(dict.fromkeys([*bases, *values.tolist()]))})

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
 
 from service.spec.fields import read_object
 from service.spec.report import Report, did_you_mean, join
 from service.spec.units import PERIOD_NAMES, QuantityError, exact_number, parse_exact, split_quantity, to_float
 from worker.limits import MAX_RUN_PERIODS, MAX_TOLERANCE, MIN_TOLERANCE
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 FIELDS: Final = ("duration", "window", "tolerance", "reset")
 RESETS: Final = ("contact", "literal")
@@ -21,7 +25,7 @@ _ROUNDING: Final = 1e-9
 Time = list[Any]  # [number, "periods" | "s"], as a study keeps it
 
 
-def read_run(report: Report, data: object, frequencies: Sequence[float]) -> dict[str, Any]:
+def read_run(report: Report, data: object, frequencies: NDArray[np.float64]) -> dict[str, Any]:
     """The run as a study keeps it (see `Study.run`), everything wrong with it noted in ``report``.
 
     Parameters
@@ -41,7 +45,7 @@ def read_run(report: Report, data: object, frequencies: Sequence[float]) -> dict
         run["tolerance"] = _read_tolerance(report, found["tolerance"])
     if "reset" in found:
         run["reset"] = _read_reset(report, found["reset"])
-    if report.found == before and frequencies:
+    if report.found == before and frequencies.size:
         _check_times(report, run, found, frequencies)
     return run
 
@@ -121,10 +125,10 @@ def _read_reset(report: Report, value: object) -> str | None:
 
 
 def _check_times(
-    report: Report, run: Mapping[str, Any], given: Mapping[str, Any], frequencies: Sequence[float]
+    report: Report, run: Mapping[str, Any], given: Mapping[str, Any], frequencies: NDArray[np.float64]
 ) -> None:
     """Compares duration and window at the lowest and the highest frequency; in between all goes straight."""
-    for frequency in dict.fromkeys((min(frequencies), max(frequencies))):
+    for frequency in dict.fromkeys((float(frequencies.min()), float(frequencies.max()))):
         at = "" if _one_unit(run) else f" at {frequency:.6g} Hz"
         duration = in_periods(run["duration"], frequency)
         if duration > MAX_RUN_PERIODS:

@@ -41,15 +41,15 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
     """Notes what is implausible about a vibration drive anywhere on the axes of ``study``."""
     for path in dict.fromkeys((*study.base, *study.axis_paths)):
         _plausible(report, study, path)
-    if not any(any(_values(study, f"excitation.amplitude_{axis}")) for axis in "xy"):
+    if not any(_values(study, f"excitation.amplitude_{axis}").any() for axis in "xy"):
         report.warn("/base/excitation: both amplitudes are 0, so the base does not move")
-    if min(_values(study, "excitation.frequency")) < 0.1:
+    if _values(study, "excitation.frequency").min() < 0.1:
         where = _pointer(study, "excitation.frequency")
         report.warn(f"{where}: below 0.1 Hz, which is slow for a vibration drive")
     pendulums = sum(path.startswith("pendulums.") and path.endswith(".mass") for path in study.base)
-    across, along = (any(_values(study, f"excitation.amplitude_{axis}")) for axis in "xy")
+    across, along = (_values(study, f"excitation.amplitude_{axis}").any() for axis in "xy")
     starts = [f"pendulums.{index}.initial_{name}" for index in range(pendulums) for name in ("angle", "speed")]
-    if along and not across and not any(any(_values(study, path)) for path in starts):
+    if along and not across and not any(_values(study, path).any() for path in starts):
         report.warn(
             "/base/pendulums: with vibration along y alone a pendulum that starts upright without speed stays upright, "
             "even at parametric resonance: nothing would move; give an initial_angle (say 0.01 rad) or an amplitude_x"
@@ -77,13 +77,13 @@ def warn_machine_shaft(report: Report, study: Study) -> None:
         _plausible(report, study, path, _PLAUSIBLE_SHAFT)
     structure = study.structure or {}
     if structure["balance"] == "constant" and (
-        structure["drive"]["form"] != "constant" or any(_values(study, "drive.torque"))
+        structure["drive"]["form"] != "constant" or _values(study, "drive.torque").any()
     ):
         report.warn(
             '/base/drive/torque: is not used: the balance "constant" puts the mean resistance in its place; choose '
             '"scale" or "refuse" to keep its course'
         )
-    if structure["balance"] == "motor" and _values(study, "wanted_irregularity"):
+    if structure["balance"] == "motor" and _values(study, "wanted_irregularity").size:
         report.warn("/base/wanted_irregularity: is not used: with a motor no required inertia is computed")
     if structure["operation"]["quantity"] == "none" and structure["mechanism"]["kind"] == "none":
         report.warn("/base: neither mechanism nor operation, so that the shaft turns evenly")
@@ -146,7 +146,7 @@ def _chosen_angle(report: Report, study: Study) -> None:
         )
 
 
-def _values(study: Study, path: str) -> tuple[float, ...]:
+def _values(study: Study, path: str) -> NDArray[np.float64]:
     return varied_values(path, study.axes, study.base)
 
 
@@ -155,7 +155,8 @@ def _plausible(report: Report, study: Study, path: str, known: dict[str, tuple[f
     if entry is None:
         return
     limit, unit, question = entry
-    largest = max(_values(study, path), key=abs)
+    values = _values(study, path)
+    largest = float(values[np.abs(values).argmax()])
     if abs(largest) > limit:
         report.warn(f"{_pointer(study, path)}: {largest:g} {unit} is more than {limit:.4g} {unit}; {question}")
 
@@ -217,7 +218,7 @@ def _columns(study: Study, paths: Sequence[str]) -> list[NDArray[np.float64]]:
     if involved.cases > _MOST_COMBINATIONS:
         cases_each = 0
         if study.combine == "grid":
-            ends = tuple(Axis(axis.paths, tuple(dict.fromkeys((min(axis.values), max(axis.values))))) for axis in axes)
+            ends = tuple(Axis(axis.paths, np.unique([axis.array.min(), axis.array.max()])) for axis in axes)
             involved = replace(study, axes=ends)
     varied = involved.columns(range(involved.cases))
     columns = [np.asarray(varied.get(path, study.base[path]), dtype=np.float64) for path in paths]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import OrderedDict
 from threading import Lock
 from typing import TYPE_CHECKING, Final
@@ -51,7 +50,7 @@ class Orders(Part):
                 STUDIES.c.number == number
             )
         ).one()
-        found = order_of(Study.from_json(json.loads(text))) if coarse else None
+        found = order_of(Study.from_text(text)) if coarse else None
         with self._orders_lock:
             self._orders[number] = found
             while len(self._orders) > _KEPT:

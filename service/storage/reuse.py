@@ -143,7 +143,7 @@ class _Spans:
         if missing:
             query = sa.select(STUDIES.c.number, STUDIES.c.study).where(STUDIES.c.number.in_(missing))
             for number, text in connection.execute(query):
-                spans[number] = span(json.loads(text))
+                spans[number] = span(Study.from_text(text))
         with self._lock:
             self._of.update(spans)
             while len(self._of) > _KEPT_SPANS:
@@ -167,7 +167,7 @@ def _find(connection: sa.Connection, spans: _Spans, study: Study, kin: str, numb
         ).one_or_none()
         if source is None:
             continue
-        other = Study.from_json(json.loads(source.study))
+        other = Study.from_text(source.study)
         ours, theirs = shared_cases(wanted, other)
         if not ours.size:
             continue

@@ -31,6 +31,7 @@ from service.storage.tables import (
 )
 from worker import models
 from worker.chunking import Chunking, spans
+from worker.limits import MAX_AXIS_VALUES
 from worker.reuse import kin_hash
 from worker.states import TERMINAL, StudyEvent, StudyState
 from worker.study import Study
@@ -43,8 +44,9 @@ if TYPE_CHECKING:
     from worker.ports import Clock
 
 MAX_PAGE = 1000
-#: Studies kept in memory after they were read.
+#: Studies kept in memory after they were read, and the values of their axes in all, 8 bytes each.
 KEPT_STUDIES = 32
+KEPT_VALUES = 2 * MAX_AXIS_VALUES
 
 
 class Studies(Orders):
@@ -164,10 +166,10 @@ class Studies(Orders):
                 return self._studies[study_id]
         with self.session.read() as connection:
             text = self._row(connection, study_id, STUDIES.c.study).study
-        study = Study.from_json(json.loads(text))
+        study = Study.from_text(text)
         with self._lock:
             self._studies[study_id] = study
-            while len(self._studies) > KEPT_STUDIES:
+            while len(self._studies) > KEPT_STUDIES or sum(map(_values, self._studies.values())) > KEPT_VALUES:
                 self._studies.popitem(last=False)
         return study
 
@@ -337,10 +339,14 @@ def study_row(
         "engine_version": models.ENGINE_VERSION,
         "physics_hash": study.physics_hash(models.ENGINE_VERSION),
         "spec": json.dumps(spec, allow_nan=False),
-        "study": json.dumps(study.to_json(), allow_nan=False),
+        "study": study.to_text(),
         "warnings": json.dumps(list(warnings)),
         "kin_hash": kin_hash(study, models.ENGINE_VERSION),
     }
+
+
+def _values(study: Study) -> int:
+    return sum(map(len, study.axes))
 
 
 def _study_of_key(connection: sa.Connection, key: str, body_hash: str) -> StudyRecord | None:

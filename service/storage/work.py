@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from typing import TYPE_CHECKING
 
@@ -132,7 +131,7 @@ class Work(Reuse):
         """The study to compute."""
         with self.session.read() as connection:
             text = connection.execute(sa.select(STUDIES.c.study).where(STUDIES.c.number == number)).scalar_one()
-        return Study.from_json(json.loads(text))
+        return Study.from_text(text)
 
     def open_chunks(self, number: int) -> list[Chunk]:
         """Chunks of a study that are not done, in the order in which they are to be run."""

@@ -106,6 +106,19 @@ def test_json_and_pickle_give_an_equal_study(of: Study) -> None:
     assert pickle.loads(pickle.dumps(of)) == of
 
 
+@given(st.one_of(grids(), zips()))
+def test_the_stored_text_gives_an_equal_study(of: Study) -> None:
+    assert Study.from_text(of.to_text()) == of
+
+
+def test_a_long_axis_is_stored_packed_and_read_in_either_form() -> None:
+    of = study(Axis(("a",), np.linspace(0.0, 1.0, 100_000) / 7.0), Axis(("b",), (1.0, 2.0)))
+    assert len(of.to_text()) < 1_100_000  # 2 MB as decimals
+    for text in (of.to_text(), json.dumps(of.to_json())):  # the second as it was stored before
+        assert Study.from_text(text) == of
+        assert Study.from_text(text).physics_hash("1") == of.physics_hash("1")
+
+
 def test_first_axis_varies_slowest() -> None:
     of = study(Axis(("a",), (1.0, 2.0)), Axis(("b", "c"), (10.0, 20.0, 30.0)))
     assert of.shape == (2, 3)

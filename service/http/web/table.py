@@ -113,7 +113,7 @@ def _ordered(
     context: Context, study_id: str, study: Study, sort: str, ending: str, at: tuple[tuple[str, str], ...]
 ) -> NDArray[np.int64]:
     """Numbers of the finished cases that match, in the order of the table."""
-    fixed = {study.axes[i].paths[0]: study.axes[i].values[index] for i, (_, index) in locate_axes(study, at).items()}
+    fixed = {study.axes[i].paths[0]: study.axes[i].value(index) for i, (_, index) in locate_axes(study, at).items()}
     cases = study.cases_at(fixed)
     if cases.size > MOST_SORTED:
         message = f"{cases.size:,} cases are too many to sort; hold further axes at a value, or take all results"

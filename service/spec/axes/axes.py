@@ -5,15 +5,21 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from service.spec.axes.values import PLANS, Plan, count_text
+import numpy as np
+
+from service.spec.axes.blocks import first_rows
+from service.spec.axes.values import PLANS, Plan, count_text, in_range
 from service.spec.fields import read_object
 from service.spec.machine.drive import Machine
 from service.spec.report import Report, join, quantity_text
 from worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_TIED_PATHS
 from worker.models import Parameter
 from worker.study import Axis, Combine
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 FIELDS = ("path", *PLANS)
 
@@ -47,7 +53,7 @@ def read_axes(report: Report, data: object, combine: Combine, machine: Machine) 
 
 def axis_values(
     report: Report, pointer: str, data: object, machine: Machine
-) -> tuple[tuple[str, ...], tuple[float, ...]] | None:
+) -> tuple[tuple[str, ...], NDArray[np.float64]] | None:
     """Paths and values (SI) of one axis alone; None when something is wrong with it, which is noted."""
     paths, plan = read_axis(report, pointer, data, machine)
     if paths is None or plan is None or not _sizes_fit(report, [plan], "grid"):
@@ -149,27 +155,50 @@ def _sizes_fit(report: Report, plans: list[Plan], combine: Combine) -> bool:
     return report.found == before
 
 
-def expand(report: Report, plan: Plan, parameters: list[Parameter], combine: Combine) -> tuple[float, ...] | None:
-    """The values of a plan, in range for every parameter, each once on an axis of a grid; None, and a problem noted."""
+def expand(report: Report, plan: Plan, parameters: list[Parameter], combine: Combine) -> NDArray[np.float64] | None:
+    """The values of a plan, in range for every parameter, each once on an axis of a grid; None, and a problem noted.
+
+    Returns
+    -------
+    float64 array, shape (plan.count,), or None
+    """
     values = plan.expand()
-    seen: dict[float, int] = {}
-    for index, value in enumerate(values):
-        where = join(plan.pointer, index) if plan.listed else plan.pointer
-        refusing = next((entry for entry in parameters if not entry.accepts(value)), None)
-        if refusing is not None:
-            report.problem(
-                where, f"value {index} is out of range for {refusing.path}", _shown(plan, value, refusing),
-                allowed=refusing.range_text(), unit=refusing.unit,
-            )  # fmt: skip
-            return None
-        if combine == "grid" and value in seen:
-            report.problem(
-                where, f"value {index} repeats value {seen[value]}", _shown(plan, value, parameters[0]),
-                allowed="each value once", unit=parameters[0].unit,
-            )  # fmt: skip
-            return None
-        seen[value] = index
-    return tuple(value + 0.0 for value in values)  # no negative zero
+    accepted = {entry.path: in_range(values, entry) for entry in parameters}
+    refused = _first(~np.logical_and.reduce(list(accepted.values())))
+    repeated = _first_repeated(values) if combine == "grid" else values.size
+    index = min(refused, repeated)
+    if index == values.size:
+        return values + 0.0  # no negative zero
+    where = join(plan.pointer, index) if plan.listed else plan.pointer
+    value = float(values[index])
+    if refused <= repeated:
+        refusing = next(entry for entry in parameters if not accepted[entry.path][index])
+        report.problem(
+            where, f"value {index} is out of range for {refusing.path}", _shown(plan, value, refusing),
+            allowed=refusing.range_text(), unit=refusing.unit,
+        )  # fmt: skip
+    else:
+        before = _first(values == value)
+        report.problem(
+            where, f"value {index} repeats value {before}", _shown(plan, value, parameters[0]),
+            allowed="each value once", unit=parameters[0].unit,
+        )  # fmt: skip
+    return None
+
+
+def _first(mask: NDArray[np.bool_]) -> int:
+    """Position of the first that is true; the length when none is."""
+    at = int(mask.argmax()) if mask.size else 0
+    return at if mask.any() else int(mask.size)
+
+
+def _first_repeated(values: NDArray[np.float64]) -> int:
+    """Position of the first value that has come before; the length when each stands once."""
+    if np.unique(values).size == values.size:
+        return int(values.size)
+    again = np.ones(values.size, dtype=np.bool_)
+    again[np.unique(values, return_index=True)[1]] = False
+    return _first(again)
 
 
 def _shown(plan: Plan, value: float, parameter: Parameter) -> float | str:
@@ -178,22 +207,25 @@ def _shown(plan: Plan, value: float, parameter: Parameter) -> float | str:
 
 
 def _rows_differ(report: Report, axes: list[Axis], machine: Machine) -> bool:
-    seen: dict[tuple[float, ...], int] = {}
-    for case, row in enumerate(zip(*(axis.values for axis in axes), strict=True)):
-        if seen.setdefault(row, case) != case:
-            pairs = [(axis.paths[0], value) for axis, value in zip(axes, row, strict=True)]
-            values = [f"{path} = {quantity_text(value, machine.parameters[path].unit)}" for path, value in pairs]
-            report.problem(
-                "/axes", f"cases {seen[row]} and {case} are the same: every zipped axis repeats its value", values,
-                allowed="each combination of values once",
-            )  # fmt: skip
-            return False
-    return True
+    if not axes:
+        return True
+    first = first_rows({axis.paths[0]: axis.array for axis in axes})
+    if first.size == len(axes[0]):
+        return True
+    case = int(np.setdiff1d(np.arange(len(axes[0])), first)[0])
+    before = _first(np.logical_and.reduce([axis.array == axis.array[case] for axis in axes]))
+    pairs = [(axis.paths[0], float(axis.array[case])) for axis in axes]
+    values = [f"{path} = {quantity_text(value, machine.parameters[path].unit)}" for path, value in pairs]
+    report.problem(
+        "/axes", f"cases {before} and {case} are the same: every zipped axis repeats its value", values,
+        allowed="each combination of values once",
+    )  # fmt: skip
+    return False
 
 
-def varied_values(path: str, axes: tuple[Axis, ...] | None, base: Mapping[str, Any]) -> tuple[float, ...]:
+def varied_values(path: str, axes: tuple[Axis, ...] | None, base: Mapping[str, Any]) -> NDArray[np.float64]:
     """Every value (SI) that ``path`` takes in the study: those of its axis, else the base's; empty when unknown."""
     for axis in axes or ():
         if path in axis.paths:
-            return axis.values
-    return (base[path],) if path in base else ()
+            return axis.array
+    return np.array([base[path]] if path in base else [], dtype=np.float64)

@@ -95,8 +95,12 @@ def one_after_another(
 def first_rows(columns: Mapping[str, Column]) -> NDArray[np.int64]:
     """Positions of the rows that have not come before, ascending."""
     distinct = list({id(column): column for column in columns.values()}.values())
-    _, first = np.unique(np.stack(distinct, axis=1), axis=0, return_index=True)
-    return np.sort(first)
+    order = np.lexsort(distinct)  # equal rows stay in order, side by side
+    again = np.ones(order.size, dtype=np.bool_)
+    again[:1] = False
+    for column in distinct:
+        again[1:] &= column[order[1:]] == column[order[:-1]]
+    return np.sort(order[~again])
 
 
 def chosen(columns: Mapping[str, Column], rows: NDArray[Any]) -> dict[str, Column]:
@@ -109,4 +113,4 @@ def as_axes(columns: Mapping[str, Column]) -> tuple[Axis, ...]:
     tied: dict[int, list[str]] = {}
     for path, column in columns.items():
         tied.setdefault(id(column), []).append(path)
-    return tuple(Axis(tuple(paths), tuple((columns[paths[0]] + 0.0).tolist())) for paths in tied.values())
+    return tuple(Axis(tuple(paths), columns[paths[0]] + 0.0) for paths in tied.values())

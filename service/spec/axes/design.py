@@ -195,7 +195,7 @@ def _axis(report: Report, pointer: str, data: object, combine: Combine, machine:
 
     def make() -> dict[str, NDArray[np.float64]] | None:
         values = expand(report, plan, [machine.parameters[path] for path in paths], combine)
-        return None if values is None else dict.fromkeys(paths, np.array(values))
+        return None if values is None else dict.fromkeys(paths, values)
 
     return Block(pointer, paths, plan.count, make)
 

@@ -6,16 +6,25 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from service.spec.fields import read_exact, read_whole
+import numpy as np
+
+from service.spec.fields import read_exact, read_number, read_whole
 from service.spec.report import Report, join
 from service.spec.units import QuantityError, parse_exact, to_float
 from worker.limits import MAX_AXIS_VALUES
 from worker.models import Parameter
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Values = NDArray[np.float64]
+
 #: How far beyond its end a step range may reach, in steps: rounding of ends that were computed.
 _STEP_ROUNDING: Final = Fraction(1, 10**9)
+#: Whole numbers up to this are doubles.
+_EXACT: Final = 2**53
 
 
 @dataclass(frozen=True)
@@ -29,14 +38,14 @@ class Plan:
     count : int
         How many there will be; may be huge.
     expand : callable
-        Gives them, SI, in order.
+        Gives them, SI, in order: float64 array, shape (count,).
     listed : bool
         Whether the user wrote every value.
     """
 
     pointer: str
     count: int
-    expand: Callable[[], list[float]]
+    expand: Callable[[], Values]
     listed: bool = False
 
 
@@ -46,11 +55,30 @@ def plan_values(report: Report, pointer: str, data: object, parameter: Parameter
         message = "has no values" if data == [] else "must be a list of values"
         report.problem(pointer, message, data, allowed=f"1 to {MAX_AXIS_VALUES:,} values")
         return None
-    numbers = [read_exact(report, join(pointer, index), value, parameter) for index, value in enumerate(data)]
-    exact = [number for number in numbers if number is not None]
-    if len(exact) < len(numbers):
+    plain = _plain_numbers(data)
+    if plain is not None and in_range(plain, parameter).all():
+        return Plan(pointer, plain.size, lambda: plain, listed=True)
+    numbers = [read_number(report, join(pointer, index), value, parameter) for index, value in enumerate(data)]
+    known = [number for number in numbers if number is not None]
+    if len(known) < len(numbers):
         return None
-    return Plan(pointer, len(exact), lambda: [to_float(number) for number in exact], listed=True)
+    return Plan(pointer, len(known), lambda: np.array(known), listed=True)
+
+
+def in_range(values: Values, parameter: Parameter) -> NDArray[np.bool_]:
+    """Which values (SI) are finite and in the range of ``parameter``, as `Parameter.accepts` tells of one."""
+    above = values > parameter.low if parameter.low_open else values >= parameter.low
+    return np.isfinite(values) & above & (values <= parameter.high)
+
+
+def _plain_numbers(data: list[Any]) -> Values | None:
+    """The numbers of a list without texts, each the double nearest to what was written; None where it has others."""
+    if not set(map(type, data)) <= {int, float}:
+        return None
+    try:
+        return np.array(data, dtype=np.float64)
+    except OverflowError:
+        return None
 
 
 def plan_linspace(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
@@ -137,25 +165,28 @@ def _division(
     return start, stop, count
 
 
-def _steps(start: Fraction, step: Fraction, count: int) -> list[float]:
+def _steps(start: Fraction, step: Fraction, count: int) -> Values:
     """start + i*step, each correctly rounded: whole numbers over one denominator, divided once."""
     common = math.lcm(start.denominator, step.denominator)
     first = start.numerator * (common // start.denominator)
     by = step.numerator * (common // step.denominator)
-    return [(first + index * by) / common for index in range(count)]
+    if max(abs(first), abs(first + (count - 1) * by), abs(by), common) <= _EXACT:
+        # The quotient of two whole numbers that are doubles is the nearest double.
+        return (first + by * np.arange(count)) / np.float64(common)
+    return np.array([(first + index * by) / common for index in range(count)])
 
 
-def _stepped(start: Fraction, stop: Fraction, step: Fraction, whole: int) -> list[float]:
+def _stepped(start: Fraction, stop: Fraction, step: Fraction, whole: int) -> Values:
     values = _steps(start, step, whole + 1)
     if abs(start + whole * step - stop) <= abs(step) * _STEP_ROUNDING:
         values[-1] = to_float(stop)
     return values
 
 
-def _multiples(start: float, stop: float, count: int) -> list[float]:
+def _multiples(start: float, stop: float, count: int) -> Values:
     if count == 1:
-        return [start]
+        return np.array([start])
     sign = math.copysign(1.0, start)
     low, high = math.log10(abs(start)), math.log10(abs(stop))
     inner = [sign * 10.0 ** (low + (high - low) * index / (count - 1)) for index in range(1, count - 1)]
-    return [start, *inner, stop]
+    return np.array([start, *inner, stop])

@@ -200,7 +200,8 @@ def check_laws(report: Report, clutches: Iterable[Clutch], axes: Sequence[Axis],
             continue
         pointer = f"/axes/{min(position for position, _ in varied.values())}"
         worst = {
-            path: (max if path.endswith("windup_limit") else min)(axis.values) for path, (_, axis) in varied.items()
+            path: float(axis.array.max() if path.endswith("windup_limit") else axis.array.min())
+            for path, (_, axis) in varied.items()
         }
         if combine == "grid":
             _check_law(report, clutch, clutch.values | worst, pointer)

@@ -26,6 +26,16 @@ def url(tmp_path: Path) -> str:
     return f"sqlite:///{tmp_path / 'a' / 'sprag.sqlite3'}"
 
 
+def test_the_studies_kept_in_memory_are_few_values(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.storage.studies.KEPT_VALUES", 5)
+    with Store.open(url) as store:
+        made = [fakes.study(3, name=f"study {index}") for index in range(3)]
+        ids = [store.create_study({}, study).id for study in made]
+        assert [store.study(study_id) for study_id in ids] == made
+        assert list(store._studies) == ids[-1:]
+        assert store.study(ids[0]) == made[0]
+
+
 @pytest.mark.parametrize(
     ("url", "message"),
     [

@@ -13,7 +13,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.service.spec_sample import SPEC, parsed, problems
+from service.spec.axes.values import _steps
+from service.spec.document import parse_spec
+from tests.service.spec_sample import SPEC, changed, parsed, problems
 from worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES
 
 PENDULUM = SPEC["base"]["pendulums"][0]
@@ -246,6 +248,46 @@ def test_sizes_are_checked_before_expansion(axes: Any, at: str, says: str) -> No
     assert problem.pointer == at
     assert says in str(problem)
     assert peak < 2_000_000
+
+
+@pytest.mark.parametrize(
+    ("axes", "combine"),
+    [
+        ([load(linspace=[0.01, 0.5, MAX_AXIS_VALUES])], "grid"),
+        ([load(values=[index / 1e6 for index in range(MAX_AXIS_VALUES)])], "grid"),
+        ([load(linspace=[0.01, 0.5, 500_000]), {"path": "gravity", "linspace": [9, 10, 500_000]}], "zip"),
+    ],
+)
+def test_a_million_values_are_never_python_numbers_one_by_one(axes: Any, combine: str) -> None:
+    spec = changed({"/axes": axes, "/combine": combine})
+    tracemalloc.start()
+    try:
+        study = parse_spec(spec).study
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert sum(map(len, study.axes)) == MAX_AXIS_VALUES
+    assert peak < 60_000_000  # a few arrays; as Python numbers with their places they take 150 MB
+
+
+@given(
+    st.fractions(-100, 100, max_denominator=10**9),
+    st.fractions(-100, 100, max_denominator=10**9),
+    st.integers(2, 50),
+)
+def test_every_value_of_a_division_is_the_nearest_double(start: Fraction, stop: Fraction, count: int) -> None:
+    step = (stop - start) / (count - 1)
+    expected = [float(start + index * step) for index in range(count)]
+    assert _steps(start, step, count).tolist() == expected
+    whole = start.limit_denominator(100), step.limit_denominator(100)
+    assert _steps(*whole, count).tolist() == [float(whole[0] + index * whole[1]) for index in range(count)]
+
+
+def test_the_first_fault_of_a_long_list_is_told() -> None:
+    values = [index / 100.0 for index in range(1000)]
+    repeated = [*values, 0.5, 0.25]
+    assert "value 1000 repeats value 50" in only_problem(load(values=repeated))[1]
+    assert only_problem(load(values=[*values, -1.0, 0.5]))[0] == "/axes/0/values/1000"
 
 
 def test_the_largest_grid() -> None:
