@@ -6,26 +6,22 @@ packages: `machine` (drive, clutch, shaft), `axes` (values, points, samples, com
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
-from service.spec.axes.axes import varied_values
 from service.spec.axes.design import read_design
 from service.spec.fields import read_object
-from service.spec.machine.clutch import check_laws
-from service.spec.machine.drive import Machine, read_base
-from service.spec.machine.shaft import read_shaft
+from service.spec.machine.registry import part_of
 from service.spec.report import Problem, Report, SpecError, did_you_mean
-from service.spec.run import read_run, refuse_run
 from service.spec.text import Format, load_spec
-from service.spec.warnings import warn_machine_shaft, warn_vibration_drive
 from worker import models
 from worker.limits import MAX_NAME_LENGTH
 from worker.study import Study
 
 if TYPE_CHECKING:
+    from service.spec.machine.machine import Machine
     from worker.models import ClutchFit
 
 __all__ = ["VERSION", "ParsedSpec", "Problem", "SpecError", "format_of", "load_spec", "parse_spec"]
@@ -36,11 +32,6 @@ VERSION: Final = 1
 UNNAMED: Final = "untitled"
 
 FIELDS: Final = ("sprag", "model", "name", "base", "run", "axes", "combine", "exclude")
-
-_WARNINGS: Final[dict[str, Callable[[Report, Study], None]]] = {
-    models.VIBRATION_DRIVE: warn_vibration_drive,
-    models.MACHINE_SHAFT: warn_machine_shaft,
-}
 
 
 @dataclass(frozen=True)
@@ -88,26 +79,15 @@ def parse_spec(data: object) -> ParsedSpec:
     model = _read_model(report, found)
     if model is None:
         raise report.error()
-    if model == models.MACHINE_SHAFT:
-        study = _read_machine_shaft(report, found, name)
-        _WARNINGS[model](report, study)
-        return ParsedSpec(study, tuple(report.warnings), {}, dict(found))
-    machine = read_base(report, found.get("base"), model)
+    part = part_of(model)
+    machine = part.read_base(report, found.get("base"))
     axes, combine = read_design(report, found, machine)
-    run = read_run(report, found.get("run", {}), varied_values("excitation.frequency", axes, machine.values))
-    check_laws(report, machine.clutches, axes or (), combine)
+    run = part.read_run(report, found.get("run", {}), machine, axes)
+    part.check(report, machine, axes or (), combine)
     report.raise_if_any()
-    study = Study(model, name, _in_order(machine), run, axes or (), combine)
-    _WARNINGS[model](report, study)
+    study = Study(model, name, _in_order(machine), run, axes or (), combine, machine.structure)
+    part.warn(report, study)
     return ParsedSpec(study, tuple(report.warnings), machine.fits, dict(found))
-
-
-def _read_machine_shaft(report: Report, found: Mapping[str, Any], name: str) -> Study:
-    machine = read_shaft(report, found.get("base"))
-    axes, combine = read_design(report, found, machine)
-    run = refuse_run(report, found.get("run", {}))
-    report.raise_if_any()
-    return Study(models.MACHINE_SHAFT, name, _in_order(machine), run, axes or (), combine, machine.structure)
 
 
 def _read_version(report: Report, found: Mapping[str, Any]) -> None:

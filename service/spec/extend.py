@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, Final
 from service.spec.axes.axes import axis_values
 from service.spec.document import ParsedSpec, parse_spec
 from service.spec.fields import read_object
-from service.spec.machine.drive import read_base
+from service.spec.machine.registry import part_of
 from service.spec.report import Problem, Report, SpecError, join, quantity_text
 
 if TYPE_CHECKING:
-    from service.spec.machine.drive import Machine
+    from service.spec.machine.machine import Machine
     from worker.study import Study
 
 FIELDS: Final = ("axes", "cases", "name")
@@ -76,7 +76,7 @@ def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> di
     if study.combine != "grid":
         report.problem("/axes", "the axes of this study go together, case by case", allowed="`cases` instead")
         raise report.error()
-    machine = read_base(Report(), spec.get("base"), study.model)
+    machine = part_of(study.model).read_base(Report(), spec.get("base"))
     for index, item in enumerate(items):
         _add(report, join("/axes", index), item, study, own, machine)
     report.raise_if_any()

@@ -50,16 +50,13 @@ def read_run(report: Report, data: object, frequencies: NDArray[np.float64]) -> 
     return run
 
 
-def refuse_run(report: Report, data: object) -> dict[str, Any]:
+def refuse_run(report: Report, data: object, why: str = "is not used: this model has no run") -> dict[str, Any]:
     """The empty run of a model that has none; every field of one that was given is noted in ``report``."""
     if not isinstance(data, Mapping):
         report.problem("/run", "must be an object", data, allowed="nothing, or an empty object: this model has no run")
         return {}
     for name, value in data.items():
-        report.problem(
-            join("/run", name), "belongs to the vibration drive: a machine shaft is solved for its whole cycle at once",
-            value, allowed="no `run`",
-        )  # fmt: skip
+        report.problem(join("/run", name), why, value, allowed="no `run`")
     return {}
 
 

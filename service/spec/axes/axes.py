@@ -12,7 +12,7 @@ import numpy as np
 from service.spec.axes.blocks import first_rows
 from service.spec.axes.values import PLANS, Plan, count_text, in_range
 from service.spec.fields import read_object
-from service.spec.machine.drive import Machine
+from service.spec.machine.machine import Machine
 from service.spec.report import Report, join, quantity_text
 from worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_TIED_PATHS
 from worker.models import Parameter

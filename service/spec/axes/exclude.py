@@ -15,7 +15,7 @@ from worker.study import SAME_VALUE
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from service.spec.machine.drive import Machine
+    from service.spec.machine.machine import Machine
 
 FIELDS: Final = ("above", "below", "at_least", "at_most", "is")
 #: path -> [(field, value)]: all of them must hold for a case to be excluded

@@ -21,7 +21,7 @@ from worker.limits import MAX_AXIS_VALUES, MAX_COLUMNS
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from service.spec.machine.drive import Machine
+    from service.spec.machine.machine import Machine
     from worker.models import Parameter
 
 FIELDS: Final = ("points",)

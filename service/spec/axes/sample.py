@@ -19,7 +19,7 @@ from worker.limits import MAX_AXES, MAX_AXIS_VALUES
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from service.spec.machine.drive import Machine
+    from service.spec.machine.machine import Machine
 
 FIELDS: Final = ("sample", "count", "seed", "ranges")
 METHODS: Final = ("latin_hypercube", "sobol", "saltelli")

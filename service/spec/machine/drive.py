@@ -1,4 +1,4 @@
-"""The machine of a spec (`base`): every parameter by its flat path in SI numbers, and the paths that axes can vary."""
+"""The vibration drive of a spec (`base`): every parameter by its flat path, and the paths that axes can vary."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from service.spec.fields import placed, read_number, read_object, read_parameters
 from service.spec.machine.clutch import Clutch, read_clutch
+from service.spec.machine.machine import Machine
 from service.spec.report import Report, did_you_mean, join
-from worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, Parameter, parameter_catalogue
+from worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, VIBRATION_DRIVE, Parameter, parameter_catalogue
 
 if TYPE_CHECKING:
     from worker.models import ClutchFit
@@ -20,21 +21,17 @@ _CLUTCH_PATH = re.compile(r"(?:pendulums\.[0-9]{1,9}\.)?clutch\.(.+)")
 
 
 @dataclass
-class Machine:
-    """What the base of a spec says, as far as it could be read.
+class Drive(Machine):
+    """What the base of a vibration drive says, as far as it could be read.
 
     Attributes
     ----------
-    values : flat path -> SI number; incomplete when problems were noted
     pendulums : number of pendulums; None when they could not be read
     clutches : the one clutch of all pendulums, or one for each; those that could be read
-    parameters : flat path -> parameter, for every number that an axis can vary
     """
 
-    values: dict[str, float] = field(default_factory=dict)
     pendulums: int | None = None
     clutches: list[Clutch] = field(default_factory=list)
-    parameters: dict[str, Parameter] = field(default_factory=dict)
 
     @property
     def fits(self) -> dict[str, ClutchFit]:
@@ -53,8 +50,7 @@ class Machine:
         clutch_path = _CLUTCH_PATH.fullmatch(path)
         if clutch_path:
             return self._why_not_clutch(path, clutch_path[1])
-        known = tuple(self.parameters)
-        return "names no numeric parameter of the base" + did_you_mean(path.removeprefix("base."), known)
+        return super().why_not(path)
 
     def _why_not_clutch(self, path: str, rest: str) -> str:
         prefix = path.removesuffix(rest)
@@ -71,10 +67,10 @@ class Machine:
         return "names no numeric parameter of the clutch" + did_you_mean(path, self.parameters)
 
 
-def read_base(report: Report, data: object, model: str) -> Machine:
+def read_drive(report: Report, data: object) -> Drive:
     """The machine in ``data`` (the spec's `base`), everything wrong with it noted in ``report``."""
-    machine = Machine()
-    catalogue = [entry for entry in parameter_catalogue(model) if not entry.path.startswith("clutch.")]
+    machine = Drive()
+    catalogue = [entry for entry in parameter_catalogue(VIBRATION_DRIVE) if not entry.path.startswith("clutch.")]
     sections = list(dict.fromkeys(entry.path.split(".")[0] for entry in catalogue))
     found = read_object(report, "/base", data, (*sections, "clutch"))
     if found is None:
@@ -99,7 +95,7 @@ def read_base(report: Report, data: object, model: str) -> Machine:
 
 
 def _read_section(
-    report: Report, pointer: str, data: object, prefix: str, entries: list[Parameter], machine: Machine
+    report: Report, pointer: str, data: object, prefix: str, entries: list[Parameter], machine: Drive
 ) -> None:
     """Reads the object whose fields are the last names of ``entries``' paths, placed under ``prefix``."""
     parameters = {name: placed(entry, f"{prefix}.{name}") for entry in entries if (name := entry.path.split(".")[-1])}
@@ -114,7 +110,7 @@ def _read_section(
         machine.values.update(read_parameters(report, pointer, found, parameters))
 
 
-def _read_pendulums(report: Report, pointer: str, data: object, entries: list[Parameter], machine: Machine) -> None:
+def _read_pendulums(report: Report, pointer: str, data: object, entries: list[Parameter], machine: Drive) -> None:
     if not isinstance(data, list) or not 1 <= len(data) <= MAX_PENDULUMS:
         message = "is required" if data is None else "must be a list of pendulums"
         report.problem(pointer, message, data, allowed=f"a list of 1 to {MAX_PENDULUMS} pendulums")
@@ -126,7 +122,7 @@ def _read_pendulums(report: Report, pointer: str, data: object, entries: list[Pa
         _read_section(report, join(pointer, index), item, f"pendulums.{index}", entries, machine)
 
 
-def _read_clutches(report: Report, base: Mapping[str, Any], machine: Machine) -> None:
+def _read_clutches(report: Report, base: Mapping[str, Any], machine: Drive) -> None:
     listed = base.get("pendulums")
     pendulums = listed if isinstance(listed, list) and machine.pendulums is not None else []
     own = [index for index, item in enumerate(pendulums) if isinstance(item, Mapping) and "clutch" in item]
@@ -161,14 +157,14 @@ def _read_clutches(report: Report, base: Mapping[str, Any], machine: Machine) ->
             )
 
 
-def _add(machine: Machine, clutch: Clutch | None) -> None:
+def _add(machine: Drive, clutch: Clutch | None) -> None:
     if clutch is not None:
         machine.clutches.append(clutch)
         machine.values.update(clutch.values)
         machine.parameters.update(clutch.parameters)
 
 
-def _assume_everything(catalogue: list[Parameter], machine: Machine) -> None:
+def _assume_everything(catalogue: list[Parameter], machine: Drive) -> None:
     """Lets axes name whatever a machine could have, so that an unreadable base brings no second problem there."""
     for entry in catalogue:
         for index in range(MAX_PENDULUMS if ".N." in entry.path else 1):

@@ -1,8 +1,6 @@
 """The machine shaft of a spec (`base`): its structure, every number by its flat path, and the paths that axes can vary.
 
-The fields are nested as the paths are: the number at ``mechanism.slider_crank.crank`` stands at
-``/base/mechanism/slider_crank/crank``. What is wrong with the machine as a whole (`shaft_check`) is looked for
-once its parts could be read.
+What is wrong with the machine as a whole (`shaft_check`) is looked for once its parts could be read.
 """
 
 from __future__ import annotations
@@ -13,8 +11,8 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from service.spec.catalogue import general_path
-from service.spec.fields import missing, read_number, read_object
-from service.spec.machine.drive import Machine
+from service.spec.fields import read_object
+from service.spec.machine.machine import Machine, read_numbers
 from service.spec.machine.shaft_check import check_machine
 from service.spec.machine.shaft_parts import (
     read_balance,
@@ -26,9 +24,9 @@ from service.spec.machine.shaft_parts import (
     read_operation,
     read_phi_c,
 )
-from service.spec.report import Report, did_you_mean, join
+from service.spec.report import Report, did_you_mean
 from worker import models
-from worker.models import Parameter, machine_shaft
+from worker.models import machine_shaft
 
 FIELDS: Final = (
     "cycle", "mean_speed", "mean_speed_is", "drive", "mechanism", "operation", "balance", "phi_c", "constants",
@@ -44,11 +42,9 @@ class ShaftMachine(Machine):
 
     Attributes
     ----------
-    structure : what of it is no number, as a study keeps it; None when it could not be read
     places : "drive", "mechanism", "operation" -> JSON Pointer of its formula, its table, or all of it
     """
 
-    structure: dict[str, Any] | None = None
     places: dict[str, str] = field(default_factory=dict)
 
     def assumed(self, path: str) -> bool:
@@ -71,7 +67,7 @@ class ShaftMachine(Machine):
             return "is no parameter of this machine, whose parts are of another kind" + did_you_mean(
                 path, self.parameters
             )
-        return "names no numeric parameter of the base" + did_you_mean(path.removeprefix("base."), self.parameters)
+        return super().why_not(path)
 
 
 def read_shaft(report: Report, data: object) -> ShaftMachine:
@@ -87,10 +83,7 @@ def read_shaft(report: Report, data: object) -> ShaftMachine:
     machine.structure = structure
     machine.parameters = machine_shaft.parameters_of(structure)
     _unused(report, found, structure)
-    for path, entry in machine.parameters.items():
-        number = _read(report, found, path, entry)
-        if number is not None:
-            machine.values[path] = number
+    read_numbers(report, found, machine)
     if report.found == before:
         check_machine(report, structure, machine.values, machine.places)
     return machine
@@ -129,27 +122,3 @@ def _unused(report: Report, found: Mapping[str, Any], structure: Mapping[str, An
     if isinstance(operation, Mapping) and structure["operation"]["over"] == "angle" and "during" in operation:
         report.problem("/base/operation/during", "tells strokes, and this diagram goes over the angle",
                        operation["during"], allowed='with `over` "stroke" only')  # fmt: skip
-
-
-def _read(report: Report, found: Mapping[str, Any], path: str, entry: Parameter) -> float | None:
-    """The number at a flat path of the base; None, and a problem noted, when it is missing or wrong."""
-    place: Any = found
-    keys: list[str | int] = []
-    for key in path.split("."):
-        index: str | int = int(key) if isinstance(place, list) else key
-        keys.append(index)
-        inside = isinstance(place, list) or (isinstance(place, Mapping) and key in place)
-        if not inside:
-            break
-        place = place[index]
-    else:
-        return read_number(report, join("/base", *keys), place, entry)
-    if entry.default is None:
-        missing(report, join("/base", *_all_keys(path)), entry)
-        return None
-    # No end of a range is a number that could be stored.
-    return entry.default if entry.accepts(entry.default) else None
-
-
-def _all_keys(path: str) -> list[str]:
-    return path.split(".")

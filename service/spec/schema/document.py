@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from service.spec.axes.design import COMBINE
 from service.spec.document import UNNAMED, VERSION
-from service.spec.fields import placed
-from service.spec.run import DEFAULTS, RESETS
+from service.spec.machine.registry import part_of
 from service.spec.schema.axes import (
     COMBINE_HELP,
     Schema,
@@ -20,17 +19,8 @@ from service.spec.schema.axes import (
     points_schema,
     sample_schema,
 )
-from service.spec.schema.quantity import quantity_schema
-from service.spec.schema.shaft import shaft_schema
 from worker import models
-from worker.limits import (
-    MAX_AXES,
-    MAX_CLUTCH_ROWS,
-    MAX_NAME_LENGTH,
-    MAX_TOLERANCE,
-    MIN_TOLERANCE,
-)
-from worker.models import CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, MAX_PENDULUMS, Parameter
+from worker.limits import MAX_AXES, MAX_NAME_LENGTH
 
 
 def spec_schema() -> Schema:
@@ -70,120 +60,8 @@ def spec_schema() -> Schema:
 
 
 def _of_model(model: str) -> Schema:
-    no_run = object_schema({}, description="nothing: a machine shaft is solved for its whole cycle")
-    run = no_run if model == models.MACHINE_SHAFT else run_schema()
+    part = part_of(model)
     return {
         "if": {"properties": {"model": {"const": model}}, "required": ["model"]},
-        "then": {"properties": {"base": base_schema(model), "run": run}},
+        "then": {"properties": {"base": part.base_schema(), "run": part.run_schema()}},
     }
-
-
-def base_schema(model: str) -> Schema:
-    """Schema of `base` for ``model``, from its catalogue of parameters; ValueError for an unknown model."""
-    if model == models.MACHINE_SHAFT:
-        return shaft_schema()
-    catalogue = [entry for entry in models.parameter_catalogue(model) if not entry.path.startswith("clutch.")]
-    properties: Schema = {}
-    required: list[str] = []
-    for section in dict.fromkeys(entry.path.split(".")[0] for entry in catalogue):
-        entries = [entry for entry in catalogue if entry.path.split(".")[0] == section]
-        if entries[0].path == section:
-            properties[section] = quantity_schema(entries[0])
-            continue
-        schema = _section(entries, with_clutch=section == "pendulums")
-        if section == "pendulums":
-            schema = {"type": "array", "minItems": 1, "maxItems": MAX_PENDULUMS, "items": schema}
-        properties[section] = schema
-        if any(entry.default is None for entry in entries):
-            required.append(section)
-    properties["clutch"] = clutch_schema()
-    return object_schema(properties, required=required, description="the machine that every case begins from")
-
-
-def clutch_schema() -> Schema:
-    """Schema of a clutch: a law, or measured data with the accuracy of its fit."""
-    pair = {"type": "array", "minItems": 2, "maxItems": 2, "description": "angle (rad) and torque (N*m)"}
-    law = {
-        "coefficients": {
-            "type": "array",
-            "minItems": 1,
-            "maxItems": MAX_COEFFICIENTS,
-            "items": {"type": ["number", "string"]},
-            "description": "c_1 .. c_p of the torque over the windup, c_1 first: N*m, N*m/rad, N*m/rad^2, ..",
-        },
-        "windup_limit": quantity_schema(CLUTCH_WINDUP_LIMIT),
-    }
-    measured = {
-        "data": {
-            "type": "array",
-            "minItems": 2,
-            "maxItems": MAX_CLUTCH_ROWS,
-            "items": {**pair, "items": {"type": ["number", "string"]}},
-            "description": "measured rows [angle, torque]",
-        },
-        "accuracy": quantity_schema(
-            Parameter("accuracy", "", "N*m", 0.0, 1e9, True, None, "largest residual of the fit that is accepted")
-        ),
-        "max_degree": {
-            "type": "integer",
-            "minimum": 1,
-            "maximum": MAX_COEFFICIENTS - 1,
-            "default": 7,
-            "description": "highest degree of the polynomial that is tried",
-        },
-        "through_origin": {"type": "boolean", "default": True, "description": "no torque at zero windup (c_1 = 0)"},
-        "angles_include_backlash": {
-            "type": "boolean",
-            "default": False,
-            "description": "the angles count from the first contact, so that the backlash is taken off them",
-        },
-    }
-    return {
-        "description": "torque of the freewheel clutch over its windup",
-        "oneOf": [
-            object_schema(law, required=("coefficients",)),
-            object_schema(measured, required=("data", "accuracy")),
-        ],
-    }
-
-
-def run_schema() -> Schema:
-    """Schema of `run`."""
-    time = {"type": ["number", "string"], "examples": ["60 periods", "2 s", 2.0], "minimum": 0}
-    return object_schema(
-        {
-            "duration": {
-                **time,
-                "default": "60 periods",
-                "description": "end of the run: a number is seconds, a text says periods or a unit of time",
-            },
-            "window": {
-                "type": "array",
-                "minItems": 2,
-                "maxItems": 2,
-                "items": time,
-                "description": "part of the run that is evaluated, [start, end]; by default the last third",
-            },
-            "tolerance": {
-                "type": "number",
-                "minimum": MIN_TOLERANCE,
-                "maximum": MAX_TOLERANCE,
-                "default": DEFAULTS["tolerance"],
-                "description": "local relative error of the integration",
-            },
-            "reset": {
-                "enum": list(RESETS),
-                "default": DEFAULTS["reset"],
-                "description": "whether an upward crossing while torque is transmitted restarts the windup (literal)",
-            },
-        },
-        description="how long each case runs, what is evaluated, how accurately",
-    )
-
-
-def _section(entries: list[Parameter], *, with_clutch: bool) -> Schema:
-    names = {entry.path.split(".")[-1]: placed(entry, entry.path) for entry in entries}
-    properties = {name: quantity_schema(entry) for name, entry in names.items()}
-    if with_clutch:
-        properties["clutch"] = clutch_schema()
-    return object_schema(properties, required=[name for name, entry in names.items() if entry.default is None])

@@ -5,12 +5,26 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from service.spec.schema.axes import Schema
+from service.spec.schema.axes import Schema, object_schema
 from service.spec.units import example
 from worker.limits import MAX_QUANTITY_LENGTH
 from worker.models import Parameter
 
 _TEXT: Final[Schema] = {"type": "string", "minLength": 1, "maxLength": MAX_QUANTITY_LENGTH}
+
+
+def plain_schema(catalogue: tuple[Parameter, ...], prefix: str = "") -> Schema:
+    """Schema of the object of all parameters below ``prefix``, nested as their paths are."""
+    below = [entry for entry in catalogue if entry.path.startswith(prefix)]
+    properties: Schema = {}
+    required: list[str] = []
+    for name in dict.fromkeys(entry.path.removeprefix(prefix).split(".")[0] for entry in below):
+        entries = [entry for entry in below if f"{entry.path}.".startswith(f"{prefix}{name}.")]
+        single = entries[0].path == f"{prefix}{name}"
+        properties[name] = quantity_schema(entries[0]) if single else plain_schema(catalogue, f"{prefix}{name}.")
+        if any(entry.default is None for entry in entries):
+            required.append(name)
+    return object_schema(properties, required=required)
 
 
 def quantity_schema(parameter: Parameter) -> Schema:

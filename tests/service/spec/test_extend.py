@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import itertools
+import tomllib
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from service.spec.document import SpecError
+from service.presets import preset_text
+from service.spec.document import SpecError, parse_spec
 from service.spec.extend import parse_extended
 from service.storage.part import SystemClock
 from tests.service.spec_sample import parsed
@@ -52,6 +54,14 @@ def test_further_values_and_a_further_axis_make_a_larger_grid() -> None:
     assert (new.combine, new.shape, new.name) == ("grid", (3, 3, 2), "larger")
     assert [axis.values for axis in new.axes[1:]] == [(0.02, 0.1, 0.3), (0.5, 0.6)]
     assert set(cases(old)) < set(cases(new))
+
+
+def test_a_machine_shaft_is_extended_by_any_of_its_numbers() -> None:
+    old = parse_spec(tomllib.loads(preset_text("press")[1]))
+    addition = {"axes": [{"path": "mechanism.slider_crank.ram_mass", "values": ["30 kg"]}]}
+    new = parse_extended(old.spec, old.study, addition).study
+    assert new.shape == (*old.study.shape, 2)
+    assert new.axes[-1].values == (20.0, 30.0)
 
 
 def test_further_cases_come_after_those_there_are() -> None:

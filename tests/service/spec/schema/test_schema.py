@@ -10,7 +10,9 @@ import jsonschema
 import pytest
 
 from service.spec.document import SpecError, format_of, load_spec, parse_spec
-from service.spec.schema.document import axis_schema, base_schema, clutch_schema, run_schema, spec_schema
+from service.spec.machine.registry import part_of
+from service.spec.schema.document import axis_schema, spec_schema
+from service.spec.schema.drive import clutch_schema, run_schema
 from tests.service.spec_sample import SPEC, changed
 from worker.models import model_names, parameter_catalogue
 
@@ -94,13 +96,13 @@ def test_it_accepts_what_the_reader_accepts(validator: Any, changes: dict[str, A
 
 def test_it_follows_the_catalogue() -> None:
     for model in model_names():
-        text = json.dumps(base_schema(model))
+        text = json.dumps(part_of(model).base_schema())
         for entry in parameter_catalogue(model):
             if not entry.path.startswith(("clutch.", "constants.")):
                 assert f'"{entry.path.split(".")[-1]}"' in text
                 assert json.dumps(entry.range_text())[1:-1] in text
     with pytest.raises(ValueError, match="unknown model"):
-        base_schema("other")
+        part_of("other")
 
 
 def test_the_parts_stand_alone() -> None:

@@ -1,0 +1,108 @@
+"""The machine of a spec (`base`), whichever model it is of: numbers by flat path, and the paths that axes can vary.
+
+Fields are nested as the paths are: the number at ``mechanism.slider_crank.crank`` stands at
+``/base/mechanism/slider_crank/crank``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from service.spec.fields import missing, read_number
+from service.spec.report import Report, did_you_mean, join
+
+if TYPE_CHECKING:
+    from worker.models import ClutchFit, Parameter
+
+
+@dataclass
+class Machine:
+    """What the base of a spec says, as far as it could be read.
+
+    Attributes
+    ----------
+    values : flat path -> SI number; incomplete when problems were noted
+    parameters : flat path -> parameter, for every number that an axis can vary
+    structure : what of it is no number, as a study keeps it; None where its model has no such, or it could not be read
+    """
+
+    values: dict[str, float] = field(default_factory=dict)
+    parameters: dict[str, Parameter] = field(default_factory=dict)
+    structure: dict[str, Any] | None = None
+
+    @property
+    def fits(self) -> dict[str, ClutchFit]:
+        """JSON Pointer of each clutch that was fitted here -> its fit."""
+        return {}
+
+    def assumed(self, path: str) -> bool:  # noqa: ARG002 - some models need it
+        """Whether ``path`` could be a number of a part of the base that could not be read."""
+        return False
+
+    def why_not(self, path: str) -> str:
+        """Why an axis cannot vary ``path``: a sentence that says what it can."""
+        known = tuple(self.parameters)
+        return "names no numeric parameter of the base" + did_you_mean(path.removeprefix("base."), known)
+
+
+def read_plain(report: Report, data: object, catalogue: tuple[Parameter, ...]) -> Machine:
+    """The machine in ``data`` of a model whose ``catalogue`` says all: nothing is counted, nothing is a choice."""
+    machine = Machine(parameters={entry.path: entry for entry in catalogue})
+    if not isinstance(data, Mapping):
+        message = "is required" if data is None else "must be an object"
+        report.problem("/base", message, data, allowed="an object with the fields " + ", ".join(_fields("", machine)))
+        return machine
+    _unknown_fields(report, "", data, machine)
+    read_numbers(report, data, machine)
+    return machine
+
+
+def read_numbers(report: Report, data: Mapping[str, Any], machine: Machine) -> None:
+    """Put the numbers of the machine's parameters into its values; what is missing or wrong is noted."""
+    for path, entry in machine.parameters.items():
+        number = _read(report, data, path, entry)
+        if number is not None:
+            machine.values[path] = number
+
+
+def _fields(prefix: str, machine: Machine) -> list[str]:
+    """The fields of the object at a path."""
+    rests = (path.removeprefix(prefix) for path in machine.parameters if path.startswith(prefix))
+    return list(dict.fromkeys(rest.split(".")[0] for rest in rests))
+
+
+def _unknown_fields(report: Report, prefix: str, data: Mapping[str, Any], machine: Machine) -> None:
+    """Note every field that no parameter is in, and every part that is no object."""
+    pointer = join("/base", *prefix.split(".")[:-1])
+    fields = _fields(prefix, machine)
+    report.unknown_fields(pointer, data, tuple(fields))
+    for name in fields:
+        part = f"{prefix}{name}"
+        if part in machine.parameters or name not in data:
+            continue
+        if isinstance(data[name], Mapping):
+            _unknown_fields(report, f"{part}.", data[name], machine)
+        else:
+            report.problem(join(pointer, name), "must be an object", data[name])
+
+
+def _read(report: Report, found: Mapping[str, Any], path: str, entry: Parameter) -> float | None:
+    """The number at a flat path of the base; None, and a problem noted, when it is missing or wrong."""
+    place: Any = found
+    keys: list[str | int] = []
+    for key in path.split("."):
+        index: str | int = int(key) if isinstance(place, list) else key
+        keys.append(index)
+        inside = isinstance(place, list) or (isinstance(place, Mapping) and key in place)
+        if not inside:
+            break
+        place = place[index]
+    else:
+        return read_number(report, join("/base", *keys), place, entry)
+    if entry.default is None:
+        missing(report, join("/base", *path.split(".")), entry)
+        return None
+    # No end of a range is a number that could be stored.
+    return entry.default if entry.accepts(entry.default) else None

@@ -1,0 +1,100 @@
+"""The part of the spec that each model has to itself: how base and run are read, what a schema says of them.
+
+A model that is not registered has what its catalogue of parameters says: plain numbers, and no run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from service.spec.axes.axes import varied_values
+from service.spec.machine.clutch import check_laws
+from service.spec.machine.drive import Drive, read_drive
+from service.spec.machine.machine import read_plain
+from service.spec.machine.shaft import read_shaft
+from service.spec.run import read_run, refuse_run
+from service.spec.schema.axes import object_schema
+from service.spec.schema.drive import drive_schema, run_schema
+from service.spec.schema.quantity import plain_schema
+from service.spec.schema.shaft import shaft_schema
+from service.spec.warnings import warn_machine_shaft, warn_vibration_drive
+from worker import models
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from service.spec.machine.machine import Machine
+    from service.spec.report import Report
+    from service.spec.schema.axes import Schema
+    from worker.study import Axis, Combine, Study
+
+    Axes = tuple[Axis, ...]
+
+
+def _no_run(report: Report, data: object, *_: object) -> dict[str, Any]:
+    return refuse_run(report, data)
+
+
+def _no_run_schema() -> Schema:
+    return object_schema({}, description="nothing: this model has no run")
+
+
+def _nothing(*_: object) -> None:
+    """No more to check, nothing to warn of."""
+
+
+@dataclass(frozen=True, slots=True)
+class SpecPart:
+    """The part of one model; every function notes what is wrong in the report that it is given.
+
+    Attributes
+    ----------
+    read_base : reads `base`
+    base_schema, run_schema : their JSON Schemas
+    read_run : reads `run` of a machine with its axes (None where they could not be read) as a study keeps it
+    check : looks at what takes machine and axes together
+    warn : warns of what is allowed, and implausible
+    """
+
+    read_base: Callable[[Report, object], Machine]
+    base_schema: Callable[[], Schema]
+    read_run: Callable[[Report, object, Machine, Axes | None], dict[str, Any]] = _no_run
+    run_schema: Callable[[], Schema] = _no_run_schema
+    check: Callable[[Report, Machine, Axes, Combine], None] = _nothing
+    warn: Callable[[Report, Study], None] = _nothing
+
+
+def _drive_run(report: Report, data: object, machine: Machine, axes: Axes | None) -> dict[str, Any]:
+    return read_run(report, data, varied_values("excitation.frequency", axes, machine.values))
+
+
+def _drive_check(report: Report, machine: Machine, axes: Axes, combine: Combine) -> None:
+    assert isinstance(machine, Drive)
+    check_laws(report, machine.clutches, axes, combine)
+
+
+def _shaft_run(report: Report, data: object, *_: object) -> dict[str, Any]:
+    why = "belongs to the vibration drive: a machine shaft is solved for its whole cycle at once"
+    return refuse_run(report, data, why)
+
+
+def _shaft_run_schema() -> Schema:
+    return object_schema({}, description="nothing: a machine shaft is solved for its whole cycle")
+
+
+_PARTS = {
+    models.VIBRATION_DRIVE: SpecPart(
+        read_drive, drive_schema, _drive_run, run_schema, _drive_check, warn_vibration_drive
+    ),
+    models.MACHINE_SHAFT: SpecPart(read_shaft, shaft_schema, _shaft_run, _shaft_run_schema, warn=warn_machine_shaft),
+}
+
+
+def part_of(model: str) -> SpecPart:
+    """The part of ``model``; ValueError where there is no such model."""
+    if model in _PARTS:
+        return _PARTS[model]
+    catalogue = models.parameter_catalogue(model)
+    return SpecPart(partial(read_plain, catalogue=catalogue), partial(plain_schema, catalogue))
