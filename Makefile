@@ -22,9 +22,10 @@ demo: $(RUNTIME)
 serve: $(RUNTIME)
 	@$(BIN)/sprag serve
 
-# The tests of one file share processes and servers, so they stay together.
+# The tests of one file share processes and servers, so they stay together. Many wait for processes of the program, so that three run
+# side by side even on two cores.
 test: check
-	$(BIN)/python -m pytest --numprocesses logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder
 
 check: $(DEV)
 	$(BIN)/ruff check .
