@@ -17,7 +17,7 @@ import numba
 import numpy as np
 
 from benchmarks.workloads import CASES, PERIODS, Timing, Workload, take_turns
-from engine.compile.lowering import GROUP
+from engine.compile.ways import GROUP
 from engine.run import Run, Span
 from engine.vibration_drive import simulate as module
 

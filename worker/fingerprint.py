@@ -61,6 +61,7 @@ def collect() -> dict[str, str]:
         "C library": " ".join(platform.libc_ver()),
         "machine": platform.machine(),
         _FEATURES: _features(),
+        "compiler": models.compiler(),
         "numba settings": _numba_settings(),
     }
 

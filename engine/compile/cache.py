@@ -1,7 +1,7 @@
 """Where generated kernels and all machine code are kept: one per-user folder for each state of the engine's source.
 
 numba notices when the file of a cached function changes, but not when a function it calls does. A folder named by a
-hash of all of the engine's sources (and of the compiler's version) makes old code unreachable instead.
+hash of all of the engine's sources (and of the compiler's version and way) makes old code unreachable instead.
 """
 
 import contextlib
@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numba
 
+from engine.compile.ways import WAY
 from engine.sources import engine_folder, source_hash
 
 #: Environment variable that moves the cache.
@@ -24,7 +25,7 @@ _TEMPORARY_NAME = f"sprag-kernels-{os.getuid()}"
 @cache
 def _engine_hash() -> str:
     sources = source_hash(engine_folder())
-    return hashlib.sha256(f"{numba.__version__} {sources}".encode()).hexdigest()[:16]
+    return hashlib.sha256(f"{numba.__version__} {WAY} {sources}".encode()).hexdigest()[:16]
 
 
 def _writable(folder: Path) -> bool:

@@ -17,12 +17,12 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
+from engine.compile.ways import GROUP
+
 _DOUBLE = ir.DoubleType()
 _INT = ir.IntType(64)
 #: Products and sums may become fused multiply-adds; nothing is reordered.
 _FLAGS = ("contract",)
-#: Lanes that are always computed together: the doubles of the largest vector.
-GROUP = 8
 #: Bytes: the largest vector, a cache line.
 _STACK_ALIGNMENT = 64
 _ARITHMETIC = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"}

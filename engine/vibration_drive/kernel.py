@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.compile.cache import cache_folder
-from engine.compile.lowering import GROUP
+from engine.compile.ways import GROUP
 from engine.taylor.batch import ROWS, SLOTS, peaks_loop, roots_loop
 from engine.vibration_drive.advance import advance_loop
 from engine.vibration_drive.bounds import bounds_loop
@@ -33,8 +33,7 @@ _MODULE = '''"""Generated kernel: {n} pendulum(s), {coefficients} clutch coeffic
 
 import numpy as np
 
-from engine.compile.jit import compiled, unmanaged
-from engine.compile.lowering import constant_record, lane_loops, lane_mask, lowest
+from engine.compile.jit import compiled, constant_record, lane_loops, lane_mask, lowest, unmanaged
 from engine.vibration_drive.events import settle_guards
 from engine.vibration_drive.lanes import highest, load_case, look_for_events, next_stop, pack, record, settle
 from engine.vibration_drive.layout import Layout, as_record

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.compile.jit import part
-from engine.compile.lowering import GROUP
+from engine.compile.ways import GROUP
 from engine.endings import ENDING_CODES, Ending
 from engine.taylor.roots import evaluate
 from engine.vibration_drive import states as ev

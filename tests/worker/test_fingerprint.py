@@ -28,7 +28,8 @@ def test_every_process_of_one_installation_has_the_same() -> None:
 
 
 @pytest.mark.parametrize(
-    "setting", ["NUMBA_CPU_FEATURES=+sse2", "NUMBA_ENABLE_AVX=0", "NUMBA_OPT=0", "NUMBA_CPU_NAME=generic"]
+    "setting",
+    ["NUMBA_CPU_FEATURES=+sse2", "NUMBA_ENABLE_AVX=0", "NUMBA_OPT=0", "NUMBA_CPU_NAME=generic", "SPRAG_COMPILER=plain"],
 )
 def test_settings_that_change_the_code_change_it(setting: str) -> None:
     name, value = setting.split("=")

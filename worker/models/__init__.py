@@ -283,6 +283,13 @@ def cache_folder() -> Path:
     return engine_cache_folder()
 
 
+def compiler() -> str:
+    """The way in which this process compiles kernels."""
+    from engine.compile.ways import WAY
+
+    return WAY
+
+
 def discard_compiled() -> None:
     """Throw away every compiled kernel of this engine that lies in the cache on disk, because some may be damaged."""
     from engine.compile.cache import discard

@@ -11,7 +11,8 @@ import numba
 import numpy as np
 import pytest
 
-from engine.compile.lowering import GROUP, constant_record, lane_loops, lane_mask, lowest
+from engine.compile.lowering import constant_record, lane_loops, lane_mask, lowest
+from engine.compile.ways import GROUP
 from engine.taylor.batch import aligned_zeros
 from engine.taylor.straight import (
     LaneCode,

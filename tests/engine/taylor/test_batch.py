@@ -9,7 +9,8 @@ import numba
 import numpy as np
 import pytest
 
-from engine.compile.lowering import GROUP, lane_loops
+from engine.compile.lowering import lane_loops
+from engine.compile.ways import GROUP
 from engine.taylor.batch import (
     FOUND,
     HARD,
