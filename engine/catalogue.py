@@ -6,7 +6,7 @@ from typing import Literal
 
 STANDARD_GRAVITY = 9.80665
 
-Kind = Literal["real", "count"]
+Kind = Literal["real", "count", "category"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,14 +43,35 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class ResultInfo:
-    """One result: name, SI unit ("1" where it has none), sentence for people, and whether it is a count."""
+    """One result.
+
+    Attributes
+    ----------
+    name : str
+    unit : str
+        SI unit; "1" where it has none.
+    description : str
+    kind : {"real", "count", "category"}
+        What its numbers are; of a category they are places in ``categories``.
+    categories : tuple of str
+        Names of a category's values. A name keeps its place for ever: the numbers are stored.
+    """
 
     name: str
     unit: str
     description: str
     kind: Kind = "real"
+    categories: tuple[str, ...] = ()
 
     @property
     def column(self) -> str:
         """The name as a database column."""
         return self.name.replace(".", "_")
+
+    def cell(self, value: float) -> float | int | str | None:
+        """A stored number as people and programs read it: a category by its name, NaN as None."""
+        if math.isnan(value):
+            return None
+        if self.kind == "real":
+            return value
+        return int(value) if self.kind == "count" else self.categories[int(value)]

@@ -65,6 +65,10 @@ class Run:
         return self.window[0].in_periods(frequency), self.window[1].in_periods(frequency)
 
 
+#: Excitation periods that a search needs for the means of a motion that never repeats itself, and their intervals.
+MEANS_FROM_PERIODS = 940
+
+
 @dataclass(frozen=True, slots=True)
 class SettledRun:
     """Settings of a search for the settled motion, shared by every case of a batch.

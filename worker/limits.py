@@ -28,9 +28,13 @@ MAX_PROBLEMS: Final = 100
 
 #: Excitation periods of any case of a study.
 MAX_RUN_PERIODS: Final = 1e6
-#: Excitation periods that the search for a settled motion may be given.
+#: Excitation periods that a search for the settled motion may be given, and the largest order of an orbit.
 MIN_SETTLED_PERIODS: Final = 100
 MAX_SETTLED_PERIODS: Final = 100_000
+MAX_ORBIT_PERIODS: Final = 64
+#: Range of the scaled distance from its orbit below which a run counts as settled.
+MIN_SETTLED: Final = 1e-10
+MAX_SETTLED: Final = 1e-3
 #: Range of the integrator's local relative error.
 MIN_TOLERANCE: Final = 1e-14
 MAX_TOLERANCE: Final = 1e-4

@@ -53,6 +53,13 @@ _MEANS = frozenset(
 )  # fmt: skip
 
 _OWN = (
+    ResultInfo(
+        "regime",
+        "1",
+        "what the motion settles to: " + ", ".join(regime.name.lower() for regime in Regime if regime),
+        "category",
+        tuple(regime.name.lower() for regime in Regime),
+    ),
     ResultInfo("regime.order", "1", "excitation periods after which the motion repeats itself", "count"),
     ResultInfo("regime.multiplier", "1", "factor by which disturbances of the orbit shrink in one turn of it"),
     ResultInfo("regime.settled_after", "1", "excitation periods from the start until the motion is settled"),

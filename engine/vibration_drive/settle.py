@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from engine.endings import ENDING_CODES, Ending
-from engine.run import Run, SettledRun
+from engine.run import MEANS_FROM_PERIODS, Run, SettledRun
 from engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count, with_lengths
 from engine.vibration_drive.characteristics import characteristics
 from engine.vibration_drive.irregular import BATCHES, Batches
@@ -115,6 +115,8 @@ def settle(columns: Mapping[str, ArrayLike], settings: SettledRun, *, cases: int
         _unloaded(module, search, np.flatnonzero(~loaded), results)
         results.values[results.endings != _OK] = np.nan
         results.regimes[results.endings != _OK] = Regime.NONE
+        settled = np.flatnonzero(results.endings == _OK)
+        results.put(settled, "regime", results.regimes[settled])
     return SettledBatch(results.values, results.endings, results.regimes, results.points, search.spent)
 
 
@@ -122,7 +124,7 @@ def _settle(search: Search, active: Ints, results: _Results) -> None:
     """Bring cases to their settled motion, and write their results."""
     settings = search.settings
     count = BATCHES
-    if settings.at_most < BATCHES * ROUND + sum(transient_rounds(_MOVE_AFTER)):
+    if settings.at_most < MEANS_FROM_PERIODS:
         count = max(1, (2 * settings.at_most // 3) // ROUND)
     plan = transient_rounds(settings.at_most - count * ROUND)
     moved = False

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from engine.endings import ENDING_CODES
 from engine.outcome import Batch, Trajectory
-from engine.run import Run
+from engine.run import Run, SettledRun
 from engine.vibration_drive.automaton import Clutch, Shaft
 from engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count
 from engine.vibration_drive.characteristics import characteristics
@@ -152,11 +152,15 @@ def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike) -> 
 
 
 def warm_up(pendulums: int, coefficients: int, tolerance: float) -> None:
-    """Generate and compile the kernel of a shape, so that other processes load it from the cache."""
-    columns: dict[str, float] = {"excitation.frequency": 1.0, "shaft.inertia": 1.0}
+    """Generate and compile the kernel of a shape, and what settles motions, so that others load them from the cache."""
+    from engine.vibration_drive.settle import settle
+
+    columns: dict[str, float] = {"excitation.frequency": 1.0, "shaft.inertia": 1.0, "shaft.load": 1.0}
     for i in range(pendulums):
         columns |= {f"pendulums.{i}.inertia": 1.0, f"pendulums.{i}.mass": 0.0, f"pendulums.{i}.arm": 0.0}
     columns |= {f"clutch.coefficients.{k}": 1.0 for k in range(max(1, coefficients))}
+    # Nothing moves, and that repeats itself: every step of the search is taken, down to the means.
+    settle(columns, SettledRun(tolerance=tolerance), cases=1)
     simulate(columns, Run(tolerance=tolerance), cases=1)
 
 

@@ -25,7 +25,7 @@ class Curves:
         return {**self.data["units"], **{name: info["unit"] for name, info in self.data["results"].items()}}
 
     def to_pandas(self) -> pd.DataFrame:
-        """A row for each point: parameters that tell the curves apart, x, results (NaN for none), ending, case."""
+        """A row for each point: what tells curves apart, x, results (NaN for none), any regime, ending, case."""
         import pandas as pd
 
         x = self.data["x"]["path"]
@@ -35,6 +35,7 @@ class Curves:
                     **{path: [value] * len(curve["x"]) for path, value in {**curve["by"], **curve["at"]}.items()},
                     x: curve["x"],
                     **{name: pd.Series(values, dtype="float64") for name, values in curve["y"].items()},
+                    **({"regime": curve["regime"]} if "regime" in curve else {}),
                     "ending": curve["endings"],
                     "case": curve["cases"],
                 }

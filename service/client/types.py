@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 
 class Progress(TypedDict):
@@ -90,6 +90,7 @@ class Curve(TypedDict):
     cases: list[int]
     y: dict[str, list[float | None]]
     endings: list[str]
+    regime: NotRequired[list[str | None]]
 
 
 class CurvesData(TypedDict):
@@ -109,7 +110,7 @@ class Case(TypedDict):
     parameters: dict[str, float]
     ending: str
     flags: list[str]
-    results: dict[str, float | None]
+    results: dict[str, float | str | None]
 
 
 Spec = Mapping[str, Any]

@@ -62,7 +62,8 @@ class Selection:
     """The cases of all curves, chosen from the study alone; ``units`` (SI) of every path that is drawn or fixed.
 
     For people: ``names`` of the drawn paths with those tied to them, and ``held``, the fixed ones with their values,
-    also those of the operating point that vary nowhere.
+    also those of the operating point that vary nowhere. ``regime`` is the result that tells the kinds of motion apart,
+    where the study has one.
     """
 
     x: str
@@ -72,15 +73,17 @@ class Selection:
     x_values: tuple[float, ...]
     results: tuple[ResultInfo, ...]
     lines: tuple[Line, ...]
+    regime: ResultInfo | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """One curve: a line of cases with their results (NaN where there is none) and endings."""
+    """One curve: a line of cases with their results (NaN where there is none), endings, and regimes if any."""
 
     line: Line
     y: dict[str, NDArray[np.float64]]
     endings: list[str]
+    regimes: list[str | None] | None = None
 
     def run(self) -> NDArray[np.intp]:
         """Places of the cases that were run, ascending: what a picture joins. Of a coarser study, its own points."""
@@ -109,6 +112,7 @@ class Curves:
                     "cases": curve.line.cases.tolist(),
                     "y": {info.name: numbers(curve.y[info.name], info.kind == "count") for info in chosen.results},
                     "endings": curve.endings,
+                    **({} if curve.regimes is None else {"regime": curve.regimes}),
                 }
                 for curve in self.curves
             ],
@@ -135,6 +139,7 @@ class Map:
     cases: NDArray[np.int64]
     values: NDArray[np.float64]
     endings: list[list[str]]
+    regimes: list[list[str | None]] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The map as JSON data; ``z.values[j][i]`` belongs to ``y.values[j]`` and ``x.values[i]``."""
@@ -152,6 +157,7 @@ class Map:
             "at": self.at,
             "cases": self.cases.tolist(),
             "endings": self.endings,
+            **({} if self.regimes is None else {"regime": self.regimes}),
         }
 
     def run(self) -> Map:
@@ -170,6 +176,7 @@ class Map:
             cases=self.cases[np.ix_(rows, columns)],
             values=self.values[np.ix_(rows, columns)],
             endings=[[self.endings[row][column] for column in columns] for row in rows],
+            regimes=self.regimes and [[self.regimes[row][column] for column in columns] for row in rows],
         )
 
 
@@ -216,7 +223,7 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
     made = tuple(lines)
     units = {path: unit_of(study, path) for path in (query.x, *made[0].by, *made[0].at)}
     names = {path: axis_name(study, path) for path in (query.x, *made[0].by)}
-    return Selection(query.x, units, names, _held(study, made[0]), x_values, results, made)
+    return Selection(query.x, units, names, _held(study, made[0]), x_values, results, made, regime_info(infos))
 
 
 def _held(study: Study, line: Line) -> tuple[str, ...]:
@@ -230,14 +237,31 @@ def _held(study: Study, line: Line) -> tuple[str, ...]:
 def draw(selection: Selection, fetch: Fetch) -> Curves:
     """Fetch the results of the selected cases, in one go."""
     names = [info.name for info in selection.results]
-    columns = fetch(np.concatenate([line.cases for line in selection.lines]), names)
-    endings = [ending or PENDING for ending in columns.endings]
+    columns = fetch(np.concatenate([line.cases for line in selection.lines]), _with(names, selection.regime))
+    endings, regimes = [ending or PENDING for ending in columns.endings], _regimes(columns, selection.regime)
     curves, start = [], 0
     for line in selection.lines:
         part = slice(start, start + line.cases.size)
-        curves.append(Curve(line, {name: columns.values[name][part] for name in names}, endings[part]))
+        y = {name: columns.values[name][part] for name in names}
+        curves.append(Curve(line, y, endings[part], regimes and regimes[part]))
         start = part.stop
     return Curves(selection, tuple(curves))
+
+
+def regime_info(infos: Sequence[ResultInfo]) -> ResultInfo | None:
+    """The result that tells the kinds of motion apart; None where there is none."""
+    return next((info for info in infos if info.kind == "category"), None)
+
+
+def _with(names: list[str], regime: ResultInfo | None) -> list[str]:
+    return names if regime is None else [*names, regime.name]
+
+
+def _regimes(columns: CaseColumns, regime: ResultInfo | None) -> list[str | None] | None:
+    """The name of the regime of each case; None for cases without one, and for all of them where there is none."""
+    if regime is None:
+        return None
+    return [None if name is None else str(name) for name in map(regime.cell, columns.values[regime.name].tolist())]
 
 
 def draw_map(
@@ -253,9 +277,11 @@ def draw_map(
     x_values, lines = _grid_lines(study, x_axis, {y: y_axis}, fixed, 1, way_out="give")
     rows = list(lines)
     cases = np.stack([row.cases for row in rows])
-    columns = fetch(cases.reshape(-1), [z])
-    endings = [ending or PENDING for ending in columns.endings]
+    regime = regime_info(infos)
+    columns = fetch(cases.reshape(-1), _with([z], regime))
+    endings, regimes = [ending or PENDING for ending in columns.endings], _regimes(columns, regime)
     width = len(x_values)
+    starts = range(0, len(endings), width)
     return Map(
         x,
         y,
@@ -269,7 +295,8 @@ def draw_map(
         result,
         cases,
         columns.values[z].reshape(cases.shape),
-        [endings[start : start + width] for start in range(0, len(endings), width)],
+        [endings[start : start + width] for start in starts],
+        None if regimes is None else [regimes[start : start + width] for start in starts],
     )
 
 
@@ -279,6 +306,11 @@ def _results(infos: Sequence[ResultInfo], parameter: str, names: Sequence[str]) 
         ErrorItem(unknown_result(infos, name), parameter=parameter, value=name, allowed=listed(i.name for i in infos))
         for name in names
         if result_of(infos, name) is None
+    ]
+    faults += [
+        ErrorItem("is a category, which comes with every point", parameter=parameter, value=name, allowed="a number")
+        for name in names
+        if (info := result_of(infos, name)) is not None and info.kind == "category"
     ]
     if faults:
         raise SelectionError(faults)

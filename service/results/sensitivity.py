@@ -126,6 +126,11 @@ def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fet
         for name in names
         if result_of(infos, name) is None
     ]
+    faults += [
+        ErrorItem("is a category, which has no variance", parameter="y", value=name)
+        for name in names
+        if (info := result_of(infos, name)) is not None and info.kind == "category"
+    ]
     varying = [axis for axis in study.axes if np.any(axis.array != axis.array[0])]
     if not varying and not faults:
         faults = [ErrorItem("nothing varies in this study", parameter="y")]

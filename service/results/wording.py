@@ -28,8 +28,13 @@ _SYMBOLS: Final = {
 _GREEK: Final = {"beta": "β", "delta": "δ", "phi": "φ", "w": "ω"}
 
 
-def number(value: float | None, digits: int = _DIGITS) -> str:
-    """A number as people read it: few digits, thousands apart, powers of ten raised; a dash for none."""
+def number(value: float | str | None, digits: int = _DIGITS) -> str:
+    """A number as people read it: few digits, thousands apart, powers of ten raised; a dash for none.
+
+    The name of a category stays as it is.
+    """
+    if isinstance(value, str):
+        return value
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "–"
     if isinstance(value, int):

@@ -1,21 +1,38 @@
-"""The run of a spec: duration, window, tolerance, reading of equation (5)."""
+"""The run of a spec: until it is settled or for a time, tolerance, reading of equation (5)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from service.spec.fields import read_object
+from service.spec.fields import read_object, read_whole
 from service.spec.report import Report, did_you_mean, join
 from service.spec.units import PERIOD_NAMES, QuantityError, exact_number, parse_exact, split_quantity, to_float
-from worker.limits import MAX_RUN_PERIODS, MAX_TOLERANCE, MIN_TOLERANCE
+from worker.limits import (
+    MAX_ORBIT_PERIODS,
+    MAX_RUN_PERIODS,
+    MAX_SETTLED,
+    MAX_SETTLED_PERIODS,
+    MAX_TOLERANCE,
+    MIN_SETTLED,
+    MIN_SETTLED_PERIODS,
+    MIN_TOLERANCE,
+)
+from worker.models import MEANS_FROM_PERIODS, SETTLED
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-FIELDS: Final = ("duration", "window", "tolerance", "reset")
+#: Fields of a run until it is settled alone, and of a run for a time alone.
+SETTLED_FIELDS: Final = ("until", "at_most", "settled", "max_period")
+TIMED_FIELDS: Final = ("duration", "window")
+FIELDS: Final = (*SETTLED_FIELDS, *TIMED_FIELDS, "tolerance", "reset")
 RESETS: Final = ("contact", "literal")
+#: What stands for the fields that are not given.
+SETTLED_DEFAULTS: Final[dict[str, Any]] = {
+    "until": SETTLED, "at_most": 1000, "settled": 1e-8, "max_period": 32, "tolerance": 1e-9, "reset": "contact",
+}  # fmt: skip
 DEFAULTS: Final[dict[str, Any]] = {"duration": [60.0, "periods"], "window": None, "tolerance": 1e-9, "reset": "contact"}
 _TIME: Final = 'seconds (2.0 or "2 s") or excitation periods ("60 periods")'
 _MAX_SECONDS: Final = 1e9
@@ -32,19 +49,24 @@ def read_run(report: Report, data: object, frequencies: NDArray[np.float64]) -> 
     ----------
     frequencies : every excitation frequency (Hz) of the study; empty when they could not be read
     """
-    run = dict(DEFAULTS)
     found = read_object(report, "/run", data, FIELDS)
     if found is None:
-        return run
+        return dict(DEFAULTS)
+    settled = not any(name in found for name in TIMED_FIELDS) and any(name in found for name in SETTLED_FIELDS)
+    run = dict(SETTLED_DEFAULTS if settled else DEFAULTS)
     before = report.found
+    if "tolerance" in found:
+        run["tolerance"] = _read_plain(report, "/run/tolerance", found["tolerance"], MIN_TOLERANCE, MAX_TOLERANCE)
+    if "reset" in found:
+        run["reset"] = _read_reset(report, found["reset"])
+    if settled:
+        _read_settled(report, found, run)
+        return run
+    _refuse_settled(report, found)
     if "duration" in found:
         run["duration"] = _read_time(report, "/run/duration", found["duration"], positive=True)
     if "window" in found:
         run["window"] = _read_window(report, found["window"])
-    if "tolerance" in found:
-        run["tolerance"] = _read_tolerance(report, found["tolerance"])
-    if "reset" in found:
-        run["reset"] = _read_reset(report, found["reset"])
     if report.found == before and frequencies.size:
         _check_times(report, run, found, frequencies)
     return run
@@ -58,6 +80,50 @@ def refuse_run(report: Report, data: object, why: str = "is not used: this model
     for name, value in data.items():
         report.problem(join("/run", name), why, value, allowed="no `run`")
     return {}
+
+
+def _read_settled(report: Report, found: Mapping[str, Any], run: dict[str, Any]) -> None:
+    """Put what is given of a run until it is settled into ``run``."""
+    if "until" in found and found["until"] != SETTLED:
+        report.problem("/run/until", "is not a valid choice", found["until"], allowed=f"'{SETTLED}'")
+    if "at_most" in found:
+        run["at_most"] = _read_periods(report, found["at_most"])
+    if "settled" in found:
+        run["settled"] = _read_plain(report, "/run/settled", found["settled"], MIN_SETTLED, MAX_SETTLED)
+    if "max_period" in found:
+        run["max_period"] = read_whole(report, "/run/max_period", found["max_period"], 1, MAX_ORBIT_PERIODS)
+    if run["at_most"] is not None and run["at_most"] < MEANS_FROM_PERIODS:
+        report.warn(
+            f"/run/at_most: {run['at_most']} periods are too few for the means of irregular motion, which takes "
+            f"{MEANS_FROM_PERIODS}: cases without a periodic motion will be unsettled"
+        )
+
+
+def _refuse_settled(report: Report, found: Mapping[str, Any]) -> None:
+    """Note the fields that contradict a duration or a window."""
+    timed = " and ".join(f"`{name}`" for name in TIMED_FIELDS if name in found)
+    for name in SETTLED_FIELDS:
+        if name in found:
+            report.problem(
+                f"/run/{name}", f"contradicts {timed}: a run lasts until it is settled or for a given time",
+                found[name], allowed=f"no `{name}`, or neither `duration` nor `window`",
+            )  # fmt: skip
+
+
+def _read_periods(report: Report, value: object) -> int | None:
+    allowed = f'{MIN_SETTLED_PERIODS} to {MAX_SETTLED_PERIODS:,} whole excitation periods, as in "1000 periods"'
+    try:
+        number, unit = split_quantity(value) if isinstance(value, str) else (None, "")
+    except QuantityError as error:
+        report.problem("/run/at_most", str(error), value, allowed=allowed)
+        return None
+    if number is None or unit not in PERIOD_NAMES:
+        report.problem("/run/at_most", "must be a number of excitation periods", value, allowed=allowed)
+    elif number.denominator != 1 or not MIN_SETTLED_PERIODS <= number <= MAX_SETTLED_PERIODS:
+        report.problem("/run/at_most", "is out of range", value, allowed=allowed)
+    else:
+        return int(number)
+    return None
 
 
 def in_periods(time: Time, frequency: float) -> float:
@@ -102,13 +168,13 @@ def _read_window(report: Report, data: object) -> list[Time] | None:
     return None if None in times else [time for time in times if time is not None]
 
 
-def _read_tolerance(report: Report, value: object) -> float | None:
-    allowed = f"{MIN_TOLERANCE:g} to {MAX_TOLERANCE:g}, a plain number"
+def _read_plain(report: Report, pointer: str, value: object, low: float, high: float) -> float | None:
+    allowed = f"{low:g} to {high:g}, a plain number"
     if isinstance(value, bool) or not isinstance(value, int | float):
-        report.problem("/run/tolerance", "must be a plain number", value, allowed=allowed)
+        report.problem(pointer, "must be a plain number", value, allowed=allowed)
         return None
-    if not MIN_TOLERANCE <= value <= MAX_TOLERANCE:
-        report.problem("/run/tolerance", "is out of range", value, allowed=allowed)
+    if not low <= value <= high:
+        report.problem(pointer, "is out of range", value, allowed=allowed)
         return None
     return float(value)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
@@ -128,12 +127,15 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class CaseRow:
-    """One finished case; ``results`` maps every result name to its SI number, None where it could not be computed."""
+    """One finished case; ``results`` maps every result name to its SI number, or to the name of a category.
+
+    None where it could not be computed.
+    """
 
     case: int
     ending: str
     flags: tuple[str, ...]
-    results: dict[str, float | int | None]
+    results: dict[str, float | int | str | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,14 +164,13 @@ class RowBlock:
 
     def rows(self) -> Iterator[CaseRow]:
         """The same, case by case."""
-        names = [info.name for info in self.infos]
-        counts = [info.kind == "count" for info in self.infos]
+        columns = [(info.name, info.kind == "real", info.cell) for info in self.infos]
         for case, ending, flags, values in zip(
             self.cases.tolist(), self.endings, self.flags, self.values.tolist(), strict=True
         ):
             results = {
-                name: None if math.isnan(value) else int(value) if count else value
-                for name, count, value in zip(names, counts, values, strict=True)
+                name: value if real and value == value else cell(value)  # noqa: PLR0124 - not NaN
+                for (name, real, cell), value in zip(columns, values, strict=True)
             }
             yield CaseRow(case, ending, split_flags(flags), results)
 

@@ -28,12 +28,12 @@ def target(model: str, variant: str) -> tuple[str, tuple[str, ...]]:
 def tuples(
     study: int, numbers: Sequence[int], result: ChunkResult, infos: Sequence[models.ResultInfo]
 ) -> list[tuple[Any, ...]]:
-    """Rows for `target`, of the cases with those numbers: NaN and infinities become NULL, counts whole numbers."""
+    """Rows for `target`, of the cases with those numbers: NaN and infinities become NULL, counts and codes whole."""
     columns: list[list[Any]] = []
     for index, info in enumerate(infos):
         column = result.values[:, index]
         finite = np.isfinite(column)
-        if info.kind == "count":
+        if info.kind != "real":
             cells: list[Any] = np.where(finite, column, 0.0).astype(np.int64).tolist()
         else:
             cells = column.tolist()

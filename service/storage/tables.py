@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from worker import models
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0013"
+HEAD_REVISION = "0014"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -145,7 +145,7 @@ def results_table(model: str, variant: str) -> sa.Table:
     if name in METADATA.tables:
         return METADATA.tables[name]
     results = (
-        sa.Column(info.column, sa.Integer if info.kind == "count" else sa.Double)
+        sa.Column(info.column, sa.Double if info.kind == "real" else sa.Integer)
         for info in models.result_infos(model, variant)
     )
     return sa.Table(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -11,12 +12,14 @@ import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
+from service.spec.document import parse_spec
 from service.storage import maintenance
 from service.storage.errors import DatabaseError, SchemaError
 from service.storage.session import Session, sqlite_driver
 from service.storage.store import Store
 from service.storage.tables import HEAD_REVISION, all_tables
 from tests.migrations.freeze import FOLDER
+from tests.service.spec_sample import changed
 from tests.worker import fakes
 from worker.states import StudyState
 
@@ -100,6 +103,42 @@ def test_the_number_of_pendulums_became_the_variant(file: Path, url: str) -> Non
     upgrade(url)
     with Store.open(url) as store:
         assert [study.variant for study in store.list_studies().studies] == ["", "3", "1"]
+
+
+@pytest.mark.parametrize(
+    ("run", "then"),
+    [
+        (None, {"duration": "60 periods"}),
+        ({}, {"duration": "60 periods"}),
+        ({"tolerance": 1e-8}, {"duration": "60 periods", "tolerance": 1e-8}),
+        ({"duration": "2 s"}, {"duration": "2 s"}),
+        ({"window": ["40 periods", "60 periods"]}, {"window": ["40 periods", "60 periods"]}),
+    ],
+)
+def test_a_stored_spec_keeps_the_run_that_it_meant(
+    file: Path, url: str, run: dict[str, object] | None, then: dict[str, object]
+) -> None:
+    thaw(FOLDER / "0013.sql", file)
+    drive = changed({"/run": ... if run is None else run})
+    others = [changed({"/model": "machine-shaft", "/run": ...}), {"name": "no spec"}]
+    connection = sqlite_driver().connect(file)
+    for number, spec in enumerate((drive, *others), start=1):
+        connection.execute("UPDATE studies SET spec = ? WHERE number = ?", (json.dumps(spec), number))
+    connection.execute(
+        "INSERT INTO schedules (id, name, spec, zone, priority, fresh, enabled, created_at, next_due)"
+        " VALUES ('sc_1', 'nightly', ?, 'UTC', 0, 0, 1, 0, 1)",
+        (json.dumps(drive),),
+    )
+    connection.commit()
+    connection.close()
+    assert upgrade(url) == ("0013", HEAD_REVISION)
+    with Store.open(url) as store:
+        (schedule,) = store.list_schedules()
+        studies = {record.number: record.id for record in store.list_studies().studies}
+        for spec in (store.spec(studies[1]), schedule.fields.spec):
+            assert spec == {**drive, "run": then}
+            assert "until" not in parse_spec(spec).study.run
+        assert [store.spec(studies[number]) for number in (2, 3)] == others
 
 
 def test_code_and_migrations_have_the_same_tables(url: str) -> None:

@@ -15,6 +15,7 @@ from engine import ENGINE_VERSION, Ending, Run, Span
 from engine.catalogue import Parameter, ResultInfo
 from engine.machine_shaft.problems import ExpressionError, InsufficientInertiaError, MachineError
 from engine.outcome import Trajectory
+from engine.run import MEANS_FROM_PERIODS
 from engine.sources import engine_folder, source_hash
 from engine.vibration_drive.clutch import (
     ClutchFit,
@@ -34,6 +35,7 @@ from engine.vibration_drive.parameters import (
 from worker.models import machine_shaft, vibration_drive
 from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
 from worker.models.model import Model, all_models, model_names, model_of, register, unregister
+from worker.models.settled import REGIME_SENTENCES, SETTLED, is_settled, settled_study
 from worker.models.vibration_drive import (
     FLAG_SENTENCES,
     NOT_SETTLED,
@@ -58,8 +60,11 @@ __all__ = [
     "MACHINE_SHAFT",
     "MAX_COEFFICIENTS",
     "MAX_PENDULUMS",
+    "MEANS_FROM_PERIODS",
     "NOT_SETTLED",
     "OK",
+    "REGIME_SENTENCES",
+    "SETTLED",
     "VIBRATION_DRIVE",
     "WINDUP_OUT_OF_DATA",
     "ChunkResult",
@@ -97,6 +102,7 @@ __all__ = [
     "fit_clutch",
     "flags_of",
     "is_compiled",
+    "is_settled",
     "kernel_source",
     "load",
     "model_names",
@@ -111,6 +117,7 @@ __all__ = [
     "run_of",
     "run_task",
     "run_trajectory",
+    "settled_study",
     "shape_of",
     "source_hash",
     "study_results",

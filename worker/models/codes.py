@@ -35,6 +35,8 @@ ENDING_CODES: Final[dict[str, int]] = {
 FLAG_MASKS: Final[dict[str, int]] = {
     "windup_out_of_data": 1 << 0,
     "not_settled": 1 << 1,
+    "irregular": 1 << 2,
+    "unsettled": 1 << 3,
 }
 
 

@@ -1,71 +1,59 @@
-"""Settled motions of a study's cases, whatever the study's own duration and window."""
+"""Studies whose cases are run until their motion is settled (docs/theory.md, "Settled motion")."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, cast
 
-import numpy as np
-
-from engine.catalogue import ResultInfo
 from engine.run import SettledRun
-from engine.vibration_drive.regimes import Regime, settled_infos
-from worker.models.vibration_drive import MODEL, pendulums, run_of
+from engine.vibration_drive.regimes import Regime
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
+    from engine.run import Reset
     from worker.study import Study
 
+#: What `Study.run` has under "until" where cases are run until they are settled.
+SETTLED: Final = "settled"
 #: Each regime, as it is told, and what it means.
-REGIME_SENTENCES: dict[str, str] = {regime.name.lower(): regime.sentence for regime in Regime}
+REGIME_SENTENCES: Final[dict[str, str]] = {regime.name.lower(): regime.sentence for regime in Regime}
+#: Flags of cases whose results are not those of a periodic motion: the names of their regimes.
+REGIME_FLAGS: Final[dict[str, str]] = {
+    regime.name.lower(): regime.sentence for regime in (Regime.IRREGULAR, Regime.UNSETTLED)
+}
+#: Periods that a periodic case takes on average, and the share of cases that take all they may (docs/performance.md).
+_PERIODIC_PERIODS, _IRREGULAR_SHARE = 150.0, 0.12
 
 
-@dataclass(frozen=True, slots=True)
-class SettledCases:
-    """Settled motions of some cases.
-
-    Attributes
-    ----------
-    infos : tuple of ResultInfo
-        Results, in the order of the columns of ``values``.
-    cases : tuple of int
-    endings, regimes : lists of str
-        Keys of `ENDING_SENTENCES` and of `REGIME_SENTENCES`.
-    values : array, shape (cases, results)
-        SI units; NaN where a result could not be computed.
-    """
-
-    infos: tuple[ResultInfo, ...]
-    cases: tuple[int, ...]
-    endings: list[str]
-    regimes: list[str]
-    values: NDArray[np.float64]
+def is_settled(run: Mapping[str, Any]) -> bool:
+    """Whether the cases of a study with that run are run until they are settled."""
+    return run.get("until") == SETTLED
 
 
-def can_settle(study: Study) -> bool:
-    """Whether the study's model has motions that settle."""
-    return study.model == MODEL
-
-
-def settle_cases(study: Study, cases: Sequence[int], at_most: int) -> SettledCases:
-    """Find the settled motion of cases of a study of vibration drives within ``at_most`` excitation periods each.
-
-    Tolerance and reset are the study's. Raises IndexError where there is no such case.
-    """
-    from engine.endings import ENDING_CODES
-    from engine.vibration_drive.settle import settle
-
-    own = run_of(study.run)
-    columns: dict[str, Any] = {**study.base, **study.columns(list(cases))}
-    settings = SettledRun(at_most=at_most, tolerance=own.tolerance, reset=own.reset)
-    batch = settle(columns, settings, cases=len(cases))
-    return SettledCases(
-        infos=settled_infos(pendulums(study)),
-        cases=tuple(cases),
-        endings=[ENDING_CODES[code].value for code in batch.endings.tolist()],
-        regimes=[Regime(code).name.lower() for code in batch.regimes.tolist()],
-        values=batch.values + 0.0,  # a negative zero is a zero
+def settings_of(run: Mapping[str, Any]) -> SettledRun:
+    """The engine's settings of a run until it is settled, from the plain data of a study."""
+    return SettledRun(
+        at_most=int(run["at_most"]),
+        settled=float(run["settled"]),
+        max_period=int(run["max_period"]),
+        tolerance=float(run["tolerance"]),
+        reset=cast("Reset", run["reset"]),
     )
+
+
+def settled_study(study: Study, at_most: int | None = None) -> Study:
+    """The same cases, run until they are settled, or for ``at_most`` excitation periods where that is given.
+
+    Whatever else the study says of its run stays as it is.
+    """
+    usual = SettledRun()
+    run: dict[str, Any] = {"at_most": usual.at_most, "settled": usual.settled, "max_period": usual.max_period}
+    run |= {name: value for name, value in study.run.items() if name not in {"duration", "window"}}
+    return replace(study, run=run | {"until": SETTLED} | ({} if at_most is None else {"at_most": at_most}))
+
+
+def mean_periods(run: Mapping[str, Any]) -> float:
+    """About the periods that are computed for a case on average, those of disturbed runs included."""
+    most = float(run["at_most"])
+    return (1.0 - _IRREGULAR_SHARE) * min(_PERIODIC_PERIODS, most) + 1.1 * _IRREGULAR_SHARE * most

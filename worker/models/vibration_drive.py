@@ -16,9 +16,11 @@ from engine.vibration_drive.parameters import (
     MAX_PENDULUMS,
     PARAMETERS,
 )
+from engine.vibration_drive.regimes import Regime, settled_infos
 from engine.vibration_drive.results import result_infos
 from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
 from worker.models.model import Model
+from worker.models.settled import REGIME_FLAGS, is_settled, mean_periods, settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -43,7 +45,10 @@ FLAG_SENTENCES: dict[str, str] = {
         "settled, and means (the efficiency above all) are not those of steady running."
     ),
     WINDUP_OUT_OF_DATA: "Some clutch was wound up beyond the measured data; its law was continued straight there.",
+    **REGIME_FLAGS,
 }
+#: What the variants of settled studies have behind the number of pendulums.
+_SETTLED_VARIANT = "-settled"
 
 _PENDULUM = re.compile(r"pendulums\.(\d+)\.")
 _COEFFICIENT = re.compile(r"(?:^|\.)clutch\.coefficients\.(\d+)$")
@@ -79,25 +84,30 @@ def _span(value: object) -> Span:
 
 
 def run_of(run: Mapping[str, Any]) -> Run:
-    """The engine's settings of the run, from the plain data of a study."""
+    """The engine's settings of the run, from the plain data of a study.
+
+    Of a run until it is settled: those of a run for as long as it may take.
+    """
     window = cast("list[object] | None", run.get("window"))
     return Run(
-        duration=_span(run["duration"]),
+        duration=Span(float(run["at_most"])) if is_settled(run) else _span(run["duration"]),
         window=None if window is None else (_span(window[0]), _span(window[1])),
         tolerance=float(cast("float", run["tolerance"])),
         reset=cast("Reset", run["reset"]),
     )
 
 
-def _flags(names: list[str], values: NDArray[np.float64]) -> list[str]:
+def _flags(infos: Iterable[ResultInfo], values: NDArray[np.float64]) -> list[str]:
     """Flags of every case, joined by commas."""
-    column = {name: values[:, index] for index, name in enumerate(names)}
+    column = {info.name: values[:, index] for index, info in enumerate(infos)}
     beyond = np.column_stack([values for name, values in column.items() if name.endswith(".fraction.beyond_data")])
-    work = [np.abs(column[f"power.{kind}.mean"]) for kind in ("input", "loss", "useful")]
-    raised = {
-        NOT_SETTLED: np.abs(column["power.stored.mean"]) > SETTLED_SHARE * np.max(work, axis=0),
-        WINDUP_OUT_OF_DATA: np.any(beyond > 0.0, axis=1),
-    }
+    raised = {WINDUP_OUT_OF_DATA: np.any(beyond > 0.0, axis=1)}
+    if "regime" in column:
+        raised |= {flag: column["regime"] == Regime[flag.upper()] for flag in REGIME_FLAGS}
+    else:
+        work = [np.abs(column[f"power.{kind}.mean"]) for kind in ("input", "loss", "useful")]
+        unsteady = np.abs(column["power.stored.mean"]) > SETTLED_SHARE * np.max(work, axis=0)
+        raised = {NOT_SETTLED: unsteady, **raised}
     return [",".join(name for name, cases in raised.items() if cases[case]) for case in range(len(values))]
 
 
@@ -112,7 +122,9 @@ def _frequency(study: Study, case: int) -> float:
 
 
 def _mean_periods(study: Study) -> float:
-    """Excitation periods of a run, averaged over the cases of the study."""
+    """Excitation periods that are computed for a case, averaged over the cases of the study."""
+    if is_settled(study.run):
+        return mean_periods(study.run)
     duration = run_of(study.run).duration
     for axis in study.axes:
         if "excitation.frequency" in axis.paths:
@@ -132,7 +144,10 @@ def kernel_source(pendulums: int, coefficients: int, tolerance: float) -> str:
 
 
 class VibrationDrive(Model):
-    """Pendulums on a vibrating base that turn a shaft through freewheels; a variant for each number of pendulums."""
+    """Pendulums on a vibrating base that turn a shaft through freewheels.
+
+    There are two variants for each number of pendulums: studies of settled motion, and of a given time.
+    """
 
     name = MODEL
     own_endings = frozenset({Ending.ACCURACY_NOT_REACHED, Ending.CHATTER, Ending.STEP_BUDGET, Ending.DIVERGED})
@@ -142,29 +157,35 @@ class VibrationDrive(Model):
         return (*PARAMETERS, CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT)
 
     def variants(self) -> tuple[str, ...]:
-        return tuple(map(str, range(1, MAX_PENDULUMS + 1)))
+        numbers = range(1, MAX_PENDULUMS + 1)
+        return (*map(str, numbers), *(f"{number}{_SETTLED_VARIANT}" for number in numbers))
 
     def variant_of(self, study: Study) -> str:
-        return str(pendulums(study))
+        return f"{pendulums(study)}{_SETTLED_VARIANT if is_settled(study.run) else ''}"
 
     def results(self, variant: str) -> tuple[ResultInfo, ...]:
-        return result_infos(int(variant))
+        number = int(variant.removesuffix(_SETTLED_VARIANT))
+        return settled_infos(number) if variant.endswith(_SETTLED_VARIANT) else result_infos(number)
 
     def result_catalogue(self) -> tuple[ResultInfo, ...]:
         # One pendulum stands for all.
         one = "pendulums.0."
-        return tuple(replace(info, name=info.name.replace(one, "pendulums.N.")) for info in result_infos(1))
+        return tuple(replace(info, name=info.name.replace(one, "pendulums.N.")) for info in settled_infos(1))
 
     def shape_of(self, study: Study) -> KernelShape:
         return KernelShape(MODEL, DriveKey(pendulums(study), coefficients(study), run_of(study.run).tolerance))
 
     def run(self, task: ChunkTask) -> ChunkResult:
+        from engine.vibration_drive.settle import settle
         from engine.vibration_drive.simulate import simulate
 
+        number = _key_of(task.shape).pendulums
+        if is_settled(task.run):
+            settled = settle(task.columns, settings_of(task.run), cases=task.count)
+            flags = _flags(settled_infos(number), settled.values)
+            return chunk_result(task.first, settled.endings, flags, settled.values)
         batch = simulate(task.columns, run_of(task.run), cases=task.count)
-        infos = result_infos(_key_of(task.shape).pendulums)
-        flags = _flags([info.name for info in infos], batch.values)
-        return chunk_result(task.first, batch.endings, flags, batch.values)
+        return chunk_result(task.first, batch.endings, _flags(result_infos(number), batch.values), batch.values)
 
     def extent(self, study: Study, case: int) -> Extent:
         """The run of one case; its periods are those of the excitation."""

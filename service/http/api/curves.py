@@ -224,13 +224,15 @@ def _curves_csv(curves: Curves) -> bytes:
     first = curves.curves[0].line
     paths = [*first.by, *first.at]
     names = [info.name for info in curves.selection.results]
-    columns: list[list[Any]] = [[] for _ in range(len(paths) + 2 + len(names) + 1)]
+    regime = [] if curves.selection.regime is None else [curves.selection.regime.name]
+    columns: list[list[Any]] = [[] for _ in range(len(paths) + 2 + len(names) + 1 + len(regime))]
     for curve in curves.curves:
         held = {**curve.line.by, **curve.line.at}
         points = len(curve.endings)
         parts: list[list[Any]] = [[held[path]] * points for path in paths]
         parts += [curve.line.cases.tolist(), list(curve.line.x)]
         parts += [curve.y[name].tolist() for name in names]
+        parts += [curve.regimes] if curve.regimes is not None else []
         for column, part in zip(columns, [*parts, curve.endings], strict=True):
             column.extend(part)
-    return exports.table_csv([*paths, "case", curves.selection.x, *names, "ending"], columns)
+    return exports.table_csv([*paths, "case", curves.selection.x, *names, *regime, "ending"], columns)

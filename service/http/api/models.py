@@ -159,7 +159,9 @@ class Case(Body):
     parameters: dict[str, float] = Field(description="values of the axes, SI, every tied path")
     ending: str = Field(description="ok, or why not; pending when it has not been run yet")
     flags: list[str]
-    results: dict[str, Number] = Field(description="SI numbers by name; null where it could not be computed")
+    results: dict[str, Number | str] = Field(
+        description="SI numbers by name, categories by their names; null where it could not be computed"
+    )
 
 
 class CaseDetail(Case):
@@ -234,6 +236,9 @@ class Curve(Body):
     cases: list[int]
     y: dict[str, list[Number]]
     endings: list[str]
+    regime: list[str | None] | None = Field(
+        default=None, description="the regime of each case of a settled study; null where it has none"
+    )
 
 
 class Curves(Body):
@@ -266,6 +271,9 @@ class Map(Body):
     at: dict[str, float]
     cases: list[list[int]]
     endings: list[list[str]]
+    regime: list[list[str | None]] | None = Field(
+        default=None, description="the regime of each case of a settled study; null where it has none"
+    )
 
 
 class AxisEffect(Body):

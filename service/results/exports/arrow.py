@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 #: Rows of one group of a Parquet file: some 20 MB of numbers.
 _GROUP_ROWS: Final = 50_000
+#: Type of the column of each kind of result.
+_TYPES: Final = {"real": pa.float64(), "count": pa.int64(), "category": pa.string()}
 
 
 class _Pieces(io.RawIOBase):
@@ -69,7 +71,7 @@ def schema(source: Source) -> pa.Schema:
     fields += [
         pa.field(
             info.name,
-            pa.int64() if info.kind == "count" else pa.float64(),
+            _TYPES[info.kind],
             metadata={"unit": info.unit, "description": info.description},
         )
         for info in source.infos
@@ -86,6 +88,9 @@ def batch(source: Source, block: RowBlock, made: pa.Schema) -> pa.RecordBatch:
     for index, info in enumerate(source.infos):
         column = np.ascontiguousarray(block.values[:, index])
         missing = np.isnan(column)
+        if info.kind == "category":
+            arrays.append(pa.array(map(info.cell, column.tolist()), pa.string()))
+            continue
         if info.kind == "count":
             column = np.where(missing, 0.0, column).astype(np.int64)
         arrays.append(pa.array(column, mask=missing))
@@ -112,8 +117,8 @@ def parquet_pieces(source: Source) -> Iterator[bytes]:
 
 def _repeating(source: Source) -> list[str]:
     """Columns that say the same in many rows; measured numbers hardly ever do, and trying costs time."""
-    counts = [info.name for info in source.infos if info.kind == "count"]
-    return [*source.study.axis_paths, "ending", *counts]
+    repeating = [info.name for info in source.infos if info.kind != "real"]
+    return [*source.study.axis_paths, "ending", *repeating]
 
 
 def arrow_pieces(source: Source) -> Iterator[bytes]:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from service.results.exports.source import Source
+    from worker.models import ResultInfo
     from worker.study import Axis, Study
 
 _CONVENTIONS: Final = "CF-1.11"
@@ -46,8 +47,7 @@ def _write(source: Source, folder: Path) -> Path:
     head["flags"] = grid.variable(rows.flags, _flag_attributes())
     head.to_netcdf(path, engine="h5netcdf", unlimited_dims=())
     for index, info in enumerate(source.infos):
-        attributes = {"units": info.unit, "long_name": info.description}
-        column = grid.variable(rows.column(index), attributes)
+        column = grid.variable(*_variable(info, rows.column(index)))
         # The coordinates are in the file already; xarray names them only for variables that are written beside them.
         if grid.labels:
             column.attrs["coordinates"] = " ".join(grid.labels)
@@ -137,6 +137,18 @@ def _flag_attributes() -> dict[str, Any]:
         "flag_masks": np.array(list(FLAG_MASKS.values()), dtype=np.int32),
         "flag_meanings": " ".join(FLAG_MASKS),
     }
+
+
+def _variable(info: ResultInfo, column: NDArray[np.float64]) -> tuple[NDArray[Any], dict[str, Any]]:
+    """Values and attributes of a result: of a category its codes, the first where there is none."""
+    if info.kind != "category":
+        return column, {"units": info.unit, "long_name": info.description}
+    attributes = {
+        "long_name": info.description,
+        "flag_values": np.arange(len(info.categories), dtype=np.int8),
+        "flag_meanings": " ".join(info.categories),
+    }
+    return np.where(np.isnan(column), 0.0, column).astype(np.int8), attributes
 
 
 class _Columns:

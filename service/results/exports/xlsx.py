@@ -81,10 +81,13 @@ def _rows(source: Source, block: RowBlock) -> Iterator[list[Any]]:
     columns = source.study.columns(block.cases)
     parameters = [columns[path].tolist() for path in source.study.axis_paths]
     values = block.values.tolist()
+    named = [index for index, info in enumerate(source.infos) if info.kind == "category"]
     for index, case in enumerate(block.cases.tolist()):
+        for column in named:
+            values[index][column] = source.infos[column].cell(values[index][column]) or ""
         yield [
             case,
-            *(column[index] for column in parameters),
+            *(parameter[index] for parameter in parameters),
             block.endings[index],
             block.flags[index].replace(",", ";"),
             *values[index],

@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from worker.study import Study
 
 #: First parts of names of results that tell of the computation rather than of the machine.
-_CHECKS: Final = ("balance", "run", "reset")
+_CHECKS: Final = ("balance", "run", "reset", "regime")
+#: Half widths of means stand in the table, beside their means.
+_HALF_WIDTH: Final = ".half_width"
 _RESULTS_A_PICTURE: Final = 3
 _MOST_PICTURES: Final = 24
 _LONGEST_GIVEN: Final = 1000
@@ -136,22 +138,24 @@ def _facts(record: StudyRecord, study: Study) -> tuple[tuple[str, str], ...]:
 
 def ranges(infos: Sequence[ResultInfo], blocks: Iterable[RowBlock]) -> tuple[Range, ...]:
     """Least, mean and largest of every result over the rows, with the first case that has the extreme."""
-    every = np.arange(len(infos))
+    columns = [index for index, info in enumerate(infos) if info.kind != "category"]
+    every = np.arange(len(columns))
     known, total = np.zeros(every.size, dtype=np.int64), np.zeros(every.size)
     # Least and largest: of each result the value and its case.
     value = {np.less: np.full(every.size, np.inf), np.greater: np.full(every.size, -np.inf)}
     case = {better: np.zeros(every.size, dtype=np.int64) for better in value}
     for block in blocks:
-        there = ~np.isnan(block.values)
+        values = block.values[:, columns]
+        there = ~np.isnan(values)
         known += there.sum(axis=0)
-        total += np.where(there, block.values, 0.0).sum(axis=0)
+        total += np.where(there, values, 0.0).sum(axis=0)
         for better, best in value.items():
-            filled = np.where(there, block.values, np.inf if better is np.less else -np.inf)
+            filled = np.where(there, values, np.inf if better is np.less else -np.inf)
             at = filled.argmin(axis=0) if better is np.less else filled.argmax(axis=0)
             new = better(filled[at, every], best)
             best[new], case[better][new] = filled[at, every][new], block.cases[at[new]]
     found = zip(
-        infos,
+        [infos[index] for index in columns],
         known.tolist(),
         value[np.less].tolist(),
         case[np.less].tolist(),
@@ -183,7 +187,7 @@ def _groups(infos: Sequence[ResultInfo]) -> Iterator[tuple[ResultInfo, ...]]:
     found: dict[tuple[str, ...], list[ResultInfo]] = {}
     for info in infos:
         first, *rest = info.name.split(".")
-        if first in _CHECKS or info.kind == "count":
+        if first in _CHECKS or info.kind != "real" or info.name.endswith(_HALF_WIDTH):
             continue
         part = f"{first}.{rest[0]}" if rest and rest[0].isdigit() else first
         found.setdefault((part, info.unit), []).append(info)

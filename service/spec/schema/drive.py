@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from service.spec.fields import placed
-from service.spec.run import DEFAULTS, RESETS
+from service.spec.run import DEFAULTS, RESETS, SETTLED_DEFAULTS, SETTLED_FIELDS, TIMED_FIELDS
 from service.spec.schema.axes import Schema, object_schema
 from service.spec.schema.quantity import quantity_schema
 from worker import models
-from worker.limits import MAX_CLUTCH_ROWS, MAX_TOLERANCE, MIN_TOLERANCE
-from worker.models import CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, MAX_PENDULUMS, Parameter
+from worker.limits import (
+    MAX_CLUTCH_ROWS,
+    MAX_ORBIT_PERIODS,
+    MAX_SETTLED,
+    MAX_SETTLED_PERIODS,
+    MAX_TOLERANCE,
+    MIN_SETTLED,
+    MIN_SETTLED_PERIODS,
+    MIN_TOLERANCE,
+)
+from worker.models import CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, MAX_PENDULUMS, SETTLED, Parameter
 
 
 def drive_schema() -> Schema:
@@ -83,8 +92,30 @@ def clutch_schema() -> Schema:
 def run_schema() -> Schema:
     """Schema of `run`."""
     time = {"type": ["number", "string"], "examples": ["60 periods", "2 s", 2.0], "minimum": 0}
-    return object_schema(
+    schema = object_schema(
         {
+            "until": {"const": SETTLED, "description": "run each case until its motion is settled"},
+            "at_most": {
+                "type": "string",
+                "default": f"{SETTLED_DEFAULTS['at_most']} periods",
+                "examples": ["1000 periods"],
+                "description": "excitation periods after which the search for the settled motion ends: "
+                f"{MIN_SETTLED_PERIODS} to {MAX_SETTLED_PERIODS:,}",
+            },
+            "settled": {
+                "type": "number",
+                "minimum": MIN_SETTLED,
+                "maximum": MAX_SETTLED,
+                "default": SETTLED_DEFAULTS["settled"],
+                "description": "scaled distance from its orbit below which a run counts as settled",
+            },
+            "max_period": {
+                "type": "integer",
+                "minimum": 1,
+                "maximum": MAX_ORBIT_PERIODS,
+                "default": SETTLED_DEFAULTS["max_period"],
+                "description": "largest number of excitation periods after which a motion may repeat itself",
+            },
             "duration": {
                 **time,
                 "default": "60 periods",
@@ -112,6 +143,9 @@ def run_schema() -> Schema:
         },
         description="how long each case runs, what is evaluated, how accurately",
     )
+    # A run lasts until it is settled or for a given time.
+    timed, until = ({"anyOf": [{"required": [name]} for name in names]} for names in (TIMED_FIELDS, SETTLED_FIELDS))
+    return {**schema, "not": {"allOf": [timed, until]}}
 
 
 def _section(entries: list[Parameter], *, with_clutch: bool) -> Schema:

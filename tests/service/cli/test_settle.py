@@ -41,7 +41,7 @@ def test_rows_have_parameters_ending_regime_and_every_result(sprag: Sprag, examp
 
 def test_json_is_null_where_there_is_no_value(sprag: Sprag, examples: Path) -> None:
     (row,) = sprag("settle", examples / _DRIVE, "--case", 178, "--json").data
-    assert row["regime"] == "periodic"
+    assert row["results"]["regime"] == "periodic"
     assert row["results"]["regime.order"] == 2
     assert row["results"]["regime.exponent"] is None
 
@@ -69,7 +69,6 @@ def test_a_case_that_ends_otherwise_is_told(sprag: Sprag, examples: Path, tmp_pa
     path.write_text(json.dumps(spec), encoding="utf-8")
     (row,) = sprag("settle", path, "--case", 178, "--json", "--at-most", 100).data
     assert row["ending"] != "ok"
-    assert row["regime"] == "none"
     assert set(row["results"].values()) == {None}
 
 

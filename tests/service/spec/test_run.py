@@ -143,3 +143,51 @@ def test_what_is_wrong_beyond_the_problems_that_are_told_is_not_taken_for_right(
     unknown = {f"field{number}": 0 for number in range(MAX_PROBLEMS)}
     told = problems({"/base/shaft": unknown, "/run": {"duration": "long", "window": ["x", 1]}})
     assert len(told) == MAX_PROBLEMS + 1
+
+
+def test_a_run_until_it_is_settled() -> None:
+    run = parsed({"/run": {"until": "settled"}}).study.run
+    assert run == {
+        "until": "settled", "at_most": 1000, "settled": 1e-8, "max_period": 32, "tolerance": 1e-9, "reset": "contact",
+    }  # fmt: skip
+    given = {"until": "settled", "at_most": "2000 periods", "settled": 1e-6, "max_period": 8, "tolerance": 1e-10}
+    assert parsed({"/run": given | {"reset": "literal"}}).study.run == given | {"at_most": 2000, "reset": "literal"}
+
+
+def test_a_field_of_a_run_until_it_is_settled_is_enough_to_ask_for_one() -> None:
+    for given in ({"at_most": "2000 periods"}, {"settled": 1e-6}, {"max_period": 8}):
+        assert parsed({"/run": given}).study.run["until"] == "settled"
+
+
+@pytest.mark.parametrize(
+    ("run", "at", "says"),
+    [
+        ({"until": "steady"}, "/until", "'settled'"),
+        ({"until": None}, "/until", "'settled'"),
+        ({"until": "settled", "duration": "60 periods"}, "/until", "contradicts `duration`"),
+        ({"window": ["1 periods", "2 periods"], "at_most": "1000 periods"}, "/at_most", "contradicts `window`"),
+        ({"max_period": 3, "duration": 1, "window": [0, 1]}, "/max_period", "contradicts `duration` and `window`"),
+        ({"at_most": 1000}, "/at_most", "number of excitation periods"),
+        ({"at_most": "10 s"}, "/at_most", "number of excitation periods"),
+        ({"at_most": "long"}, "/at_most", "must begin with a number"),
+        ({"at_most": "1000.5 periods"}, "/at_most", "out of range"),
+        ({"at_most": "99 periods"}, "/at_most", "out of range"),
+        ({"at_most": "100001 periods"}, "/at_most", "out of range"),
+        ({"settled": 0}, "/settled", "out of range"),
+        ({"settled": "1e-8"}, "/settled", "plain number"),
+        ({"max_period": 0}, "/max_period", "out of range"),
+        ({"max_period": 65}, "/max_period", "out of range"),
+        ({"max_period": 2.5}, "/max_period", "whole number"),
+        ({"until": "settled", "tolerance": 1}, "/tolerance", "out of range"),
+    ],
+)
+def test_settled_runs_that_are_refused(run: dict[str, Any], at: str, says: str) -> None:
+    found = problems({"/run": run})
+    assert list(found) == ["/run" + at]
+    assert says in str(found["/run" + at])
+
+
+def test_too_few_periods_for_irregular_motion_are_said() -> None:
+    (warning,) = parsed({"/run": {"at_most": "900 periods"}, "/axes": []}).warnings
+    assert warning.startswith("/run/at_most: 900 periods are too few for the means of irregular motion")
+    assert parsed({"/run": {"at_most": "940 periods"}, "/axes": []}).warnings == ()

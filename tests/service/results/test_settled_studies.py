@@ -1,0 +1,143 @@
+"""Settled studies from the spec to every answer: the regime of a case is a result like the others, told by its name."""
+
+from __future__ import annotations
+
+import csv
+import io
+from typing import Any
+
+import httpx
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import xarray as xr
+
+from engine.run import SettledRun
+from engine.vibration_drive.regimes import Regime
+from engine.vibration_drive.settle import settle
+from service.results.curves import regime_info
+from service.spec.document import parse_spec
+from tests.service.conftest import API, Service, made_up
+from tests.service.spec_sample import changed
+from worker import models
+from worker.models import ChunkResult
+from worker.study import Study
+
+#: A case at a load, the same without one, and one whose motion is irregular: 25 Hz, 2 mm.
+SPEC: dict[str, Any] = changed(
+    {"/run": {"until": "settled"}, "/axes": [{"path": "shaft.load", "values": [0, 0.2, 0.7, 1.6]}]}
+)
+REGIMES = ["periodic", "irregular", None, "unsettled"]
+
+
+def rows_of(study: Study) -> ChunkResult:
+    """Made-up rows with the regimes of `REGIMES`; the case without one did not end ok."""
+    rows = made_up(study)
+    column = [info.name for info in models.study_results(study)].index("regime")
+    rows.values[:] = np.abs(np.random.default_rng(3).normal(size=rows.values.shape))
+    rows.values[:, column] = [0 if name is None else Regime[name.upper()] for name in REGIMES]
+    rows.values[2] = np.nan
+    endings = ["ok" if name else "chatter" for name in REGIMES]
+    flags = [name if name in {"irregular", "unsettled"} else "" for name in map(str, REGIMES)]
+    return ChunkResult(0, endings, flags, rows.values)
+
+
+@pytest.fixture
+def study_id(service: Service) -> str:
+    """A settled study whose rows are there."""
+    found = service.submit(SPEC)
+    record, study = service.store.get_study(found), service.store.study(found)
+    whole, epoch = rows_of(study), service.store.take_over("test")
+    for chunk in service.store.claim(epoch, service.store.open_chunks(record.number)):
+        part = slice(chunk.first, chunk.first + chunk.count)
+        result = ChunkResult(chunk.first, whole.endings[part], whole.flags[part], whole.values[part])
+        assert service.store.commit(epoch, chunk, result)
+    service.store.settle(epoch, record.number)
+    return found
+
+
+def file(service: Service, study_id: str, form: str) -> httpx.Response:
+    response = service.http.get(f"{API}/studies/{study_id}/results", params={"format": form})
+    assert response.status_code == 200, response.text
+    return response
+
+
+def test_a_chunk_of_a_settled_study_has_the_results_of_the_engine() -> None:
+    study = parse_spec(SPEC).study
+    done = models.run_chunk(study, 0, study.cases)
+    columns: dict[str, Any] = {**study.base, **study.columns(range(study.cases))}
+    batch = settle(columns, SettledRun(), cases=study.cases)
+    np.testing.assert_array_equal(done.values, batch.values + 0.0)
+    names = [info.name for info in models.study_results(study)]
+    rows = [dict(zip(names, values, strict=True)) for values in done.values.tolist()]
+    assert [Regime(int(row["regime"])) for row in rows][:2] == [Regime.COASTING, Regime.PERIODIC]
+    assert rows[1]["shaft.speed.mean"] == pytest.approx(22.8350116679, abs=1e-9)
+    assert rows[1]["regime.order"] == 2
+    for row, flags in zip(rows, done.flags, strict=True):
+        for name in ("irregular", "unsettled"):
+            assert (name in flags.split(",")) == (Regime(int(row["regime"])).name.lower() == name)
+        assert "not_settled" not in flags
+
+
+def test_the_regime_of_a_case_is_told_by_its_name(service: Service, study_id: str) -> None:
+    cases = service.get(f"/studies/{study_id}/cases")["cases"]
+    assert [case["results"]["regime"] for case in cases] == REGIMES
+    assert cases[3]["flags"] == ["unsettled"]
+    assert isinstance(cases[0]["results"]["regime.order"], int)
+    assert set(cases[2]["results"].values()) == {None}
+
+
+def test_files_have_the_name_of_the_regime_or_its_number(service: Service, study_id: str) -> None:
+    rows = list(csv.DictReader(io.StringIO(file(service, study_id, "csv").text)))
+    assert [row["regime"] or None for row in rows] == REGIMES
+    table = pq.read_table(io.BytesIO(file(service, study_id, "parquet").content))
+    assert table["regime"].to_pylist() == REGIMES
+    grid = xr.load_dataset(io.BytesIO(file(service, study_id, "netcdf").content), engine="h5netcdf")
+    names = grid["regime"].attrs["flag_meanings"].split()
+    assert names == [regime.name.lower() for regime in Regime]
+    assert grid["regime"].attrs["flag_values"].tolist() == list(range(len(names)))
+    assert [names[code] for code in grid["regime"].values] == [name or "none" for name in REGIMES]
+    assert file(service, study_id, "json").json()["rows"][1]["results"]["regime"] == "irregular"
+    assert file(service, study_id, "xlsx").content.startswith(b"PK")
+
+
+def test_curves_have_the_regime_of_every_point(service: Service, study_id: str) -> None:
+    curves = f"/studies/{study_id}/curves"
+    (curve,) = service.get(curves, x="shaft.load", y="shaft.speed.mean")["curves"]
+    assert curve["regime"] == REGIMES
+    text = service.http.get(API + curves, params={"x": "shaft.load", "y": "shaft.speed.mean", "format": "csv"}).text
+    assert [row["regime"] or None for row in csv.DictReader(io.StringIO(text))] == REGIMES
+    response = service.http.get(API + curves, params={"x": "shaft.load", "y": "regime"})
+    assert response.status_code == 422
+    assert "category" in response.text
+
+
+def test_transient_studies_have_no_regime(service: Service) -> None:
+    timed = service.submit(changed({"/run": {"duration": "60 periods"}}))
+    study = service.store.study(timed)
+    assert regime_info(models.study_results(study)) is None
+    assert study.run == {"duration": [60.0, "periods"], "window": None, "tolerance": 1e-9, "reset": "contact"}
+
+
+def test_settled_and_transient_cases_do_not_share_rows() -> None:
+    from worker.reuse import kin_hash
+
+    settled, timed = (parse_spec(changed({"/run": run})).study for run in ({"until": "settled"}, {"duration": 2}))
+    longer = parse_spec(changed({"/run": {"at_most": "2000 periods"}})).study
+    assert len({kin_hash(study, models.ENGINE_VERSION) for study in (settled, timed, longer)}) == 3
+    assert len({models.variant_of(study) for study in (settled, timed)}) == 2
+    assert models.variant_of(longer) == models.variant_of(settled)
+
+
+def test_a_settled_case_is_estimated_by_what_a_search_takes() -> None:
+    settled, timed, longer = (
+        models.estimate_seconds_per_case(parse_spec(changed({"/run": run})).study)
+        for run in ({"until": "settled"}, {"duration": "60 periods"}, {"at_most": "10000 periods"})
+    )
+    assert 3.5 < settled / timed < 6.0
+    assert 3.0 < longer / settled < 8.0
+
+
+def test_the_motion_of_a_settled_case_lasts_as_long_as_its_search_may(service: Service, study_id: str) -> None:
+    study = service.store.study(study_id)
+    assert models.extent(study, 1).end == pytest.approx(1000.0 / 25.0)
