@@ -10,7 +10,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from service.faults import ErrorItem
 from service.results.selection import Fixed, SelectionError, axis_name, held_text, listed, locate_axes, require_axis
 from service.spec.catalogue import result_of, unit_of, unknown_result
+from worker import models
 from worker.limits import MAX_CURVE_VALUES
 from worker.models import WorkerEnding
 from worker.models.codes import PENDING
@@ -26,12 +27,6 @@ if TYPE_CHECKING:
     from service.storage.records import CaseColumns
     from worker.models import ResultInfo
     from worker.study import Study
-
-#: Parameters without which a picture tells nobody what it shows.
-_OPERATING_POINT: Final = (
-    "excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y", "shaft.load",
-    "mean_speed", "drive.inertia",
-)  # fmt: skip
 
 #: Results of cases, aligned with them: (case numbers, result names) -> columns.
 Fetch = Callable[[NDArray[np.int64], Sequence[str]], "CaseColumns"]
@@ -228,8 +223,8 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
 
 def _held(study: Study, line: Line) -> tuple[str, ...]:
     """The fixed axes, then what of the operating point varies nowhere."""
-    varying = study.axis_paths
-    always = [path for path in _OPERATING_POINT if path in study.base and path not in varying]
+    point, varying = models.presentation_of(study).operating_point, study.axis_paths
+    always = [path for path in point if path in study.base and path not in varying]
     fixed = [*line.at.items(), *((path, study.base[path]) for path in always)]
     return tuple(held_text(study, path, value) for path, value in fixed)
 

@@ -1,4 +1,4 @@
-"""The curve shown first for a study: speed against load where it has them, whatever is nearest to it elsewhere."""
+"""The curve shown first for a study: what its model says of it, whatever is nearest to that elsewhere."""
 
 from __future__ import annotations
 
@@ -11,23 +11,16 @@ import numpy as np
 from service.results.curves import CurveQuery
 from service.results.selection import axis_name, held_text
 from service.spec.catalogue import unit_of
+from worker import models
 
 if TYPE_CHECKING:
     from worker.models import ResultInfo
     from worker.study import Axis, Study
 
-#: Axes a designer draws along, and then those told apart by colour, first choice first; of either model.
-_ALONG: Final = ("shaft.load", "excitation.frequency", "drive.inertia")
-_APART: Final = (
-    "excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y", "shaft.load", "mean_speed",
-)  # fmt: skip
-_RESULTS: Final = ("shaft.speed.mean", "shaft.speed.max", "irregularity")
+#: Curves that can be told apart by colour.
 _MOST_CURVES: Final = 8
-#: Results of the mechanical characteristic, and how many of another model stand for them.
-_CHARACTERISTIC: Final = (
-    "shaft.speed.mean", "torque.mean", "power.useful.mean", "efficiency",
-    "irregularity", "omega.max", "omega.min", "energy.fluctuation", "drive_torque.mean", "required_inertia",
-)  # fmt: skip
+#: Results that stand for the main ones of a model that names none.
+_MOST_MAIN: Final = 10
 
 
 def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
@@ -38,23 +31,25 @@ def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
     varying = [axis for axis in study.axes if len(axis) > 1]
     if not varying:
         return None
+    shown = models.presentation_of(study)
     names = [info.name for info in infos]
-    y = tuple(name for name in _RESULTS if name in names) or (names[0],)
-    x = next((path for path in _ALONG for axis in varying if path in axis.paths), varying[0].paths[0])
+    y = tuple(name for name in shown.drawn if name in names) or (names[0],)
+    x = next((path for path in shown.along for axis in varying if path in axis.paths), varying[0].paths[0])
     if study.combine == "zip":
         return CurveQuery(x, y)
     others = [axis for axis in varying if x not in axis.paths]
     few = [axis for axis in others if len(axis) <= _MOST_CURVES]
-    by = next((path for path in _APART for axis in few if path in axis.paths), few[0].paths[0] if few else None)
+    by = next((path for path in shown.apart for axis in few if path in axis.paths), few[0].paths[0] if few else None)
     held = [axis for axis in others if by not in axis.paths]
     at = tuple((axis.paths[0], repr(usual_value(study, axis))) for axis in held)
     return CurveQuery(x, y if by is None else y[:1], () if by is None else (by,), at)
 
 
-def characteristic_names(infos: Sequence[ResultInfo]) -> tuple[str, ...]:
-    """The results that tell most of a machine: speed, torque, power and efficiency where it has them."""
+def main_results(study: Study, infos: Sequence[ResultInfo]) -> tuple[str, ...]:
+    """The results that tell most of a machine, by its model; the first ones where it names none."""
     names = [info.name for info in infos]
-    return tuple(name for name in _CHARACTERISTIC if name in names) or tuple(names[: len(_CHARACTERISTIC)])
+    main = models.presentation_of(study).main
+    return tuple(name for name in main if name in names) or tuple(names[:_MOST_MAIN])
 
 
 def usual_value(study: Study, axis: Axis) -> float:

@@ -8,24 +8,14 @@ from typing import Final
 
 from markupsafe import Markup
 
+from worker import models
+
 #: Narrow blank without a line break: between thousands, as ISO 80000 writes them.
 _THIN: Final = "\N{NARROW NO-BREAK SPACE}"
 _RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 #: Significant digits of numbers on pages; files and the interface for programs have all of them.
 _DIGITS: Final = 5
-#: MODEL's letters as books print them: base and index.
-_SYMBOLS: Final = {
-    "nu/2pi": ("f", ""),
-    "chi": ("χ", ""),
-    "lambda": ("λ", ""),
-    "delta": ("δ", ""),
-    "phi(0)": ("φ", "0"),
-    "phi'(0)": ("ω", "0"),
-    "phi_e'(0)": ("ω", "e0"),
-    "c_(K+1)": ("c", "k"),
-    "u_end": ("u", "end"),
-}
-_GREEK: Final = {"beta": "β", "delta": "δ", "phi": "φ", "w": "ω"}
+_GREEK: Final = {"beta": "β", "chi": "χ", "delta": "δ", "lambda": "λ", "phi": "φ", "w": "ω"}
 
 
 def number(value: float | str | None, digits: int = _DIGITS) -> str:
@@ -66,7 +56,7 @@ def symbol(text: str) -> Markup:
     base, _, index = text.partition("_")
     if not index and (found := re.fullmatch(r"([A-Za-z]+)(\d+)", text)):
         base, index = found[1], found[2]
-    base, index = _SYMBOLS.get(text, (_GREEK.get(base, base), index))
+    base, index = models.printed_symbol(text) or (_GREEK.get(base, base), index)
     return Markup("<i>{}</i>{}").format(base, Markup("<sub>{}</sub>").format(index) if index else "")
 
 

@@ -35,6 +35,7 @@ from engine.vibration_drive.parameters import (
 from worker.models import machine_shaft, vibration_drive
 from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
 from worker.models.model import Model, all_models, model_names, model_of, register, unregister
+from worker.models.presentation import Panel, Presentation
 from worker.models.settled import REGIME_SENTENCES, SETTLED, is_settled, settled_study
 from worker.models.vibration_drive import (
     FLAG_SENTENCES,
@@ -81,7 +82,9 @@ __all__ = [
     "KernelShape",
     "MachineError",
     "Model",
+    "Panel",
     "Parameter",
+    "Presentation",
     "ResultInfo",
     "Run",
     "Span",
@@ -110,6 +113,8 @@ __all__ = [
     "parameter_catalogue",
     "parameters_of",
     "prepare",
+    "presentation_of",
+    "printed_symbol",
     "register",
     "result_catalogue",
     "result_infos",
@@ -158,13 +163,24 @@ ENDING_SENTENCES: dict[str, str] = {
 
 def endings_of(model: str) -> dict[str, str]:
     """The endings that a case of ``model`` can have, with their sentences."""
-    foreign = {ending.value for other in all_models() if other.name != model for ending in other.own_endings}
-    return {name: sentence for name, sentence in ENDING_SENTENCES.items() if name not in foreign}
+    own = {OK, *model_of(model).endings, *WorkerEnding}
+    return {name: sentence for name, sentence in ENDING_SENTENCES.items() if name in own}
 
 
 def flags_of(model: str) -> dict[str, str]:
     """The flags that a case of ``model`` can have, with their sentences."""
     return dict(model_of(model).flags)
+
+
+def presentation_of(study: Study) -> Presentation:
+    """What people are shown of the model of ``study``."""
+    return model_of(study.model).presentation
+
+
+def printed_symbol(text: str) -> tuple[str, str] | None:
+    """Base and index of a letter of some catalogue as books print it; None where no model has its own way of it."""
+    found = (model.presentation.symbols.get(text) for model in all_models())
+    return next(filter(None, found), None)
 
 
 def parameter_catalogue(model: str) -> tuple[Parameter, ...]:

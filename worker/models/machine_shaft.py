@@ -28,6 +28,7 @@ from engine.machine_shaft.spec import (
 from engine.machine_shaft.tables import MAX_ROWS
 from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
 from worker.models.model import Model
+from worker.models.shaft_presentation import PRESENTATION
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -145,7 +146,7 @@ class MachineShaft(Model):
     """A shaft that a drive turns steadily against a mechanism and its resistance, over one cycle."""
 
     name = MODEL
-    own_endings = frozenset(
+    endings = frozenset(
         {
             Ending.INERTIA_INSUFFICIENT,
             Ending.UNBALANCED_WORK,
@@ -157,6 +158,7 @@ class MachineShaft(Model):
             Ending.NEAR_SINGULAR,
         }
     )
+    presentation = PRESENTATION
 
     def parameters(self) -> tuple[Parameter, ...]:
         return catalogue()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
+from worker.models.presentation import Presentation
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -17,8 +19,7 @@ if TYPE_CHECKING:
 class Model(Protocol):
     """A model: how a study's columns become a call of the engine, and what comes back.
 
-    A subclass says ``name`` and whatever has no body here. ``own_endings`` are endings that no other model has;
-    ``flags`` maps each flag to the sentence that a user reads.
+    A subclass says ``name`` and whatever has no body here.
     """
 
     @property
@@ -27,14 +28,19 @@ class Model(Protocol):
         ...
 
     @property
-    def own_endings(self) -> frozenset[Ending]:
-        """Endings that this model alone gives."""
+    def endings(self) -> frozenset[Ending]:
+        """Endings that a case can have besides ok."""
         return frozenset()
 
     @property
     def flags(self) -> Mapping[str, str]:
         """The flags that a case can have, with their sentences."""
         return {}
+
+    @property
+    def presentation(self) -> Presentation:
+        """What people are shown of it."""
+        return Presentation()
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Every numeric parameter: paths in a spec, with letters for indices and names."""

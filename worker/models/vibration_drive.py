@@ -19,6 +19,7 @@ from engine.vibration_drive.parameters import (
 from engine.vibration_drive.regimes import Regime, settled_infos
 from engine.vibration_drive.results import result_infos
 from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
+from worker.models.drive_presentation import PRESENTATION
 from worker.models.model import Model
 from worker.models.settled import REGIME_FLAGS, is_settled, mean_periods, settings_of
 
@@ -150,8 +151,9 @@ class VibrationDrive(Model):
     """
 
     name = MODEL
-    own_endings = frozenset({Ending.ACCURACY_NOT_REACHED, Ending.CHATTER, Ending.STEP_BUDGET, Ending.DIVERGED})
+    endings = frozenset({Ending.ACCURACY_NOT_REACHED, Ending.CHATTER, Ending.STEP_BUDGET, Ending.DIVERGED})
     flags = FLAG_SENTENCES
+    presentation = PRESENTATION
 
     def parameters(self) -> tuple[Parameter, ...]:
         return (*PARAMETERS, CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT)

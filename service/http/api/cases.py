@@ -84,7 +84,7 @@ def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
         {
             **row_json(row, parameters),
             "ending_meaning": models.ENDING_SENTENCES.get(row.ending, "The case has not been run yet."),
-            "flag_meanings": {flag: models.FLAG_SENTENCES.get(flag, "") for flag in row.flags},
+            "flag_meanings": {flag: models.flags_of(study.model).get(flag, "") for flag in row.flags},
             "links": {"self": own, "study": study_address(study_id), "trajectory": f"{own}/trajectory"},
         }
     )

@@ -18,9 +18,9 @@ from service.http.web.study import study_frame
 from service.http.web.templates import page
 from service.http.work import Attended
 from service.results import trajectories
-from service.results.defaults import characteristic_names
+from service.results.defaults import main_results
 from service.results.pictures.motion import draw_motion
-from service.results.pictures.shaft import draw_shaft
+from service.results.pictures.panels import panels
 from service.results.selection import axis_name
 from service.spec.catalogue import unit_of
 from worker import models
@@ -75,7 +75,7 @@ def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = 
         row=row,
         ending=PENDING if row is None else row.ending,
         sentence="The case has not been run yet." if row is None else models.ENDING_SENTENCES.get(row.ending, ""),
-        flags=[(flag, models.FLAG_SENTENCES.get(flag, "")) for flag in (() if row is None else row.flags)],
+        flags=[(flag, models.flags_of(study.model).get(flag, "")) for flag in (() if row is None else row.flags)],
         parameters=[
             (
                 axis_name(study, axis.paths[0]),
@@ -85,7 +85,8 @@ def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = 
             for axis in study.axes
         ],
         infos=infos,
-        main=[info for info in infos if info.name in characteristic_names(infos)],
+        shown=models.presentation_of(study),
+        main=[info for info in infos if info.name in main_results(study, infos)],
         faults=faults,
         span=span,
         begin=begin,
@@ -145,5 +146,5 @@ async def motion_picture(
         return unchanged
     await work.load(models.shape_of(study))
     made = await work.compute(models.run_trajectory, study, case, *times, SAMPLES // 3)
-    paint = draw_shaft if made.along == "angle" else draw_motion
-    return tagged(await picture(paint, "svg", made, f"{study.name}, case {case}").response(work), tag)
+    title = f"{study.name}, case {case}"
+    return tagged(await picture(draw_motion, "svg", made, panels(study, made), title).response(work), tag)

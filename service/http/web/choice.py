@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from service.faults import ErrorItem
 from service.results.curves import CurveQuery
-from service.results.defaults import characteristic_names, main_query, usual_value
+from service.results.defaults import main_query, main_results, usual_value
 from service.results.selection import SelectionError
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def characteristic(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | No
     main = main_query(study, infos)
     if main is None:
         return None
-    return CurveQuery(main.x, characteristic_names(infos), main.by, main.at)
+    return CurveQuery(main.x, main_results(study, infos), main.by, main.at)
 
 
 def curve_query(study: Study, infos: Sequence[ResultInfo], given: QueryParams) -> CurveQuery | None:

@@ -96,6 +96,7 @@ def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[dict[s
         "study.html",
         **frame,
         tab="",
+        shown=models.presentation_of(study),
         caption=None if query is None else caption(study, query),
         figure=None if query is None else f"/studies/{study_id}/figures/curves?{urlencode([*pairs, ('columns', '2')])}",
         picture=None if query is None or too_many else f"{address}/curves?{urlencode([*pairs, ('format', 'svg')])}",

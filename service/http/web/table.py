@@ -29,7 +29,8 @@ router = APIRouter(include_in_schema=False)
 _ROWS: Final = 50
 #: Cases that are read to be sorted; of more, a value has to be held first.
 MOST_SORTED: Final = 20_000
-_USUAL: Final = ("shaft.speed.mean", "shaft.irregularity", "torque.mean", "power.useful.mean", "efficiency")
+#: Results of a model that names none for the table.
+_FIRST: Final = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +56,8 @@ def cases_page(
     infos = models.study_results(study)
     given = request.query_params
     names = [name for name in given.getlist("col") if result_of(infos, name)]
-    names = names or [name for name in _USUAL if result_of(infos, name)] or [info.name for info in infos[:5]]
+    usual = models.presentation_of(study).columns
+    names = names or [name for name in usual if result_of(infos, name)] or [info.name for info in infos[:_FIRST]]
     at = tuple(
         (path.strip(), value.strip())
         for path, equals, value in (item.partition("=") for item in given.getlist("at"))
@@ -82,7 +84,7 @@ def cases_page(
         fixed=fixed_choices(study, (), at),
         sort=sort,
         ending=ending,
-        flags=models.FLAG_SENTENCES,
+        flags=models.flags_of(study.model),
         sortable=study.cases <= MOST_SORTED or bool(at),
         most_sorted=MOST_SORTED,
         units_of=lambda path: unit_of(study, path),

@@ -4,35 +4,38 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from service.results.pictures.curves import Picture, render
-from service.results.pictures.panels import STATES, panels, spans_of
+from service.results.pictures.curves import Picture, axis_label, render
+from service.results.pictures.panels import STATES, spans_of
+from service.results.pictures.shaft import draw_shaft
 from service.results.wording import words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from worker.models import Trajectory
+    from worker.models import Panel, Trajectory
 
 
-def draw_motion(made: Trajectory, title: str, picture: Picture) -> bytes:
+def draw_motion(made: Trajectory, panels: tuple[Panel, ...], title: str, picture: Picture) -> bytes:
     """The picture of a motion; lines of one plot are told apart by colour and by style."""
-    rows = panels(made)
+    if made.along == "angle":
+        return draw_shaft(made, panels, title, picture)
 
     def paint(figure: Figure) -> None:
-        heights = [*(3.0 for _ in rows), 0.45 * len(made.states) + 0.3]
-        plots = figure.subplots(len(rows) + 1, 1, sharex=True, height_ratios=heights)
-        for axes, (quantity, unit, lines) in zip(plots, rows, strict=False):
-            for (name, label), style in zip(lines, ("-", "--", ":", "-.") * 3, strict=False):
+        heights = [*(3.0 for _ in panels), *([0.45 * len(made.states) + 0.3] if made.states else [])]
+        plots = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights, squeeze=False).reshape(-1)
+        for axes, panel in zip(plots, panels, strict=False):
+            for (name, label), style in zip(panel.lines, ("-", "--", ":", "-.") * 3, strict=False):
                 axes.plot(made.times, made.values[:, made.names.index(name)], style, label=label, linewidth=1.1)
-            axes.set_ylabel(f"{quantity} ({unit})")
-            if len(lines) > 1:
+            axes.set_ylabel(axis_label(panel.title, panel.unit))
+            if len(panel.lines) > 1:
                 axes.legend(fontsize=8, loc="upper right", framealpha=0.8)
-        _strip(plots[-1], made)
+        if made.states:
+            _strip(plots[-1], made)
         plots[-1].set_xlabel("time (s)")
         figure.suptitle(title, fontsize=10)
 
-    return render(paint, picture, (8.0, 2.1 * len(rows) + 0.5 * len(made.states) + 1.0))
+    return render(paint, picture, (8.0, 2.1 * len(panels) + 0.5 * len(made.states) + 1.0))
 
 
 def _strip(axes: Axes, made: Trajectory) -> None:

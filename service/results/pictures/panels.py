@@ -5,18 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
-from service.results.wording import words
+from worker import models
 
 if TYPE_CHECKING:
-    from worker.models import Trajectory
+    from worker.models import Panel, Trajectory
+    from worker.study import Study
 
-#: Panels: title, unit, and lines (variable, name).
-PANELS: Final[tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...]] = (
-    ("ω, angular speed", "rad/s", (("omega", "ω"),)),
-    ("T, kinetic energy", "J", (("energy", "T"),)),
-    ("S₁ … S₄", "rad^2/s^2", (("s1", "S₁"), ("s2", "S₂"), ("s3", "S₃"), ("s4", "S₄"))),
-    ("Torques", "N*m", (("drive_torque", "driving"), ("resisting_torque", "resisting"))),
-)
 #: How states look: colour and pattern, so that either alone tells them.
 STATES: Final = {
     "free": ("#d9dee5", "", ""),
@@ -29,27 +23,9 @@ STATES: Final = {
 }
 
 
-def panels(made: Trajectory) -> list[tuple[str, str, list[tuple[str, str]]]]:
-    """What is drawn over time: (title, unit, lines), each line a variable and what it is called."""
-    pendulums = [
-        name.removesuffix(".angle") for name in made.names if name.endswith(".angle") and name != "shaft.angle"
-    ]
-
-    def each(quantity: str) -> list[tuple[str, str]]:
-        return [(f"{pendulum}.{quantity}", words(pendulum)) for pendulum in pendulums]
-
-    powers = [
-        ("power.input", "input"),
-        ("power.useful", "useful"),
-        ("power.loss", "loss"),
-        ("power.clutch", "clutches"),
-    ]
-    return [
-        ("angle", "rad", each("angle")),
-        ("speed", "rad/s", [*each("speed"), ("shaft.speed", "Shaft")]),
-        ("torque", "N*m", [*each("torque"), *([("torque", "All clutches")] if len(pendulums) > 1 else [])]),
-        ("power", "W", powers),
-    ]
+def panels(study: Study, made: Trajectory) -> tuple[Panel, ...]:
+    """The plots of a motion of a case of ``study``."""
+    return models.presentation_of(study).panels(made.names, made.units)
 
 
 def spans_of(states: list[str]) -> Iterator[tuple[str, int, int]]:

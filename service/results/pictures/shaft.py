@@ -7,27 +7,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from service.results.pictures.curves import Picture, axis_label, render
-from service.results.pictures.panels import PANELS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from worker.models import Trajectory
+    from worker.models import Panel, Trajectory
 
 
-def draw_shaft(made: Trajectory, title: str, picture: Picture) -> bytes:
-    """Speed, energy, squares and torques over the angle; lines of one plot are told apart by colour and by style."""
+def draw_shaft(made: Trajectory, panels: tuple[Panel, ...], title: str, picture: Picture) -> bytes:
+    """The panels over the angle, two in a row; lines of one plot are told apart by colour and by style."""
 
     def paint(figure: Figure) -> None:
-        plots = figure.subplots(2, 2, sharex=True).reshape(-1)
-        for axes, (name, unit, lines) in zip(plots, PANELS, strict=True):
-            for (variable, label), style in zip(lines, ("-", "--", ":", "-."), strict=False):
+        plots = figure.subplots((len(panels) + 1) // 2, 2, sharex=True).reshape(-1)
+        for axes, panel in zip(plots, panels, strict=False):
+            for (variable, label), style in zip(panel.lines, ("-", "--", ":", "-."), strict=False):
                 y = made.values[:, made.names.index(variable)]
                 axes.plot(np.degrees(made.times), y, style, label=label, linewidth=1.2)
-            axes.set_ylabel(axis_label(name, unit))
-            if len(lines) > 1:
+            axes.set_ylabel(axis_label(panel.title, panel.unit))
+            if len(panel.lines) > 1:
                 axes.legend(fontsize=8)
-        for axes in plots[2:]:
+        for axes in plots[-2:]:
             axes.set_xlabel("φ (°)")
         figure.suptitle(title, fontsize=10)
 

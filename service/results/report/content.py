@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from worker.models import ResultInfo
     from worker.study import Study
 
-#: First parts of names of results that tell of the computation rather than of the machine.
-_CHECKS: Final = ("balance", "run", "reset", "regime")
 #: Half widths of means stand in the table, beside their means.
 _HALF_WIDTH: Final = ".half_width"
 _RESULTS_A_PICTURE: Final = 3
@@ -172,7 +170,7 @@ def _pictures(study: Study, infos: tuple[ResultInfo, ...], fetch: Fetch) -> tupl
     query = main_query(study, infos)
     if query is None:
         return (), "Nothing varies in this study, so that there is no curve."
-    groups = list(_groups(infos))
+    groups = list(_groups(infos, models.presentation_of(study).checks))
     chosen = [info for group in groups for info in group]
     try:
         whole = draw(select(study, infos, replace(query, y=tuple(info.name for info in chosen))), fetch)
@@ -182,12 +180,12 @@ def _pictures(study: Study, infos: tuple[ResultInfo, ...], fetch: Fetch) -> tupl
     return tuple(_part(whole, group) for group in groups), ""
 
 
-def _groups(infos: Sequence[ResultInfo]) -> Iterator[tuple[ResultInfo, ...]]:
+def _groups(infos: Sequence[ResultInfo], checks: tuple[str, ...]) -> Iterator[tuple[ResultInfo, ...]]:
     """Results of one unit and one part of the machine, a few at a time."""
     found: dict[tuple[str, ...], list[ResultInfo]] = {}
     for info in infos:
         first, *rest = info.name.split(".")
-        if first in _CHECKS or info.kind != "real" or info.name.endswith(_HALF_WIDTH):
+        if first in checks or info.kind != "real" or info.name.endswith(_HALF_WIDTH):
             continue
         part = f"{first}.{rest[0]}" if rest and rest[0].isdigit() else first
         found.setdefault((part, info.unit), []).append(info)

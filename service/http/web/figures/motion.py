@@ -18,7 +18,7 @@ from worker import models
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from worker.models import Trajectory
+    from worker.models import Panel, Trajectory
     from worker.study import Study
 
 #: Times at which a motion is sampled for a picture, and points of a line that are drawn.
@@ -30,13 +30,15 @@ _OTHER: Final = ("#999999", "+", "+++")
 def motion_figures(study: Study, case: int, start: float, end: float) -> dict[str, Figure]:
     """The case run again and drawn. For the computing process."""
     made = models.run_trajectory(study, case, start, end, SAMPLES)
+    shown = models.presentation_of(study)
     if made.times.size == 0 or made.times[-1] == start < end:
         told = {"data": [], "layout": {}, "note": _no_motion(study, case, made.ending)}
-        return {"motion": told, **({} if made.along == "angle" else {"phase": told})}
+        return {"motion": told, **({"phase": told} if shown.portrait else {})}
     if made.along == "angle":
-        return {"motion": shaft_figure(made)}
+        return {"motion": shaft_figure(study, made)}
     column = {name: made.values[:, index] for index, name in enumerate(made.names)}
-    return {"motion": _histories(made, column), "phase": _phase(made, column)}
+    histories = {"motion": _histories(panels(study, made), made, column)}
+    return histories | ({"phase": _phase(shown.phases(made.names), made, column)} if shown.portrait else {})
 
 
 def _no_motion(study: Study, case: int, ending: str) -> str:
@@ -50,8 +52,7 @@ def _no_motion(study: Study, case: int, ending: str) -> str:
     return f"There is no motion in this part: the run stopped at {when} with {ending}."
 
 
-def _histories(made: Trajectory, column: dict[str, NDArray[np.float64]]) -> Figure:
-    rows = panels(made)
+def _histories(rows: tuple[Panel, ...], made: Trajectory, column: dict[str, NDArray[np.float64]]) -> Figure:
     strip = 0.045 * len(made.states) + 0.02
     height = (1.0 - strip - 0.05 * len(rows)) / len(rows)
     traces: list[Figure] = []
@@ -66,14 +67,14 @@ def _histories(made: Trajectory, column: dict[str, NDArray[np.float64]]) -> Figu
         "xaxis": {"anchor": "y", "title": {"text": "Time (s)"}, "zeroline": False},
         "yaxis": {"domain": [0.0, strip], "fixedrange": True, "zeroline": False, "showgrid": False},
     }
-    for index, (title, unit, lines) in enumerate(rows):
+    for index, panel in enumerate(rows):
         top = 1.0 - index * (height + 0.05)
         layout[f"yaxis{index + 2}"] = {
             "domain": [top - height, top],
-            "title": {"text": axis_title(title, unit)},
+            "title": {"text": axis_title(panel.title, panel.unit)},
             "zeroline": True,
         }
-        for index_of, (name, label) in enumerate(lines):
+        for index_of, (name, label) in enumerate(panel.lines):
             y = column[name]
             kept = thin(y, _MOST_POINTS)
             traces.append(
@@ -83,8 +84,8 @@ def _histories(made: Trajectory, column: dict[str, NDArray[np.float64]]) -> Figu
                     "x": made.times[kept].tolist(),
                     "y": numbers(y[kept]),
                     "name": label,
-                    "legendgroup": title,
-                    "legendgrouptitle": {"text": words(title)},
+                    "legendgroup": panel.title,
+                    "legendgrouptitle": {"text": words(panel.title)},
                     "yaxis": f"y{index + 2}",
                     "line": {
                         "width": 1.6,
@@ -102,7 +103,7 @@ def _strips(made: Trajectory) -> Iterator[Figure]:
         return
     bars: dict[str, list[tuple[float, float, str]]] = {}
     for name, states in made.states.items():
-        row = "Shaft" if name == "shaft" else f"{words(name)} clutch"
+        row = words(name)
         for state, first, stop in spans_of(list(states)):
             begin, last = float(made.times[first]), float(made.times[min(stop, made.times.size - 1)])
             bars.setdefault(state, []).append((begin, last - begin, row))
@@ -126,17 +127,19 @@ def _strips(made: Trajectory) -> Iterator[Figure]:
         }
 
 
-def _phase(made: Trajectory, column: dict[str, NDArray[np.float64]]) -> Figure:
-    """Speed over angle of each pendulum."""
+def _phase(
+    phases: tuple[tuple[str, str, str], ...], made: Trajectory, column: dict[str, NDArray[np.float64]]
+) -> Figure:
+    """Speed over angle of each part of the machine that swings."""
     traces = []
-    for index, (name, label) in enumerate(panels(made)[0][2]):
+    for index, (angle, speed, label) in enumerate(phases):
         step = max(made.times.size // _MOST_POINTS, 1)
         traces.append(
             {
                 "type": "scatter",
                 "mode": "lines",
-                "x": numbers(column[name][::step]),
-                "y": numbers(column[name.replace(".angle", ".speed")][::step]),
+                "x": numbers(column[angle][::step]),
+                "y": numbers(column[speed][::step]),
                 "name": label,
                 "line": {"width": 1.4, "color": PALETTE[index % len(PALETTE)], "dash": DASHES[index % len(DASHES)]},
             }

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from service.http.web.figures.curves import DASHES, PALETTE, Figure
 from service.http.web.figures.thinning import thin
 from service.results.curves import numbers
-from service.results.pictures.panels import PANELS
+from service.results.pictures.panels import panels
 from service.results.wording import unit_text
 
 if TYPE_CHECKING:
@@ -20,10 +20,12 @@ if TYPE_CHECKING:
 #: Angles at which a machine is drawn.
 SAMPLES: Final = 1441
 _MOST_POINTS: Final = 1500
+#: Between two rows of panels, in parts of the figure's height.
+_GAP: Final = 0.12
 
 
-def shaft_figure(made: Trajectory) -> Figure:
-    """Four panels over the angle in degrees; an angle at which the energy has its mean is marked."""
+def shaft_figure(study: Study, made: Trajectory) -> Figure:
+    """The panels over the angle in degrees, two in a row."""
     degrees = [math.degrees(angle) for angle in made.times.tolist()]
     column = {name: made.values[:, index] for index, name in enumerate(made.names)}
     traces: list[Figure] = []
@@ -34,19 +36,21 @@ def shaft_figure(made: Trajectory) -> Figure:
         "uirevision": "keep",
         "legend": {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom"},
     }
-    for panel, (title, unit, lines) in enumerate(PANELS):
-        suffix = "" if panel == 0 else str(panel + 1)
-        left, low = (0.0 if panel % 2 == 0 else 0.56), (0.56 if panel < 2 else 0.0)
+    drawn = panels(study, made)
+    height = (1.0 + _GAP) / ((len(drawn) + 1) // 2) - _GAP
+    for index, panel in enumerate(drawn):
+        suffix = "" if index == 0 else str(index + 1)
+        left, low = (0.0 if index % 2 == 0 else 0.56), max(1.0 - height - (index // 2) * (height + _GAP), 0.0)
         x_axis: Figure = {"domain": [left, left + 0.44], "anchor": f"y{suffix}", "zeroline": False, "dtick": 60}
-        x_axis |= {"title": {"text": "φ, angle of the shaft (°)" if panel > 1 else ""}}
-        layout[f"xaxis{suffix}"] = x_axis | ({"matches": "x"} if panel else {})
+        x_axis |= {"title": {"text": "φ, angle of the shaft (°)" if index >= len(drawn) - 2 else ""}}
+        layout[f"xaxis{suffix}"] = x_axis | ({"matches": "x"} if index else {})
         layout[f"yaxis{suffix}"] = {
-            "domain": [low, low + 0.44],
+            "domain": [low, low + height],
             "anchor": f"x{suffix}",
-            "title": {"text": f"{title} ({unit_text(unit)})"},
+            "title": {"text": f"{panel.title} ({unit_text(panel.unit)})"},
             "zeroline": True,
         }
-        for index, (name, label) in enumerate(lines):
+        for place, (name, label) in enumerate(panel.lines):
             y = column[name]
             kept = thin(y, _MOST_POINTS)
             traces.append(
@@ -56,10 +60,10 @@ def shaft_figure(made: Trajectory) -> Figure:
                     "x": [degrees[position] for position in kept.tolist()],
                     "y": numbers(y[kept]),
                     "name": label,
-                    "showlegend": len(lines) > 1,
+                    "showlegend": len(panel.lines) > 1,
                     "xaxis": f"x{suffix}",
                     "yaxis": f"y{suffix}",
-                    "line": {"width": 1.8, "color": PALETTE[index % len(PALETTE)], "dash": DASHES[index % len(DASHES)]},
+                    "line": {"width": 1.8, "color": PALETTE[place % len(PALETTE)], "dash": DASHES[place % len(DASHES)]},
                 }
             )
     return {"data": traces, "layout": layout}
@@ -74,7 +78,9 @@ def machine_case(study: Study) -> dict[str, Any]:
     values = {info.name: numbers(rows.values[0, index : index + 1])[0] for index, info in enumerate(infos)}
     found: dict[str, Any] = {"ending": rows.endings[0], "results": values, "figure": None}
     if rows.endings[0] == models.OK:
-        found["figure"] = shaft_figure(models.run_trajectory(study, 0, 0.0, models.extent(study, 0).end, SAMPLES))
+        found["figure"] = shaft_figure(
+            study, models.run_trajectory(study, 0, 0.0, models.extent(study, 0).end, SAMPLES)
+        )
     return found
 
 

@@ -1,0 +1,233 @@
+"""A model that this file alone knows goes through everything: spec, HTTP, worker, storage, curves, pages, exports."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from engine import Ending
+from engine.catalogue import Parameter, ResultInfo
+from engine.outcome import Trajectory
+from service.results.exports import MEDIA_TYPES
+from service.settings import Settings
+from service.spec.document import SpecError, parse_spec
+from service.spec.extend import parse_extended
+from service.spec.schema.document import spec_schema
+from service.storage.part import SystemClock
+from service.storage.session import Session
+from service.storage.tables import METADATA, results_table
+from worker import models
+from worker.dispatcher import Dispatcher
+from worker.executors.inline import InlineExecutor
+from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
+from worker.models.model import Model
+from worker.study import Study
+
+if TYPE_CHECKING:
+    from tests.service.conftest import Service
+
+NAME = "damped-oscillator"
+END = 2.0
+PARAMETERS = (
+    Parameter("body.mass", "m", "kg", 0.0, 1e3, True, None, "mass of the body"),
+    Parameter("body.spring_rate", "c", "N/m", 0.0, 1e9, True, None, "rate of its spring"),
+    Parameter("damping", "D", "1", 0.0, 0.99, False, 0.05, "damping ratio"),
+)
+RESULTS = (
+    ResultInfo("frequency", "Hz", "frequency of the damped oscillation"),
+    ResultInfo("displacement.end", "m", "displacement after 2 s of a body that was let go at 1 m"),
+    ResultInfo("swings", "1", "whole oscillations in 2 s", "count"),
+)
+
+
+def displacement(columns: dict[str, Any], times: Any) -> Any:
+    """Closed form for x(0) = 1 m, x'(0) = 0."""
+    speed, ratio = np.sqrt(columns["body.spring_rate"] / columns["body.mass"]), columns["damping"]
+    damped = speed * np.sqrt(1.0 - np.square(ratio))
+    sine = ratio * speed / damped * np.sin(damped * times)
+    return np.exp(-ratio * speed * times) * (np.cos(damped * times) + sine)
+
+
+class DampedOscillator(Model):
+    """A body on a spring with a damper."""
+
+    name = NAME
+    endings = frozenset({Ending.DIVERGED})
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        return PARAMETERS
+
+    def results(self, variant: str) -> tuple[ResultInfo, ...]:
+        return RESULTS
+
+    def shape_of(self, study: Study) -> KernelShape:
+        return KernelShape(NAME)
+
+    def run(self, task: ChunkTask) -> ChunkResult:
+        speed = np.sqrt(task.columns["body.spring_rate"] / task.columns["body.mass"])
+        frequency = speed * np.sqrt(1.0 - np.square(task.columns["damping"])) / (2.0 * math.pi)
+        results = (frequency, displacement(task.columns, END), np.floor(frequency * END))
+        values = np.column_stack([np.broadcast_to(result, task.count) for result in results])
+        return chunk_result(task.first, np.zeros(task.count, dtype=np.int8), [""] * task.count, values)
+
+    def extent(self, study: Study, case: int) -> Extent:
+        return Extent("time", "s", END, 1.0)
+
+    def trajectory(self, study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
+        times = np.linspace(start, end, points)
+        values = displacement({**study.base, **study.case_parameters(case)}, times)
+        return Trajectory(times, ("displacement",), ("m",), values[:, None], {}, Ending.OK)
+
+    def estimate_seconds_per_case(self, study: Study) -> float:
+        return 1e-6
+
+
+SPEC: dict[str, Any] = {
+    "sprag": 1,
+    "model": NAME,
+    "name": "a toy",
+    "base": {"body": {"mass": "500 g", "spring_rate": 200}, "damping": 0.1},
+    "axes": [
+        {"path": "body.spring_rate", "linspace": [100, 400, 4]},
+        {"path": "body.mass", "values": [0.5, 1.0, 2.0]},
+    ],
+}
+
+
+@pytest.fixture(autouse=True)
+def toy() -> Iterator[None]:
+    """The model, for the time of a test."""
+    models.register(DampedOscillator())
+    yield
+    METADATA.remove(results_table(NAME, ""))
+    results_table.cache_clear()
+    models.unregister(NAME)
+
+
+@pytest.fixture
+def settings(settings: Settings) -> Settings:
+    """Settings of a service whose database has the model's table, as a migration would make it."""
+    session = Session(settings.database_url)
+    with session.write() as connection:
+        results_table(NAME, "").create(connection)
+    session.close()
+    return settings
+
+
+@pytest.fixture
+def finished(service: Service) -> tuple[Service, str]:
+    """The study, submitted by HTTP and run by the dispatcher."""
+    study_id = service.submit(SPEC)
+    store = service.store
+    Dispatcher(store, InlineExecutor(), SystemClock()).run(lambda: store.get_study(study_id).state.terminal)
+    return service, study_id
+
+
+def expected(study: Study) -> NDArray[np.float64]:
+    """Displacements of every case."""
+    return np.asarray(displacement({**study.base, **study.columns(range(study.cases))}, END))
+
+
+def test_the_spec_is_read_by_the_catalogue_alone() -> None:
+    parsed = parse_spec(SPEC)
+    assert parsed.study.base == {"body.mass": 0.5, "body.spring_rate": 200.0, "damping": 0.1}
+    assert parsed.study.run == {}
+    wider = parse_extended(SPEC, parsed.study, {"axes": [{"path": "damping", "values": [0.2]}]}).study
+    assert wider.shape == (4, 3, 2)
+
+
+@pytest.mark.parametrize(
+    ("changes", "pointer", "says"),
+    [
+        ({"base": None}, "/base", "is required"),
+        ({"base": {"body": 3}}, "/base/body", "must be an object"),
+        ({"base": {"body": {"mass": 1, "spring_rate": 2, "sprng": 3}}}, "/base/body/sprng", "unknown"),
+        ({"base": {"body": {"mass": 0, "spring_rate": 2}}}, "/base/body/mass", "out of range"),
+        ({"base": {"body": {"mass": 1}}}, "/base/body/spring_rate", "is required"),
+        ({"run": {"duration": 3}}, "/run/duration", "this model has no run"),
+        ({"axes": [{"path": "body.mas", "values": [1]}]}, "/axes/0/path", "body.mass"),
+    ],
+)
+def test_what_is_wrong_with_the_spec_is_told_where_it_is(changes: dict[str, Any], pointer: str, says: str) -> None:
+    with pytest.raises(SpecError) as caught:
+        parse_spec(SPEC | changes)
+    assert any(problem.pointer == pointer and says in problem.message for problem in caught.value.problems), caught
+
+
+def test_the_catalogues_list_it(service: Service) -> None:
+    listed = service.get(f"/models/{NAME}")
+    assert [entry["path"] for entry in listed["parameters"]] == [entry.path for entry in PARAMETERS]
+    assert [entry["name"] for entry in listed["results"]] == [info.name for info in RESULTS]
+    assert "diverged" in listed["endings"]
+    assert "chatter" not in listed["endings"]
+    rules = spec_schema()["allOf"]
+    own = next(rule for rule in rules if rule["if"]["properties"]["model"]["const"] == NAME)
+    assert own["then"]["properties"]["base"]["required"] == ["body"]
+
+
+def test_rows_are_the_models(finished: tuple[Service, str]) -> None:
+    service, study_id = finished
+    study = service.store.study(study_id)
+    record = service.store.get_study(study_id)
+    assert (record.state, record.ok, record.variant) == ("finished", 12, "")
+    block = service.store.case_rows(study_id)
+    np.testing.assert_array_equal(block.values[:, 1], expected(study))
+    row = service.get(f"/studies/{study_id}/cases/7")
+    assert isinstance(row["results"]["swings"], int)
+
+
+def test_curves_maps_sensitivity_and_trajectories(finished: tuple[Service, str]) -> None:
+    service, study_id = finished
+    values = expected(service.store.study(study_id)).reshape(4, 3)
+    curves = service.get(f"/studies/{study_id}/curves", x="body.spring_rate", y="displacement.end", by="body.mass")
+    assert [curve["y"]["displacement.end"] for curve in curves["curves"]] == values.T.tolist()
+    drawn = service.get(f"/studies/{study_id}/map", x="body.mass", y="body.spring_rate", z="displacement.end")
+    assert drawn["z"]["values"] == values.tolist()
+    shares = service.get(f"/studies/{study_id}/sensitivity", y="frequency")
+    assert [effect["paths"] for effect in shares["results"][0]["effects"]] == [["body.spring_rate"], ["body.mass"]]
+    motion = service.get(f"/studies/{study_id}/cases/0/trajectory", points=5)
+    assert motion["values"]["displacement"][0] == 1.0
+    assert motion["values"]["displacement"][-1] == values[0, 0]
+
+
+@pytest.mark.parametrize("form", sorted(MEDIA_TYPES))
+def test_every_export_has_its_rows(finished: tuple[Service, str], form: str) -> None:
+    service, study_id = finished
+    answer = service.http.get(f"/api/v1/studies/{study_id}/results", params={"format": form})
+    assert answer.status_code == 200
+    assert answer.content
+    if form == "csv":
+        rows = list(csv.DictReader(io.StringIO(answer.text)))
+        values = expected(service.store.study(study_id))
+        assert [float(row["displacement.end"]) for row in rows] == values.tolist()
+
+
+def test_pages_pictures_and_the_report_show_it(finished: tuple[Service, str]) -> None:
+    service, study_id = finished
+    own = f"/studies/{study_id}"
+    pages = ("", "/cases", "/cases/7", "/curves", "/map")
+    for page in (*(own + page for page in pages), "/", f"/compare?study={study_id}"):
+        answer = service.http.get(page)
+        assert answer.status_code == 200, page
+        assert "a toy" in answer.text
+    for picture in ("figures/curves", "figures/map", "cases/7/motion", "cases/7/motion.svg"):
+        assert service.http.get(f"{own}/{picture}").status_code == 200, picture
+    histories = service.http.get(f"{own}/cases/7/motion").json()
+    (line,) = histories["motion"]["data"]
+    assert line["y"][0] == 1.0
+    assert "phase" not in histories
+    report = service.http.get(f"/api/v1{own}/report", params={"format": "html"})
+    assert "displacement.end" in report.text
+
+
+def test_its_cases_are_reused(finished: tuple[Service, str]) -> None:
+    service, _ = finished
+    preview = service.http.post("/api/v1/studies:preview", json=SPEC | {"name": "again"}).json()
+    assert (preview["cases"], preview["reusable"]) == (12, 12)

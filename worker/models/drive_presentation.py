@@ -1,0 +1,78 @@
+"""What is shown of vibration drives."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from worker.models.presentation import Panel, Presentation
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+def _pendulums(names: Sequence[str]) -> tuple[str, ...]:
+    """Beginnings of the variables of each pendulum, such as "pendulums.0"."""
+    return tuple(name.removesuffix(".angle") for name in names if name.endswith(".angle") and name != "shaft.angle")
+
+
+def _title(pendulum: str) -> str:
+    return f"Pendulum {pendulum.rpartition('.')[2]}"
+
+
+def _panels(names: Sequence[str], _: Sequence[str]) -> tuple[Panel, ...]:
+    pendulums = _pendulums(names)
+
+    def each(quantity: str) -> tuple[tuple[str, str], ...]:
+        return tuple((f"{pendulum}.{quantity}", _title(pendulum)) for pendulum in pendulums)
+
+    together = (("torque", "All clutches"),) if len(pendulums) > 1 else ()
+    powers = (
+        ("power.input", "input"),
+        ("power.useful", "useful"),
+        ("power.loss", "loss"),
+        ("power.clutch", "clutches"),
+    )
+    return (
+        Panel("angle", "rad", each("angle")),
+        Panel("speed", "rad/s", (*each("speed"), ("shaft.speed", "Shaft"))),
+        Panel("torque", "N*m", (*each("torque"), *together)),
+        Panel("power", "W", powers),
+    )
+
+
+def _phases(names: Sequence[str]) -> tuple[tuple[str, str, str], ...]:
+    return tuple((f"{pendulum}.angle", f"{pendulum}.speed", _title(pendulum)) for pendulum in _pendulums(names))
+
+
+_POINT: Final = ("excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y", "shaft.load")
+
+PRESENTATION: Final = Presentation(
+    along=("shaft.load", "excitation.frequency"),
+    apart=_POINT,
+    drawn=("shaft.speed.mean", "shaft.speed.max"),
+    main=("shaft.speed.mean", "torque.mean", "power.useful.mean", "efficiency"),
+    heading="Mechanical characteristic",
+    columns=("shaft.speed.mean", "shaft.irregularity", "torque.mean", "power.useful.mean", "efficiency"),
+    operating_point=_POINT,
+    checks=("balance", "run", "reset", "regime"),
+    balance=(
+        ("", "power.input.mean", "put in by the base"),
+        ("−", "power.loss.mean", "lost in damping"),
+        ("−", "power.useful.mean", "against the load"),
+        ("=", "power.stored.mean", "stored in the machine"),
+    ),
+    residual="balance.energy",
+    panels=_panels,
+    phases=_phases,
+    portrait="Speed over angle of each pendulum",
+    motion="Angles, speeds, torques and powers over time, and the states of clutches and shaft",
+    motion_note="States of the clutches: free; taking up the lost motion; engaged; beyond the measured data; locked. "
+    "The shaft is held by the load or rotating.",
+    symbols={
+        "nu/2pi": ("f", ""),
+        "phi(0)": ("φ", "0"),
+        "phi'(0)": ("ω", "0"),
+        "phi_e'(0)": ("ω", "e0"),
+        "c_(K+1)": ("c", "k"),
+    },
+)
