@@ -18,12 +18,13 @@ from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import psutil
 
-from benchmarks.faults.harness import Service
+from benchmarks.faults.harness import Service, until
 from service.presets import preset_text
 
 _LEAVE = 5.0
@@ -72,30 +73,35 @@ def ask(port: int, over: Any, told: Any) -> None:
     told.send(waits)
 
 
+def weight(service: Service) -> tuple[int, int]:
+    """Memory (bytes) of a service: of the process that answers, and of all its processes.
+
+    Pages that several of them share count once in all: it is the proportional set size (/proc/PID/smaps_rollup).
+    """
+    own = psutil.Process(service.process.pid)
+    sizes = []
+    for process in (own, *own.children(recursive=True)):
+        with suppress(psutil.Error):
+            sizes.append(process.memory_full_info().pss)
+    return sizes[0], sum(sizes)
+
+
 class Watch:
     """Asks /livez again and again, and looks at the memory of the service."""
 
     def __init__(self, service: Service) -> None:
+        self._service = service
         self._port = port_of(service)
-        self._process = psutil.Process(service.process.pid)
         self.waits: list[float] = []
         self.memory = self.family = 0
         self._over = threading.Event()
 
     def weigh(self) -> None:
-        """Until the end: the largest memory of the service, and with the processes that check for it."""
-        dispatcher = self._dispatcher()
+        """Until the end: the largest memory of the process that answers, and of the whole service."""
         while not self._over.wait(0.1):
-            with suppress(psutil.Error):
-                checking = [child for child in self._process.children() if child.pid != dispatcher]
-                own = self._process.memory_info().rss
-                family = sum(part.memory_full_info().pss for part in (self._process, *checking))
+            with suppress(psutil.Error, IndexError):
+                own, family = weight(self._service)
                 self.memory, self.family = max(self.memory, own), max(self.family, family)
-
-    def _dispatcher(self) -> int | None:
-        with suppress(psutil.Error):
-            return next((child.pid for child in self._process.children() if child.children()), None)
-        return None
 
     @contextmanager
     def watching(self) -> Iterator[None]:
@@ -124,16 +130,23 @@ def port_of(service: Service) -> int:
     return port
 
 
-def send(port: int, made: bytes, patience: float) -> str:
-    """Preview a spec; the status of the answer, or that the client left before."""
+def request(port: int, method: str, path: str, body: bytes | None, patience: float) -> str:
+    """Ask for something; the status of the answer, which is read whole, or that the client left before."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=patience)
     try:
-        connection.request("POST", "/api/v1/studies:preview", made, {"Content-Type": "application/json"})
-        return str(connection.getresponse().status)
+        connection.request(method, path, body, {"Content-Type": "application/json"} if body else {})
+        answer = connection.getresponse()
+        answer.read()
+        return str(answer.status)
     except TimeoutError:
         return "left"
     finally:
         connection.close()
+
+
+def send(port: int, made: bytes, patience: float) -> str:
+    """Preview a spec; the status of the answer, or that the client left before."""
+    return request(port, "POST", "/api/v1/studies:preview", made, patience)
 
 
 def throw(service: Service, made: dict[str, Any], patience: float, clients: int) -> tuple[Watch, Counter[str], float]:
@@ -145,30 +158,91 @@ def throw(service: Service, made: dict[str, Any], patience: float, clients: int)
     return watch, answers, time.perf_counter() - began
 
 
+def tell(name: str, watch: Watch, clients: int, seconds: float, answers: Counter[str]) -> None:
+    """Print what came of it."""
+    print(
+        f"{name}: {clients} clients in {seconds:.1f} s, answers {dict(answers)}; "
+        f"/livez at most {1e3 * max(watch.waits):.0f} ms of {len(watch.waits)}; "
+        f"answering process {watch.memory / 1e6:.0f} MB, whole service {watch.family / 1e6:.0f} MB",
+        flush=True,
+    )
+
+
+def come_and_go(service: Service, clients: int) -> None:
+    """Clients that send a bomb and leave at once, each ten times, and one that stays; how long that one waits."""
+    watch, port, body = Watch(service), port_of(service), json.dumps(long_axis()).encode()
+    children = {child.pid for child in psutil.Process(service.process.pid).children()}
+    began = time.perf_counter()
+    with watch.watching(), ThreadPoolExecutor(clients + 1) as crowd:
+        leavers = [crowd.submit(send, port, body, 0.05) for _ in range(10 * clients)]
+        stayed = send(port, json.dumps(press("1")).encode(), _STAY)
+        waited = time.perf_counter() - began
+        answers = Counter(leaver.result() for leaver in leavers)
+    tell("clients that leave at once", watch, clients, time.perf_counter() - began, answers)
+    anew = {child.pid for child in psutil.Process(service.process.pid).children()} - children
+    print(f"clients that leave at once: one that stays got {stayed} after {waited:.1f} s; {len(anew)} processes anew")
+
+
+def look_at_stored(service: Service, clients: int) -> None:
+    """Clients that open, copy, extend and export a stored study of a million values."""
+    study = service.submit(long_axis())
+    service.http.post(f"/studies/{study}:pause")
+    extension = json.dumps({"axes": [{"path": "excitation.frequency", "values": [20.0]}]}).encode()
+    ways = [
+        ("GET", f"/api/v1/studies/{study}", None),
+        ("GET", f"/studies/{study}", None),
+        ("GET", f"/new?clone={study}", None),
+        ("POST", f"/api/v1/studies/{study}:extend", extension),
+        ("GET", f"/api/v1/studies/{study}/rows?format=csv", None),
+        ("GET", f"/api/v1/studies/{study}/curves?x=shaft.load&y=shaft.speed.mean", None),
+    ]
+    watch, began = Watch(service), time.perf_counter()
+    with watch.watching(), ThreadPoolExecutor(clients) as crowd:
+        asked = [ways[number % len(ways)] for number in range(3 * clients)]
+        answers = Counter(crowd.map(lambda way: request(port_of(service), *way, _STAY), asked))
+    tell("stored study of a million values", watch, clients, time.perf_counter() - began, answers)
+
+
 def main() -> None:
     """Throw every bomb, then end a service under fire."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--clients", type=int, default=40)
     clients = parser.parse_args().clients
     for name, (made, patience) in BOMBS.items():
-        with tempfile.TemporaryDirectory() as folder:
-            service = Service(Path(folder))
-            service.start()
-            send(port_of(service), json.dumps(press("1")).encode(), _STAY)  # until the processes that check are there
+        with running() as service:
             watch, answers, seconds = throw(service, made, patience, clients)
-            print(
-                f"{name}: {clients} clients in {seconds:.1f} s, answers {dict(answers)}; "
-                f"/livez at most {1e3 * max(watch.waits):.0f} ms of {len(watch.waits)}; "
-                f"service {watch.memory / 1e6:.0f} MB, with its checking processes {watch.family / 1e6:.0f} MB",
-                flush=True,
-            )
+            tell(name, watch, clients, seconds, answers)
             crowd = [threading.Thread(target=_fire, args=(service, made)) for _ in range(clients)]
             for thread in crowd:
                 thread.start()
-            time.sleep(1.0)
+            until(partial(crowded, service, clients), "every client is connected")
             print(f"{name}: ended {service.stop():.1f} s after SIGTERM under fire", flush=True)
             for thread in crowd:
                 thread.join()
+    for attack in (come_and_go, look_at_stored):
+        with running() as service:
+            attack(service, clients)
+            service.stop()
+
+
+@contextmanager
+def running() -> Iterator[Service]:
+    """A service that can take work; to be stopped by whoever uses it."""
+    with tempfile.TemporaryDirectory() as folder:
+        service = Service(Path(folder))
+        service.start()
+        until(lambda: request(port_of(service), "GET", "/readyz", None, _STAY) == "200", "specs can be checked")
+        yield service
+
+
+def crowded(service: Service, clients: int) -> bool:
+    """Whether that many clients are connected to the service."""
+    try:
+        found = psutil.Process(service.process.pid).net_connections("tcp")
+    except psutil.Error:
+        return False
+    port = port_of(service)
+    return sum(item.status == psutil.CONN_ESTABLISHED and item.laddr.port == port for item in found) >= clients
 
 
 def _fire(service: Service, made: dict[str, Any]) -> None:

@@ -55,6 +55,9 @@ class Limits:
         Key of the problem that its client is told of.
     setting : str
         Name of the setting of the time, where there is one.
+    leave_seconds : float
+        Time that one whose client has left is given to end before its process is killed: about what another process
+        takes to start. It counts as one of its client's until then.
     """
 
     seconds: float
@@ -62,6 +65,7 @@ class Limits:
     waiting: int = MAX_WAITING
     problem: str = "timed-out"
     setting: str = ""
+    leave_seconds: float = 2.0
 
 
 class ProcessComputer:
@@ -116,14 +120,25 @@ class ProcessComputer:
         """The function's value. Function, arguments and value must be picklable."""
         with self._turn(self._limits.seconds):
             job = self._schedule(self._limits.seconds, function, *args)
+            future = asyncio.wrap_future(job.future)
             try:
-                return await asyncio.wrap_future(job.future)
+                return await asyncio.shield(future)
             except asyncio.CancelledError:
                 task = asyncio.current_task()
                 if task is not None and not task.cancelling():  # it was `close` that cancelled what waited
                     raise JobStoppedError from None
-                job.stop()  # nobody waits for it any more
+                await self._leave(job, future)
                 raise
+
+    async def _leave(self, job: Job[R], future: asyncio.Future[R]) -> None:
+        """Nobody waits for the job any more: end it, with its process only where it runs on for long."""
+        if job.future.cancel():
+            return
+        try:
+            await asyncio.wait([future], timeout=self._limits.leave_seconds)
+        finally:
+            job.stop()
+            future.cancel()
 
     async def load(self, shape: models.KernelShape) -> None:
         """Have a kernel ready. The compilation goes on when its request is gone, so that the next one finds it."""

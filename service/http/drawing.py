@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
 from starlette.responses import Response
 
+from service.http.respond import entity_tag, not_modified, tagged
 from service.http.work import Work
+from service.jobs import answers
+from service.results.defaults import drawn_numbers
 from service.results.pictures import curves as pictures
+
+if TYPE_CHECKING:
+    from service.http.context import Context
+    from service.storage.records import StudyRecord
 
 #: matplotlib puts its styles into the picture, which the pages' policy forbids; a picture can do nothing else.
 _PICTURE_POLICY = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
@@ -22,11 +31,17 @@ class Drawing:
     draw: Callable[..., bytes]
     args: tuple[Any, ...]
     media_type: str
-    headers: Mapping[str, str]
+    headers: Mapping[str, str] = field(default_factory=dict)
 
     async def response(self, work: Work) -> Response:
         """The file."""
-        content = await work.check(self.draw, *self.args)
+        return self._sent(await work.check(self.draw, *self.args))
+
+    def here(self) -> Response:
+        """The file, drawn by this process at once."""
+        return self._sent(self.draw(*self.args))
+
+    def _sent(self, content: bytes) -> Response:
         return Response(content, media_type=self.media_type, headers=dict(self.headers))
 
 
@@ -43,5 +58,36 @@ def picture_of(form: str) -> pictures.Picture:
 
 def attachment(content: bytes, media_type: str, filename: str) -> Response:
     """A small file to be saved under that name."""
-    headers = {"Content-Disposition": f'attachment; filename="{filename}"'}
-    return Response(content, media_type=media_type, headers=headers)
+    return Response(content, media_type=media_type, headers=attached(filename))
+
+
+def attached(filename: str) -> dict[str, str]:
+    """The headers of a file that is to be saved under that name."""
+    return {"Content-Disposition": f'attachment; filename="{filename}"'}
+
+
+def placed(context: Context, drawing: Drawing) -> Response | Drawing:
+    """A drawing of `service.jobs.answers`: at once where it has few numbers, else still to be made, elsewhere."""
+    _, study_id, query, *_ = drawing.args
+    return drawing if drawn_numbers(context.store.study(study_id), query) > answers.FEW else drawing.here()
+
+
+async def conditional(
+    context: Context,
+    work: Work,
+    request: Request,
+    study_id: str,
+    form: str,
+    make: Callable[[StudyRecord], Response | Drawing],
+) -> Response:
+    """The answer that ``make`` gives, or 304 when the client has it: it depends on the study's rows and the query."""
+
+    def look() -> tuple[str, Response | Drawing, bool]:
+        record = context.store.get_study(study_id)
+        tag = entity_tag(record.id, record.revision, request.url.path, request.url.query, form)
+        unchanged = not_modified(request, tag)
+        return tag, unchanged or make(record), unchanged is not None
+
+    tag, made, unchanged = await run_in_threadpool(look)
+    response = await made.response(work) if isinstance(made, Drawing) else made
+    return response if unchanged else tagged(response, tag)

@@ -60,7 +60,7 @@ def usual_value(study: Study, axis: Axis) -> float:
 
 
 def drawn_numbers(study: Study, query: CurveQuery) -> int:
-    """How many numbers the curves of ``query`` (from `main_query`) have."""
+    """How many numbers the curves of ``query`` have, at most."""
     if study.combine == "zip":
         return study.cases * len(query.y)
     axes = [axis for path in (query.x, *query.by) for axis in study.axes if path in axis.paths]

@@ -57,6 +57,7 @@ class Studies(Orders):
         self.chunking = chunking
         self._studies: OrderedDict[str, Study] = OrderedDict()
         self._lock = Lock()
+        self._reading = Lock()
         #: Set when a study is deleted, for `service.jobs.housekeeping`.
         self.deleted = Event()
 
@@ -163,6 +164,13 @@ class Studies(Orders):
         with self._lock:
             if study_id in self._studies:
                 self._studies.move_to_end(study_id)
+                return self._studies[study_id]
+        with self._reading:  # one long study at a time, and once for all who wait for it
+            return self._read_study(study_id)
+
+    def _read_study(self, study_id: str) -> Study:
+        with self._lock:
+            if study_id in self._studies:
                 return self._studies[study_id]
         with self.session.read() as connection:
             text = self._row(connection, study_id, STUDIES.c.study).study

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from fastapi import APIRouter, Depends, Query, Request
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from service.faults import parameter_error, shown
 from service.http.api import models as m
 from service.http.api.document import files, format_query, problems
 from service.http.api.document import not_modified as documented_304
-from service.http.context import Context, Ctx, StudyId
-from service.http.drawing import Drawing, attachment, picture, picture_of
+from service.http.context import Ctx, StudyId
+from service.http.drawing import Drawing, attached, conditional, picture, picture_of, placed
 from service.http.requests import strict_query
-from service.http.respond import choose_format, entity_tag, json_response, not_modified, streamed, tagged
-from service.http.work import CHECK_PROBLEMS, Attended, Work
+from service.http.respond import JSON, choose_format, streamed
+from service.http.work import CHECK_PROBLEMS, Attended
+from service.jobs import answers
 from service.results import exports, report
-from service.results.curves import CurveQuery, Curves, draw, draw_map, select
+from service.results.curves import CurveQuery
 from service.results.pictures import curves as pictures
 from service.results.report.content import report_of
 from worker import models
@@ -81,14 +79,13 @@ async def get_curves(
     query = CurveQuery(x, tuple(y), tuple(by or ()), _pairs(at))
 
     def make(record: StudyRecord) -> Response | Drawing:
-        study = context.store.study(study_id)
-        selection = select(study, models.study_results(study), query)
-        curves = draw(selection, partial(context.store.rows_for_cases, study_id))
+        asked, title = (context.library, study_id, query), record.name or record.model
         if chosen == "json":
-            return json_response({"study": study_id, **curves.to_json()})
+            return placed(context, Drawing(answers.curves_json, asked, JSON))
         if chosen == "csv":
-            return attachment(_curves_csv(curves), _CURVE_FORMATS["csv"], f"{study_id}-curves.csv")
-        return picture(pictures.draw_curves, picture_of(chosen), curves, record.name or record.model)
+            headers = attached(f"{study_id}-curves.csv")
+            return placed(context, Drawing(answers.curves_csv, asked, _CURVE_FORMATS["csv"], headers))
+        return picture(answers.curves_picture, picture_of(chosen), *asked, title)
 
     return await conditional(context, work, request, study_id, chosen, make)
 
@@ -117,12 +114,10 @@ async def get_map(
     chosen = choose_format(request, form, _MAP_FORMATS)
 
     def make(record: StudyRecord) -> Response | Drawing:
-        study = context.store.study(study_id)
-        fetch = partial(context.store.rows_for_cases, study_id)
-        drawn = draw_map(study, models.study_results(study), x, y, z, _pairs(at), fetch)
+        asked = (context.library, study_id, CurveQuery(x, (z,), (y,), _pairs(at)))
         if chosen == "json":
-            return json_response({"study": study_id, **drawn.to_json()})
-        return picture(pictures.draw_map, picture_of(chosen), drawn, record.name or record.model)
+            return placed(context, Drawing(answers.map_json, asked, JSON))
+        return picture(answers.map_picture, picture_of(chosen), *asked, record.name or record.model)
 
     return await conditional(context, work, request, study_id, chosen, make)
 
@@ -188,27 +183,6 @@ async def get_report(
     return await conditional(context, work, request, study_id, chosen, make)
 
 
-async def conditional(
-    context: Context,
-    work: Work,
-    request: Request,
-    study_id: str,
-    form: str,
-    make: Callable[[StudyRecord], Response | Drawing],
-) -> Response:
-    """The answer that ``make`` gives, or 304 when the client has it: it depends on the study's rows and the query."""
-
-    def look() -> tuple[str, Response | Drawing, bool]:
-        record = context.store.get_study(study_id)
-        tag = entity_tag(record.id, record.revision, request.url.path, request.url.query, form)
-        unchanged = not_modified(request, tag)
-        return tag, unchanged or make(record), unchanged is not None
-
-    tag, made, unchanged = await run_in_threadpool(look)
-    response = await made.response(work) if isinstance(made, Drawing) else made
-    return response if unchanged else tagged(response, tag)
-
-
 def _pairs(at: list[str] | None) -> tuple[tuple[str, str], ...]:
     pairs = []
     for item in at or ():
@@ -217,22 +191,3 @@ def _pairs(at: list[str] | None) -> tuple[tuple[str, str], ...]:
             raise parameter_error("at", "must be path=value", shown(item), "for instance shaft.load=0.1 N*m")
         pairs.append((path.strip(), value.strip()))
     return tuple(pairs)
-
-
-def _curves_csv(curves: Curves) -> bytes:
-    """Every point of every curve as one row: fixed parameters, x, results, ending."""
-    first = curves.curves[0].line
-    paths = [*first.by, *first.at]
-    names = [info.name for info in curves.selection.results]
-    regime = [] if curves.selection.regime is None else [curves.selection.regime.name]
-    columns: list[list[Any]] = [[] for _ in range(len(paths) + 2 + len(names) + 1 + len(regime))]
-    for curve in curves.curves:
-        held = {**curve.line.by, **curve.line.at}
-        points = len(curve.endings)
-        parts: list[list[Any]] = [[held[path]] * points for path in paths]
-        parts += [curve.line.cases.tolist(), list(curve.line.x)]
-        parts += [curve.y[name].tolist() for name in names]
-        parts += [curve.regimes] if curve.regimes is not None else []
-        for column, part in zip(columns, [*parts, curve.endings], strict=True):
-            column.extend(part)
-    return exports.table_csv([*paths, "case", curves.selection.x, *names, *regime, "ending"], columns)

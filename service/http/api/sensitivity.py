@@ -9,11 +9,10 @@ from fastapi import APIRouter, Depends, Query, Request
 from starlette.responses import Response
 
 from service.http.api import models as m
-from service.http.api.curves import conditional
 from service.http.api.document import files, format_query, problems
 from service.http.api.document import not_modified as documented_304
 from service.http.context import Ctx, StudyId
-from service.http.drawing import Drawing, attachment, picture, picture_of
+from service.http.drawing import Drawing, attachment, conditional, picture, picture_of
 from service.http.requests import strict_query
 from service.http.respond import choose_format, json_response
 from service.http.work import CHECK_PROBLEMS, Attended

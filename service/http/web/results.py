@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Final
 from urllib.parse import urlencode
 
@@ -10,22 +9,27 @@ from fastapi import APIRouter, Query, Request
 from starlette.responses import RedirectResponse, Response
 
 from service.http import views
-from service.http.context import Context, Ctx, StudyId
-from service.http.respond import entity_tag, json_response, not_modified, tagged
+from service.http.context import Ctx, StudyId
+from service.http.drawing import Drawing, conditional, placed
+from service.http.respond import JSON, json_response
 from service.http.web.choice import MapQuery, curve_query, map_query, pairs_of, varying_axes
-from service.http.web.figures.curves import curves_figure, map_figure
+from service.http.web.figures import answers
 from service.http.web.study import fixed_choices, study_frame
 from service.http.web.templates import page
-from service.results.curves import CurveQuery, draw, draw_map, select
+from service.http.work import Attended
+from service.results.curves import CurveQuery, select
 from service.results.pictures import curves as pictures
 from service.results.selection import SelectionError
 from service.spec.catalogue import unit_of
 from worker import models
 
 if TYPE_CHECKING:
+    from service.storage.records import StudyRecord
     from worker.study import Study
 
 router = APIRouter(include_in_schema=False)
+
+_NOTHING: Final[dict[str, Any]] = {"data": [], "layout": {}}
 
 #: Kinds of map: word on the control.
 KINDS: Final = {"heatmap": "Colours", "contour": "Lines of equal value"}
@@ -116,40 +120,31 @@ def _axis_choices(study: Study) -> list[dict[str, Any]]:
 
 
 @router.get("/studies/{study_id:study}/figures/curves")
-def curves_of(
-    context: Ctx, request: Request, study_id: StudyId, columns: Annotated[int, Query(ge=1, le=2)] = 1
+async def curves_of(
+    context: Ctx, work: Attended, request: Request, study_id: StudyId, columns: Annotated[int, Query(ge=1, le=2)] = 1
 ) -> Response:
     """The figure of curves: as many points as the eye can tell apart, highest and lowest ones always among them."""
 
-    def make(study: Study) -> dict[str, Any]:
-        infos = models.study_results(study)
-        query = curve_query(study, infos, request.query_params)
+    def make(_record: StudyRecord) -> Response | Drawing:
+        study = context.store.study(study_id)
+        query = curve_query(study, models.study_results(study), request.query_params)
         if query is None:
-            return {"data": [], "layout": {}}
-        fetch = partial(context.store.rows_for_cases, study_id)
-        return curves_figure([("", draw(select(study, infos, query), fetch))], columns)
+            return json_response(_NOTHING)
+        return placed(context, Drawing(answers.curves_json, (context.library, study_id, query, columns), JSON))
 
-    return _figure(context, request, study_id, make)
+    return await conditional(context, work, request, study_id, "figure", make)
 
 
 @router.get("/studies/{study_id:study}/figures/map")
-def map_of(context: Ctx, request: Request, study_id: StudyId, kind: str = "heatmap") -> Response:
+async def map_of(context: Ctx, work: Attended, request: Request, study_id: StudyId, kind: str = "heatmap") -> Response:
     """The figure of a map."""
 
-    def make(study: Study) -> dict[str, Any]:
-        infos = models.study_results(study)
-        query = map_query(study, infos, request.query_params)
+    def make(_record: StudyRecord) -> Response | Drawing:
+        study = context.store.study(study_id)
+        query = map_query(study, models.study_results(study), request.query_params)
         if query is None:
-            return {"data": [], "layout": {}}
-        fetch = partial(context.store.rows_for_cases, study_id)
-        return map_figure(draw_map(study, infos, query.x, query.y, query.z, query.at, fetch), kind == "contour")
+            return json_response(_NOTHING)
+        curves = CurveQuery(query.x, (query.z,), (query.y,), query.at)
+        return placed(context, Drawing(answers.map_json, (context.library, study_id, curves, kind == "contour"), JSON))
 
-    return _figure(context, request, study_id, make)
-
-
-def _figure(context: Context, request: Request, study_id: str, make: Any) -> Response:
-    record = context.store.get_study(study_id)
-    tag = entity_tag(record.id, record.revision, request.url.path, request.url.query)
-    if unchanged := not_modified(request, tag):
-        return unchanged
-    return tagged(json_response(make(context.store.study(study_id))), tag)
+    return await conditional(context, work, request, study_id, "figure", make)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
@@ -21,13 +24,14 @@ from service.http.work import Work
 from service.storage.scopes import TokenScope
 from tests.service.conftest import API, InThread, Service
 from tests.worker import fakes
+from worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from anyio.from_thread import BlockingPortal
 
-_LIMITS = Limits(60.0, 64 * 2**20, 8, "too-costly", "SPRAG_CHECK_TIMEOUT")
+_LIMITS = Limits(60.0, 64 * 2**20, 8, "too-costly", "SPRAG_CHECK_TIMEOUT", leave_seconds=0.0)
 
 
 @pytest.fixture
@@ -98,6 +102,34 @@ def test_a_client_that_leaves_ends_the_process(
         asked.result(60)
     psutil.wait_procs([process], timeout=60)
     assert not process.is_running()
+
+
+def test_what_ends_soon_after_its_client_left_costs_no_process(portal: BlockingPortal, tmp_path: Path) -> None:
+    begun, told = tmp_path / "begun", tmp_path / "told"
+    os.mkfifo(begun)
+    os.mkfifo(told)
+    limits = replace(_LIMITS, leave_seconds=60.0)
+    checker = ProcessComputer(limits, prepare=fakes.prepare_nothing)
+
+    async def leave() -> None:
+        process = await checker.run(os.getpid)
+        slow = partial(fakes.load_between, begun=str(begun), told=str(told))
+        running = asyncio.ensure_future(checker.run(slow, models.KernelShape("", ())))
+        await asyncio.to_thread(begun.read_text)
+        queued = asyncio.ensure_future(checker.run(signal.pause))  # would keep the process for ever
+        await anyio.wait_all_tasks_blocked()
+        running.cancel()
+        queued.cancel()
+        await asyncio.to_thread(told.write_text, "now")
+        assert await checker.run(os.getpid) == process
+        for task in (running, queued):
+            with pytest.raises(asyncio.CancelledError):
+                await task
+
+    try:
+        portal.call(leave)
+    finally:
+        checker.close()
 
 
 def test_each_has_a_share_and_no_more(portal: BlockingPortal) -> None:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import csv
 import io
 import math
+import pickle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 from service.http.api import models as m
+from service.results.curves import CurveQuery, select
+from service.results.selection import SelectionError
 from worker import models
 
 if TYPE_CHECKING:
@@ -205,6 +208,43 @@ def test_a_map_has_rows_of_y(service: Service, grid: dict[str, Any]) -> None:
     left = ask(service, study_id, "x=shaft.load&y=excitation.frequency&z=torque.max", "map")
     assert "left open: give its value as at=excitation.amplitude_x=VALUE" in left.json()["detail"]
     assert "by=" not in left.json()["detail"]
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "/api/v1/studies/{}/curves?x=shaft.load&y=torque.max&by=excitation.frequency&at=excitation.amplitude_x=0.001",
+        "/api/v1/studies/{}/curves?x=shaft.load&y=torque.max&at=excitation.frequency=16&at=excitation.amplitude_x=0.001"
+        "&format=csv",
+        "/api/v1/studies/{}/map?x=shaft.load&y=excitation.frequency&z=torque.max&at=excitation.amplitude_x=0.001",
+        "/studies/{}/figures/curves",
+        "/studies/{}/figures/map?kind=contour",
+    ],
+)
+def test_many_numbers_are_written_by_a_process_that_checks(
+    service: Service, grid: dict[str, Any], address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study_id = service.submit(grid)
+    service.fill(study_id)
+    service.checker.calls.clear()
+    here = service.http.get(address.format(study_id))
+    assert here.status_code == 200
+    assert service.checker.calls == []
+    monkeypatch.setattr("service.jobs.answers.FEW", 0)
+    elsewhere = service.http.get(address.format(study_id))
+    assert len(service.checker.calls) == 1
+    pickle.dumps(service.checker.calls)
+    assert elsewhere.content == here.content
+    names = ("content-type", "content-disposition", "etag", "vary")
+    assert [elsewhere.headers.get(name) for name in names] == [here.headers.get(name) for name in names]
+
+
+def test_what_a_process_refuses_comes_back_whole(service: Service, grid: dict[str, Any]) -> None:
+    study = service.store.study(service.submit(grid))
+    with pytest.raises(SelectionError) as refused:
+        select(study, models.study_results(study), CurveQuery("nonsense", ("torque.max",)))
+    again = pickle.loads(pickle.dumps(refused.value))
+    assert (again.errors, str(again)) == (refused.value.errors, str(refused.value))
 
 
 def test_too_many_numbers_are_refused(service: Service, spec: dict[str, Any]) -> None:
