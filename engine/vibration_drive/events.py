@@ -8,15 +8,7 @@ from engine.taylor.batch import HARD, NONE, RESULT, SLOTS, STATUS, put, slot_sta
 from engine.taylor.roots import RECIPROCAL, first_root
 from engine.vibration_drive.automaton import CLUTCH_TARGET, Band
 from engine.vibration_drive.layout import Layout
-from engine.vibration_drive.locking import (
-    EDGE,
-    acceleration,
-    lock_share,
-    others_in_contact,
-    settle_others,
-    share_at,
-    shared_acceleration,
-)
+from engine.vibration_drive.locking import ROUNDING, acceleration, decide, grazes, typical_speed
 from engine.vibration_drive.states import (
     BEYOND,
     ENGAGED,
@@ -34,6 +26,7 @@ from engine.vibration_drive.states import (
     SHAFT_STATE,
     SKIP_SHAFT,
     SKIP_STEP,
+    SKIP_T,
     SKIP_U,
     SKIP_W,
     START,
@@ -48,8 +41,6 @@ from engine.vibration_drive.states import (
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Relative speed, against the pendulum's own motion, below which a start of interaction counts as a crossing of zero.
-_ROUNDING = 1e-12
 #: Angle in rad, and the same of speed over the excitation's rate, below which a motion about 0 is rounding.
 _STILL = 1e-14
 
@@ -164,6 +155,8 @@ def collect_guards(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks
             if fresh and band // 2 < 2:
                 for k in range(Z[lane, (SKIP_W if band // 2 == 0 else SKIP_U) + i]):
                     g[k] = 0.0
+            elif fresh and Z[lane, SKIP_T + i] == band:
+                g[0] = 0.0
             used = _enter(W, Z, lay, lane, i, CLUTCH_TARGET[literal, state, band], g, blocks, meta, used)
     return used
 
@@ -196,8 +189,8 @@ def _start(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> None:
     # w = 0 by the crossing itself, unless the case began with a pendulum already faster than the shaft.
     speed = W[(base + lay.p_speed) * lanes + lane]
     shaft = W[lay.speed * lanes + lane]
-    size = abs(speed) + abs(acceleration(W, lay, lane, i)) * W[lay.inverse_rate * lanes + lane]
-    crossing = Z[lane, EVENT_SMOOTH] == 1 or abs(speed - shaft) <= _ROUNDING * size
+    size = typical_speed(W, lay, lane, i)
+    crossing = Z[lane, EVENT_SMOOTH] == 1 or abs(speed - shaft) <= ROUNDING * size
     if crossing:
         W[(base + lay.p_speed) * lanes + lane] = shaft
     backlash = W[(base + lay.p_backlash) * lanes + lane]
@@ -206,30 +199,16 @@ def _start(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> None:
         set_clutch(W, Z, lay, lane, i, TAKE_UP)
         return
     W[(base + lay.p_u) * lanes + lane] = 0.0
-    state = ENGAGED
     if crossing and W[(base + lay.p_law) * lanes + lane] > 0.0:
-        if others_in_contact(W, Z, lay, lane, i, size):
-            rate = shared_acceleration(W, Z, lay, lane, i, size)
-            share = share_at(W, lay, lane, i, rate)
-            settle_others(W, Z, lay, lane, i, size, rate)
-        else:
-            share = lock_share(W, Z, lay, lane, i)
-        # At the edge the trend decides. At a step's start the series tell it: w'' has the sign of the torque's rate.
-        bend = W[(base + lay.p_speed + 2) * lanes + lane] - W[(lay.speed + 2) * lanes + lane]
-        if abs(share) <= EDGE and Z[lane, EVENT_SMOOTH] == 0 and bend > 0.0:
-            state = LOCKED
-        elif share < EDGE:
-            state = FREE
-            Z[lane, SKIP_W + i] = 2 if share > -EDGE else 0
-        elif share <= 1.0 - EDGE:
-            state = LOCKED
-        elif share < 1.0 + EDGE:
-            Z[lane, SKIP_W + i] = 2
-            Z[lane, SKIP_U + i] = 3
-    if state != FREE:
+        again = Z[lane, i] != FREE
+        decide(W, Z, lay, lane, i, size, -1)
+        again = again and Z[lane, i] != FREE
+    else:
+        again = True
+        set_clutch(W, Z, lay, lane, i, ENGAGED)
+    if again:
         W[(base + lay.p_engagements) * lanes + lane] += 1.0
-    set_clutch(W, Z, lay, lane, i, state)
-    if Z[lane, LITERAL] == 1 and state == ENGAGED:
+    if Z[lane, LITERAL] == 1 and Z[lane, i] == ENGAGED:
         # From beyond the data too, w has just risen: it must fall before it can rise again.
         watch_fall(W, lay, lane, i, True)
 
@@ -245,33 +224,39 @@ def _at_rest(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> bool:
     base = lay.pendulums + i * lay.stride
     phi, speed = (base + lay.p_phi) * lanes + lane, (base + lay.p_speed) * lanes + lane
     still = abs(W[phi]) < _STILL and abs(W[speed]) * W[lay.inverse_rate * lanes + lane] < _STILL
-    if not still or Z[lane, i] == LOCKED or W[lay.acc_x * lanes + lane] != 0.0 or (W[phi] == 0.0 and W[speed] == 0.0):
+    driven = W[lay.acc_x * lanes + lane] * W[(base + lay.p_ml) * lanes + lane] != 0.0
+    if not still or Z[lane, i] == LOCKED or driven or (W[phi] == 0.0 and W[speed] == 0.0):
         return False
     W[phi] = W[speed] = 0.0
     return True
 
 
 @part
-def _let_go_too(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, target: int) -> None:
-    """Let the locked clutches go that come to the same edge at the same instant as clutch ``i``, as copies of it do.
+def _break_away(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
+    """The shaft starts without acceleration, and so without leaving behind a pendulum that stays at rest.
 
-    One after the other they would leave each other a step of rounding, in which nothing tells the trend any more.
+    Its torques balance the load but for the error of the step that led there.
     """
-    lanes = lay.lanes
+    Z[lane, SKIP_SHAFT] = 2
     for j in range(lay.n):
-        base = lay.pendulums + j * lay.stride
-        if j == i or Z[lane, j] != LOCKED:
-            continue
-        share = lock_share(W, Z, lay, lane, j)
-        rate = W[(base + lay.p_torque + 1) * lanes + lane]
-        winds = target == ENGAGED and abs(share - 1.0) < EDGE and rate > 0.0
-        opens = target == FREE and abs(share) < EDGE and rate < 0.0
-        if winds or opens:
-            W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
-            W[(base + lay.p_u) * lanes + lane] = 0.0
-            Z[lane, SKIP_W + j] = 2
-            Z[lane, SKIP_U + j] = 3
-            set_clutch(W, Z, lay, lane, j, target)
+        if Z[lane, j] == FREE:
+            _at_rest(W, Z, lay, lane, j)
+            speed = W[(lay.pendulums + j * lay.stride + lay.p_speed) * lay.lanes + lane]
+            if speed == 0.0 and acceleration(W, lay, lane, j) == 0.0:
+                Z[lane, SKIP_W + j] = 2
+
+
+@part
+def _unlock(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, target: int) -> None:
+    """Let the locked clutch ``i`` go, and decide about all locked clutches with it.
+
+    Copies of it come to the same edge at the same instant. One after the other they would leave each other a step of
+    rounding, in which nothing tells the trend any more.
+    """
+    size = typical_speed(W, lay, lane, i)
+    if Z[lane, EVENT_SMOOTH] == 0 and Z[lane, SKIP_T + i] == 0 and decide(W, Z, lay, lane, i, size, -1):
+        return
+    decide(W, Z, lay, lane, i, size, target)
 
 
 @part
@@ -298,10 +283,11 @@ def transit(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
                 W[(lay.pendulums + j * lay.stride + lay.p_speed) * lanes + lane] = 0.0
         set_shaft(W, Z, lay, lane, target)
         if target == ROTATING and smooth:
-            Z[lane, SKIP_SHAFT] = 2
+            _break_away(W, Z, lay, lane)
         return
     base = lay.pendulums + i * lay.stride
     source = Z[lane, i]
+    asked = Z[lane, SKIP_W + i] > 0 or Z[lane, SKIP_U + i] > 0
     if source != target:
         Z[lane, SKIP_W + i] = 0
         Z[lane, SKIP_U + i] = 0
@@ -316,13 +302,12 @@ def transit(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
         watch_fall(W, lay, lane, i, False)
         return
     if source == LOCKED:
+        _unlock(W, Z, lay, lane, i, target)
+        return
+    if source == ENGAGED and target == FREE and not asked and grazes(W, lay, lane, i):
         W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
         W[(base + lay.p_u) * lanes + lane] = 0.0
-        if smooth:
-            Z[lane, SKIP_W + i] = 2
-            Z[lane, SKIP_U + i] = 3
-        set_clutch(W, Z, lay, lane, i, target)
-        _let_go_too(W, Z, lay, lane, i, target)
+        decide(W, Z, lay, lane, i, typical_speed(W, lay, lane, i), -1)
         return
     if source == TAKE_UP and target == FREE:
         if smooth:

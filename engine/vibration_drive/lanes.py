@@ -16,7 +16,7 @@ from engine.vibration_drive.bounds import TOO_LONG
 from engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS
 from engine.vibration_drive.events import collect_guards, transit
 from engine.vibration_drive.layout import Layout
-from engine.vibration_drive.states import law, set_clutch, set_shaft
+from engine.vibration_drive.states import count_event, law, set_clutch, set_shaft
 from engine.vibration_drive.strobes import FRACTION, begin_at, note
 from engine.vibration_drive.window import energy, primitive, sample, series, watch_extrema
 
@@ -30,7 +30,7 @@ MOST_HALVINGS = 60
 #: Share of the final period-mean speed that ends the run-up.
 RUNUP_SHARE = 0.95
 
-_FREE = int(Clutch.FREE)
+_FREE, _LOCKED = int(Clutch.FREE), int(Clutch.LOCKED)
 _HELD, _ROTATING = int(Shaft.HELD), int(Shaft.ROTATING)
 _OK = ENDING_CODES.index(Ending.OK)
 _ACCURACY = ENDING_CODES.index(Ending.ACCURACY_NOT_REACHED)
@@ -215,12 +215,11 @@ def _take_event(W: Floats, Z: Ints, lay: Layout, lane: int, h: float, most_event
     Z[lane, ev.EVENTS_AT_ONCE] = 0 if h > 0.0 else Z[lane, ev.EVENTS_AT_ONCE] + 1
     pendulum = Z[lane, ev.EVENT_PENDULUM]
     counts = pendulum == ev.OF_SHAFT or Z[lane, pendulum] != Z[lane, ev.EVENT_TARGET]
+    locked = pendulum != ev.OF_SHAFT and Z[lane, pendulum] == _LOCKED
     transit(W, Z, lay, lane)
-    if not counts:
-        return _RUNNING
-    if Z[lane, ev.PERIOD] > 0 or W[lay.f * lay.lanes + lane] > 0.0:
-        Z[lane, ev.EVENTS] += 1
-        Z[lane, ev.EVENTS_IN_PERIOD] += 1
+    # A lock may hold after all, where another one gives way.
+    if counts and not (locked and Z[lane, pendulum] == _LOCKED):
+        count_event(W, Z, lay, lane)
     if Z[lane, ev.EVENTS_IN_PERIOD] > most_events or Z[lane, ev.EVENTS_AT_ONCE] > MOST_AT_ONCE:
         return _CHATTER
     return _RUNNING

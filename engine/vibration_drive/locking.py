@@ -1,4 +1,9 @@
-"""Clutches that lock: delta = 0 and c_1 > 0 at the start of interaction (docs/theory.md, "The automaton")."""
+"""Clutches that lock: delta = 0 and c_1 > 0 (docs/theory.md, "Locking").
+
+All clutches that meet, with w = 0 and u = 0 or locked, are decided together. Their torques follow from the shaft's
+acceleration, the one root of a piecewise linear function; where that leaves a clutch at the edge of two states, its
+trend follows from the shaft's rate of acceleration in the same way.
+"""
 
 import math
 
@@ -6,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.compile.jit import part
+from engine.vibration_drive.automaton import Band
 from engine.vibration_drive.layout import Layout
 from engine.vibration_drive.states import (
     ENGAGED,
@@ -13,9 +19,12 @@ from engine.vibration_drive.states import (
     LOCKED,
     ROTATING,
     SHAFT_STATE,
+    SKIP_T,
     SKIP_U,
     SKIP_W,
+    count_event,
     law,
+    law_slope,
     set_clutch,
 )
 
@@ -23,9 +32,17 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: Relative speed and windup, against the pendulum's own motion, below which another clutch is about to lock too.
-_TOUCHING = 1e-9
-#: A lock torque this near to 0 or c_1 (as a share of c_1) is at the edge: rounding must not lock what has just opened.
+TOUCHING = 1e-9
+#: The same for a clutch that comes to the shaft's speed, or leaves it: below this it is rounding.
+ROUNDING = 1e-12
+#: A lock torque this near to 0 or c_1 (as a share of c_1) is at the edge of two states; its trend decides.
 EDGE = 1e-10
+
+#: Between two steps the rows of a pendulum's distances to its guards hold what is decided: the torque of the clutch at
+#: a shaft that does not accelerate, its bounds, whether it meets others, and the lock torque as a share of c_1.
+_PULL, _LEAST, _MOST, _MEETS, _SHARE = range(5)
+
+_T_LOW, _T_HIGH = int(Band.T_LOW), int(Band.T_HIGH)
 
 
 @part
@@ -48,42 +65,56 @@ def acceleration(W: Floats, lay: Layout, lane: int, i: int) -> float:
 
 
 @part
-def lock_share(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> float:
-    """Torque that would keep w = 0 at clutch ``i``, as a share of its c_1, when interaction starts with delta = 0.
-
-    Above 1 the clutch winds up, below 0 it opens, between it locks. If the torque then breaks the held shaft away, what
-    counts is the torque with the shaft already moving.
-    """
+def _jerk(W: Floats, lay: Layout, lane: int, i: int, rate: float) -> float:
+    """Rate of ``acceleration`` while the pendulum moves with the shaft, whose acceleration is ``rate``."""
     lanes = lay.lanes
     base = lay.pendulums + i * lay.stride
-    first = W[(base + lay.p_law) * lanes + lane]
-    own = W[(base + lay.p_inertia) * lanes + lane]
-    needed = own * acceleration(W, lay, lane, i)
-    push = -W[lay.load * lanes + lane]
-    inertia = W[lay.inertia * lanes + lane]
-    for j in range(lay.n):
-        if j == i:
-            continue
-        other = lay.pendulums + j * lay.stride
-        if Z[lane, j] == LOCKED:
-            moved = W[(other + lay.p_inertia) * lanes + lane]
-            inertia += moved
-            push += moved * acceleration(W, lay, lane, j)
-        elif Z[lane, j] >= ENGAGED:
-            push += law(W, other + lay.p_force, lay.coefficients, lanes, lane, W[(other + lay.p_u) * lanes + lane])
-    if Z[lane, SHAFT_STATE] == ROTATING or push + min(needed, first) > 0.0:
-        needed -= own * (push + needed) / (inertia + own)
-    return float(needed / first)
+    phi = W[(base + lay.p_phi) * lanes + lane]
+    speed = W[(base + lay.p_speed) * lanes + lane]
+    theta = 2.0 * math.pi * W[lay.f * lanes + lane]
+    nu = W[lay.nu * lanes + lane]
+    cos_chi, sin_chi = W[lay.cos_chi * lanes + lane], W[lay.sin_chi * lanes + lane]
+    x = -W[lay.acc_x * lanes + lane] * math.cos(theta)
+    y = -W[lay.acc_y * lanes + lane] * (math.sin(theta) * cos_chi + math.cos(theta) * sin_chi)
+    x_rate = nu * W[lay.acc_x * lanes + lane] * math.sin(theta)
+    y_rate = -nu * W[lay.acc_y * lanes + lane] * (math.cos(theta) * cos_chi - math.sin(theta) * sin_chi)
+    along = x_rate + (y + W[lay.gravity * lanes + lane]) * speed
+    push = along * math.cos(phi) + (y_rate - x * speed) * math.sin(phi)
+    return float(
+        W[(base + lay.p_ml) * lanes + lane] * push
+        - W[(base + lay.p_spring) * lanes + lane] * speed
+        - W[(base + lay.p_damping) * lanes + lane] * rate
+    )
 
 
 @part
-def _touches(W: Floats, Z: Ints, lay: Layout, lane: int, j: int, size: float) -> bool:
-    """Whether clutch ``j``, not locked, is at w = 0 and u = 0 to rounding and could lock; ``size``: a typical speed."""
+def typical_speed(W: Floats, lay: Layout, lane: int, i: int) -> float:
+    """Size of the motion of pendulum ``i`` at the lane's state, rad/s."""
+    speed = W[(lay.pendulums + i * lay.stride + lay.p_speed) * lay.lanes + lane]
+    return float(abs(speed) + abs(acceleration(W, lay, lane, i)) * W[lay.inverse_rate * lay.lanes + lane])
+
+
+@part
+def grazes(W: Floats, lay: Layout, lane: int, i: int) -> bool:
+    """Whether clutch ``i``, about to open, could lock and has w = 0 but for rounding."""
     lanes = lay.lanes
-    base = lay.pendulums + j * lay.stride
+    base = lay.pendulums + i * lay.stride
     if W[(base + lay.p_backlash) * lanes + lane] > 0.0 or not W[(base + lay.p_law) * lanes + lane] > 0.0:
         return False
-    near = _TOUCHING * size
+    w = W[(base + lay.p_speed) * lanes + lane] - W[lay.speed * lanes + lane]
+    return bool(abs(w) <= ROUNDING * typical_speed(W, lay, lane, i))
+
+
+@part
+def _meets(W: Floats, Z: Ints, lay: Layout, lane: int, j: int, size: float) -> bool:
+    """Whether clutch ``j`` is locked, or at w = 0 and u = 0 to rounding and could lock; ``size``: a typical speed."""
+    lanes = lay.lanes
+    base = lay.pendulums + j * lay.stride
+    if Z[lane, j] == LOCKED:
+        return True
+    if W[(base + lay.p_backlash) * lanes + lane] > 0.0 or not W[(base + lay.p_law) * lanes + lane] > 0.0:
+        return False
+    near = TOUCHING * size
     w = W[(base + lay.p_speed) * lanes + lane] - W[lay.speed * lanes + lane]
     u = W[(base + lay.p_u) * lanes + lane]
     wound = Z[lane, j] == ENGAGED and abs(u) <= near * W[lay.inverse_rate * lanes + lane]
@@ -91,112 +122,197 @@ def _touches(W: Floats, Z: Ints, lay: Layout, lane: int, j: int, size: float) ->
 
 
 @part
-def _in_contact(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, j: int, size: float) -> bool:
-    """Whether what clutch ``j`` does is decided together with clutch ``i``, whose interaction starts."""
-    return bool(j == i or Z[lane, j] == LOCKED or _touches(W, Z, lay, lane, j, size))
+def _torque(W: Floats, lay: Layout, lane: int, j: int, rate: float) -> float:
+    """Torque of a clutch, or its rate, while the shaft's acceleration, or its rate, is ``rate``."""
+    base = lay.pendulums + j * lay.stride
+    notes = (base + lay.p_m_w_low) * lay.lanes + lane
+    free = W[notes + _PULL * lay.lanes] - W[(base + lay.p_inertia) * lay.lanes + lane] * rate
+    return float(min(max(free, W[notes + _LEAST * lay.lanes]), W[notes + _MOST * lay.lanes]))
 
 
 @part
-def _excess(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float, push: float, rate: float) -> float:
-    """Torque that is left over if the shaft's acceleration is ``rate``; rises with it.
-
-    A clutch in contact then has the torque that keeps w = 0, but at least 0 and at most its c_1.
-    """
-    lanes = lay.lanes
-    left = W[lay.inertia * lanes + lane] * rate - push
+def _excess(W: Floats, lay: Layout, lane: int, push: float, rate: float) -> float:
+    """Torque that is left over if the shaft's acceleration is ``rate``; rises with it."""
+    left = W[lay.inertia * lay.lanes + lane] * rate - push
     for j in range(lay.n):
-        if _in_contact(W, Z, lay, lane, i, j, size):
-            base = lay.pendulums + j * lay.stride
-            own = W[(base + lay.p_inertia) * lanes + lane]
-            torque = own * (acceleration(W, lay, lane, j) - rate)
-            left -= min(max(torque, 0.0), W[(base + lay.p_law) * lanes + lane])
+        left -= _torque(W, lay, lane, j, rate)
     return float(left)
 
 
 @part
-def shared_acceleration(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float) -> float:
-    """Acceleration of the shaft that is consistent with every clutch in contact when interaction of ``i`` starts.
+def _consistent(W: Floats, lay: Layout, lane: int, push: float) -> float:
+    """The shaft's acceleration, or its rate, at which nothing is left over of ``push`` and all torques.
 
-    Each of them opens (torque 0), locks (between) or winds up (c_1) as the shaft leaves it behind, keeps it or is left
-    behind: a linear complementarity problem. Its torques fall as the shaft's acceleration rises, so that acceleration
-    is the one root of a piecewise linear function, whose corners are where a clutch just opens or just winds up.
+    Its corners are where a clutch's torque comes to one of its bounds; between two of them the function is linear.
     """
     lanes = lay.lanes
-    push = -W[lay.load * lanes + lane]
-    for j in range(lay.n):
-        if not _in_contact(W, Z, lay, lane, i, j, size) and Z[lane, j] >= ENGAGED:
-            base = lay.pendulums + j * lay.stride
-            push += law(W, base + lay.p_force, lay.coefficients, lanes, lane, W[(base + lay.p_u) * lanes + lane])
-    if Z[lane, SHAFT_STATE] != ROTATING and _excess(W, Z, lay, lane, i, size, push, 0.0) >= 0.0:
-        return 0.0
     low, high = -math.inf, math.inf
     for j in range(lay.n):
-        if _in_contact(W, Z, lay, lane, i, j, size):
-            base = lay.pendulums + j * lay.stride
-            opens = acceleration(W, lay, lane, j)
-            winds = opens - W[(base + lay.p_law) * lanes + lane] / W[(base + lay.p_inertia) * lanes + lane]
-            for corner in (winds, opens):
-                if _excess(W, Z, lay, lane, i, size, push, corner) <= 0.0:
+        base = lay.pendulums + j * lay.stride
+        notes = (base + lay.p_m_w_low) * lanes + lane
+        own = W[(base + lay.p_inertia) * lanes + lane]
+        for bound in (_LEAST, _MOST):
+            corner = (W[notes + _PULL * lanes] - W[notes + bound * lanes]) / own
+            if abs(corner) < math.inf:
+                if _excess(W, lay, lane, push, corner) <= 0.0:
                     low = max(low, corner)
                 else:
                     high = min(high, corner)
     inertia = W[lay.inertia * lanes + lane]
     for j in range(lay.n):
-        if _in_contact(W, Z, lay, lane, i, j, size):
-            base = lay.pendulums + j * lay.stride
-            own = W[(base + lay.p_inertia) * lanes + lane]
-            first = W[(base + lay.p_law) * lanes + lane]
-            opens = acceleration(W, lay, lane, j)
-            if opens - first / own >= high:
-                push += first
-            elif opens > low:
-                inertia += own
-                push += own * opens
+        base = lay.pendulums + j * lay.stride
+        notes = (base + lay.p_m_w_low) * lanes + lane
+        own = W[(base + lay.p_inertia) * lanes + lane]
+        least, most = W[notes + _LEAST * lanes], W[notes + _MOST * lanes]
+        if (W[notes + _PULL * lanes] - most) / own >= high:
+            push += most
+        elif (W[notes + _PULL * lanes] - least) / own <= low:
+            push += least
+        else:
+            inertia += own
+            push += W[notes + _PULL * lanes]
     return float(push / inertia)
 
 
 @part
-def share_at(W: Floats, lay: Layout, lane: int, j: int, rate: float) -> float:
-    """Torque that keeps w = 0 at clutch ``j`` while the shaft's acceleration is ``rate``, as a share of its c_1."""
-    base = lay.pendulums + j * lay.stride
-    own = W[(base + lay.p_inertia) * lay.lanes + lane]
-    return float(own * (acceleration(W, lay, lane, j) - rate) / W[(base + lay.p_law) * lay.lanes + lane])
+def _shared_acceleration(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float) -> float:
+    """Acceleration of the shaft that is consistent with every clutch that meets clutch ``i``; each one's share of c_1.
 
-
-@part
-def others_in_contact(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float) -> bool:
-    """Whether another clutch is locked, or at w = 0 and u = 0 too, when interaction of ``i`` starts."""
-    others = 0
-    for j in range(lay.n):
-        if j != i and _in_contact(W, Z, lay, lane, i, j, size):
-            others += 1
-    return others > 0
-
-
-@part
-def settle_others(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float, rate: float) -> None:
-    """Put every other clutch in contact into the state that goes with the shaft's acceleration ``rate``.
-
-    At the edge of two states a clutch keeps the one it has: its guards tell the trend.
+    Each of them opens (torque 0), locks (between) or winds up (c_1) as the shaft leaves it behind, keeps it or is left
+    behind: a linear complementarity problem.
     """
     lanes = lay.lanes
+    push = -W[lay.load * lanes + lane]
     for j in range(lay.n):
-        if j == i or not _in_contact(W, Z, lay, lane, i, j, size):
+        base = lay.pendulums + j * lay.stride
+        notes = (base + lay.p_m_w_low) * lanes + lane
+        for k in range(_SHARE + 1):
+            W[notes + k * lanes] = 0.0
+        if j == i or _meets(W, Z, lay, lane, j, size):
+            W[notes + _MEETS * lanes] = 1.0
+            W[notes + _PULL * lanes] = W[(base + lay.p_inertia) * lanes + lane] * acceleration(W, lay, lane, j)
+            W[notes + _MOST * lanes] = W[(base + lay.p_law) * lanes + lane]
+        elif Z[lane, j] >= ENGAGED:
+            push += law(W, base + lay.p_force, lay.coefficients, lanes, lane, W[(base + lay.p_u) * lanes + lane])
+    rate = 0.0
+    if Z[lane, SHAFT_STATE] == ROTATING or _excess(W, lay, lane, push, 0.0) < 0.0:
+        rate = _consistent(W, lay, lane, push)
+    for j in range(lay.n):
+        base = lay.pendulums + j * lay.stride
+        notes = (base + lay.p_m_w_low) * lanes + lane
+        if W[notes + _MEETS * lanes] > 0.0:
+            own = W[(base + lay.p_inertia) * lanes + lane]
+            W[notes + _SHARE * lanes] = (W[notes + _PULL * lanes] - own * rate) / W[(base + lay.p_law) * lanes + lane]
+    return rate
+
+
+@part
+def _shared_jerk(W: Floats, Z: Ints, lay: Layout, lane: int, rate: float, near: float) -> None:
+    """Note the rate of each torque that meets, where the shaft's acceleration is ``rate``.
+
+    A clutch at the edge of opening can only gain torque, one at the edge of winding up can only lose it.
+    """
+    lanes = lay.lanes
+    push = 0.0
+    for j in range(lay.n):
+        base = lay.pendulums + j * lay.stride
+        notes = (base + lay.p_m_w_low) * lanes + lane
+        if W[notes + _MEETS * lanes] > 0.0:
+            share = W[notes + _SHARE * lanes]
+            opening, winding = abs(share) < near, abs(share - 1.0) < near
+            beyond = not (opening or winding) and not 0.0 < share < 1.0
+            W[notes + _PULL * lanes] = W[(base + lay.p_inertia) * lanes + lane] * _jerk(W, lay, lane, j, rate)
+            W[notes + _LEAST * lanes] = 0.0 if opening or beyond else -math.inf
+            W[notes + _MOST * lanes] = 0.0 if winding or beyond else math.inf
+        elif Z[lane, j] >= ENGAGED:
+            w = W[(base + lay.p_speed) * lanes + lane] - W[lay.speed * lanes + lane]
+            u = W[(base + lay.p_u) * lanes + lane]
+            push += w * law_slope(W, base + lay.p_force, lay.coefficients, lanes, lane, u)
+    jerk = 0.0
+    if Z[lane, SHAFT_STATE] == ROTATING or rate > 0.0:
+        jerk = _consistent(W, lay, lane, push)
+    for j in range(lay.n):
+        base = lay.pendulums + j * lay.stride
+        W[(base + lay.p_m_w_low + _PULL) * lanes + lane] -= W[(base + lay.p_inertia) * lanes + lane] * jerk
+
+
+@part
+def _at_edge(W: Floats, lay: Layout, lane: int, near: float) -> bool:
+    """Whether the lock torque of a clutch that meets others is at 0 or c_1."""
+    count = 0
+    for j in range(lay.n):
+        notes = (lay.pendulums + j * lay.stride + lay.p_m_w_low) * lay.lanes + lane
+        share = W[notes + _SHARE * lay.lanes]
+        if W[notes + _MEETS * lay.lanes] > 0.0 and (abs(share) < near or abs(share - 1.0) < near):
+            count += 1
+    return count > 0
+
+
+@part
+def _put(W: Floats, Z: Ints, lay: Layout, lane: int, j: int, state: int, edge: int) -> None:
+    """Put a clutch that meets others into a state, with w = 0 and u = 0 exactly; ``edge``: band of its torque, or 0.
+
+    The skips at the edge tell the guards which leading coefficients are zero there.
+    """
+    lanes = lay.lanes
+    base = lay.pendulums + j * lay.stride
+    if Z[lane, j] == FREE and state != FREE:
+        W[(base + lay.p_engagements) * lanes + lane] += 1.0
+    W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
+    W[(base + lay.p_u) * lanes + lane] = 0.0
+    Z[lane, SKIP_W + j] = 2 if edge > 0 and state != LOCKED else 0
+    Z[lane, SKIP_U + j] = 3 if edge > 0 and state == ENGAGED else 0
+    Z[lane, SKIP_T + j] = edge if state == LOCKED else 0
+    set_clutch(W, Z, lay, lane, j, state)
+
+
+@part
+def decide(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float, target: int) -> bool:
+    """Put clutch ``i`` and all that it meets into the one combination of states that is consistent.
+
+    Parameters
+    ----------
+    size : float
+        A typical speed of pendulum ``i``, rad/s, against which others are near.
+    target : int
+        The state into which the torque of clutch ``i``, locked, just passes (FREE or ENGAGED); -1 where its state is
+        open.
+
+    Returns
+    -------
+    bool
+        Whether any state changed, or a clutch was found at the edge of two.
+    """
+    lanes = lay.lanes
+    rate = _shared_acceleration(W, Z, lay, lane, i, size)
+    near = EDGE
+    own = (lay.pendulums + i * lay.stride + lay.p_m_w_low + _SHARE) * lanes + lane
+    if target >= 0:
+        # Its share is at the edge but for the error of the step that led there; so are those of its copies.
+        passed = 1.0 if target == ENGAGED else 0.0
+        near += abs(W[own] - passed)
+        W[own] = passed
+    if _at_edge(W, lay, lane, near):
+        _shared_jerk(W, Z, lay, lane, rate, near)
+    put = 0
+    for j in range(lay.n):
+        notes = (lay.pendulums + j * lay.stride + lay.p_m_w_low) * lanes + lane
+        if not W[notes + _MEETS * lanes] > 0.0:
             continue
-        source = Z[lane, j]
-        share = share_at(W, lay, lane, j, rate)
+        share, trend = W[notes + _SHARE * lanes], W[notes + _PULL * lanes]
         state = FREE if share < 0.0 else (ENGAGED if share > 1.0 else LOCKED)
-        opening, winding = abs(share) < EDGE, abs(share - 1.0) < EDGE
-        if state == source or (opening and source != ENGAGED) or (winding and source != FREE):
-            continue
-        if winding:
-            state = ENGAGED
-            Z[lane, SKIP_U + j] = 3
-        elif opening:
-            state = FREE
-            Z[lane, SKIP_W + j] = 2
-        if source == FREE:
-            W[(lay.pendulums + j * lay.stride + lay.p_engagements) * lanes + lane] += 1.0
-        W[(lay.pendulums + j * lay.stride + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
-        W[(lay.pendulums + j * lay.stride + lay.p_u) * lanes + lane] = 0.0
-        set_clutch(W, Z, lay, lane, j, state)
+        edge = 0
+        if abs(share) < near:
+            edge = _T_LOW
+            state = LOCKED if trend > 0.0 else FREE
+        elif abs(share - 1.0) < near:
+            edge = _T_HIGH
+            state = ENGAGED if trend > 0.0 else LOCKED
+        if j == i and target >= 0:
+            state = target
+        if Z[lane, j] != state or edge > 0:
+            put += 1
+            if j != i and Z[lane, j] != state:
+                count_event(W, Z, lay, lane)
+            _put(W, Z, lay, lane, j, state, edge)
+    return put > 0

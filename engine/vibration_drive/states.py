@@ -35,7 +35,8 @@ LITERAL = 19
 SKIP_SHAFT = 20
 SKIP_W = 21  # eight columns
 SKIP_U = 29  # eight columns
-LANE_INTEGERS = 37
+SKIP_T = 37  # eight columns: the band whose edge the torque is at, or 0
+LANE_INTEGERS = 45
 
 NO_EVENT = -2
 OF_SHAFT = -1
@@ -137,6 +138,14 @@ def set_clutch(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, state: int) -
     W[lay.driven * lanes + lane] = 1.0 if driving > 0.0 else 0.0
     W[lay.driving_max * lanes + lane] = max(driving, W[lay.driving_max * lanes + lane])
     _set_mobility(W, Z, lay, lane)
+
+
+@part
+def count_event(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
+    """Count a transition; those at t = 0 belong to the start."""
+    if Z[lane, PERIOD] > 0 or W[lay.f * lay.lanes + lane] > 0.0:
+        Z[lane, EVENTS] += 1
+        Z[lane, EVENTS_IN_PERIOD] += 1
 
 
 @part

@@ -43,3 +43,38 @@ def odd_drive(rng: np.random.Generator, pendulums: int) -> Columns:
             own = {name: columns[f"pendulums.{index - 1}.{name}"] for name in own}
         columns |= {f"pendulums.{index}.{name}": value for name, value in own.items()}
     return columns
+
+
+def idle_drive(rng: np.random.Generator, pendulums: int) -> tuple[Columns, int]:
+    """An odd drive with one pendulum that nothing excites, and which that is; ``pendulums`` >= 2 counts it.
+
+    It hangs at exactly 0 with mass or arm 0, so horizontal vibration does not move it either. The shaft never turns
+    back, so its clutch stays out of all that happens.
+    """
+    columns = odd_drive(rng, pendulums - 1)
+    if rng.random() < 0.7:
+        columns["excitation.amplitude_x"] = rng.uniform(1e-3, 4e-3)
+    place = int(rng.integers(pendulums))
+    for index in reversed(range(place, pendulums - 1)):
+        for name in [path.split(".")[2] for path in columns if path.startswith("pendulums.0.")]:
+            columns[f"pendulums.{index + 1}.{name}"] = columns[f"pendulums.{index}.{name}"]
+    own = {
+        "inertia": 10.0 ** rng.uniform(-3.5, -2.0), "mass": 0.25, "arm": 0.03, "spring_arm": 0.05,
+        "spring_rate": rng.uniform(6e3, 1e5), "damping": float(rng.choice([0.0, 0.03])),
+        "backlash": float(rng.choice([0.0, 0.0, 0.005])), "initial_angle": 0.0, "initial_speed": 0.0,
+    }  # fmt: skip
+    own[str(rng.choice(["mass", "arm"]))] = 0.0
+    return columns | {f"pendulums.{place}.{name}": value for name, value in own.items()}, place
+
+
+def without(columns: Columns, place: int) -> Columns:
+    """The same drive without one of its pendulums."""
+    out: Columns = {}
+    for path, value in columns.items():
+        if not path.startswith("pendulums."):
+            out[path] = value
+            continue
+        index, name = int(path.split(".")[1]), path.split(".")[2]
+        if index != place:
+            out[f"pendulums.{index - (index > place)}.{name}"] = value
+    return out

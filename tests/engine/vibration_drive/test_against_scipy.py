@@ -15,7 +15,7 @@ from engine.endings import Ending
 from engine.run import Reset
 from engine.vibration_drive.simulate import trajectory
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, clutch, column, drive, pendulum, periods
-from tests.engine.vibration_drive.reference_automaton import Accumulating, Drive
+from tests.engine.vibration_drive.reference_run import Accumulating, Drive
 
 DURATION, START = 8, 3
 NUDGE = 1e-12

@@ -1,0 +1,144 @@
+"""A second implementation of the vibration drive for comparison only, slow and plain: its equations.
+
+It shares nothing with the engine. Its automaton is in ``reference_automaton``, its integration in ``reference_run``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Pendulum:
+    """docs/theory.md: J, M l, c a^2, lambda, delta, law and end of its data."""
+
+    inertia: float
+    moment: float
+    spring: float
+    damping: float
+    backlash: float
+    law: tuple[float, ...]
+    limit: float
+
+    def torque(self, u: Any) -> Any:
+        """Law (3), straight beyond the end of the data; numbers or arrays."""
+        inside = np.minimum(u, self.limit)
+        value = sum(c * inside**k for k, c in enumerate(self.law))
+        slope = sum(k * c * inside ** (k - 1) for k, c in enumerate(self.law) if k > 0)
+        return value + np.where(u > self.limit, slope * (u - inside), 0.0)
+
+
+@dataclass
+class Outcome:
+    """What a run gave: states at whole periods, integrals and extrema over the window, number of transitions."""
+
+    states: list[tuple[str, ...]] = field(default_factory=list)
+    values: list[Floats] = field(default_factory=list)
+    events: int = 0
+    engagements: int = 0
+    largest: dict[str, float] = field(default_factory=dict)
+    mean: dict[str, float] = field(default_factory=dict)
+
+
+class Machine:
+    """The machine of flat parameters, as the engine takes them."""
+
+    out: Outcome
+
+    def __init__(self, columns: Mapping[str, Any], literal: bool) -> None:
+        def get(path: str, default: float = 0.0) -> float:
+            return float(columns.get(path, default))
+
+        self.n = 1 + max(int(path.split(".")[1]) for path in columns if path.startswith("pendulums."))
+        self.literal = literal
+        self.nu = 2.0 * math.pi * get("excitation.frequency")
+        self.period = 1.0 / get("excitation.frequency")
+        self.d, self.b = get("excitation.amplitude_x"), get("excitation.amplitude_y")
+        self.chi = get("excitation.phase")
+        self.g = get("gravity", 9.80665)
+        self.inertia, self.load = get("shaft.inertia"), get("shaft.load")
+        law = tuple(get(f"clutch.coefficients.{k}") for k in range(12))
+        while len(law) > 1 and law[-1] == 0.0:
+            law = law[:-1]
+        self.pendulums = [
+            Pendulum(
+                get(f"pendulums.{i}.inertia"),
+                get(f"pendulums.{i}.mass") * get(f"pendulums.{i}.arm"),
+                get(f"pendulums.{i}.spring_rate") * get(f"pendulums.{i}.spring_arm") ** 2,
+                get(f"pendulums.{i}.damping"),
+                get(f"pendulums.{i}.backlash"),
+                law,
+                get("clutch.windup_limit", math.inf),
+            )
+            for i in range(self.n)
+        ]
+        # Angles, speeds, windups; shaft's angle and speed; integrals: torque, input, loss, clutch work, angles.
+        n = self.n
+        self.shaft = 3 * n + 1
+        self.start = np.zeros(4 * n + 6)
+        self.start[:n] = [get(f"pendulums.{i}.initial_angle") for i in range(n)]
+        self.start[n : 2 * n] = [get(f"pendulums.{i}.initial_speed") for i in range(n)]
+        self.start[self.shaft] = get("shaft.initial_speed")
+        self.clutches = ["free"] * n
+        self.shaft_state = "rotating" if self.start[self.shaft] > 0.0 or self.load == 0.0 else "held"
+
+    def base(self, t: Any) -> tuple[Any, Any]:
+        """x'' and y'' of (2)."""
+        square = self.nu**2
+        return -self.d * square * np.cos(self.nu * t), -self.b * square * np.sin(self.nu * t + self.chi)
+
+    def free_moment(self, i: int, t: Any, y: Any) -> Any:
+        """J phi'' of (1) without the clutch."""
+        p = self.pendulums[i]
+        phi, speed = y[i], y[self.n + i]
+        ax, ay = self.base(t)
+        drive = p.moment * (ax * np.cos(phi) + (ay + self.g) * np.sin(phi))
+        return drive - p.spring * phi - p.damping * speed
+
+    def torques(self, t: Any, y: Any) -> tuple[list[Any], Any]:
+        """Torque of every clutch and the shaft's acceleration in the present mode."""
+        sprung = [
+            self.pendulums[i].torque(y[2 * self.n + i]) if self.clutches[i] in ("engaged", "beyond") else 0.0 * t
+            for i in range(self.n)
+        ]
+        locked = [i for i in range(self.n) if self.clutches[i] == "locked"]
+        free = {i: self.free_moment(i, t, y) for i in locked}
+        acceleration = 0.0 * t
+        if self.shaft_state == "rotating":
+            together = self.inertia + sum(self.pendulums[i].inertia for i in locked)
+            acceleration = (sum(sprung) + sum(free.values()) - self.load) / together
+        for i in locked:
+            sprung[i] = free[i] - self.pendulums[i].inertia * acceleration
+        return sprung, acceleration
+
+    def rates(self, t: float, y: Floats) -> Floats:
+        """Right-hand side of everything that is integrated."""
+        n = self.n
+        torque, acceleration = self.torques(t, y)
+        out = np.zeros_like(y)
+        ax, ay = self.base(t)
+        shaft = y[self.shaft]
+        for i, p in enumerate(self.pendulums):
+            speed = y[n + i]
+            out[i] = speed
+            out[n + i] = (self.free_moment(i, t, y) - torque[i]) / p.inertia
+            if self.clutches[i] == "locked":
+                out[n + i] = acceleration
+            elif self.clutches[i] != "free":
+                out[2 * n + i] = speed - shaft
+            out[3 * n + 3] += p.moment * speed * (ax * math.cos(y[i]) + ay * math.sin(y[i]))
+            out[3 * n + 4] += p.damping * speed**2
+            out[3 * n + 6 + i] = y[i]
+        out[3 * n] = shaft
+        out[self.shaft] = acceleration
+        out[3 * n + 2] = sum(torque)
+        out[3 * n + 5] = sum(torque) * shaft
+        return out
