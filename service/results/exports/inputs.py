@@ -5,45 +5,18 @@ A default that nobody wrote is an input like any other: without it a file does n
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from inspect import signature
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from service.spec.catalogue import parameter_of, unit_of
-from worker import models
+from service.spec.machine.registry import part_of
 
 if TYPE_CHECKING:
     from worker.study import Study
 
 #: Where the value of an input is from; "" where the user's own spec is not known.
 Origin = Literal["given", "default", "fitted", "axes", ""]
-
-#: What of a machine is no number, by its path; of a clutch that is fitted, by the last part of it.
-_MEANINGS: Final = {
-    "cycle": "revolutions of a cycle",
-    "mean_speed_is": "mean that mean_speed and the irregularity refer to",
-    "balance": "what makes the work over a cycle zero",
-    "phi_c": "angle with T = T_mean from which S3 and S4 count, from 0",
-    "drive.motor.kind": "kind of the motor",
-    "drive.torque.interpolation": "between the rows of the torque's table",
-    "mechanism": "the mechanism",
-    "mechanism.quick_return.kind": "kind of the quick return",
-    "mechanism.cam.rise": "law of the rise",
-    "mechanism.cam.fall": "law of the fall",
-    "mechanism.interpolation": "between the rows of the mechanism's table",
-    "operation": "how the resistance is given",
-    "operation.quantity": "what the diagram is of",
-    "operation.over": "what the diagram goes over",
-    "operation.during": "strokes in which the diagram holds",
-    "operation.sense": "direction of the force",
-    "operation.interpolation": "between the rows of the operation's table",
-    "windup_limit": "largest windup; none: the law holds for any",
-    "max_degree": "largest degree that the fit may have",
-    "through_origin": "whether the fitted torque begins at 0",
-    "angles_include_backlash": "whether the measured angles begin before the backlash is taken up",
-}
-_FIT_OPTIONS: Final = ("max_degree", "through_origin", "angles_include_backlash")
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +61,8 @@ def inputs(study: Study, spec: Mapping[str, Any]) -> tuple[Input, ...]:
         for path in dict.fromkeys((*varying, *study.base))
     ]
     chosen = [
-        Input(path, text, "", _MEANINGS.get(path) or _MEANINGS[path.rpartition(".")[2]], _origin(spec, path))
-        for path, text in choices(study, spec).items()
+        Input(choice.path, choice.text, "", choice.meaning, _origin(spec, choice.path))
+        for choice in part_of(study.model).choices(study, spec)
     ]
     return (*numbers, *chosen)
 
@@ -112,56 +85,7 @@ def defaults(study: Study, spec: Mapping[str, Any]) -> list[str]:
 
 def choices(study: Study, spec: Mapping[str, Any]) -> dict[str, str]:
     """What of the machine is no number, by its path in the base."""
-    return dict(_fit_choices(study, spec) if study.structure is None else _shaft_choices(study.structure))
-
-
-def _fit_choices(study: Study, spec: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    base = spec.get("base") or {}
-    places = [("clutch", base)] if "clutch" in base else []
-    places += [(f"pendulums.{index}.clutch", item) for index, item in enumerate(base.get("pendulums") or ())]
-    for place, owner in places:
-        clutch = owner.get("clutch") or {}
-        if "data" in clutch:
-            usual = signature(models.fit_clutch).parameters
-            for name in _FIT_OPTIONS:
-                value = clutch.get(name, usual[name].default)
-                yield f"{place}.{name}", str(value).lower()
-        elif clutch and f"{place}.windup_limit" not in (*study.base, *study.axis_paths):
-            yield f"{place}.windup_limit", "none"
-
-
-def _shaft_choices(structure: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    drive, mechanism, operation = (structure[name] for name in ("drive", "mechanism", "operation"))
-    cycle, phi_c = structure["cycle"], structure["phi_c"]
-    yield "cycle", f"{cycle} revolution{'s' if cycle > 1 else ''}"
-    yield "mean_speed_is", structure["mean_speed_is"]
-    yield "balance", structure["balance"]
-    yield "phi_c", "the first at which T rises" if phi_c is None else str(phi_c)
-    if drive["motor"]:
-        yield "drive.motor.kind", drive["motor"]
-    if drive["table"]:
-        yield "drive.torque.interpolation", drive["table"]["interpolation"]
-    yield "mechanism", mechanism["kind"]
-    if "quick_return" in mechanism:
-        yield "mechanism.quick_return.kind", mechanism["quick_return"]
-    for law in ("rise", "fall"):
-        if law in mechanism:
-            yield f"mechanism.cam.{law}", mechanism[law]
-    if mechanism.get("table"):
-        yield "mechanism.interpolation", mechanism["table"]["interpolation"]
-    yield from _operation_choices(operation)
-
-
-def _operation_choices(operation: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    form = operation.get("form", operation["quantity"])  # a gas has no form, nothing that resists has neither
-    yield "operation", "value" if form == "constant" else form
-    if "form" not in operation:
-        return
-    used = ["quantity", "over", *(["during"] if operation["over"] == "stroke" else [])]
-    for name in [*used, *(["sense"] if operation["quantity"] == "force" else [])]:
-        yield f"operation.{name}", operation[name]
-    if operation.get("table"):
-        yield "operation.interpolation", operation["table"]["interpolation"]
+    return {choice.path: choice.text for choice in part_of(study.model).choices(study, spec)}
 
 
 def _origin(spec: Mapping[str, Any], path: str) -> Origin:

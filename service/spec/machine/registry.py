@@ -10,6 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from service.spec.axes.axes import varied_values
+from service.spec.machine.choices import Choice, drive_choices, shaft_choices
 from service.spec.machine.clutch import check_laws
 from service.spec.machine.drive import Drive, read_drive
 from service.spec.machine.machine import read_plain
@@ -23,7 +24,7 @@ from service.spec.warnings import warn_machine_shaft, warn_vibration_drive
 from worker import models
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable, Mapping
 
     from service.spec.machine.machine import Machine
     from service.spec.report import Report
@@ -45,6 +46,10 @@ def _nothing(*_: object) -> None:
     """No more to check, nothing to warn of."""
 
 
+def _no_choices(*_: object) -> tuple[Choice, ...]:
+    return ()
+
+
 @dataclass(frozen=True, slots=True)
 class SpecPart:
     """The part of one model; every function notes what is wrong in the report that it is given.
@@ -56,6 +61,7 @@ class SpecPart:
     read_run : reads `run` of a machine with its axes (None where they could not be read) as a study keeps it
     check : looks at what takes machine and axes together
     warn : warns of what is allowed, and implausible
+    choices : what of the machine of a study is no number; takes the user's own spec too
     """
 
     read_base: Callable[[Report, object], Machine]
@@ -64,6 +70,7 @@ class SpecPart:
     run_schema: Callable[[], Schema] = _no_run_schema
     check: Callable[[Report, Machine, Axes, Combine], None] = _nothing
     warn: Callable[[Report, Study], None] = _nothing
+    choices: Callable[[Study, Mapping[str, Any]], Iterable[Choice]] = _no_choices
 
 
 def _drive_run(report: Report, data: object, machine: Machine, axes: Axes | None) -> dict[str, Any]:
@@ -86,9 +93,22 @@ def _shaft_run_schema() -> Schema:
 
 _PARTS = {
     models.VIBRATION_DRIVE: SpecPart(
-        read_drive, drive_schema, _drive_run, run_schema, _drive_check, warn_vibration_drive
+        read_base=read_drive,
+        base_schema=drive_schema,
+        read_run=_drive_run,
+        run_schema=run_schema,
+        check=_drive_check,
+        warn=warn_vibration_drive,
+        choices=drive_choices,
     ),
-    models.MACHINE_SHAFT: SpecPart(read_shaft, shaft_schema, _shaft_run, _shaft_run_schema, warn=warn_machine_shaft),
+    models.MACHINE_SHAFT: SpecPart(
+        read_base=read_shaft,
+        base_schema=shaft_schema,
+        read_run=_shaft_run,
+        run_schema=_shaft_run_schema,
+        warn=warn_machine_shaft,
+        choices=shaft_choices,
+    ),
 }
 
 

@@ -1,0 +1,103 @@
+"""What of a machine is no number, as a table of inputs shows it: a text for each choice, defaults included."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from inspect import signature
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from worker import models
+
+if TYPE_CHECKING:
+    from worker.study import Study
+
+#: Options of the fit of a clutch law, and what they mean.
+_FIT_OPTIONS: Final = {
+    "max_degree": "largest degree that the fit may have",
+    "through_origin": "whether the fitted torque begins at 0",
+    "angles_include_backlash": "whether the measured angles begin before the backlash is taken up",
+}
+#: The choices of a machine shaft.
+_MEANINGS: Final = {
+    "cycle": "revolutions of a cycle",
+    "mean_speed_is": "mean that mean_speed and the irregularity refer to",
+    "balance": "what makes the work over a cycle zero",
+    "phi_c": "angle with T = T_mean from which S3 and S4 count, from 0",
+    "drive.motor.kind": "kind of the motor",
+    "drive.torque.interpolation": "between the rows of the torque's table",
+    "mechanism": "the mechanism",
+    "mechanism.quick_return.kind": "kind of the quick return",
+    "mechanism.cam.rise": "law of the rise",
+    "mechanism.cam.fall": "law of the fall",
+    "mechanism.interpolation": "between the rows of the mechanism's table",
+    "operation": "how the resistance is given",
+    "operation.quantity": "what the diagram is of",
+    "operation.over": "what the diagram goes over",
+    "operation.during": "strokes in which the diagram holds",
+    "operation.sense": "direction of the force",
+    "operation.interpolation": "between the rows of the operation's table",
+}
+
+
+class Choice(NamedTuple):
+    """One choice: its path in the base, what was chosen, and what it decides."""
+
+    path: str
+    text: str
+    meaning: str
+
+
+def drive_choices(study: Study, spec: Mapping[str, Any]) -> Iterator[Choice]:
+    """How the clutch laws of a vibration drive are fitted, and which have no limit."""
+    base = spec.get("base") or {}
+    places = [("clutch", base)] if "clutch" in base else []
+    places += [(f"pendulums.{index}.clutch", item) for index, item in enumerate(base.get("pendulums") or ())]
+    for place, owner in places:
+        clutch = owner.get("clutch") or {}
+        if "data" in clutch:
+            usual = signature(models.fit_clutch).parameters
+            for name in _FIT_OPTIONS:
+                value = clutch.get(name, usual[name].default)
+                yield Choice(f"{place}.{name}", str(value).lower(), _FIT_OPTIONS[name])
+        elif clutch and f"{place}.windup_limit" not in (*study.base, *study.axis_paths):
+            yield Choice(f"{place}.windup_limit", "none", "largest windup; none: the law holds for any")
+
+
+def shaft_choices(study: Study, _: Mapping[str, Any]) -> Iterator[Choice]:
+    """The structure of a machine shaft."""
+    for path, text in _chosen(study.structure or {}):
+        yield Choice(path, text, _MEANINGS[path])
+
+
+def _chosen(structure: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    drive, mechanism, operation = (structure[name] for name in ("drive", "mechanism", "operation"))
+    cycle, phi_c = structure["cycle"], structure["phi_c"]
+    yield "cycle", f"{cycle} revolution{'s' if cycle > 1 else ''}"
+    yield "mean_speed_is", structure["mean_speed_is"]
+    yield "balance", structure["balance"]
+    yield "phi_c", "the first at which T rises" if phi_c is None else str(phi_c)
+    if drive["motor"]:
+        yield "drive.motor.kind", drive["motor"]
+    if drive["table"]:
+        yield "drive.torque.interpolation", drive["table"]["interpolation"]
+    yield "mechanism", mechanism["kind"]
+    if "quick_return" in mechanism:
+        yield "mechanism.quick_return.kind", mechanism["quick_return"]
+    for law in ("rise", "fall"):
+        if law in mechanism:
+            yield f"mechanism.cam.{law}", mechanism[law]
+    if mechanism.get("table"):
+        yield "mechanism.interpolation", mechanism["table"]["interpolation"]
+    yield from _operation_choices(operation)
+
+
+def _operation_choices(operation: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    form = operation.get("form", operation["quantity"])  # a gas has no form, nothing that resists has neither
+    yield "operation", "value" if form == "constant" else form
+    if "form" not in operation:
+        return
+    used = ["quantity", "over", *(["during"] if operation["over"] == "stroke" else [])]
+    for name in [*used, *(["sense"] if operation["quantity"] == "force" else [])]:
+        yield f"operation.{name}", operation[name]
+    if operation.get("table"):
+        yield "operation.interpolation", operation["table"]["interpolation"]
