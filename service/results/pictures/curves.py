@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 import numpy as np
 
 from service.faults import ErrorItem
+from service.results.regimes import DOUBTFUL, MARKED, MARKS, regimes_of, stretches
 from service.results.selection import SelectionError
 from worker.pool.child_process import uncounted
 
@@ -96,6 +97,7 @@ def paint_curves(figure: Figure, curves: Curves, title: str) -> None:
     chosen = curves.selection
     plots[-1].set_xlabel(axis_label(chosen.names[chosen.x], chosen.units[chosen.x]))
     _explain(figure, list(plots), curves)
+    _explain_regimes(figure, regimes_of(curve.regimes for curve in curves.curves))
     head(figure, title, chosen.held)
 
 
@@ -120,10 +122,28 @@ def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
         axes.set_xlabel(axis_label(drawn.names[0], drawn.units[0]))
         axes.set_ylabel(axis_label(drawn.names[1], drawn.units[1]))
         figure.colorbar(mesh, label=axis_label(drawn.result.name, drawn.result.unit))
+        _mark_doubtful(axes, drawn)
+        _explain_regimes(figure, [name for name in regimes_of(drawn.regimes or ()) if name in DOUBTFUL])
         missing = int(np.isnan(drawn.values).sum())
         head(figure, title, (*drawn.held, f"grey: {missing} cases without a result") if missing else drawn.held)
 
     return render(paint, picture, (8.0, 6.0))
+
+
+def _mark_doubtful(axes: Axes, drawn: Map) -> None:
+    """The points of a map whose motion is not periodic."""
+    for name in DOUBTFUL:
+        places = [
+            (drawn.x_values[column], drawn.y_values[row])
+            for row, regimes in enumerate(drawn.regimes or ())
+            for column, own in enumerate(regimes)
+            if own == name
+        ]
+        if places:
+            mark = MARKS[name]
+            axes.plot(
+                *zip(*places, strict=True), color=mark.colour, linestyle="none", marker=mark.marker, clip_on=False
+            )
 
 
 def check_size(what: str, count: int, most: int) -> None:
@@ -176,17 +196,27 @@ def _paint_curves(axes: Axes, curves: Curves, infos: list[ResultInfo], unit: str
         # A line tells how x leads to y; points of a zip that go to and fro are not on one.
         run = curve.run()
         x = np.asarray(curve.line.x)[run]
+        regimes = None if curve.regimes is None else [curve.regimes[place] for place in run.tolist()]
         joined = bool(np.all(np.diff(x) > 0.0))
         for info, (style, marker) in zip(infos, itertools.cycle(_STYLES), strict=False):
-            axes.plot(
-                x,
-                curve.y[info.name][run],
-                color=colour,
-                linestyle=style if joined else "none",
-                marker=marker,
-                markersize=3.0 if joined else 4.5,
-                linewidth=1.4,
-            )
+            y = curve.y[info.name][run]
+            for stretch in stretches(regimes, len(x)):
+                axes.plot(
+                    x[stretch],
+                    y[stretch],
+                    color=colour,
+                    linestyle=style if joined else "none",
+                    marker=marker,
+                    markersize=3.0 if joined else 4.5,
+                    linewidth=1.4,
+                )
+            for name in MARKED:
+                places = [place for place, own in enumerate(regimes or ()) if own == name]
+                if places:
+                    mark = MARKS[name]
+                    axes.plot(
+                        x[places], y[places], color=mark.colour, linestyle="none", marker=mark.marker, markersize=5.0
+                    )
     if len(infos) == 1:
         axes.set_ylabel(axis_label(infos[0].name, unit))
         return
@@ -244,6 +274,21 @@ def _explain(figure: Figure, plots: list[Axes], curves: Curves) -> None:
     bar.set_ticks(list(labelled), labels=[texts[number] for number in labelled])
     bar.ax.tick_params(labelsize=8, length=0)
     bar.set_label(meaning.replace(" =\n", " = "), fontsize=8)
+
+
+def _explain_regimes(figure: Figure, regimes: list[str]) -> None:
+    """What the marks of points mean, below the plots; nothing where all motions are periodic."""
+    from matplotlib.lines import Line2D
+
+    if not set(regimes) & set(MARKED):
+        return
+    handles = [
+        Line2D(
+            [], [], color=MARKS[name].colour, marker=MARKS[name].marker, markersize=5.0, linestyle="none", label=name
+        )
+        for name in regimes
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=8, frameon=False)
 
 
 def head(figure: Figure, title: str, held: tuple[str, ...]) -> None:

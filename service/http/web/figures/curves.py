@@ -11,11 +11,14 @@ import numpy as np
 
 from service.http.web.figures.thinning import thin
 from service.results.curves import numbers
+from service.results.regimes import DOUBTFUL, MARKED, MARKS, regimes_of, stretches
 from service.results.wording import number, unit_text, words
 from worker.models import WorkerEnding
 from worker.models.codes import PENDING
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from service.results.curves import Curve, Curves, Map
     from worker.models import ResultInfo
 
@@ -69,19 +72,17 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1) -> Figu
         return {"data": [], "layout": {}, "note": told}
     rows = math.ceil(len(chosen.results) / columns)
     lines = [(label, curve) for label, curves in drawn for curve in curves.curves]
-    traces = [
-        trace
-        for panel, info in enumerate(chosen.results)
-        for trace in _panel_traces(
-            lines, info, panel, min(max(_MOST_POINTS // len(lines), _LEAST_POINTS), _LINE_POINTS)
-        )
-    ]
-    margin = {"t": 60 if 1 < len(lines) <= len(PALETTE) else 20, "r": 20, "b": 60, "l": 70}
+    most = min(max(_MOST_POINTS // len(lines), _LEAST_POINTS), _LINE_POINTS)
+    traces: list[Figure] = []
+    for panel, info in enumerate(chosen.results):
+        traces += [*_panel_traces(lines, info, panel, most), *_regime_traces(lines, info, panel)]
+    named = len(lines) > 1 or any(trace["legendgroup"].startswith("regime ") for trace in traces)
+    margin = {"t": 60 if named and len(lines) <= len(PALETTE) else 20, "r": 20, "b": 60, "l": 70}
     layout: Figure = {
         "height": _pixels(rows) + margin["t"] + margin["b"],
         "margin": margin,
         "hovermode": "closest",
-        "showlegend": len(lines) > 1,
+        "showlegend": named,
         "legend": _legend(drawn, len(lines)),
         "uirevision": "keep",
     }
@@ -175,10 +176,12 @@ def _panel_traces(lines: Sequence[tuple[str, Curve]], info: ResultInfo, panel: i
     labels = list(dict.fromkeys(label for label, _ in lines))
     for index, ((label, curve), (colour, symbol)) in enumerate(zip(lines, styles, strict=False)):
         run = curve.run()
+        regimes = None if curve.regimes is None else [curve.regimes[place] for place in run.tolist()]
         y = curve.y[info.name][run]
         kept = thin(y, most)
         x = np.array(curve.line.x)[run]
         joined = bool(np.all(np.diff(x) > 0.0))
+        drawn = _with_gaps(kept, regimes)
         study = escaped(_short(label))
         values = ", ".join(number(value) for value in curve.line.by.values())
         first = index == 0 or lines[index - 1][0] != label
@@ -189,13 +192,49 @@ def _panel_traces(lines: Sequence[tuple[str, Curve]], info: ResultInfo, panel: i
             "legendgroup": str(index),
             "legendgrouptitle": {"text": study if values and first else ""},
             "showlegend": panel == 0,
-            "x": x[kept].tolist(),
-            "y": numbers(y[kept]),
-            "customdata": curve.line.cases[run][kept].tolist(),
+            "x": [None if place is None else float(x[place]) for place in drawn],
+            "y": [None if place is None or np.isnan(y[place]) else float(y[place]) for place in drawn],
+            "customdata": [None if place is None else int(curve.line.cases[run][place]) for place in drawn],
+            "connectgaps": False,
             "line": {"color": colour, "width": 1.8, "dash": DASHES[labels.index(label) % len(DASHES)]},
             "marker": {"color": colour, "symbol": symbol, "size": 6},
             "hovertemplate": f"%{{x:.5g}}, %{{y:.5g}} {unit_text(info.unit)}<br>case %{{customdata}}"
             f"<extra>{', '.join(text for text in (study, values) if text) or escaped(words(info.name))}</extra>",
+            "xaxis": "x" if panel == 0 else f"x{panel + 1}",
+            "yaxis": "y" if panel == 0 else f"y{panel + 1}",
+        }
+
+
+def _with_gaps(kept: NDArray[np.int64], regimes: list[str | None] | None) -> list[int | None]:
+    """Places of the points of a line, None where it is broken."""
+    if regimes is None:
+        return list(kept.tolist())
+    shown, drawn = set(kept.tolist()), list[int | None]()
+    for stretch in stretches(regimes, len(regimes)):
+        part = [place for place in stretch.tolist() if place in shown]
+        drawn += [None, *part] if drawn and part else part
+    return drawn
+
+
+def _regime_traces(lines: Sequence[tuple[str, Curve]], info: ResultInfo, panel: int) -> Iterator[Figure]:
+    """The points of each regime that is not periodic, upon the lines; and all regimes in the legend."""
+    occurring = regimes_of(curve.regimes for _, curve in lines)
+    for name in occurring if len(occurring) > 1 or set(occurring) & set(MARKED) else ():
+        places = [(curve, place) for _, curve in lines for place, own in enumerate(curve.regimes or ()) if own == name]
+        places = places if name in MARKED else []
+        yield {
+            "type": "scatter",
+            "mode": "markers",
+            "name": name,
+            "legendgroup": f"regime {name}",
+            "legendgrouptitle": {"text": "Regime" if name == occurring[0] else ""},
+            "showlegend": panel == 0,
+            "x": [curve.line.x[place] for curve, place in places] or [None],
+            "y": numbers(np.array([curve.y[info.name][place] for curve, place in places])) or [None],
+            "customdata": [int(curve.line.cases[place]) for curve, place in places] or [None],
+            "marker": {"color": MARKS[name].colour, "symbol": MARKS[name].symbol, "size": 8},
+            "hovertemplate": f"%{{x:.5g}}, %{{y:.5g}} {unit_text(info.unit)}<br>case %{{customdata}}"
+            f"<extra>{name}</extra>",
             "xaxis": "x" if panel == 0 else f"x{panel + 1}",
             "yaxis": "y" if panel == 0 else f"y{panel + 1}",
         }
@@ -231,13 +270,38 @@ def map_figure(drawn: Map, contour: bool) -> Figure:
     }
     if contour:
         trace |= {"contours": {"showlabels": True}, "line": {"width": 1}, "connectgaps": False}
+    doubtful = list(_doubtful_traces(drawn))
     return {
-        "data": [trace],
+        "data": [trace, *doubtful],
         "layout": {
             "height": 520,
-            "margin": {"t": 20, "r": 20, "b": 60, "l": 70},
+            "margin": {"t": 40 if doubtful else 20, "r": 20, "b": 60, "l": 70},
+            "showlegend": bool(doubtful),
+            "legend": {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom"},
             "xaxis": {"title": {"text": axis_title(drawn.names[0], drawn.units[0])}},
             "yaxis": {"title": {"text": axis_title(drawn.names[1], drawn.units[1])}},
         },
         "cases": True,
     }
+
+
+def _doubtful_traces(drawn: Map) -> Iterator[Figure]:
+    """The points of a map whose motion is not periodic, marked."""
+    for name in DOUBTFUL:
+        places = [
+            (row, column)
+            for row, regimes in enumerate(drawn.regimes or ())
+            for column, own in enumerate(regimes)
+            if own == name
+        ]
+        if places:
+            yield {
+                "type": "scatter",
+                "mode": "markers",
+                "name": name,
+                "x": [drawn.x_values[column] for _, column in places],
+                "y": [drawn.y_values[row] for row, _ in places],
+                "customdata": [int(drawn.cases[place]) for place in places],
+                "marker": {"color": MARKS[name].colour, "symbol": MARKS[name].symbol, "size": 8},
+                "hovertemplate": f"case %{{customdata}}<extra>{name}</extra>",
+            }

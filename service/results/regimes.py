@@ -1,0 +1,70 @@
+"""How pictures tell the regimes of points apart, and which points a line may join."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Regime of points that no line leads to: they are not of the settled machine.
+UNSETTLED: Final = "unsettled"
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """How points of one regime are marked: colour, symbol of plotly and marker of matplotlib.
+
+    Periodic points have the colour of their curve.
+    """
+
+    colour: str
+    symbol: str
+    marker: str
+
+
+#: Colours that people with any kind of colour vision tell apart, and shapes that tell the same in grey.
+MARKS: Final[dict[str, Mark]] = {
+    "periodic": Mark("#777777", "circle", "o"),
+    "held": Mark("#8c6d31", "square", "s"),
+    "coasting": Mark("#56b4e9", "diamond", "D"),
+    "irregular": Mark("#cc79a7", "triangle-up", "^"),
+    UNSETTLED: Mark("#d55e00", "x", "x"),
+}
+#: Regimes that are marked upon their curves.
+MARKED: Final = tuple(name for name in MARKS if name != "periodic")
+#: Regimes whose points are marked in maps: their results have an interval, or are not of a settled motion.
+DOUBTFUL: Final = ("irregular", UNSETTLED)
+
+
+def stretches(regimes: Sequence[str | None] | None, points: int) -> list[NDArray[np.int64]]:
+    """Places of the points that a line joins: neighbours of one regime; an unsettled point stands alone.
+
+    A point without a regime (it has no result) belongs to no stretch, unless the study knows no regimes at all.
+    """
+    if regimes is None:
+        return [np.arange(points, dtype=np.int64)]
+    found: list[list[int]] = []
+    for place, regime in enumerate(regimes):
+        if regime is None:
+            continue
+        before = regimes[place - 1] if place else None
+        if found and regime == before and regime != UNSETTLED:
+            found[-1].append(place)
+        else:
+            found.append([place])
+    return [np.array(stretch, dtype=np.int64) for stretch in found]
+
+
+def regimes_of(lists: Iterable[Sequence[str | None] | None]) -> list[str]:
+    """The regimes that occur, in the order of `MARKS`."""
+    occurring = {regime for regimes in lists for regime in regimes or ()}
+    return [name for name in MARKS if name in occurring]
+
+
+def counted(counts: Counter[str]) -> str:
+    """How many cases have which regime, in words: ``486 periodic, 24 irregular``; most frequent first."""
+    return ", ".join(f"{count:,} {name}" for name, count in counts.most_common())

@@ -1,0 +1,95 @@
+"""Lines of pictures join points of one regime, and what is not periodic is marked."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from service.http.web.figures.curves import curves_figure, map_figure
+from service.results.curves import CurveQuery, Curves, draw, draw_map, select
+from service.results.pictures.curves import draw_curves
+from service.results.pictures.curves import draw_map as paint_map
+from service.results.regimes import MARKS, counted, regimes_of, stretches
+from service.spec.document import parse_spec
+from service.storage.records import CaseColumns
+from tests.service.spec_sample import changed
+from worker import models
+from worker.study import Study
+
+REGIMES = ["coasting", "periodic", "periodic", "irregular", "periodic", "unsettled", "unsettled", None]
+
+
+def joined(regimes: list[str | None] | None, points: int = 8) -> list[list[int]]:
+    return [stretch.tolist() for stretch in stretches(regimes, points)]
+
+
+def test_a_line_joins_neighbours_of_one_regime_and_no_unsettled_point() -> None:
+    assert joined(REGIMES) == [[0], [1, 2], [3], [4], [5], [6]]
+    assert joined(["irregular"] * 3) == [[0, 1, 2]]
+    assert joined(["periodic", None, "periodic"]) == [[0], [2]]
+    assert joined(None) == [list(range(8))]
+    assert joined([]) == []
+
+
+def test_regimes_are_told_in_one_order_and_counted_by_frequency() -> None:
+    assert regimes_of([REGIMES, None]) == ["periodic", "coasting", "irregular", "unsettled"]
+    assert counted(Counter(irregular=24, periodic=4860, unsettled=2)) == "4,860 periodic, 24 irregular, 2 unsettled"
+    assert set(MARKS) | {"none"} == set(models.REGIME_SENTENCES)
+
+
+def study(loads: int, frequencies: int = 1) -> Study:
+    axes = [
+        {"path": "excitation.frequency", "values": [20.0 + index for index in range(frequencies)]},
+        {"path": "shaft.load", "linspace": [0, 0.7, loads]},
+    ]
+    return parse_spec(changed({"/run": {"until": "settled"}, "/axes": axes})).study
+
+
+def fetched(cases: np.ndarray[tuple[int], np.dtype[np.int64]], names: list[str]) -> CaseColumns:
+    """Rows whose regimes go along `REGIMES`; the speed is the number of the case."""
+    places = [REGIMES[case % 8] for case in cases.tolist()]
+    codes = [np.nan if name is None else list(models.REGIME_SENTENCES).index(name) for name in places]
+    columns = {name: np.array(codes) if name == "regime" else cases.astype(float) for name in names}
+    columns["shaft.speed.mean"][[name is None for name in places]] = np.nan
+    return CaseColumns(cases, ["ok" if name else "chatter" for name in places], columns)
+
+
+def drawn() -> Curves:
+    one = study(8)
+    return draw(select(one, models.study_results(one), CurveQuery("shaft.load", ("shaft.speed.mean",))), fetched)
+
+
+def test_a_figure_breaks_lines_and_marks_regimes() -> None:
+    figure = curves_figure([("", drawn())])
+    line, *marks = figure["data"]
+    assert line["customdata"] == [0, None, 1, 2, None, 3, None, 4, None, 5, None, 6]
+    assert line["connectgaps"] is False
+    assert {trace["name"]: trace["customdata"] for trace in marks} == {
+        "periodic": [None], "coasting": [0], "irregular": [3], "unsettled": [5, 6],
+    }  # fmt: skip
+    assert figure["layout"]["showlegend"]
+    transient = replace(drawn(), curves=tuple(replace(curve, regimes=None) for curve in drawn().curves))
+    (line,) = curves_figure([("", transient)])["data"]
+    assert line["customdata"] == list(range(8))
+
+
+def test_a_picture_names_the_regimes_that_occur() -> None:
+    with_marks = draw_curves(drawn(), "", "svg")
+    periodic = replace(drawn(), curves=tuple(replace(curve, regimes=["periodic"] * 8) for curve in drawn().curves))
+    assert with_marks.count(MARKS["unsettled"].colour.encode()) > 0
+    assert MARKS["unsettled"].colour.encode() not in draw_curves(periodic, "", "svg")
+
+
+@pytest.mark.parametrize("name", ["irregular", "unsettled"])
+def test_a_map_marks_what_is_not_periodic(name: str) -> None:
+    two = study(8, 2)
+    found = draw_map(
+        two, models.study_results(two), "shaft.load", "excitation.frequency", "shaft.speed.mean", (), fetched
+    )
+    marks = {trace["name"]: trace["customdata"] for trace in map_figure(found, contour=False)["data"][1:]}
+    assert marks[name] == [case for case in range(16) if REGIMES[case % 8] == name]
+    assert found.to_json()["regime"][1] == REGIMES
+    assert MARKS[name].colour.encode() in paint_map(found, "", "svg")
