@@ -17,6 +17,7 @@ from dataclasses import replace
 from multiprocessing import active_children, get_context
 from multiprocessing.pool import Pool
 from pathlib import Path
+from typing import Any
 
 import psutil
 
@@ -34,6 +35,11 @@ from worker.study import Axis, Study
 _POLL_SECONDS = 0.1
 
 
+def timed(study: Study, duration: list[Any]) -> dict[str, Any]:
+    """The run of a study as one of a given time."""
+    return {"duration": duration, "window": None, **{name: study.run[name] for name in ("tolerance", "reset")}}
+
+
 def example(cases: int, periods: float) -> Study:
     """The one-pendulum example, with the load and the frequency drawn finely enough for that many cases."""
     study = parse_spec(load_spec(preset_text("one_pendulum")[1], "json")).study
@@ -42,7 +48,7 @@ def example(cases: int, periods: float) -> Study:
         Axis(("excitation.frequency",), tuple(20.0 + 15.0 * i / 49 for i in range(50))),
         Axis(("shaft.load",), tuple(0.5 * i / loads for i in range(loads))),
     )
-    return replace(study, axes=axes, run={**study.run, "duration": [periods, "periods"], "window": None})
+    return replace(study, axes=axes, run=timed(study, [periods, "periods"]))
 
 
 def _compute(task: tuple[Study, int, int]) -> int:

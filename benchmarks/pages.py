@@ -44,8 +44,8 @@ def fill(store: Store, axes: list[dict[str, object]], name: str) -> str:
         for chunk in store.claim(epoch, chunks):
             values = random.normal(size=(chunk.count, len(infos)))
             for column, info in enumerate(infos):
-                if info.kind == "count":
-                    values[:, column] = chunk.first % 100
+                if info.kind != "real":
+                    values[:, column] = chunk.first % 100 if info.kind == "count" else 1
             endings = [
                 "chatter" if case % _RARE == 0 else "ok" for case in range(chunk.first, chunk.first + chunk.count)
             ]

@@ -57,6 +57,7 @@ def build(path: Path, study: Study) -> tuple[str, float]:
     """A finished study of random doubles in the database at ``path``: its id, and the seconds its commits took."""
     infos = models.study_results(study)
     counts = [index for index, info in enumerate(infos) if info.kind == "count"]
+    categories = [index for index, info in enumerate(infos) if info.kind == "category"]
     numbers = np.random.default_rng(3)
     seconds = 0.0
     with Store.open(f"sqlite:///{path}", chunking=Chunking(5_000)) as store:
@@ -65,6 +66,7 @@ def build(path: Path, study: Study) -> tuple[str, float]:
         for chunk in store.claim(epoch, store.open_chunks(record.number)):
             values = numbers.normal(size=(chunk.count, len(infos)))
             values[:, counts] = numbers.integers(0, 5_000, (chunk.count, len(counts)))
+            values[:, categories] = numbers.integers(1, 3, (chunk.count, len(categories)))
             result = ChunkResult(chunk.first, ["ok"] * chunk.count, [""] * chunk.count, values)
             start = time.perf_counter()
             store.commit(epoch, chunk, result)

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.overhead import timed
 from service.jobs.local import run_here
 from service.presets import preset_text
 from service.spec.document import load_spec, parse_spec
@@ -147,7 +148,7 @@ def real_studies() -> Iterator[tuple[str, Study]]:
     by_load = (Axis(("shaft.load",), loads), Axis(("excitation.frequency",), frequencies))
     yield "loads outside", replace(example, axes=by_load)
     yield "frequencies outside", replace(example, axes=by_load[::-1])
-    fixed = {**example.run, "duration": [2.0, "s"], "window": None}
+    fixed = timed(example, [2.0, "s"])
     yield "fixed time, frequencies outside", replace(example, axes=by_load[::-1], run=fixed)
 
 

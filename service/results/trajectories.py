@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 
 def span(study: Study, case: int, start: str | None, end: str | None) -> tuple[float, float]:
-    """First and last place of a part of the case's extent (time in s, angle in rad); by default all of it.
+    """First and last place of a part of the case's extent (time in s, angle in rad); by default from its `begin` on.
 
     ``start`` and ``end`` are SI numbers, or quantities with a unit or in periods. Raises FaultError, about the
     parameter ``from`` or ``to``, when they are no places within it.
     """
     extent = models.extent(study, case)
-    first = 0.0 if start is None else _place("from", start, extent)
     last = extent.end if end is None else _place("to", end, extent)
+    first = (extent.begin if extent.begin < last else 0.0) if start is None else _place("from", start, extent)
     # The last digit of an end given in periods or degrees is not the client's to know.
     if math.isclose(last, extent.end, rel_tol=1e-12):
         last = extent.end

@@ -29,11 +29,16 @@ SETTLED_FIELDS: Final = ("until", "at_most", "settled", "max_period")
 TIMED_FIELDS: Final = ("duration", "window")
 FIELDS: Final = (*SETTLED_FIELDS, *TIMED_FIELDS, "tolerance", "reset")
 RESETS: Final = ("contact", "literal")
-#: What stands for the fields that are not given.
+#: What stands for the fields that are not given. A run without a field of `TIMED_FIELDS` lasts until it is settled.
 SETTLED_DEFAULTS: Final[dict[str, Any]] = {
     "until": SETTLED, "at_most": 1000, "settled": 1e-8, "max_period": 32, "tolerance": 1e-9, "reset": "contact",
 }  # fmt: skip
-DEFAULTS: Final[dict[str, Any]] = {"duration": [60.0, "periods"], "window": None, "tolerance": 1e-9, "reset": "contact"}
+TIMED_DEFAULTS: Final[dict[str, Any]] = {
+    "duration": [60.0, "periods"],
+    "window": None,
+    "tolerance": 1e-9,
+    "reset": "contact",
+}
 _TIME: Final = 'seconds (2.0 or "2 s") or excitation periods ("60 periods")'
 _MAX_SECONDS: Final = 1e9
 #: Ends that are equal but for the rounding of a conversion between seconds and periods count as equal.
@@ -51,9 +56,9 @@ def read_run(report: Report, data: object, frequencies: NDArray[np.float64]) -> 
     """
     found = read_object(report, "/run", data, FIELDS)
     if found is None:
-        return dict(DEFAULTS)
-    settled = not any(name in found for name in TIMED_FIELDS) and any(name in found for name in SETTLED_FIELDS)
-    run = dict(SETTLED_DEFAULTS if settled else DEFAULTS)
+        return dict(SETTLED_DEFAULTS)
+    settled = not any(name in found for name in TIMED_FIELDS)
+    run = dict(SETTLED_DEFAULTS if settled else TIMED_DEFAULTS)
     before = report.found
     if "tolerance" in found:
         run["tolerance"] = _read_plain(report, "/run/tolerance", found["tolerance"], MIN_TOLERANCE, MAX_TOLERANCE)

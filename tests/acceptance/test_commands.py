@@ -93,8 +93,7 @@ def test_the_same_key_submits_once(running: Service) -> None:
 def test_a_study_is_held_and_cancelled(running: Service, tmp_path: Path) -> None:
     at = ("--server", running.address, "--json")
     spec = json.loads(SPEC.read_text())
-    spec["run"]["duration"] = "20000 periods"
-    spec["run"]["window"] = ["40 periods", "60 periods"]
+    spec["run"] = {"duration": "20000 periods", "window": ["40 periods", "60 periods"]}
     long = tmp_path / "long.json"
     long.write_text(json.dumps(spec))
     study = sprag("submit", long, *at).data["id"]

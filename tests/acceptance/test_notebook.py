@@ -45,7 +45,7 @@ def test_the_example_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         ).execute()
     said = [outputs(cell) for cell in notebook.cells if cell.cell_type == "code"]
     assert "'done': 27" in said[1]
-    assert "(27, 48)" in said[5]
+    assert "(27, 73)" in said[5]
     assert "33 cases, 27 of them taken from before" in said[7]
     assert said[8].startswith("/base/shaft/inertia is out of range - allowed: > 0")
     codes = [cell for cell in notebook.cells if cell.cell_type == "code"]

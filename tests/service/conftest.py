@@ -14,10 +14,10 @@ import pytest
 from anyio.from_thread import BlockingPortal, start_blocking_portal
 from fastapi import FastAPI
 
-from service.http.api.examples import SPEC
 from service.http.app import chunking, create_app
 from service.settings import Settings
 from service.storage.store import Store
+from tests.service.timed_spec import SPEC
 from worker import models
 from worker.models import ChunkResult, KernelShape
 from worker.study import Study
@@ -112,6 +112,8 @@ def made_up(study: Study) -> ChunkResult:
     for column, info in enumerate(infos):
         if info.kind == "count":
             values[:, column] = np.arange(study.cases) + column
+        if info.kind == "category":
+            values[:, column] = 1 + np.arange(study.cases) % (len(info.categories) - 1)
     endings = ["chatter" if case % 5 == 4 else "ok" for case in range(study.cases)]
     flags = [models.WINDUP_OUT_OF_DATA if case % 4 == 3 else "" for case in range(study.cases)]
     values[[ending != "ok" for ending in endings]] = np.nan

@@ -84,9 +84,12 @@ class Extent:
     end : float
     period : float
         What "1 period" means in that unit.
+    begin : float
+        Where the part begins that is told by default.
     """
 
     along: str
     unit: str
     end: float
     period: float
+    begin: float = 0.0

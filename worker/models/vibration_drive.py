@@ -190,8 +190,13 @@ class VibrationDrive(Model):
         return chunk_result(task.first, batch.endings, _flags(result_infos(number), batch.values), batch.values)
 
     def extent(self, study: Study, case: int) -> Extent:
-        """The run of one case; its periods are those of the excitation."""
-        return Extent("time", "s", duration_seconds(study, case), 1.0 / _frequency(study, case))
+        """The run of one case; its periods are those of the excitation.
+
+        Of a settled study, the run for as long as its search may take; what it comes to stands at the end.
+        """
+        end, period = duration_seconds(study, case), 1.0 / _frequency(study, case)
+        begin = end - study.run["max_period"] * period if is_settled(study.run) else 0.0
+        return Extent("time", "s", end, period, begin)
 
     def trajectory(self, study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
         """Instantaneous values at ``points`` equally spaced times from ``start`` to ``end`` (s)."""

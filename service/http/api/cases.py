@@ -108,7 +108,8 @@ async def get_trajectory(
         str | None,
         Query(
             alias="from",
-            description="first time, in s or with a unit (s, periods), or angle, in rad or with a unit; by default 0",
+            description="first time, in s or with a unit (s, periods), or angle, in rad or with a unit; by default 0, "
+            "of a settled study `max_period` periods before the end",
             examples=["0"],
         ),
     ] = None,
@@ -116,7 +117,8 @@ async def get_trajectory(
         str | None,
         Query(
             alias="to",
-            description="last time or angle, likewise; by default the end of the run, or cycle",
+            description="last time or angle, likewise; by default the end of the run (`at_most` of a settled study) "
+            "or cycle",
             examples=["2.5 periods"],
         ),
     ] = None,

@@ -24,7 +24,7 @@ SPEC: Final[dict[str, Any]] = {
         "shaft": {"inertia": "2e-3 kg*m^2", "load": "0.1 N*m"},
         "clutch": {"coefficients": [0, 200, 0, 20000]},
     },
-    "run": {"duration": "60 periods", "window": ["40 periods", "60 periods"]},
+    "run": {"until": "settled", "at_most": "1000 periods"},
     "axes": [
         {"path": "excitation.frequency", "linspace": ["16 Hz", "35 Hz", 3]},
         {"path": "shaft.load", "values": [0.02, 0.1, "0.3 N*m"]},
@@ -51,8 +51,8 @@ damping = "0.01 N*m*s/rad"
 backlash = "0.005 rad"
 
 [run]
-duration = "60 periods"
-window = ["40 periods", "60 periods"]
+until = "settled"
+at_most = "1000 periods"
 
 [[axes]]
 path = "shaft.load"

@@ -72,8 +72,7 @@ def run_inputs(study: Study, spec: Mapping[str, Any]) -> tuple[Input, ...]:
     given = spec.get("run") or {}
     origins: dict[bool, Origin] = {True: "given", False: "default" if "base" in spec else ""}
     return tuple(
-        Input(name, "the last third" if value is None else _text(value), "", "", origins[name in given])
-        for name, value in study.run.items()
+        Input(name, _run_text(name, value), "", "", origins[name in given]) for name, value in study.run.items()
     )
 
 
@@ -103,6 +102,12 @@ def _origin(spec: Mapping[str, Any], path: str) -> Origin:
         else:
             return "default"
     return "default" if place is None else "given"
+
+
+def _run_text(name: str, value: object) -> str:
+    if value is None:
+        return "the last third"
+    return f"{value} periods" if name in {"at_most", "max_period"} else _text(value)
 
 
 def _text(value: object) -> str:

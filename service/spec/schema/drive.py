@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from service.spec.fields import placed
-from service.spec.run import DEFAULTS, RESETS, SETTLED_DEFAULTS, SETTLED_FIELDS, TIMED_FIELDS
+from service.spec.run import RESETS, SETTLED_DEFAULTS, SETTLED_FIELDS, TIMED_FIELDS
 from service.spec.schema.axes import Schema, object_schema
 from service.spec.schema.quantity import quantity_schema
 from worker import models
@@ -94,7 +94,11 @@ def run_schema() -> Schema:
     time = {"type": ["number", "string"], "examples": ["60 periods", "2 s", 2.0], "minimum": 0}
     schema = object_schema(
         {
-            "until": {"const": SETTLED, "description": "run each case until its motion is settled"},
+            "until": {
+                "const": SETTLED,
+                "description": "run each case until its motion is settled; the default where there is neither "
+                "`duration` nor `window`",
+            },
             "at_most": {
                 "type": "string",
                 "default": f"{SETTLED_DEFAULTS['at_most']} periods",
@@ -118,8 +122,8 @@ def run_schema() -> Schema:
             },
             "duration": {
                 **time,
-                "default": "60 periods",
-                "description": "end of the run: a number is seconds, a text says periods or a unit of time",
+                "description": "end of the run, which then lasts for a given time: a number is seconds, a text says "
+                "periods or a unit of time; 60 periods where there is a window alone",
             },
             "window": {
                 "type": "array",
@@ -132,12 +136,12 @@ def run_schema() -> Schema:
                 "type": "number",
                 "minimum": MIN_TOLERANCE,
                 "maximum": MAX_TOLERANCE,
-                "default": DEFAULTS["tolerance"],
+                "default": SETTLED_DEFAULTS["tolerance"],
                 "description": "local relative error of the integration",
             },
             "reset": {
                 "enum": list(RESETS),
-                "default": DEFAULTS["reset"],
+                "default": SETTLED_DEFAULTS["reset"],
                 "description": "whether an upward crossing while torque is transmitted restarts the windup (literal)",
             },
         },

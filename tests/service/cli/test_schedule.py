@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from service.cli.app import execute
-from service.http.api.examples import SPEC
+from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -15,12 +15,12 @@ import pytest
 from pydantic import SecretStr
 
 from service.http import attempts as module
-from service.http.api.examples import SPEC
 from service.http.app import create_app
 from service.http.attempts import FIRST_SECONDS, FORGET_SECONDS, LONGEST_SECONDS, MOST_WAITING, Attempts
 from service.http.problems import ApiError
 from service.logs import JsonFormatter, TextFormatter
 from tests.conftest import ROOT
+from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
     from service.settings import Settings

@@ -10,11 +10,11 @@ import httpx
 import pytest
 from pydantic import SecretStr
 
-from service.http.api.examples import SPEC
 from service.http.app import create_app
 from service.http.guard import OPEN_PATHS, Guard
 from service.settings import Settings, UnsafeSettingsError
 from tests.service.http.routes import every_route
+from tests.service.timed_spec import SPEC
 from worker.limits import MAX_BODY_BYTES
 
 if TYPE_CHECKING:

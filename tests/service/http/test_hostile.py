@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from service.cli.app import execute
-from service.http.api.examples import SPEC
+from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -15,13 +15,13 @@ import pytest
 from pydantic import SecretStr
 
 from service.http import access
-from service.http.api.examples import SPEC
 from service.http.app import create_app
 from service.settings import Settings
 from service.storage.errors import TokenNotFound
 from service.storage.scopes import TokenScope
 from service.storage.store import Store
 from tests.service.http.routes import every_route
+from tests.service.timed_spec import SPEC
 from worker.states import StudyState
 
 if TYPE_CHECKING:

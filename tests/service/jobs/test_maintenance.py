@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import pytest
 
 from service.cli.app import execute
-from service.http.api.examples import SPEC
 from service.jobs.dispatching import worker_settings
 from service.jobs.maintenance import Maintenance, MaintenancePlan, backups
 from service.jobs.submission import accept
 from service.spec.document import parse_spec
 from service.storage.errors import StudyNotFound
 from service.storage.store import Store
+from tests.service.timed_spec import SPEC
 from tests.worker.fakes import HandClock
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from service.http.api import models as m
-from service.http.api.examples import SPEC
 from service.jobs.scheduler import Scheduler
 from service.results.curves import Curve, Line, Map
 from service.schedules.deadline import FinishError, check_run_finish, finish_at, run_finish_at
 from service.schedules.fields import read_fields
+from tests.service.timed_spec import SPEC
 from tests.worker import fakes
 from worker.chunking import Chunking
 from worker.dispatcher import POLL_SECONDS, Dispatcher

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from service.http.api.examples import SPEC
 from service.http.api.schedules import EXAMPLE
 from service.jobs.scheduler import Scheduler
 from tests.service.conftest import Service
 from tests.service.schedules.conftest import Clock
+from tests.service.timed_spec import SPEC
 
 API = "/api/v1/schedules"
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from service.http.api.examples import SPEC
 from service.jobs.scheduler import Scheduler
 from service.schedules.fields import ScheduleFields, read_fields
 from service.settings import Settings
 from service.storage.schedules import RunState
 from service.storage.store import Store
+from tests.service.timed_spec import SPEC
 from tests.worker import fakes
 from worker.dispatcher import Dispatcher
 from worker.executors.inline import InlineExecutor

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from service.http.api.examples import SPEC
 from service.http.app import chunking
 from service.jobs import scheduler as module
 from service.jobs.scheduler import Scheduler
@@ -19,6 +18,7 @@ from service.storage.schedules import RunState
 from service.storage.store import Store
 from tests.service.conftest import Service
 from tests.service.schedules.conftest import NEW_YEAR, Clock
+from tests.service.timed_spec import SPEC
 from worker.states import StudyState
 
 if TYPE_CHECKING:

@@ -75,7 +75,7 @@ def test_defaults() -> None:
     }
     assert parsed(taken_away).study == explicit
     assert parsed({"/run": ...}).study.run == {
-        "duration": [60.0, "periods"], "window": None, "tolerance": 1e-9, "reset": "contact",
+        "until": "settled", "at_most": 1000, "settled": 1e-8, "max_period": 32, "tolerance": 1e-9, "reset": "contact",
     }  # fmt: skip
     assert parsed({"/axes": ...}).study.cases == 1
 

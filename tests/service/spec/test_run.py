@@ -154,8 +154,15 @@ def test_a_run_until_it_is_settled() -> None:
     assert parsed({"/run": given | {"reset": "literal"}}).study.run == given | {"at_most": 2000, "reset": "literal"}
 
 
-def test_a_field_of_a_run_until_it_is_settled_is_enough_to_ask_for_one() -> None:
-    for given in ({"at_most": "2000 periods"}, {"settled": 1e-6}, {"max_period": 8}):
+def test_a_run_without_duration_and_window_lasts_until_it_is_settled() -> None:
+    for given in (
+        {},
+        {"tolerance": 1e-8},
+        {"reset": "literal"},
+        {"at_most": "2000 periods"},
+        {"settled": 1e-6},
+        {"max_period": 8},
+    ):
         assert parsed({"/run": given}).study.run["until"] == "settled"
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.http.api.examples import SPEC
 from service.http.app import create_app
 from service.jobs.maintenance import Maintenance, MaintenancePlan, backups
 from service.jobs.scheduler import Scheduler
@@ -21,6 +20,7 @@ from service.storage.clock_watch import ClockWatch
 from service.storage.errors import StudyNotFound
 from service.storage.store import Store
 from tests.service.conftest import InThread
+from tests.service.timed_spec import SPEC
 from tests.worker.fakes import HandClock
 
 DAY = 86_400.0  # s

@@ -9,9 +9,10 @@ from typing import Any, Final
 from service.http.web.form.fields import FORM_MODEL, pendulum, sections
 from service.spec.measured import MeasuredDataError, parse_measured
 from service.spec.report import Problem
+from service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
 from service.spec.units import QuantityError, parse_quantity
 from worker.limits import MAX_AXES
-from worker.models import MAX_PENDULUMS
+from worker.models import MAX_PENDULUMS, SETTLED
 
 Values = dict[str, str]
 Faults = dict[str, list[str]]
@@ -27,6 +28,8 @@ WAYS: Final = {
     "geomspace": ("from", "to", "count"),
     "range": ("from", "to", "step"),
 }
+#: What the form says of a run for a given time, which a spec says by its duration or window.
+TIMED: Final = "time"
 _FIELDS: Final = frozenset({"sprag", "model", "name", "base", "run", "axes", "combine"})
 
 
@@ -135,10 +138,16 @@ def _told(problem: Problem) -> str:
 
 
 def _run(values: Mapping[str, str]) -> dict[str, Any]:
-    run = _object(values, "/run", ["/run/duration", "/run/tolerance"])
+    run = _object(
+        values, "/run", ["/run/at_most", "/run/max_period", "/run/settled", "/run/duration", "/run/tolerance"]
+    )
     window = [plain(values.get(f"/run/window/{index}", "")) for index in (0, 1)]
     if any(window):
         run["window"] = window
+    if values.get("/run/until", SETTLED) == SETTLED:
+        run = {"until": SETTLED, **run}
+    elif not any(window):
+        run.setdefault("duration", time_text(TIMED_DEFAULTS["duration"]))
     if values.get("/run/reset", "contact") != "contact":
         run["reset"] = values["/run/reset"]
     return run
@@ -207,7 +216,9 @@ def values_of(spec: Mapping[str, Any]) -> Values:
             values |= {f"/base/{key}/{name}": _text(value) for name, value in content.items()}
         else:
             values[f"/base/{key}"] = _text(content)
-    for key, content in spec.get("run", {}).items():
+    run = spec.get("run", {})
+    values["/run/until"] = TIMED if any(name in run for name in TIMED_FIELDS) else SETTLED
+    for key, content in run.items():
         if key == "window":
             values |= {f"/run/window/{index}": _text(item) for index, item in enumerate(content)}
         else:

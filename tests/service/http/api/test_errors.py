@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from service.http.api.examples import SPEC
 from service.http.problems import PROBLEM_TYPES, Problem
 from service.storage.errors import DatabaseBusyError, DatabaseFullError
+from tests.service.timed_spec import SPEC
 from worker.limits import MAX_BODY_BYTES
 
 if TYPE_CHECKING:

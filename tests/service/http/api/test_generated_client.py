@@ -13,8 +13,9 @@ from typing import Any
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from service.http.api.examples import EXTENSION_AXES, SPEC
+from service.http.api.examples import EXTENSION_AXES
 from tests.service.conftest import PortalTransport, Service
+from tests.service.timed_spec import SPEC
 
 PACKAGE = "generated_sprag"
 

@@ -16,8 +16,8 @@ import httpx
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, sync_playwright
 
-from service.http.api.examples import SPEC
 from tests.acceptance.processes import SECONDS, service
+from tests.service.timed_spec import SPEC
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 #: What the policy keeps out of plotly, by the hashes that the browser tells of: empty style attributes, and that of the

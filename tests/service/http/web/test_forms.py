@@ -100,14 +100,42 @@ def filled(**changes: str) -> dict[str, str]:
         ("/axes/1/values", "1,5 mm", "decimal point"),
         ("/axes/2/path", "shaft.lod", "shaft.load"),
         ("/run/tolerance", "1", "out of range"),
-        ("/run/window/1", "90 periods", "ends after the run"),
-        ("/run/duration", "-1", "out of range"),
+        ("/run/at_most", "1000", "number of excitation periods"),
+        ("/run/max_period", "0", "out of range"),
+        ("/run/settled", "2", "out of range"),
     ],
 )
 def test_each_fault_stands_beside_its_field(name: str, text: str, message: str) -> None:
     checked = check_form({**filled(), name: text}, Chunking())
     assert message in " ".join(checked.faults[name])
     assert checked.preview is None
+
+
+TIMED = {"/run/until": "time", "/run/at_most": "", "/run/window/0": "40 periods", "/run/window/1": "60 periods"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "name", "message"),
+    [
+        (TIMED | {"/run/window/1": "90 periods"}, "/run/window/1", "ends after the run"),
+        (TIMED | {"/run/duration": "-1"}, "/run/duration", "out of range"),
+        (TIMED | {"/run/until": "settled"}, "/run/until", "contradicts `window`"),
+        (TIMED | {"/run/at_most": "1000 periods"}, "/run/at_most", "contradicts `window`"),
+    ],
+)
+def test_faults_of_a_run_for_a_given_time(changes: dict[str, str], name: str, message: str) -> None:
+    checked = check_form({**filled(), **changes}, Chunking())
+    assert message in " ".join(checked.faults[name])
+    assert checked.preview is None
+
+
+def test_an_empty_form_asks_for_settled_motion_and_the_other_choice_for_60_periods() -> None:
+    for values, run in (
+        ({}, {"until": "settled"}),
+        ({"/run/until": "time"}, {"duration": "60 periods"}),
+        ({"/run/until": "time", "/run/duration": "2 s"}, {"duration": "2 s"}),
+    ):
+        assert spec_of(values)[0]["run"] == run
 
 
 def test_axes_that_are_not_filled_in_do_not_shift_the_faults() -> None:
@@ -245,7 +273,7 @@ def test_values_are_repeated_as_people_write_them() -> None:
 
 
 def test_a_part_after_the_run_stopped_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    study = parse_spec(drives()[0]).study
+    study = parse_spec(drives()[0] | {"run": {"duration": "60 periods"}}).study
 
     def stopped(study: Study, case: int, start: float, end: float, points: int) -> models.Trajectory:
         times = np.linspace(start, end, points)

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from service.http.api.examples import SPEC
 from service.http.app import chunking, create_app
 from service.jobs.scheduler import Scheduler
 from service.settings import Settings
 from service.storage.scopes import TokenScope
 from service.storage.store import Store
 from tests.service.conftest import InThread, made_up
+from tests.service.timed_spec import SPEC
 from tests.serving import served
 from worker.models import ChunkResult
 

@@ -114,6 +114,7 @@ def test_files_for_programs_name_the_defaults(service: Service, form: str) -> No
 
 def test_a_fitted_clutch_is_told_from_a_given_one_and_the_run_has_its_defaults(service: Service) -> None:
     spec = json.loads((EXAMPLES / "measured_clutch.json").read_text(encoding="utf-8"))
+    spec["run"] = {"duration": "60 periods"}
     book = openpyxl.load_workbook(io.BytesIO(got(service, spec, "xlsx")))
     origins = {row[0]: (row[1], row[4]) for row in book["inputs"].iter_rows(values_only=True) if row[4]}
     assert origins["pendulums.0.clutch.coefficients.1"][1] == "fitted"
