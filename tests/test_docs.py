@@ -13,7 +13,7 @@ from service.cli.app import app
 from service.presets import ABOUT, preset_names, preset_text
 from service.settings import table
 from worker import limits, models
-from worker.models.codes import ENDING_CODES, FLAG_MASKS
+from worker.codes import ENDING_CODES, FLAG_MASKS
 from worker.states import StudyState
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -6,6 +6,8 @@ import io
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from worker.codes import ENDING_CODES, PENDING
+
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
@@ -49,11 +51,19 @@ class Curves:
     def to_xarray(self) -> xr.Dataset:
         """A grid of the results over x and what tells the curves apart, with units as attributes.
 
-        Raises ValueError when two points have the same parameters, as cases that go side by side can.
+        ``ending`` has the codes of the NetCDF files (attributes ``flag_values`` and ``flag_meanings``, -1 pending), and
+        ``case`` the number of the case, a coordinate; both are -1 where the grid has no point.
+
+        Raises ValueError when two points have the same parameters, as cases that go side by side can, or for an ending
+        that this client does not know.
         """
         names = list(self.data["results"])
         dims = [*self.data["curves"][0]["by"], self.data["x"]["path"]]
-        indexed = self.to_pandas().set_index(dims)[names]
+        table = self.to_pandas()
+        if unknown := set(table["ending"]) - set(ENDING_CODES):
+            raise ValueError(f"the ending {min(unknown)!r} is unknown to this version of the client; see `to_pandas`")
+        table["ending"] = table["ending"].map(ENDING_CODES)
+        indexed = table.set_index(dims)[[*names, "ending", "case"]]
         if not indexed.index.is_unique:
             raise ValueError("several points have the same parameters, so that they are no grid; see `to_pandas`")
         grid = indexed.to_xarray()
@@ -61,7 +71,15 @@ class Curves:
             grid[name].attrs["units"] = self.units[name]
         for name in names:
             grid[name].attrs["long_name"] = self.data["results"][name]["description"]
-        return grid
+        grid["ending"] = grid["ending"].fillna(ENDING_CODES[PENDING]).astype("int16")
+        grid["ending"].attrs = {
+            "long_name": "how the case ended",
+            "flag_values": list(ENDING_CODES.values()),
+            "flag_meanings": " ".join(ENDING_CODES),
+        }
+        grid["case"] = grid["case"].fillna(-1).astype("int64")
+        grid["case"].attrs = {"units": "1", "long_name": "number of the case"}
+        return grid.set_coords("case")
 
 
 def table_of(parquet: bytes) -> pd.DataFrame:

@@ -200,7 +200,7 @@ def _take_over(store: Store, lock: OneHolder, say: Callable[[str], None]) -> Non
     holder = lock.holder()
     hung = (store.silence() or 0.0) > HUNG_SECONDS or not store.session.can_write(LOCKED_SECONDS)
     if hung and lock.end_holder():
-        say(f"process {holder} hung and was ended")
+        say(f"{'the transaction of ' if store.session.on_server else ''}process {holder} hung and was ended")
     lock.seize()
 
 

@@ -16,6 +16,7 @@ from service.storage.part import SystemClock
 from service.storage.room import GOES_ON
 from service.storage.session import lock_of
 from service.storage.store import Store
+from service.storage.work import run_owner
 from worker.chunking import Chunking
 from worker.dispatcher import Dispatcher
 from worker.executors.inline import InlineExecutor
@@ -88,14 +89,15 @@ def run_here(
             settings = WorkerSettings(url, processes, chunk_timeout)
             watch = _Watch(store, record.id, on_progress)
             lock = lock_of(store.session, owner_name())
+            owner = run_owner(owner_name(), record.id)
             try:
                 while not watch.ended():
                     if lock.take():
                         runner = executor or (pool(settings) if processes else InlineExecutor())
                         renew = None if executor or not processes else partial(renewed_pool, settings)
-                        Dispatcher(
-                            store, runner, SystemClock(), owner=owner_name(), only=record.number, renew=renew
-                        ).run(watch.ended)
+                        Dispatcher(store, runner, SystemClock(), owner=owner, only=record.number, renew=renew).run(
+                            watch.ended
+                        )
                     else:
                         time.sleep(STANDBY_SECONDS)
             except (KeyboardInterrupt, ExecutorError) as error:

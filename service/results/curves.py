@@ -19,9 +19,9 @@ from service.faults import ErrorItem
 from service.results.selection import Fixed, SelectionError, axis_name, held_text, listed, locate_axes, require_axis
 from service.spec.catalogue import result_of, unit_of, unknown_result
 from worker import models
+from worker.codes import PENDING
 from worker.limits import MAX_CURVE_VALUES
 from worker.models import WorkerEnding
-from worker.models.codes import PENDING
 
 if TYPE_CHECKING:
     from service.storage.records import CaseColumns

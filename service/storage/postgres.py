@@ -202,20 +202,26 @@ class ServerLock:
             self._ask(f"SELECT pg_terminate_backend(a.pid, {LOST_SECONDS * 1000}) {_HOLDER}")
 
     def end_holder(self) -> bool:
-        """False: the server ends the connection of a hung holder, and with it its lock and its transaction."""
-        return False
+        """End the connection in whose transaction a hung process keeps all others from writing; whether there was one.
+
+        `seize` ends the connection that has the lock, which is another one.
+        """
+        frozen = "AND a.state LIKE 'idle in transaction%%' AND clock_timestamp() - a.state_change > interval '1 s'"
+        return self._ask(f"SELECT pg_terminate_backend(a.pid, {LOST_SECONDS * 1000}) {_HOLDER} {frozen}", _WRITER) == (
+            True,
+        )
 
     def holder(self) -> str:
         """Host and process of whoever has the lock, "" where nobody does."""
         row = self._ask(f"SELECT a.application_name {_HOLDER}")
         return str(row[0]) if row else ""
 
-    def _ask(self, statement: str) -> tuple[Any, ...] | None:
+    def _ask(self, statement: str, lock: int = _DISPATCHER) -> tuple[Any, ...] | None:
         if self._connection is None or self._connection.closed:
             self._held = False
             self._connection = connect(self._url, self._lock_seconds, self._owner)
         try:
-            return self._connection.execute(statement.encode(), (_LOCKS, _DISPATCHER)).fetchone()
+            return self._connection.execute(statement.encode(), (_LOCKS, lock)).fetchone()
         except psycopg.Error as error:
             self.release()
             raise explained(error, location(self._url)) or error from None

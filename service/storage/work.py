@@ -41,6 +41,19 @@ CLAIMED = (CHUNKS.c.state == "claimed") & CHUNKS.c.study.in_(
 )
 
 
+#: Between the process and the study in the name of an owner that runs one study only.
+_RUNS = " runs "
+_ABANDONED = (
+    "`sprag run` (process {process}) ended before its study did; resume the study to have a worker go on with it, or "
+    "give the same `sprag run` again, which takes the done cases from it"
+)
+
+
+def run_owner(process: str, study_id: str) -> str:
+    """The name of an owner that takes over for one study, of its own."""
+    return f"{process}{_RUNS}{study_id}"
+
+
 class _SourceGoneError(Exception):
     """Rows that were to be copied are not there any more."""
 
@@ -54,18 +67,32 @@ class Work(Reuse):
     """Claims and results."""
 
     def take_over(self, owner: str) -> int:
-        """Raise the epoch, return every claim of an older one to waiting, and give the new epoch."""
+        """Raise the epoch, return every claim of an older one to waiting, and give the new epoch.
+
+        The study of a `run_owner` that has left it unfinished is held: nobody asked a worker for it.
+        """
         now = self._now()
         with self.session.write() as connection:
-            last = connection.execute(sa.select(DISPATCHER.c.epoch).with_for_update()).scalar_one_or_none()
-            epoch = (last or 0) + 1
+            query = sa.select(DISPATCHER.c.epoch, DISPATCHER.c.owner).with_for_update()
+            last = connection.execute(query).one_or_none()
+            epoch = (0 if last is None else last.epoch) + 1
             values = {"epoch": epoch, "owner": owner, "started_at": now, "heartbeat_at": now}
             if last is None:
                 connection.execute(sa.insert(DISPATCHER).values(id=1, **values))
             else:
                 connection.execute(sa.update(DISPATCHER).values(values))
             return_claims(connection)
+            if last is not None and last.owner != owner:
+                self._hold_abandoned(connection, last.owner)
         return epoch
+
+    def _hold_abandoned(self, connection: sa.Connection, owner: str) -> None:
+        process, _, study_id = owner.partition(_RUNS)
+        row = connection.execute(
+            sa.select(STUDIES.c.number, STUDIES.c.state).where(STUDIES.c.id == study_id, STUDIES.c.deleted_at.is_(None))
+        ).one_or_none()
+        if row is not None and StudyState(row.state) in {StudyState.QUEUED, StudyState.RUNNING}:
+            self._move(connection, row.number, StudyEvent.FAULT, _ABANDONED.format(process=process))
 
     def dispatcher(self) -> DispatcherRecord | None:
         """The dispatcher that took over last; None when there never was one."""

@@ -10,7 +10,7 @@ import sqlalchemy as sa
 
 from service.storage.store import Store
 from service.storage.tables import CHUNKS
-from service.storage.work import CLAIMED
+from service.storage.work import CLAIMED, run_owner
 from tests.contract.filling import SPEC, create, finish
 from tests.worker import fakes
 from worker.ports import Chunk, EpochLostError
@@ -74,6 +74,32 @@ def test_a_new_epoch_takes_over_and_the_old_one_can_do_nothing(store: Store) -> 
     dispatcher = store.dispatcher()
     assert dispatcher is not None
     assert (dispatcher.owner, dispatcher.epoch) == ("new", new)
+
+
+def test_the_study_of_a_run_that_was_killed_is_held_and_no_other(store: Store) -> None:
+    asked, other = create(store), create(store)
+    owner = run_owner("host:12", asked.id)
+    first = store.take_over(owner)
+    store.claim(first, [*store.open_chunks(asked.number)[:1], *store.open_chunks(other.number)[:1]])
+    store.take_over(owner)  # the same run, once more
+    assert store.get_study(asked.id).state is StudyState.RUNNING
+    store.take_over("worker")
+    held = store.get_study(asked.id)
+    assert held.state is StudyState.PAUSED
+    assert held.reason is not None
+    assert held.reason.startswith("`sprag run` (process host:12) ended before its study did; resume the study")
+    assert store.get_study(other.id).state is StudyState.RUNNING
+    assert store.resume_study(asked.id).state is StudyState.QUEUED
+    store.take_over("another worker")
+    assert store.get_study(asked.id).state is StudyState.QUEUED
+
+
+def test_a_run_that_came_to_its_end_leaves_nothing_to_hold(store: Store) -> None:
+    record = create(store)
+    finish(store, record)
+    store.take_over(run_owner("host:12", record.id))
+    store.take_over("worker")
+    assert store.get_study(record.id).state is StudyState.FINISHED
 
 
 def test_a_stale_result_of_a_returned_claim_is_dropped(store: Store) -> None:

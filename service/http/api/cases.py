@@ -20,8 +20,8 @@ from service.results import trajectories
 from service.results.exports import MEDIA_TYPES, Format, row_json, rows_json
 from service.storage.records import CaseRow
 from worker import models
+from worker.codes import PENDING
 from worker.limits import MAX_PAGE_SIZE, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
-from worker.models.codes import PENDING
 
 if TYPE_CHECKING:
     from worker.study import Study

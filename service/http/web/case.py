@@ -24,7 +24,7 @@ from service.results.pictures.panels import panels
 from service.results.selection import axis_name
 from service.spec.catalogue import unit_of
 from worker import models
-from worker.models.codes import PENDING
+from worker.codes import PENDING
 
 if TYPE_CHECKING:
     from worker.study import Study

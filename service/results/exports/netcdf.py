@@ -16,7 +16,7 @@ from service.results.exports.inputs import description_of
 from service.results.exports.source import machine
 from service.results.exports.spool import spooled
 from service.spec.catalogue import unit_of
-from worker.models.codes import ENDING_CODES, FLAG_MASKS, PENDING, flags_mask
+from worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, flags_mask
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -82,6 +82,11 @@ def test_a_study_from_submission_to_table_grid_and_curves(
     labelled = curves.to_xarray()
     np.testing.assert_array_equal(labelled[SPEED].values.reshape(-1), speeds)
     assert labelled[SPEED].attrs["units"] == "rad/s"
+    for name in ("ending", "case"):  # as in the file with all rows
+        np.testing.assert_array_equal(labelled[name].values, grid[name].values)
+        assert labelled[name].dtype == grid[name].dtype
+    for name in ("flag_values", "flag_meanings"):
+        assert list(labelled["ending"].attrs[name]) == list(grid["ending"].attrs[name])
     held = study.curves("shaft.load", SPEED, at={"excitation.frequency": np.float64(16.0)})
     np.testing.assert_array_equal(held.to_pandas()[SPEED], speeds[:3])
     assert study.curves("shaft.load", SPEED, at={"excitation.frequency": "960 rpm"}) == held
@@ -166,6 +171,9 @@ def test_cases_side_by_side_with_equal_parameters_are_no_grid(client: Client, se
         "results": {SPEED: {"unit": "rad/s", "description": ""}}, "curves": [point],
     }  # fmt: skip
     assert Curves(data).to_pandas()[SPEED].isna().tolist() == [False, True]
+    with pytest.raises(ValueError, match="ending 'x' is unknown"):
+        Curves(data).to_xarray()
+    point["endings"] = ["ok", "pending"]
     with pytest.raises(ValueError, match="no grid"):
         Curves(data).to_xarray()
 

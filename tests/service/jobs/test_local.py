@@ -266,6 +266,25 @@ def test_a_run_that_is_interrupted_leaves_nothing_to_later_workers_and_its_rows_
         assert (run.record.state, run.record.reused) == (StudyState.FINISHED, record.done)
 
 
+def test_a_run_that_is_killed_leaves_its_study_held(url: str) -> None:
+    class KilledError(BaseException):
+        """Nothing after it is done."""
+
+    def killed(_: models.ChunkTask) -> models.ChunkResult:
+        raise KilledError
+
+    with (
+        pytest.raises(KilledError),
+        run_here({}, fakes.study(20), processes=0, database_url=url, chunk_cases=4, executor=InlineExecutor(killed)),
+    ):
+        pass
+    with Store.open(url) as store:
+        (left,) = store.list_studies().studies
+        assert left.state is StudyState.RUNNING
+        store.take_over("a worker")
+        assert store.get_study(left.id).state is StudyState.PAUSED
+
+
 def test_a_run_that_another_dispatcher_works_on_is_cancelled_too(url: str) -> None:
     lock = DispatcherLock(Path(url.removeprefix("sqlite:///")))
     assert lock.take()

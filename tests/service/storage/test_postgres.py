@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -20,6 +21,8 @@ from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
 from service.http.app import chunking, create_app
+from service.jobs import dispatching
+from service.jobs.dispatching import WorkerSettings, run_dispatcher
 from service.settings import Settings
 from service.storage import postgres as storage
 from service.storage import session as session_module
@@ -33,6 +36,7 @@ from tests.service.conftest import API, InThread, Service
 from tests.worker import fakes
 from worker import models
 from worker.chunking import Chunking
+from worker.executors.inline import InlineExecutor
 from worker.states import StudyState
 
 DEADLINE = 120.0
@@ -317,6 +321,45 @@ def test_a_standby_takes_over_in_seconds_when_the_dispatcher_is_killed_or_loses_
                 assert process.stderr is not None
                 process.stderr.close()
         assert codes == [-signal.SIGKILL, 3, 0]
+
+
+#: Takes the dispatcher's lock, begins to write, and stands still.
+STOPPED = """
+import os, signal, sys
+from service.storage.session import Session, lock_of
+session = Session(sys.argv[1])
+lock = lock_of(session, "host:1")
+assert lock.take()
+with session.write() as connection:
+    print("ready", flush=True)
+    os.kill(os.getpid(), signal.SIGSTOP)
+"""
+
+
+def test_a_worker_that_was_stopped_in_its_transaction_keeps_nobody_from_taking_over(
+    postgres_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(dispatching, "LOCKED_SECONDS", 1.5)  # a transaction that is idle for less is left alone
+    said: list[str] = []
+    with Store.open(postgres_url) as store:
+        command = [sys.executable, "-c", STOPPED, postgres_url]
+        process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "ready\n"
+            os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+            assert not store.session.can_write(0.01)
+            run_dispatcher(
+                WorkerSettings(postgres_url, 1, 60.0), lambda: True, say=said.append,
+                executor=lambda _: InlineExecutor(fakes.run), take_over=True,
+            )  # fmt: skip
+            assert said[0] == "the transaction of process host:1 hung and was ended"
+            assert store.session.can_write(0.01)
+        finally:
+            process.kill()
+            process.wait()
+            assert process.stdout is not None
+            process.stdout.close()
 
 
 def test_a_server_that_crashes_ends_the_worker_with_a_sentence_and_loses_nothing(tmp_path: Path) -> None:

@@ -13,8 +13,8 @@ from service.http.web.figures.thinning import thin
 from service.results.curves import numbers
 from service.results.regimes import DOUBTFUL, MARKED, MARKS, regimes_of, stretches
 from service.results.wording import number, unit_text, words
+from worker.codes import PENDING
 from worker.models import WorkerEnding
-from worker.models.codes import PENDING
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

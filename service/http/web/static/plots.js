@@ -1,6 +1,13 @@
 // Draws every element that has data-figure: the server makes the figure, this gives it the colours of the page.
 "use strict";
 
+// plotly gives some shapes a style attribute, which the policy of the pages refuses; the same as properties is allowed.
+const setAttribute = Element.prototype.setAttribute;
+SVGElement.prototype.setAttribute = function (name, value) {
+  if (name === "style") this.style.cssText = value;
+  else setAttribute.call(this, name, value);
+};
+
 sprag.figures = new Map();
 
 sprag.colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
