@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from engine.machine_shaft.simulate import estimate_seconds, simulate
+from engine.machine_shaft.estimate import estimate_seconds
+from engine.machine_shaft.simulate import simulate
 from engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
 from engine.machine_shaft.tables import Table
 from service.jobs.local import run_here
@@ -65,6 +66,12 @@ def studies(cases: int) -> dict[str, tuple[MachineSpec, Mapping[str, Any]]]:
     motor |= {"drive.motor.breakdown_slip": 0.15}
     rows = tuple((math.radians(a), 130.0 + 40.0 * math.sin(math.radians(a))) for a in range(0, 360, 10))
     tabled = replace(PRESS, balance="scale", drive=Drive("table", table=Table(rows)))
+    load = {path: value for path, value in inertia.items() if not path.startswith("operation")}
+    own = load | {"constants.a": np.linspace(2.0, 3.0, cases)}
+
+    def formula(text: str, *constants: str) -> MachineSpec:
+        return replace(PRESS, operation=OperationChoice("torque", "formula", formula=text), constants=constants)
+
     return {
         "drive inertia, midrange": (PRESS, inertia),
         "drive inertia, mean over angle": (replace(PRESS, mean_speed_is="angle"), inertia),
@@ -73,6 +80,11 @@ def studies(cases: int) -> dict[str, tuple[MachineSpec, Mapping[str, Any]]]:
         "onset of the force": (PRESS, onset),
         "with the flywheel for an irregularity": (PRESS, inertia | {"wanted_irregularity": 0.05}),
         "driving torque from a table of 36 rows": (tabled, inertia),
+        "formula that all cases share": (formula("100 + 50*sin(phi)"), load),
+        "formula with a constant": (formula("100 + a*sin(phi)", "a"), own),
+        "formula with a jump": (formula("if(phi > a, 1000, 0)", "a"), own),
+        "formula with a wide peak": (formula("10 + 100*exp(-(phi - a)^2)", "a"), own),
+        "formula with a peak of half a degree": (formula("10 + 1e4*exp(-((phi - a)/0.01)^2)", "a"), own),
         "motor, limit cycle": (replace(PRESS, balance="motor", drive=Drive(motor="kloss")), motor),
     }
 

@@ -118,7 +118,9 @@ def test_results_that_the_pages_name_exist() -> None:
 
 
 def test_the_reference_lists_every_ending_flag_and_state() -> None:
-    sentences = {**models.ENDING_SENTENCES, **models.FLAG_SENTENCES}
+    sentences = dict(models.ENDING_SENTENCES)
+    for model in models.model_names():
+        sentences |= models.flags_of(model)
     sentences |= {state.value: state.sentence for state in StudyState}
     for key, sentence in sentences.items():
         assert f"| `{key}` | {sentence} |" in REFERENCE

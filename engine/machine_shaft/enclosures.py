@@ -116,6 +116,18 @@ class Program:
         )  # fmt: skip
         return errors, least
 
+    def entries(self, low: float, high: float) -> tuple[Floats, Floats]:
+        """Lower and upper ends, each of shape (ORDERS,), of a formula's enclosures on one interval (``intervals``).
+
+        The formula has no variable beside ``phi``.
+        """
+        stack = np.empty((2, self._most + _SPARE, ORDERS))
+        _enclose(
+            self.codes, self.arguments, self.numbers, np.array([low]), np.array([high]), np.empty((1, 0)),
+            np.zeros((1, ORDERS)), stack, np.empty(1), np.empty(1),
+        )  # fmt: skip
+        return stack[0, 0], stack[1, 0]
+
 
 def _whole(node: Node) -> int | None:
     """The whole number that an exponent is, if it is one."""
@@ -135,7 +147,9 @@ def _way(low: Floats, high: Floats, row: int, series: Floats) -> None:
         for i in range(j + 1, ORDERS):
             binomial = binomial * i / (i - j)
             spread += binomial * abs(series[i])
-        low[row, j], high[row, j] = series[j] - spread, series[j] + spread
+        # A few dozen operations, each right to a unit in the last place.
+        spread = iv.up(spread, 64.0)
+        low[row, j], high[row, j] = iv.down(series[j] - spread, 1.0), iv.up(series[j] + spread, 1.0)
     low[row, 0], high[row, 0] = max(low[row, 0], 0.0), min(high[row, 0], 1.0)
 
 
@@ -228,9 +242,9 @@ def _angle_of(low: Floats, high: Floats, y: int, x: int, spare: int) -> None:
         iv.divide(low, high, x, y, spare)
         iv.arctangent(low, high, spare, y, spare + 1)
         iv.negate(low, high, y)
-        low[y, 0], high[y, 0] = low[y, 0] + turn, high[y, 0] + turn
+        iv.shift(low, high, y, 0, iv.down(turn, 1.0), iv.up(turn, 1.0))
     else:
-        iv.rough(low, high, y, -np.pi, np.pi)
+        iv.rough(low, high, y, -iv.up(np.pi, 1.0), iv.up(np.pi, 1.0))
 
 
 @part
@@ -278,7 +292,7 @@ def _function(low: Floats, high: Floats, u: int, code: int, spare: int) -> None:
         iv.arcsine(low, high, u, out, spare + 1, spare + 2)
         if code == _ACOS:
             iv.negate(low, high, out)
-            low[out, 0], high[out, 0] = low[out, 0] + 0.5 * np.pi, high[out, 0] + 0.5 * np.pi
+            iv.shift(low, high, out, 0, iv.down(0.5 * np.pi, 1.0), iv.up(0.5 * np.pi, 1.0))
     iv.copy(low, high, out, u)
 
 
@@ -333,7 +347,8 @@ def _enclose(
                     iv.constant(low, high, top, numbers[step], numbers[step])
                 elif code == _PHI:
                     iv.constant(low, high, top, starts[n], ends[n])
-                    low[top, 1] = high[top, 1] = 0.5 * (ends[n] - starts[n])
+                    half = 0.5 * (ends[n] - starts[n])
+                    low[top, 1], high[top, 1] = iv.down(half, 1.0), iv.up(half, 1.0)
                 elif code == _X:
                     _way(low, high, top, ways[n])
                 else:
@@ -358,4 +373,4 @@ def _enclose(
         errors[n] = np.inf
         for k in range(ORDERS):
             # Entries that are no numbers do not count.
-            errors[n] = min(errors[n], np.fmin(0.5 * (high[top, k] - low[top, k]), np.inf))
+            errors[n] = min(errors[n], iv.up(np.fmin(0.5 * (high[top, k] - low[top, k]), np.inf), 1.0))

@@ -281,6 +281,16 @@ class Expression:
         """How many quantities there are whose change of sign is a jump or a kink of the formula."""
         return len(self._switches)
 
+    @property
+    def names(self) -> set[str]:
+        """Names of variables and constants that the formula uses."""
+        return _names(self.root)
+
+    @property
+    def kinds(self) -> set[str]:
+        """Operations and functions that the formula uses."""
+        return _kinds(self.root)
+
     def evaluate(self, variables: Mapping[str, Dual]) -> Dual:
         """Value and derivative; ``variables`` gives both for every name. Not-finite values are left for the caller."""
         with np.errstate(all="ignore"):
@@ -327,6 +337,10 @@ def _content(node: Node) -> tuple[object, ...]:
 def _names(node: Node) -> set[str]:
     own = {node.kind[5:]} if node.kind.startswith("name ") else set()
     return own.union(*(_names(part) for part in node.parts))
+
+
+def _kinds(node: Node) -> set[str]:
+    return {node.kind}.union(*(_kinds(part) for part in node.parts))
 
 
 def _divisor(parts: tuple[Node, ...], variables: Mapping[str, Dual]) -> Value:

@@ -4,7 +4,8 @@ A series is a row of two arrays ``low`` and ``high`` of shape (rows, ORDERS): en
 Taylor coefficient about every place of an interval, times the k-th power of the interval's half width. Entry 0
 encloses the function itself. A function that is not smooth on the interval has entries without bounds after the first.
 
-Rounding is not directed outward: what these enclosures decide allows for errors far above it.
+Every operation is rounded outward: sums, products and quotients by a unit in the last place, which is twice their
+error, functions of the mathematical library by more than they are known to be wrong.
 """
 
 import math
@@ -18,6 +19,56 @@ Floats = NDArray[np.float64]
 
 #: Coefficients of a series.
 ORDERS = 12
+#: Distance of 1 to the next number, and the least number above 0.
+_ULP, _LEAST = 2.0**-52, 5e-324
+#: Units in the last place by which functions of the mathematical library may be wrong; glibc's are within 2.
+_LIBRARY = 4.0
+
+
+@part
+def down(x: float, ulps: float) -> float:
+    """A number below ``x`` by so many units in its last place; 0, infinities and what is no number stay."""
+    return x - (ulps * _ULP * abs(x) + _LEAST) if 0.0 < abs(x) < math.inf else x
+
+
+@part
+def up(x: float, ulps: float) -> float:
+    """A number above ``x`` by so many units in its last place; 0, infinities and what is no number stay."""
+    return x + (ulps * _ULP * abs(x) + _LEAST) if 0.0 < abs(x) < math.inf else x
+
+
+@part
+def _product(a: float, b: float) -> float:
+    """``a b``, where nothing times anything is nothing, and a product that is too small for a number is not."""
+    if a == 0.0 or b == 0.0:
+        return 0.0
+    c = a * b
+    return c if c != 0.0 else (_LEAST if (a > 0.0) == (b > 0.0) else -_LEAST)
+
+
+@part
+def _exactly(a: float, b: float, c: float) -> bool:
+    """Whether ``a b`` is ``c`` without rounding (T. J. Dekker, 1971); False where that is not known."""
+    if c == 0.0 or not 1e-250 < abs(c) < 1e250 or not max(abs(a), abs(b)) < 1e250:
+        return c == 0.0 and (a == 0.0 or b == 0.0)
+    p, q = a * 134217729.0, b * 134217729.0
+    a_high, b_high = p - (p - a), q - (q - b)
+    a_low, b_low = a - a_high, b - b_high
+    return a_high * b_high - c + a_high * b_low + a_low * b_high + a_low * b_low == 0.0
+
+
+@part
+def lower_sum(a: float, b: float) -> float:
+    """``a + b`` or a number below it; itself where it is not rounded (D. E. Knuth's TwoSum)."""
+    c = a + b
+    d = c - a
+    return c if (a - (c - d)) + (b - d) >= 0.0 else down(c, 1.0)
+
+
+@part
+def upper_sum(a: float, b: float) -> float:
+    """``a + b`` or a number above it."""
+    return -lower_sum(-a, -b)
 
 
 @part
@@ -25,11 +76,10 @@ def times(a: float, b: float, c: float, d: float) -> tuple[float, float]:
     """Product of the intervals a .. b and c .. d; nothing times anything, even infinite, is nothing."""
     if (a == 0.0 and b == 0.0) or (c == 0.0 and d == 0.0):
         return 0.0, 0.0
-    p = 0.0 if a == 0.0 or c == 0.0 else a * c
-    q = 0.0 if a == 0.0 or d == 0.0 else a * d
-    r = 0.0 if b == 0.0 or c == 0.0 else b * c
-    s = 0.0 if b == 0.0 or d == 0.0 else b * d
-    return min(p, q, r, s), max(p, q, r, s)
+    if a == b and c == d and _exactly(a, c, a * c):
+        return a * c, a * c
+    p, q, r, s = _product(a, c), _product(a, d), _product(b, c), _product(b, d)
+    return down(min(p, q, r, s), 1.0), up(max(p, q, r, s), 1.0)
 
 
 @part
@@ -37,18 +87,27 @@ def over(a: float, b: float, c: float, d: float) -> tuple[float, float]:
     """Quotient of the intervals a .. b and c .. d; without bounds where the second has a zero."""
     if not (c > 0.0 or d < 0.0):
         return -math.inf, math.inf
-    return times(a, b, 1.0 / d, 1.0 / c)
+    if a == b and c == d and _exactly(a / c, c, a):
+        return a / c, a / c
+    return times(a, b, down(1.0 / d, 1.0), up(1.0 / c, 1.0))
 
 
 @part
-def sine_range(a: float, b: float) -> tuple[float, float]:
-    """Range of the sine over a .. b."""
+def _passes(a: float, b: float, place: float, period: float) -> bool:
+    """Whether ``place``, or one whole periods from it, may lie in a .. b."""
+    margin = 4.0 * _ULP * (abs(a) + abs(b) + period)
+    return math.floor((b + margin - place) / period) > math.floor((a - margin - place) / period)
+
+
+@part
+def wave_range(a: float, b: float, at_a: float, at_b: float, crest: float) -> tuple[float, float]:
+    """Range over a .. b of a sine or cosine with these values at the ends and a crest at ``crest``."""
     if not (b - a < 2.0 * math.pi and abs(a) < 1e15):
         return -1.0, 1.0
-    low, high = min(math.sin(a), math.sin(b)), max(math.sin(a), math.sin(b))
-    if math.floor((b - 0.5 * math.pi) / (2.0 * math.pi)) > math.floor((a - 0.5 * math.pi) / (2.0 * math.pi)):
+    low, high = max(down(min(at_a, at_b), _LIBRARY), -1.0), min(up(max(at_a, at_b), _LIBRARY), 1.0)
+    if _passes(a, b, crest, 2.0 * math.pi):
         high = 1.0
-    if math.floor((b + 0.5 * math.pi) / (2.0 * math.pi)) > math.floor((a + 0.5 * math.pi) / (2.0 * math.pi)):
+    if _passes(a, b, crest - math.pi, 2.0 * math.pi):
         low = -1.0
     return low, high
 
@@ -87,10 +146,14 @@ def negate(low: Floats, high: Floats, row: int) -> None:
 def add(low: Floats, high: Floats, u: int, v: int, sign: float) -> None:
     """``u + sign v`` into ``u``."""
     for k in range(ORDERS):
-        if sign > 0.0:
-            low[u, k], high[u, k] = low[u, k] + low[v, k], high[u, k] + high[v, k]
-        else:
-            low[u, k], high[u, k] = low[u, k] - high[v, k], high[u, k] - low[v, k]
+        least, most = (low[v, k], high[v, k]) if sign > 0.0 else (-high[v, k], -low[v, k])
+        shift(low, high, u, k, least, most)
+
+
+@part
+def shift(low: Floats, high: Floats, u: int, k: int, a: float, b: float) -> None:
+    """Add the interval a .. b to entry ``k`` of ``u``."""
+    low[u, k], high[u, k] = lower_sum(low[u, k], a), upper_sum(high[u, k], b)
 
 
 @part
@@ -101,12 +164,24 @@ def weighted(
     a = b = 0.0
     for j in range(first, last + 1):
         p, q = times(low[u, j], high[u, j], low[v, n - j], high[v, n - j])
-        factor = 1.0 if by_j == 0.0 and by_rest == 0.0 else by_j * j + by_rest * (n - j)
-        if factor >= 0.0:
-            a, b = a + factor * p if factor > 0.0 else a, b + factor * q if factor > 0.0 else b
-        else:
-            a, b = a + factor * q, b + factor * p
+        if by_j != 0.0 or by_rest != 0.0:
+            factor = by_j * j + by_rest * (n - j)
+            error = 0.0 if by_j == math.floor(by_j) else 2.0 * _ULP * (abs(by_j * j) + abs(by_rest * (n - j)))
+            p, q = times(p, q, factor - error, factor + error)
+        a, b = lower_sum(a, p), upper_sum(b, q)
     return a, b
+
+
+@part
+def _parts(a: float, b: float, n: int) -> tuple[float, float]:
+    """The interval a .. b over n."""
+    return (a, b) if n == 1 else (down(a / n, 1.0), up(b / n, 1.0))
+
+
+@part
+def _less(a: float, b: float, p: float, q: float) -> tuple[float, float]:
+    """The interval a .. b less p .. q."""
+    return lower_sum(a, -q), upper_sum(b, -p)
 
 
 @part
@@ -120,8 +195,9 @@ def multiply(low: Floats, high: Floats, u: int, v: int, out: int) -> None:
 def divide(low: Floats, high: Floats, u: int, v: int, out: int) -> None:
     """``u / v`` into ``out``, another row."""
     for n in range(ORDERS):
-        a, b = weighted(low, high, v, out, n, 1, n, 0.0, 0.0)
-        low[out, n], high[out, n] = over(low[u, n] - b, high[u, n] - a, low[v, 0], high[v, 0])
+        p, q = weighted(low, high, v, out, n, 1, n, 0.0, 0.0)
+        a, b = _less(low[u, n], high[u, n], p, q)
+        low[out, n], high[out, n] = over(a, b, low[v, 0], high[v, 0])
 
 
 @part
@@ -141,9 +217,12 @@ def whole_power(low: Floats, high: Floats, u: int, exponent: int, out: int, spar
             low[u, 0] = max(low[u, 0], 0.0)
     if size > 0 and size % 2 == 0:
         least = 0.0 if a <= 0.0 <= b else min(abs(a), abs(b))
-        low[out, 0], high[out, 0] = least**size, max(abs(a), abs(b)) ** size
-    elif size > 0:
-        low[out, 0], high[out, 0] = a**size, b**size
+        most = max(abs(a), abs(b)) ** size
+        low[out, 0] = max(down(least**size, _LIBRARY + size), 0.0)
+        high[out, 0] = up(most + _LEAST, _LIBRARY + size)
+    elif size > 1:
+        low[out, 0] = down(a**size - _LEAST, _LIBRARY + size)
+        high[out, 0] = up(b**size + _LEAST, _LIBRARY + size)
     if exponent < 0:
         constant(low, high, u, 1.0, 1.0)
         divide(low, high, u, out, spare)
@@ -158,34 +237,34 @@ def real_power(low: Floats, high: Floats, u: int, exponent: float, out: int) -> 
         rough(low, high, out, -math.inf, math.inf)
         return
     if exponent > 0.0:
-        low[out, 0], high[out, 0] = a**exponent, b**exponent
+        low[out, 0], high[out, 0] = down(a**exponent, _LIBRARY), up(b**exponent + _LEAST, _LIBRARY)
     else:
-        low[out, 0] = b**exponent
-        high[out, 0] = a**exponent if a > 0.0 else math.inf
+        low[out, 0] = down(b**exponent, _LIBRARY)
+        high[out, 0] = up(a**exponent + _LEAST, _LIBRARY) if a > 0.0 else math.inf
     for n in range(1, ORDERS):
         p, q = weighted(low, high, u, out, n, 1, n, exponent, -1.0)
-        low[out, n], high[out, n] = over(p / n, q / n, low[u, 0], high[u, 0])
+        p, q = _parts(p, q, n)
+        low[out, n], high[out, n] = over(p, q, low[u, 0], high[u, 0])
 
 
 @part
 def exponential(low: Floats, high: Floats, u: int, out: int) -> None:
     """exp(u) into ``out``."""
-    low[out, 0], high[out, 0] = math.exp(min(low[u, 0], 709.7)), math.exp(min(high[u, 0], 709.7))
-    if high[u, 0] > 709.7:
-        high[out, 0] = math.inf
+    low[out, 0] = max(down(math.exp(min(low[u, 0], 709.7)), _LIBRARY), 0.0)
+    high[out, 0] = math.inf
+    if high[u, 0] <= 709.7:
+        high[out, 0] = up(max(math.exp(high[u, 0]), _LEAST), _LIBRARY)
     for n in range(1, ORDERS):
         p, q = weighted(low, high, u, out, n, 1, n, 1.0, 0.0)
-        low[out, n], high[out, n] = p / n, q / n
+        low[out, n], high[out, n] = _parts(p, q, n)
 
 
 @part
 def logarithm(low: Floats, high: Floats, u: int, out: int) -> None:
     """log(u), where u is positive, into ``out``."""
-    low[out, 0] = math.log(low[u, 0]) if low[u, 0] > 0.0 else -math.inf
-    high[out, 0] = math.log(high[u, 0]) if high[u, 0] > 0.0 else math.inf
-    for n in range(1, ORDERS):
-        p, q = weighted(low, high, out, u, n, 1, n - 1, 1.0, 0.0)
-        low[out, n], high[out, n] = over(low[u, n] - q / n, high[u, n] - p / n, low[u, 0], high[u, 0])
+    low[out, 0] = down(math.log(low[u, 0]), _LIBRARY) if low[u, 0] > 0.0 else -math.inf
+    high[out, 0] = up(math.log(high[u, 0]), _LIBRARY) if high[u, 0] > 0.0 else math.inf
+    by_slope(low, high, u, u, out)
 
 
 @part
@@ -194,37 +273,38 @@ def root(low: Floats, high: Floats, u: int, out: int) -> None:
     if not high[u, 0] >= 0.0:
         rough(low, high, out, -math.inf, math.inf)
         return
-    low[out, 0], high[out, 0] = math.sqrt(max(low[u, 0], 0.0)), math.sqrt(high[u, 0])
+    low[out, 0], high[out, 0] = down(math.sqrt(max(low[u, 0], 0.0)), 1.0), up(math.sqrt(high[u, 0]), 1.0)
     for n in range(1, ORDERS):
         p, q = weighted(low, high, out, out, n, 1, n - 1, 0.0, 0.0)
-        low[out, n], high[out, n] = over(low[u, n] - q, high[u, n] - p, 2.0 * low[out, 0], 2.0 * high[out, 0])
+        a, b = _less(low[u, n], high[u, n], p, q)
+        low[out, n], high[out, n] = over(a, b, 2.0 * low[out, 0], 2.0 * high[out, 0])
 
 
 @part
 def sine_and_cosine(low: Floats, high: Floats, u: int, sine: int, cosine: int) -> None:
     """sin(u) and cos(u) into two other rows."""
     a, b = low[u, 0], high[u, 0]
-    low[sine, 0], high[sine, 0] = sine_range(a, b)
-    low[cosine, 0], high[cosine, 0] = sine_range(a + 0.5 * math.pi, b + 0.5 * math.pi)
+    low[sine, 0], high[sine, 0] = wave_range(a, b, math.sin(a), math.sin(b), 0.5 * math.pi)
+    low[cosine, 0], high[cosine, 0] = wave_range(a, b, math.cos(a), math.cos(b), 0.0)
     for n in range(1, ORDERS):
         p, q = weighted(low, high, u, cosine, n, 1, n, 1.0, 0.0)
         r, s = weighted(low, high, u, sine, n, 1, n, 1.0, 0.0)
-        low[sine, n], high[sine, n] = p / n, q / n
-        low[cosine, n], high[cosine, n] = -s / n, -r / n
+        low[sine, n], high[sine, n] = _parts(p, q, n)
+        low[cosine, n], high[cosine, n] = _parts(-s, -r, n)
 
 
 @part
 def hyperbolic(low: Floats, high: Floats, u: int, sine: int, cosine: int) -> None:
     """sinh(u) and cosh(u) into two other rows."""
     a, b = low[u, 0], high[u, 0]
-    low[sine, 0], high[sine, 0] = np.sinh(a), np.sinh(b)
-    low[cosine, 0] = 1.0 if a <= 0.0 <= b else np.cosh(min(abs(a), abs(b)))
-    high[cosine, 0] = np.cosh(max(abs(a), abs(b)))
+    low[sine, 0], high[sine, 0] = down(np.sinh(a), _LIBRARY), up(np.sinh(b), _LIBRARY)
+    low[cosine, 0] = 1.0 if a <= 0.0 <= b else max(down(np.cosh(min(abs(a), abs(b))), _LIBRARY), 1.0)
+    high[cosine, 0] = up(np.cosh(max(abs(a), abs(b))), _LIBRARY)
     for n in range(1, ORDERS):
         p, q = weighted(low, high, u, cosine, n, 1, n, 1.0, 0.0)
         r, s = weighted(low, high, u, sine, n, 1, n, 1.0, 0.0)
-        low[sine, n], high[sine, n] = p / n, q / n
-        low[cosine, n], high[cosine, n] = r / n, s / n
+        low[sine, n], high[sine, n] = _parts(p, q, n)
+        low[cosine, n], high[cosine, n] = _parts(r, s, n)
 
 
 @part
@@ -232,22 +312,22 @@ def tangent(low: Floats, high: Floats, u: int, out: int, square: int, sign: floa
     """tan(u) (``sign`` 1) or tanh(u) (-1) into ``out``, by h' = (1 + sign h^2) u'; ``square`` is overwritten."""
     a, b = low[u, 0], high[u, 0]
     if sign < 0.0:
-        low[out, 0], high[out, 0] = math.tanh(a), math.tanh(b)
-    elif math.floor(a / math.pi + 0.5) != math.floor(b / math.pi + 0.5) or not abs(a) < 1e15:
+        low[out, 0], high[out, 0] = down(math.tanh(a), _LIBRARY), up(math.tanh(b), _LIBRARY)
+    elif not (b - a < math.pi and abs(a) < 1e15) or _passes(a, b, 0.5 * math.pi, math.pi):
         rough(low, high, out, -math.inf, math.inf)
         return
     else:
-        low[out, 0], high[out, 0] = math.tan(a), math.tan(b)
+        low[out, 0], high[out, 0] = down(math.tan(a), _LIBRARY), up(math.tan(b), _LIBRARY)
     for n in range(ORDERS):
         if n > 0:
             p, q = weighted(low, high, u, square, n, 1, n, 1.0, 0.0)
-            low[out, n], high[out, n] = p / n, q / n
+            low[out, n], high[out, n] = _parts(p, q, n)
         p, q = weighted(low, high, out, out, n, 0, n, 0.0, 0.0)
         if n == 0:
             p = max(p, 0.0)
         low[square, n], high[square, n] = (p, q) if sign > 0.0 else (-q, -p)
         if n == 0:
-            low[square, 0], high[square, 0] = low[square, 0] + 1.0, high[square, 0] + 1.0
+            shift(low, high, square, 0, 1.0, 1.0)
             if sign < 0.0:
                 low[square, 0] = max(low[square, 0], 0.0)
 
@@ -257,15 +337,18 @@ def by_slope(low: Floats, high: Floats, u: int, slope: int, out: int) -> None:
     """Entries after the first of a function h of u with h' = u'/slope, into ``out``."""
     for n in range(1, ORDERS):
         p, q = weighted(low, high, out, slope, n, 1, n - 1, 1.0, 0.0)
-        low[out, n], high[out, n] = over(low[u, n] - q / n, high[u, n] - p / n, low[slope, 0], high[slope, 0])
+        p, q = _parts(p, q, n)
+        a, b = _less(low[u, n], high[u, n], p, q)
+        low[out, n], high[out, n] = over(a, b, low[slope, 0], high[slope, 0])
 
 
 @part
 def arctangent(low: Floats, high: Floats, u: int, out: int, slope: int) -> None:
     """atan(u) into ``out``; ``slope`` is overwritten."""
     multiply(low, high, u, u, slope)
-    low[slope, 0], high[slope, 0] = max(low[slope, 0], 0.0) + 1.0, high[slope, 0] + 1.0
-    low[out, 0], high[out, 0] = math.atan(low[u, 0]), math.atan(high[u, 0])
+    low[slope, 0] = max(low[slope, 0], 0.0)
+    shift(low, high, slope, 0, 1.0, 1.0)
+    low[out, 0], high[out, 0] = down(math.atan(low[u, 0]), _LIBRARY), up(math.atan(high[u, 0]), _LIBRARY)
     by_slope(low, high, u, slope, out)
 
 
@@ -278,7 +361,8 @@ def arcsine(low: Floats, high: Floats, u: int, out: int, spare: int, slope: int)
         return
     multiply(low, high, u, u, spare)
     negate(low, high, spare)
-    low[spare, 0], high[spare, 0] = 1.0 + low[spare, 0], min(1.0 + high[spare, 0], 1.0)
+    shift(low, high, spare, 0, 1.0, 1.0)
+    high[spare, 0] = min(high[spare, 0], 1.0)
     root(low, high, spare, slope)
-    low[out, 0], high[out, 0] = math.asin(a), math.asin(b)
+    low[out, 0], high[out, 0] = down(math.asin(a), _LIBRARY), up(math.asin(b), _LIBRARY)
     by_slope(low, high, u, slope, out)

@@ -291,11 +291,21 @@ class CrankShaper(_QuickReturn):
         """See Mechanism."""
         crank, distance = number_of(values, "crank"), number_of(values, "pivot_distance")
         if distance > crank:
-            return None
+            return self._rod_at_fault(values)
         return (
             f"the pivot_distance ({distance:.6g} m) of a crank_shaper is more than the crank ({crank:.6g} m), its "
             "pivot lying outside the crank's circle, and here it is not"
         )
+
+    def _rod_at_fault(self, values: Values) -> str | None:
+        """What is wrong where the link swings as it should; None where the rod does not reach the ram's line."""
+        theta = np.stack([self._link(values, phi)[0] for phi in self.worst_angles(values)])
+        reach = float(_slider_margin(values["link_arm"], values, theta).min())
+        if abs(reach) <= 1e-9:
+            return "the rod stands square to the ram's line there, and the ram could go on either way"
+        if reach > 0.0:
+            return "the link_arm and the rod come into one line there, and the ram would turn back within a stroke"
+        return None
 
     def worst_angles(self, values: Values) -> Sequence[Floats]:
         """See Mechanism."""

@@ -353,14 +353,3 @@ def _problem(ending: Ending, result: Mapping[str, float], row: Columns, rule: st
 _PLAIN_PROBLEMS: dict[Ending, type[MotorStalledError | MotorOverrunError | NearSingularError | QuadratureError]] = {
     problem.ending: problem for problem in (MotorStalledError, MotorOverrunError, NearSingularError, QuadratureError)
 }
-
-#: Times of a case by the benchmark, over that with the mean as midrange.
-_COST = {"midrange": 1.0, "angle": 2.2, "time": 1.7}
-
-
-def estimate_seconds(model: MachineSpec) -> float:
-    """Rough time of one case on one core, in s."""
-    tables = [part.table for part in (model.drive, model.mechanism, model.operation) if part.table is not None]
-    panels = PANELS * model.cycle + sum(len(table.rows) for table in tables)
-    factor = 8.0 if model.balance == "motor" else _COST[model.mean_speed_is]
-    return 1e-5 + factor * 7e-6 * panels

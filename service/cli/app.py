@@ -14,6 +14,7 @@ import typer
 
 from service.cli import database, demo, doctor, extend, fit, local, pictures, processes, remote, schedule, settle, token
 from service.cli.console import CommandFailureError, ExitCode, TroubleError, say, write_text
+from service.extras import command_for
 
 #: Set to anything to see where a fault of the program lies.
 DEBUG_VARIABLE = "SPRAG_DEBUG"
@@ -131,6 +132,9 @@ def _invoke(arguments: Sequence[str]) -> int:
         # typer turns a broken pipe into exit 1, which here would mean that some cases failed.
         raise _PipeClosedError from stop
     except Exception as error:
+        command = command_for(error) if isinstance(error, ModuleNotFoundError) else None
+        if command is not None:
+            return _report(TroubleError(f"this command needs a package that is not installed: {command}"), as_json)
         if os.environ.get(DEBUG_VARIABLE):
             traceback.print_exc()
         sentence = f"This is a fault of Sprag: {type(error).__name__}: {error}. {DEBUG_VARIABLE}=1 shows where it lies."

@@ -51,8 +51,6 @@ class ValueFormat(StrEnum):
 
 #: Rough time until the program and its pool of processes have started.
 _START_SECONDS = 2.0
-#: A study that takes less is not worth a pool.
-_NO_POOL_SECONDS = 1.0
 
 
 def validate(spec: SpecFile, points: PointsFile = None, as_json: JsonFlag = False) -> None:
@@ -247,7 +245,7 @@ def run(
     as_json: JsonFlag = False,
 ) -> None:
     """Run a study here, without a service: rows or a report to standard output or FILE, progress on standard error."""
-    from service.jobs.local import run_here
+    from service.jobs.local import pool_size, run_here
     from service.results.unaffected import Unaffected
 
     finish = _finish(finish_by)
@@ -262,7 +260,7 @@ def run(
         run_here(
             parsed.spec,
             parsed.study,
-            processes=_pool_size(parsed.study, settings, processes),
+            processes=pool_size(parsed.study, settings.pool_processes, asked=processes is not None),
             database_url=settings.database_url if db is not None else None,
             chunk_cases=settings.chunk_cases,
             chunk_timeout=settings.chunk_timeout,
@@ -321,25 +319,13 @@ def _finish(text: str | None) -> datetime | None:
         raise WrongInputError("an option is wrong", problems=[problem]) from None
 
 
-def _pool_size(study: Study, settings: Settings, asked: int | None) -> int:
-    """Processes to run on; 0, which is this process itself, where starting a pool would take longer than the study."""
-    from worker.models import estimate_seconds_per_case
-
-    if asked is None and study.cases * estimate_seconds_per_case(study) < _NO_POOL_SECONDS:
-        return 0
-    return settings.pool_processes
-
-
 def _rows(done: LocalRun, study: Study, form: Format | ReportFormat) -> Iterator[bytes]:
     """The rows of a finished study as the service exports them, or its report."""
-    from service.results.exports import Source, export
+    from service.jobs.local import source_of
+    from service.results.exports import export
     from service.results.report import write_report
     from service.results.report.content import report_of
-    from worker.models import study_results
 
-    record = done.record
     if form == "html" or form == "pdf":  # noqa: PLR1714 - so that the types are told apart
-        return iter([write_report(report_of(done.store, record.id), form)])
-    about = {"study": record.id, "name": record.name, "model": record.model, "engine_version": record.engine_version}
-    source = Source(study, study_results(study), done.store.iter_rows(record.id), about, done.store.spec(record.id))
-    return export(source, form)
+        return iter([write_report(report_of(done.store, done.record.id), form)])
+    return export(source_of(done, study), form)

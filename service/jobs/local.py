@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from service.jobs.dispatching import STANDBY_SECONDS, WorkerSettings, owner_name, pool, renewed_pool
+from service.results.exports.source import Source
 from service.stale_files import marked, sweep
 from service.storage.part import SystemClock
 from service.storage.room import GOES_ON
@@ -20,6 +21,7 @@ from service.storage.work import run_owner
 from worker.chunking import Chunking
 from worker.dispatcher import Dispatcher
 from worker.executors.inline import InlineExecutor
+from worker.models import estimate_seconds_per_case, study_results
 from worker.ports import ExecutorError, StoreError
 from worker.states import StudyState, TransitionError
 
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
 _FOLDER_PREFIX = "sprag-run-"
 #: What the reason of a study that is held for want of room ends with; true of services, and not here.
 _LATER = (f"; {GOES_ON}", "; it is tried again from time to time")
+#: A study that takes less is not worth a pool.
+_NO_POOL_SECONDS = 1.0
 #: Seconds between two reports of progress.
 REPORT_SECONDS = 0.25
 
@@ -108,6 +112,23 @@ def run_here(
             finally:
                 lock.release()
             yield LocalRun(store, watch.final(passing=database_url is None))
+
+
+def pool_size(study: Study, most: int, *, asked: bool) -> int:
+    """Processes to run on: ``most``, or 0, which is this process itself, where a pool takes longer than the study.
+
+    ``asked`` tells that somebody named the number.
+    """
+    if not asked and study.cases * estimate_seconds_per_case(study) < _NO_POOL_SECONDS:
+        return 0
+    return most
+
+
+def source_of(done: LocalRun, study: Study) -> Source:
+    """The rows of a study that was run, for an export."""
+    record = done.record
+    about = {"study": record.id, "name": record.name, "model": record.model, "engine_version": record.engine_version}
+    return Source(study, study_results(study), done.store.iter_rows(record.id), about, done.store.spec(record.id))
 
 
 def _cancelled(store: Store, study_id: str, *, ours: bool) -> StudyRecord:

@@ -9,15 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sqlalchemy as sa
+from alembic import command
 from alembic.autogenerate import compare_metadata
+from alembic.config import Config
 from alembic.migration import MigrationContext
 
+import migrations
 from service.spec.document import parse_spec
 from service.storage import maintenance
 from service.storage.errors import DatabaseError, SchemaError
 from service.storage.session import Session, sqlite_driver
 from service.storage.store import Store
 from service.storage.tables import HEAD_REVISION, all_tables
+from tests import postgres
 from tests.migrations.freeze import FOLDER
 from tests.service.spec_sample import changed
 from tests.worker import fakes
@@ -139,6 +143,29 @@ def test_a_stored_spec_keeps_the_run_that_it_meant(
             assert spec == {**drive, "run": then}
             assert "until" not in parse_spec(spec).study.run
         assert [store.spec(studies[number]) for number in (2, 3)] == others
+
+
+def test_a_server_has_the_variants_too(postgres_server: postgres.Server) -> None:
+    url = postgres_server.url(postgres_server.new_database())
+    session = Session(url)
+    config = Config()
+    config.set_main_option("script_location", str(Path(migrations.__path__[0])))
+    with session.write() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, "0012")
+        for number, (model, pendulums) in enumerate([("vibration-drive", 3), ("machine-shaft", 0)]):
+            connection.execute(
+                sa.text(
+                    "INSERT INTO studies (id, name, model, pendulums, state, cases, done, ok, chunk_cases, "
+                    "engine_version, physics_hash, spec, study, warnings, revision, created_at) VALUES "
+                    f"('st_{number}', 'old', '{model}', {pendulums}, 'finished', 1, 1, 1, 1, '3', '', "
+                    "'{}', '{}', '[]', 1, 0)"
+                )
+            )
+    session.close()
+    assert upgrade(url) == ("0012", HEAD_REVISION)
+    with Store.open(url) as store:
+        assert [study.variant for study in store.list_studies().studies] == ["", "3"]
 
 
 def test_code_and_migrations_have_the_same_tables(url: str) -> None:

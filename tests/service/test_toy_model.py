@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +29,7 @@ from worker.dispatcher import Dispatcher
 from worker.executors.inline import InlineExecutor
 from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
 from worker.models.model import Model
+from worker.models.presentation import Presentation
 from worker.study import Study
 
 if TYPE_CHECKING:
@@ -60,6 +62,8 @@ class DampedOscillator(Model):
 
     name = NAME
     endings = frozenset({Ending.DIVERGED})
+
+    presentation = Presentation(drawn=("displacement.end",), heading="What a spring does", columns=("swings",))
 
     def parameters(self) -> tuple[Parameter, ...]:
         return PARAMETERS
@@ -223,6 +227,9 @@ def test_pages_pictures_and_the_report_show_it(finished: tuple[Service, str]) ->
     (line,) = histories["motion"]["data"]
     assert line["y"][0] == 1.0
     assert "phase" not in histories
+    assert "What a spring does" in service.http.get(own).text
+    columns = service.http.get(f"{own}/cases").text
+    assert re.findall(r'name="col" value="([^"]+)" checked', columns) == ["swings"]
     report = service.http.get(f"/api/v1{own}/report", params={"format": "html"})
     assert "displacement.end" in report.text
 

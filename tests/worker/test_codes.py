@@ -35,5 +35,5 @@ def test_every_ending_and_flag_has_a_number_of_its_own() -> None:
     assert ENDING_CODES.keys() >= {PENDING, *models.ENDING_SENTENCES}
     assert len(set(ENDING_CODES.values())) == len(ENDING_CODES)
     assert all(-1 <= code < 1 << 15 for code in ENDING_CODES.values())
-    assert FLAG_MASKS.keys() >= set(models.FLAG_SENTENCES)
+    assert FLAG_MASKS.keys() >= {flag for model in models.model_names() for flag in models.flags_of(model)}
     assert sorted(FLAG_MASKS.values()) == [1 << bit for bit in range(len(FLAG_MASKS))]

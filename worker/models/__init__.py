@@ -38,7 +38,6 @@ from worker.models.model import Model, all_models, model_names, model_of, regist
 from worker.models.presentation import Panel, Presentation
 from worker.models.settled import REGIME_SENTENCES, SETTLED, is_settled, settled_study
 from worker.models.vibration_drive import (
-    FLAG_SENTENCES,
     NOT_SETTLED,
     WINDUP_OUT_OF_DATA,
     coefficients,
@@ -57,7 +56,6 @@ __all__ = [
     "CLUTCH_WINDUP_LIMIT",
     "ENDING_SENTENCES",
     "ENGINE_VERSION",
-    "FLAG_SENTENCES",
     "MACHINE_SHAFT",
     "MAX_COEFFICIENTS",
     "MAX_PENDULUMS",

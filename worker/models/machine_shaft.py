@@ -191,12 +191,13 @@ class MachineShaft(Model):
         return trajectory(spec_of(study.structure), columns, np.linspace(start, end, points))
 
     def estimate_seconds_per_case(self, study: Study) -> float:
-        from engine.machine_shaft.simulate import estimate_seconds
+        from engine.machine_shaft.estimate import estimate_seconds
 
         return estimate_seconds(spec_of(study.structure))
 
     def estimate_compile_seconds(self, shape: KernelShape) -> float:
-        return 5.0
+        """On one core, with the enclosures of formulas."""
+        return 10.0
 
     def prepare(self) -> None:
         import engine.machine_shaft.simulate  # noqa: F401

@@ -40,6 +40,7 @@ class Presentation:
     checks : first parts of names of results that tell of the computation rather than of the machine
     balance : rows of a balance of means: sign, result, words; ``residual`` is the result with what is left over
     panels : plots of a motion, from the names and units of its variables
+    states : how states look, colour and two patterns (plotly's, matplotlib's), so that either alone tells them
     phases : lines of the phase portrait, from the names of the variables: (angle, speed, what it is of)
     portrait : what the phase portrait shows; "" where there is none
     motion, motion_note : what the plots show in a few words, and what a reader has to know of them
@@ -57,6 +58,7 @@ class Presentation:
     balance: tuple[tuple[str, str, str], ...] = ()
     residual: str = ""
     panels: Callable[[Sequence[str], Sequence[str]], tuple[Panel, ...]] = panels_by_unit
+    states: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
     phases: Callable[[Sequence[str]], tuple[tuple[str, str, str], ...]] = _no_phases
     portrait: str = ""
     motion: str = "Motion of the case"

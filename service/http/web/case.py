@@ -20,7 +20,6 @@ from service.http.work import Attended
 from service.results import trajectories
 from service.results.defaults import main_results
 from service.results.pictures.motion import draw_motion
-from service.results.pictures.panels import panels
 from service.results.selection import axis_name
 from service.spec.catalogue import unit_of
 from worker import models
@@ -147,4 +146,4 @@ async def motion_picture(
     await work.load(models.shape_of(study))
     made = await work.compute(models.run_trajectory, study, case, *times, SAMPLES // 3)
     title = f"{study.name}, case {case}"
-    return tagged(await picture(draw_motion, "svg", made, panels(study, made), title).response(work), tag)
+    return tagged(await picture(draw_motion, "svg", made, models.presentation_of(study), title).response(work), tag)

@@ -25,7 +25,6 @@ from service.http.web.templates import fragment, page, spec_text
 from service.http.work import Attended, Work
 from service.presets import preset_names
 from service.results.pictures.motion import draw_motion
-from service.results.pictures.panels import panels
 from service.results.wording import number, words
 from service.spec.catalogue import parameter_of
 from service.spec.document import parse_spec
@@ -236,7 +235,8 @@ async def laboratory_picture(work: Attended, request: Request) -> Response:
     await work.load(models.shape_of(chosen.study))
     end = models.extent(chosen.study, 0).end
     made = await work.compute(models.run_trajectory, chosen.study, 0, 0.0, end, SAMPLES // 4)
-    return await picture(draw_motion, "svg", made, panels(chosen.study, made), chosen.study.name).response(work)
+    shown = models.presentation_of(chosen.study)
+    return await picture(draw_motion, "svg", made, shown, chosen.study.name).response(work)
 
 
 @router.get("/laboratory/study")

@@ -11,11 +11,13 @@ from service.results.pictures.curves import Picture, axis_label, render
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from worker.models import Panel, Trajectory
+    from worker.models import Presentation, Trajectory
 
 
-def draw_shaft(made: Trajectory, panels: tuple[Panel, ...], title: str, picture: Picture) -> bytes:
+def draw_shaft(made: Trajectory, shown: Presentation, title: str, picture: Picture) -> bytes:
     """The panels over the angle, two in a row; lines of one plot are told apart by colour and by style."""
+
+    panels = shown.panels(made.names, made.units)
 
     def paint(figure: Figure) -> None:
         plots = figure.subplots((len(panels) + 1) // 2, 2, sharex=True).reshape(-1)

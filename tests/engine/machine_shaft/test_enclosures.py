@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from numpy.polynomial import chebyshev
@@ -64,3 +67,70 @@ def test_the_way_is_taken_from_its_values() -> None:
 def test_an_angle_at_which_there_is_a_pole_is_not_enclosed() -> None:
     errors, _ = Program(Expression("1/(phi - 1)"), []).over(np.array([0.9]), np.array([1.2]), np.empty((1, 0)), None)
     assert np.isinf(errors[0])
+
+
+_SERIES_OF = {
+    # Taylor coefficients at a number.
+    "phi*phi*phi": lambda x: [x**3, 3 * x**2, 3 * x, 1],
+    "1/phi": lambda x: [(-1) ** k / x ** (k + 1) for k in range(4)],
+    "(phi + 0.1)*(phi - 0.3)": lambda x: [
+        (x + Fraction(0.1)) * (x - Fraction(0.3)), 2 * x + Fraction(0.1) - Fraction(0.3), 1, 0,
+    ],
+    "phi^7/3": lambda x: [Fraction(c, 3) * x ** (7 - k) for k, c in enumerate((1, 7, 21, 35))],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", _SERIES_OF)
+def test_rounding_is_directed_outward(text: str) -> None:
+    """Exact fractions of the first four coefficients, times powers of the half width, lie within the entries."""
+    for place in np.random.default_rng(1).uniform(0.6, 6.0, 200):
+        low, high = Program(Expression(text), []).entries(place, place)
+        assert Fraction(low[0]) <= _SERIES_OF[text](Fraction(place))[0] <= Fraction(high[0])
+        assert high[0] - low[0] <= 60.0 * np.spacing(abs(high[0]))
+        start, end = place - 0.5, place + 0.5
+        low, high = Program(Expression(text), []).entries(start, end)
+        half = (Fraction(end) - Fraction(start)) / 2
+        for x in (Fraction(start), Fraction(place), Fraction(end)):
+            for k, value in enumerate(_SERIES_OF[text](x)):
+                assert Fraction(low[k]) <= value * half**k <= Fraction(high[k])
+
+
+@pytest.mark.parametrize(
+    ("text", "exact"),
+    [
+        ("sin(phi)", Decimal("0.8414709848078965066525023216302989996226")),
+        ("cos(phi)", Decimal("0.5403023058681397174009366074429766037323")),
+        ("tan(phi)", Decimal("1.557407724654902230506974807458360173087")),
+        ("exp(phi)", Decimal("2.718281828459045235360287471352662497757")),
+        ("sinh(phi)", Decimal("1.175201193643801456882381850595600815156")),
+        ("cosh(phi)", Decimal("1.543080634815243778477905620757061682602")),
+        ("tanh(phi)", Decimal("0.7615941559557648881194582826047935904128")),
+        ("4*atan(phi)", Decimal("3.141592653589793238462643383279502884197")),
+        ("2*asin(phi)", Decimal("3.141592653589793238462643383279502884197")),
+        ("acos(-phi)", Decimal("3.141592653589793238462643383279502884197")),
+        ("log(phi + 1)", Decimal("0.6931471805599453094172321214581765680755")),
+        ("sqrt(phi + 1)", Decimal("1.414213562373095048801688724209698078570")),
+        ("(phi + 1)^0.5", Decimal("1.414213562373095048801688724209698078570")),
+        ("phi/3", Decimal("0.3333333333333333333333333333333333333333")),
+        ("0.1*phi + 0.2", Decimal("0.3000000000000000166533453693773481063545")),
+        ("atan2(phi, -phi)*4/3", Decimal("3.141592653589793238462643383279502884197")),
+    ],
+)
+def test_a_function_of_one_is_enclosed(text: str, exact: Decimal) -> None:
+    low, high = Program(Expression(text), []).entries(1.0, 1.0)
+    assert Decimal(low[0]) <= exact <= Decimal(high[0])
+    assert Decimal(low[0]) < Decimal(high[0])
+    assert high[0] - low[0] < 1e-14
+
+
+def test_crests_are_not_missed_at_large_angles() -> None:
+    for k in (0, 7, 10**6, 10**12):
+        crest = 2.0 * np.pi * k
+        assert Program(Expression("cos(phi)"), []).entries(crest - 1e-3, crest + 1e-3)[1][0] == 1.0
+        assert Program(Expression("cos(phi)"), []).entries(crest, crest + 1e-3)[1][0] == 1.0
+
+
+def test_whole_numbers_are_not_rounded() -> None:
+    for text, value in (("floor(6/2)", 3.0), ("mod(3*4, 4)", 0.0), ("step(2*3 - 6)", 1.0), ("floor(phi*2)", 2.0)):
+        low, high = Program(Expression(text), []).entries(1.0, 1.0)
+        assert (low[0], high[0]) == (value, value)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from engine.endings import ENDING_CODES, Ending
+from engine.machine_shaft.estimate import estimate_seconds
 from engine.machine_shaft.parameters import parameters
 from engine.machine_shaft.problems import (
     AssemblyError,
@@ -25,7 +26,7 @@ from engine.machine_shaft.problems import (
     UnbalancedWorkError,
 )
 from engine.machine_shaft.results import result_infos
-from engine.machine_shaft.simulate import check, estimate_seconds, simulate
+from engine.machine_shaft.simulate import check, simulate
 from engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
 from engine.machine_shaft.tables import Table
 from engine.machine_shaft.trajectory import trajectory
@@ -185,6 +186,12 @@ def test_catalogues_are_sound() -> None:
                 assert p.range_text()
                 assert p.default is None or p.accepts(p.default) or p.path == "wanted_irregularity"
     assert 0.0 < estimate_seconds(PRESS) < 0.1
+    costs = [
+        estimate_seconds(replace(PRESS, operation=OperationChoice("torque", "formula", formula=text), constants=("a",)))
+        for text in ("sin(phi)", "a*sin(phi)", "a*step(phi - 2)", "a*exp(-((phi - 2)/0.01)^2)")
+    ]
+    assert estimate_seconds(PRESS) < costs[0] < costs[1] < costs[2]
+    assert costs[3] > 5.0 * costs[0]
     for ending in Ending:
         assert ending.sentence
 
@@ -213,6 +220,21 @@ def test_a_rod_that_folds_onto_its_crank_is_told(
     assert math.degrees(error.value.angle) == pytest.approx(degrees, abs=1e-3)
     with pytest.raises(AssemblyError, match="do not reach each other there"):
         check(MachineSpec(mechanism=choice), numbers | {f"mechanism.{kind}.rod": 0.099 + abs(offset)})
+
+
+@pytest.mark.parametrize(
+    ("rod", "offset", "cause"),
+    [
+        (0.05, 0.05, "the rod stands square to the ram's line there"),
+        (0.12, 0.2, "link_arm and the rod come into one line there"),
+        (0.04, 0.05, "do not reach each other there"),
+    ],
+)
+def test_a_crank_shaper_is_told_what_its_rod_does(rod: float, offset: float, cause: str) -> None:
+    lengths = {"crank": 0.1, "link_arm": 0.1, "pivot_distance": 0.2, "rod": rod, "offset": offset}
+    numbers = FLAT | {f"mechanism.quick_return.{name}": length for name, length in lengths.items()}
+    with pytest.raises(AssemblyError, match=cause):
+        check(MachineSpec(mechanism=MechanismChoice("quick_return", quick_return="crank_shaper")), numbers)
 
 
 def test_a_parallelogram_is_told_that_it_folds() -> None:

@@ -18,7 +18,8 @@ from worker.study import Axis, Study
 def test_every_ending_has_a_sentence() -> None:
     assert set(models.ENDING_SENTENCES) == {ending.value for ending in (*Ending, *models.WorkerEnding)}
     assert all(sentence.endswith(".") for sentence in models.ENDING_SENTENCES.values())
-    assert all(sentence.endswith(".") for sentence in models.FLAG_SENTENCES.values())
+    for model in models.model_names():
+        assert all(sentence.endswith(".") for sentence in models.flags_of(model).values())
 
 
 def test_unknown_models_are_named() -> None:

@@ -11,20 +11,19 @@ from service.http.web.figures.curves import DASHES, PALETTE, Figure, axis_title
 from service.http.web.figures.shaft import shaft_figure
 from service.http.web.figures.thinning import thin
 from service.results.curves import numbers
-from service.results.pictures.panels import STATES, panels, spans_of
+from service.results.pictures.states import OTHER_LOOK, spans_of
 from service.results.wording import number, words
 from worker import models
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from worker.models import Panel, Trajectory
+    from worker.models import Presentation, Trajectory
     from worker.study import Study
 
 #: Times at which a motion is sampled for a picture, and points of a line that are drawn.
 SAMPLES: Final = 6000
 _MOST_POINTS: Final = 2400
-_OTHER: Final = ("#999999", "+", "+++")
 
 
 def motion_figures(study: Study, case: int, start: float, end: float) -> dict[str, Figure]:
@@ -35,9 +34,9 @@ def motion_figures(study: Study, case: int, start: float, end: float) -> dict[st
         told = {"data": [], "layout": {}, "note": _no_motion(study, case, made.ending)}
         return {"motion": told, **({"phase": told} if shown.portrait else {})}
     if made.along == "angle":
-        return {"motion": shaft_figure(study, made)}
+        return {"motion": shaft_figure(shown, made)}
     column = {name: made.values[:, index] for index, name in enumerate(made.names)}
-    histories = {"motion": _histories(panels(study, made), made, column)}
+    histories = {"motion": _histories(shown, made, column)}
     return histories | ({"phase": _phase(shown.phases(made.names), made, column)} if shown.portrait else {})
 
 
@@ -52,7 +51,8 @@ def _no_motion(study: Study, case: int, ending: str) -> str:
     return f"There is no motion in this part: the run stopped at {when} with {ending}."
 
 
-def _histories(rows: tuple[Panel, ...], made: Trajectory, column: dict[str, NDArray[np.float64]]) -> Figure:
+def _histories(shown: Presentation, made: Trajectory, column: dict[str, NDArray[np.float64]]) -> Figure:
+    rows = shown.panels(made.names, made.units)
     strip = 0.045 * len(made.states) + 0.02
     height = (1.0 - strip - 0.05 * len(rows)) / len(rows)
     traces: list[Figure] = []
@@ -94,10 +94,10 @@ def _histories(rows: tuple[Panel, ...], made: Trajectory, column: dict[str, NDAr
                     },
                 }
             )
-    return {"data": [*traces, *_strips(made)], "layout": layout, "zoom": True}
+    return {"data": [*traces, *_strips(shown, made)], "layout": layout, "zoom": True}
 
 
-def _strips(made: Trajectory) -> Iterator[Figure]:
+def _strips(shown: Presentation, made: Trajectory) -> Iterator[Figure]:
     """States over time: one row for the shaft and one for each clutch, a colour and a pattern for each state."""
     if not made.times.size:
         return
@@ -108,7 +108,7 @@ def _strips(made: Trajectory) -> Iterator[Figure]:
             begin, last = float(made.times[first]), float(made.times[min(stop, made.times.size - 1)])
             bars.setdefault(state, []).append((begin, last - begin, row))
     for state, found in bars.items():
-        colour, pattern, _ = STATES.get(state, _OTHER)
+        colour, pattern, _ = shown.states.get(state, OTHER_LOOK)
         yield {
             "type": "bar",
             "orientation": "h",

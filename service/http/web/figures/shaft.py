@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any, Final
 from service.http.web.figures.curves import DASHES, PALETTE, Figure
 from service.http.web.figures.thinning import thin
 from service.results.curves import numbers
-from service.results.pictures.panels import panels
 from service.results.wording import unit_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from worker.models import Trajectory
+    from worker.models import Presentation, Trajectory
     from worker.study import Study
 
 #: Angles at which a machine is drawn.
@@ -24,7 +23,7 @@ _MOST_POINTS: Final = 1500
 _GAP: Final = 0.12
 
 
-def shaft_figure(study: Study, made: Trajectory) -> Figure:
+def shaft_figure(shown: Presentation, made: Trajectory) -> Figure:
     """The panels over the angle in degrees, two in a row."""
     degrees = [math.degrees(angle) for angle in made.times.tolist()]
     column = {name: made.values[:, index] for index, name in enumerate(made.names)}
@@ -36,7 +35,7 @@ def shaft_figure(study: Study, made: Trajectory) -> Figure:
         "uirevision": "keep",
         "legend": {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom"},
     }
-    drawn = panels(study, made)
+    drawn = shown.panels(made.names, made.units)
     height = (1.0 + _GAP) / ((len(drawn) + 1) // 2) - _GAP
     for index, panel in enumerate(drawn):
         suffix = "" if index == 0 else str(index + 1)
@@ -78,9 +77,8 @@ def machine_case(study: Study) -> dict[str, Any]:
     values = {info.name: numbers(rows.values[0, index : index + 1])[0] for index, info in enumerate(infos)}
     found: dict[str, Any] = {"ending": rows.endings[0], "results": values, "figure": None}
     if rows.endings[0] == models.OK:
-        found["figure"] = shaft_figure(
-            study, models.run_trajectory(study, 0, 0.0, models.extent(study, 0).end, SAMPLES)
-        )
+        whole = models.run_trajectory(study, 0, 0.0, models.extent(study, 0).end, SAMPLES)
+        found["figure"] = shaft_figure(models.presentation_of(study), whole)
     return found
 
 

@@ -1,0 +1,34 @@
+"""How long a case of a machine takes, from what the machine consists of (benchmarks/machine_shaft.py measures it)."""
+
+from engine.machine_shaft.expressions import Expression
+from engine.machine_shaft.simulate import PANELS
+from engine.machine_shaft.spec import MachineSpec
+
+#: Times of a case by the benchmark, over that with the mean as midrange.
+_COST = {"midrange": 1.0, "angle": 2.2, "time": 1.7}
+#: What a formula adds: one that all cases share, one with constants, and one with jumps or kinks.
+_FORMULA, _OWN, _SWITCHES = 0.1, 0.7, 1.0
+#: What a formula adds that may have a narrow peak: 0 where its peak is wide, 16 with one of half a degree.
+_PEAK = 6.0
+_SHARP = frozenset({"exp", "tanh", "sinh", "cosh", "atan"})
+
+
+def estimate_seconds(model: MachineSpec) -> float:
+    """Rough time of one case on one core, in s."""
+    parts = (model.drive, model.mechanism, model.operation)
+    panels = PANELS * model.cycle + sum(len(part.table.rows) for part in parts if part.table is not None)
+    factor = 8.0 if model.balance == "motor" else _COST[model.mean_speed_is]
+    factor += sum(_formula_cost(part.formula, model.constants) for part in parts if part.formula is not None)
+    return 1e-5 + factor * 7e-6 * panels
+
+
+def _formula_cost(text: str, constants: tuple[str, ...]) -> float:
+    expression = Expression(text, ("phi", "x", *constants))
+    cost = _FORMULA
+    if expression.names & set(constants):
+        cost += _OWN
+    if expression.switch_count:
+        cost += _SWITCHES
+    if expression.kinds & _SHARP:
+        cost += _PEAK
+    return cost

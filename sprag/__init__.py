@@ -1,0 +1,84 @@
+"""Sprag as a library: a running service, studies run here, the engine (docs/python.md).
+
+    import sprag
+
+    table = sprag.run("study.toml")  # run here; needs sprag[server]
+    with sprag.Client("http://sprag.example:8000") as client:  # the base installation
+        table = client.submit("study.toml").wait().table()
+
+Everything is loaded when it is asked for. What belongs to an extra that is not installed raises `MissingExtraError`,
+which names it.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from service.client import (
+        AsyncClient,
+        AsyncStudy,
+        Client,
+        Curves,
+        RefusedError,
+        ServiceError,
+        SpecFileError,
+        Study,
+        StudyTimeoutError,
+        UnreachableError,
+    )
+    from service.extras import MissingExtraError
+    from sprag import engine
+    from sprag.local import run
+
+    __version__: str
+
+_OF_CLIENT: Final = (
+    "AsyncClient",
+    "AsyncStudy",
+    "Client",
+    "Curves",
+    "RefusedError",
+    "ServiceError",
+    "SpecFileError",
+    "Study",
+    "StudyTimeoutError",
+    "UnreachableError",
+)
+__all__ = [
+    "AsyncClient",
+    "AsyncStudy",
+    "Client",
+    "Curves",
+    "MissingExtraError",
+    "RefusedError",
+    "ServiceError",
+    "SpecFileError",
+    "Study",
+    "StudyTimeoutError",
+    "UnreachableError",
+    "__version__",
+    "engine",
+    "run",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("sprag")
+    if name in _OF_CLIENT:
+        return getattr(import_module("service.client"), name)
+    extras = import_module("service.extras")
+    if name == "MissingExtraError":
+        return extras.MissingExtraError
+    with extras.naming_extra(f"sprag.{name}"):
+        if name == "run":
+            return import_module("sprag.local").run
+        if name == "engine":
+            return import_module("sprag.engine")
+    raise AttributeError(f"module 'sprag' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

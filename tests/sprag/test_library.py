@@ -1,0 +1,165 @@
+"""The library as docs/python.md shows it, and what it says where an extra is missing."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import sprag
+from engine.vibration_drive.simulate import simulate as plain_simulate
+from tests.engine.vibration_drive.drive import drive, periods
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+SPEC: dict[str, Any] = {
+    "sprag": 1,
+    "model": "vibration-drive",
+    "base": {
+        "excitation": {"frequency": "20 Hz", "amplitude_x": "2 mm", "amplitude_y": "2 mm"},
+        "pendulums": [
+            {"inertia": 1e-3, "mass": 0.5, "arm": 0.03, "spring_rate": 9000, "spring_arm": 0.05, "damping": 0.01}
+        ],
+        "shaft": {"inertia": 2e-3},
+        "clutch": {"coefficients": [0, 200, 0, 2e4]},
+    },
+    "run": {"duration": "12 periods", "window": ["8 periods", "12 periods"]},
+    "axes": [{"path": "shaft.load", "values": ["0 N*m", "0.1 N*m", "0.2 N*m"]}],
+}
+
+
+def section(title: str) -> str:
+    """The program of one section of the page."""
+    text = PAGE.split(f"\n## {title}\n")[1].split("\n## ")[0]
+    return "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL))
+
+
+def python(*arguments: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """Run Python in a process of its own."""
+    return subprocess.run([sys.executable, *arguments], cwd=cwd, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("title", ["Studies run here", "The engine"])
+def test_the_page_runs(title: str, tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(section(title), encoding="utf-8")
+    done = python(str(script))
+    assert done.returncode == 0, done.stderr
+    assert "rad/s" in done.stdout
+
+
+def test_a_study_run_here_has_rows_and_units() -> None:
+    told: list[int] = []
+    table = sprag.run(SPEC, processes=0, on_progress=lambda progress: told.append(progress.done))
+    assert table["shaft.load"].tolist() == [0.0, 0.1, 0.2]
+    assert set(table["ending"]) == {"ok"}
+    units = table.attrs["units"]
+    assert (units["shaft.load"], units["shaft.speed.mean"], units["efficiency"]) == ("N*m", "rad/s", "1")
+    assert set(units) == set(table.columns) - {"case", "ending", "flags"}
+    assert told[-1] == 3
+
+
+def test_a_study_of_a_file_and_a_database(tmp_path: Path) -> None:
+    import json
+
+    path = tmp_path / "study.json"
+    path.write_text(json.dumps(SPEC), encoding="utf-8")
+    database = str(tmp_path / "kept.sqlite3")
+    first = sprag.run(path, processes=0, database=database)
+    pd.testing.assert_frame_equal(first, sprag.run(str(path), processes=0, database=database))
+
+
+def test_what_is_wrong_with_a_study_is_named() -> None:
+    from service.spec.report import SpecError
+
+    with pytest.raises(SpecError) as refused:
+        sprag.run(SPEC | {"base": SPEC["base"] | {"shaft": {"inertia": -1.0}}})
+    assert [problem.pointer for problem in refused.value.problems] == ["/base/shaft/inertia"]
+    with pytest.raises(sprag.SpecFileError, match="no-such-file"):
+        sprag.run("no-such-file.toml")
+
+
+def test_the_engine_takes_arrays_and_frames() -> None:
+    loads = np.array([0.0, 0.1, 0.2])
+    run = periods(12.0, 8.0, 12.0)
+    columns = drive(1, shaft__load=loads)
+    results = sprag.engine.simulate(columns, run)
+    batch = plain_simulate(columns, run, cases=3)
+    np.testing.assert_array_equal(results.drop(columns="ending").to_numpy(dtype=float), batch.values)
+    assert results["ending"].tolist() == ["ok"] * 3
+    assert results.attrs["units"]["shaft.speed.mean"] == "rad/s"
+    frame = pd.DataFrame(columns, index=["a", "b", "c"])
+    again = sprag.engine.simulate(frame, run)
+    assert again.index.tolist() == ["a", "b", "c"]
+    np.testing.assert_array_equal(again["shaft.speed.mean"], results["shaft.speed.mean"])
+    assert len(sprag.engine.simulate(drive(1), run)) == 1
+    assert len(sprag.engine.simulate(frame.iloc[:0], run)) == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"shaft.lode": 1.0}, "shaft.lode is not a parameter of the vibration drive"),
+        ({"pendulums.0.inertia": [1e-3, -1.0]}, r"pendulums.0.inertia is -1 in case 1; allowed: > 0 kg\*m\^2 and <= 1"),
+        (
+            {"shaft.load": [0.1, 0.2], "shaft.inertia": [1.0] * 3},
+            "arrays differ in length: shaft.inertia 3, shaft.load 2",
+        ),
+        ({"shaft.load": [[0.1, 0.2]]}, "shaft.load must be a number or an array of one dimension, not of 2"),
+        ({"shaft.load": float("nan")}, "shaft.load is nan in case 0"),
+    ],
+)
+def test_what_is_wrong_with_arrays_is_named(change: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        sprag.engine.simulate(drive(1) | change)
+
+
+def test_the_client_is_there_without_the_rest() -> None:
+    program = """
+import sys
+for name in ("numpy", "pandas", "numba", "sqlalchemy", "fastapi", "pyarrow", "pydantic"):
+    sys.modules[name] = None
+import sprag
+sprag.Client, sprag.AsyncClient, sprag.RefusedError, sprag.__version__
+for ask in (lambda: sprag.run, lambda: sprag.engine):
+    try:
+        ask()
+    except sprag.MissingExtraError as error:
+        print(error)
+"""
+    done = python("-c", program)
+    assert done.returncode == 0, done.stderr
+    first, second = done.stdout.splitlines()
+    assert re.fullmatch(r"sprag\.run needs the package '\w+': pip install \"sprag\[server\]\"", first)
+    assert re.fullmatch(r"sprag\.engine needs the package '\w+': pip install \"sprag\[server\]\"", second)
+
+
+def test_a_command_names_the_extra_that_it_needs() -> None:
+    blocked = "import sys; sys.modules.update(dict.fromkeys(['numpy', 'sqlalchemy', 'pydantic_settings', 'pydantic']))"
+    command = f"{blocked}; sys.argv[1:] = ['run', 'examples/press.toml']; from service.cli import main; main()"
+    done = python("-c", command)
+    assert done.returncode == 3
+    assert 'pip install "sprag[server]"' in done.stderr
+
+
+def test_the_module_is_the_command_line_whatever_lies_in_the_folder(tmp_path: Path) -> None:
+    (tmp_path / "worker.py").write_text("raise SystemExit('the wrong worker')")
+    (tmp_path / "service").mkdir()
+    (tmp_path / "service" / "__init__.py").write_text("raise SystemExit('the wrong service')")
+    done = python("-m", "sprag", "--version", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (0, f"sprag {version('sprag')}\n"), done.stderr
+
+
+def test_what_is_offered_is_listed_and_nothing_else_is_there() -> None:
+    assert set(sprag.__all__) <= set(dir(sprag))
+    for name in sprag.__all__:
+        assert getattr(sprag, name) is not None
+    with pytest.raises(AttributeError, match="nothing"):
+        sprag.nothing  # noqa: B018
