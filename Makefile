@@ -53,7 +53,7 @@ endef
 $(RUNTIME): $(SOURCES)
 	@$(MAKE_ENVIRONMENT)
 	@echo "Installing Sprag (a minute or so, this once) ..."
-	@$(PIP) install -c constraints.txt -e .
+	@$(PIP) install -c constraints.txt -e '.[server]'
 	@touch $@
 
 $(DEV): $(SOURCES)

@@ -21,7 +21,7 @@ from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parents[1]
 #: Extras whose packages are tried too.
-EXTRAS = ("postgres", "cluster")
+EXTRAS = ("tables", "server", "postgres", "cluster")
 TOOLS = ("pytest", "hypothesis", "jsonschema", "openpyxl", "pandas", "polars", "psutil", "openapi-spec-validator")
 TESTS = (
     "tests/test_foreign_parts.py",

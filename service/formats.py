@@ -15,6 +15,9 @@ MEDIA_TYPES: Final[dict[Format, str]] = {
     "xlsx": "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",
     "netcdf": "application/x-netcdf",
 }
+#: Formats of a study's report.
+ReportFormat = Literal["html", "pdf"]
+REPORT_FORMATS: Final[tuple[ReportFormat, ...]] = get_args(ReportFormat)
 #: How the name of a file in each format ends; the first ending is the one that is given.
 SUFFIXES: Final[dict[Format, tuple[str, ...]]] = {
     "csv": ("csv",),

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from service.cli.console import WrongInputError, cell_text, say, show_table, write_json
+from service.cli.console import OK, WrongInputError, cell_text, say, show_table, write_json
 from service.cli.files import write_pieces
 from service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
 from service.cli.remote import connection
@@ -141,8 +141,6 @@ def _show_effects(result: dict[str, Any]) -> None:
 
 def show_curves(found: dict[str, Any]) -> None:
     """One table for each curve: the axis, then every result against it."""
-    from worker.models import OK
-
     x = found["x"]
     columns = [(_heading(x["path"], x["unit"]), True)]
     columns += [(_heading(name, result["unit"]), True) for name, result in found["results"].items()]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from service.cli.console import (
+    OK,
     CommandFailureError,
     ExitCode,
     TroubleError,
@@ -35,14 +36,13 @@ from service.cli.options import (
     Token,
     WaitTimeout,
 )
+from service.formats import FORMATS, REPORT_FORMATS, Format, ReportFormat, format_of
 from service.spec.report import Problem
 from worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
 from worker.states import TERMINAL, StudyState
 
 if TYPE_CHECKING:
     from service.client import Query, RefusedError, ServiceClient
-    from service.results.exports import Format
-    from service.results.report import ReportFormat
 
 #: A parameter with its sign, as the service's messages write it: "by=", "at=shaft.load=0.2".
 _PARAMETER_IN_TEXT = re.compile(r"(?<![\w.-])(x|y|by|at)=(?=(\w?))")
@@ -203,8 +203,6 @@ def show_study(study: dict[str, Any], as_json: bool) -> None:
         write_json(study)
         return
     print(study["id"])
-    from worker.models import OK
-
     progress = study["progress"]
     endings = ", ".join(f"{count} {name}" for name, count in progress.get("endings", {}).items() if name != OK)
     say(
@@ -318,8 +316,6 @@ def export(
     as_json: JsonFlag = False,
 ) -> None:
     """Write all case rows of a study, or a report of it, to a file or to standard output."""
-    from service.results.exports import Format
-
     chosen = table_format(form, file, as_json)
     with connection(server, token) as client:
         table = chosen in get_args(Format)
@@ -333,9 +329,6 @@ def export(
 
 def table_format(form: TableFormat | None, file: str | None, as_json: bool) -> Format | ReportFormat:
     """The format that was asked for: by name, by the ending of the file's name, or by ``--json``; csv otherwise."""
-    from service.results.exports import FORMATS, format_of
-    from service.results.report import REPORT_FORMATS
-
     if form is not None:
         return next(known for known in (*FORMATS, *REPORT_FORMATS) if known == form.value)
     ending = (file or "").rpartition(".")[2].lower()

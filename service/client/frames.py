@@ -6,6 +6,7 @@ import io
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from service.extras import naming_extra
 from worker.codes import ENDING_CODES, PENDING
 
 if TYPE_CHECKING:
@@ -28,7 +29,8 @@ class Curves:
 
     def to_pandas(self) -> pd.DataFrame:
         """A row for each point: what tells curves apart, x, results (NaN for none), any regime, ending, case."""
-        import pandas as pd
+        with naming_extra("Curves.to_pandas", "tables"):
+            import pandas as pd
 
         x = self.data["x"]["path"]
         parts = [
@@ -57,6 +59,9 @@ class Curves:
         Raises ValueError when two points have the same parameters, as cases that go side by side can, or for an ending
         that this client does not know.
         """
+        with naming_extra("Curves.to_xarray", "tables"):
+            import xarray  # noqa: F401 - pandas uses it
+
         names = list(self.data["results"])
         dims = [*self.data["curves"][0]["by"], self.data["x"]["path"]]
         table = self.to_pandas()
@@ -84,13 +89,17 @@ class Curves:
 
 def table_of(parquet: bytes) -> pd.DataFrame:
     """All rows of a study, from its Parquet file."""
-    import pandas as pd
+    with naming_extra("a table", "tables"):
+        import pandas as pd
+        import pyarrow  # noqa: F401 - pandas uses it
 
     return pd.read_parquet(io.BytesIO(parquet))
 
 
 def grid_of(netcdf: bytes) -> xr.Dataset:
     """All rows of a study as a labelled grid, from its NetCDF file."""
-    import xarray as xr
+    with naming_extra("a grid", "tables"):
+        import h5netcdf  # noqa: F401 - xarray uses it
+        import xarray as xr
 
     return xr.load_dataset(io.BytesIO(netcdf), engine="h5netcdf")

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import subprocess
+import sys
 import tomllib
+from importlib.metadata import packages_distributions
+
+from packaging.requirements import Requirement
 
 from tests.acceptance.processes import ROOT
 
+PACKAGES = ("sprag", "engine", "worker", "service", "migrations")
+#: Extras of the program itself, beside its dependencies.
+RUNTIME = ("tables", "server", "postgres", "cluster")
 CONSTRAINTS = (ROOT / "constraints.txt").read_text()
 
 
@@ -26,12 +34,48 @@ def test_constraints_are_names_and_exact_versions_only() -> None:
 def test_every_library_the_project_names_is_constrained() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
-    named = [*project["dependencies"], *extras["dev"], *extras["benchmark"], "cloudpickle"]  # the last is heyoka's
+    named = [*project["dependencies"], *(name for extra in extras.values() for name in extra)]
+    named = [name for name in named if not name.startswith("sprag[")] + ["cloudpickle"]  # the last is heyoka's
     constrained = {normal(line.split("==")[0]) for line in CONSTRAINTS.splitlines() if "==" in line}
     for requirement in named:
         found = re.match(r"[A-Za-z0-9._-]+", requirement)
         assert found
         assert normal(found[0]) in constrained, requirement
+
+
+def imported() -> dict[str, str]:
+    """The modules that the program imports, wherever it does, and a file that imports each."""
+    found: dict[str, str] = {}
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+                if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                    names = [node.module]
+                for name in names:
+                    found.setdefault(name.partition(".")[0], str(path.relative_to(ROOT)))
+    return {name: path for name, path in found.items() if name not in {*PACKAGES, *sys.stdlib_module_names}}
+
+
+def test_every_library_that_is_imported_is_named() -> None:
+    """What only another library brings goes away with that."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    named = project["dependencies"] + [name for extra in RUNTIME for name in extras[extra]]
+    own = {normal(Requirement(name).name) for name in named}
+    distributions = packages_distributions()
+    missing = {
+        module: path
+        for module, path in imported().items()
+        if not {normal(name) for name in distributions.get(module, ())} & own
+    }
+    assert not missing
+
+
+def test_the_base_installation_is_the_client() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert project["dependencies"] == ["httpx", "rich", "typer"]
+    assert "'.[server]'" in (ROOT / "Makefile").read_text()
 
 
 def test_the_gate_is_the_test_command_of_the_readme() -> None:

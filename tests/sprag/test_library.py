@@ -141,6 +141,76 @@ for ask in (lambda: sprag.run, lambda: sprag.engine):
     assert re.fullmatch(r"sprag\.engine needs the package '\w+': pip install \"sprag\[server\]\"", second)
 
 
+#: As if only what the base installation has were there.
+BASE_ONLY = """
+import sys
+for name in ("numpy", "pandas", "xarray", "numba", "sqlalchemy", "fastapi", "pydantic", "pydantic_settings", "pint"):
+    sys.modules[name] = None
+"""
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["list"],
+        ["submit", "examples/press.toml"],
+        ["watch", "st_1"],
+        ["cancel", "st_1"],
+        ["curve", "st_1", "--x", "shaft.load", "--y", "efficiency"],
+        ["export", "st_1", "-o", "rows.xlsx"],
+        ["export", "st_1", "-o", "report.pdf"],
+        ["schedule", "list"],
+    ],
+    ids=" ".join,
+)
+def test_commands_for_a_running_service_need_no_extra(command: list[str]) -> None:
+    arguments = [*command, "--server", "http://127.0.0.1:9"]
+    done = python("-c", f"{BASE_ONLY}\nsys.argv[1:] = {arguments}\nfrom service.cli import main\nmain()")
+    assert (done.returncode, "No Sprag service at http://127.0.0.1:9" in done.stderr) == (3, True), done.stderr
+
+
+def test_answers_are_shown_without_an_extra() -> None:
+    program = """
+from service.cli.console import OK
+from service.cli.pictures import show_curves
+from service.cli.remote import show_study
+progress = {"done": 2, "total": 2, "ok": 1, "endings": {OK: 1, "chatter": 1}}
+about = {"id": "st_1", "name": "one", "model": "m", "state": "finished", "time_over": False}
+show_study({**about, "progress": progress}, False)
+curve = {"by": {}, "at": {}, "x": [1.0, 2.0], "y": {"efficiency": [0.5, None]}, "endings": [OK, "chatter"]}
+results = {"efficiency": {"unit": "1"}}
+show_curves({"x": {"path": "shaft.load", "unit": "N*m"}, "results": results, "units": {}, "curves": [curve]})
+"""
+    done = python("-c", BASE_ONLY + program)
+    assert done.returncode == 0, done.stderr
+    assert "1 chatter" in done.stderr
+    assert done.stdout.count("chatter") == 1
+
+
+def test_the_name_of_the_good_ending_is_that_of_the_models() -> None:
+    from service.cli.console import OK
+    from worker import models
+
+    assert OK == models.OK
+
+
+def test_tables_name_the_extra_that_they_need() -> None:
+    program = """
+import sys
+sys.modules["pandas"] = sys.modules["xarray"] = None
+import sprag
+from service.client.frames import grid_of, table_of
+data = {"x": {"path": "x"}, "curves": [], "results": {}, "units": {}}
+for ask in (lambda: table_of(b""), lambda: grid_of(b""), sprag.Curves(data).to_pandas, sprag.Curves(data).to_xarray):
+    try:
+        ask()
+    except sprag.MissingExtraError as error:
+        print(error)
+"""
+    done = python("-c", program)
+    assert done.stdout.count('pip install "sprag[tables]"') == 4, done.stderr
+
+
 def test_a_command_names_the_extra_that_it_needs() -> None:
     blocked = "import sys; sys.modules.update(dict.fromkeys(['numpy', 'sqlalchemy', 'pydantic_settings', 'pydantic']))"
     command = f"{blocked}; sys.argv[1:] = ['run', 'examples/press.toml']; from service.cli import main; main()"

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final, Literal, get_args
+from typing import TYPE_CHECKING, Final
+
+from service.formats import REPORT_FORMATS, ReportFormat
 
 if TYPE_CHECKING:
     from service.results.report.content import Report
 
 __all__ = ["MEDIA_TYPES", "REPORT_FORMATS", "ReportFormat", "write_report"]
 
-ReportFormat = Literal["html", "pdf"]
-REPORT_FORMATS: Final[tuple[ReportFormat, ...]] = get_args(ReportFormat)
 MEDIA_TYPES: Final[dict[ReportFormat, str]] = {"html": "text/html; charset=utf-8", "pdf": "application/pdf"}
 
 

@@ -1,0 +1,106 @@
+"""The wheel in an environment of its own, and what lies in the user's folder meanwhile."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import sysconfig
+import zipfile
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from tests.acceptance.processes import ROOT, environment
+
+STUDY = {
+    "sprag": 1,
+    "model": "vibration-drive",
+    "base": {
+        "excitation": {"frequency": "20 Hz", "amplitude_x": "2 mm", "amplitude_y": "2 mm"},
+        "pendulums": [{"inertia": 1e-3, "mass": 0.5, "arm": 0.03, "spring_rate": 9000, "spring_arm": 0.05}],
+        "shaft": {"inertia": 2e-3},
+        "clutch": {"coefficients": [0, 200, 0, 2e4]},
+    },
+    "run": {"duration": "12 periods", "window": ["8 periods", "12 periods"]},
+    "axes": [{"path": "shaft.load", "values": ["0 N*m", "0.1 N*m", "0.2 N*m"]}],
+}
+
+
+def run(*command: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end."""
+    kept = {name: value for name, value in environment().items() if name != "PYTHONPATH"}
+    return subprocess.run(list(map(str, command)), cwd=cwd, env=kept, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel, built of a copy without the network."""
+    folder = tmp_path_factory.mktemp("wheel")
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    for name in filter(None, listed.split("\0")):
+        if name.startswith(("sprag/", "engine/", "worker/", "service/", "migrations/", "README.md", "pyproject.toml")):
+            target = folder / "sources" / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes((ROOT / name).read_bytes())
+    build = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-index", "--no-build-isolation", "-w", folder]
+    done = run(*build, folder / "sources", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of an environment's programs that has the wheel, and this one's libraries without its `sprag`."""
+    folder = tmp_path_factory.mktemp("installed")
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
+    own = Path(sysconfig.get_path("purelib", vars={"base": str(folder), "platbase": str(folder)}))
+    (own / "libraries.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    python = folder / "bin" / "python"
+    install = [sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index"]
+    done = run(*install, "--ignore-installed", wheel, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    where = run(python, "-c", "import service, sprag; print(service.__file__, sprag.__file__)", cwd=folder)
+    assert where.stdout.count(str(own)) == 2, where
+    return folder / "bin"
+
+
+@pytest.fixture
+def hostile(tmp_path: Path) -> Path:
+    """A user's folder with modules of the names that the program's packages have."""
+    for name in ("worker", "engine"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('the wrong module')\n")
+    for name in ("service", "migrations"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").write_text("raise SystemExit('the wrong package')\n")
+    (tmp_path / "study.json").write_text(json.dumps(STUDY))
+    return tmp_path
+
+
+@pytest.mark.parametrize("command", [["sprag"], ["python", "-m", "sprag"]], ids=["command", "module"])
+def test_what_lies_in_the_folder_changes_nothing(installed: Path, hostile: Path, command: list[str]) -> None:
+    program = [installed / command[0], *command[1:]]
+    told = run(*program, "--version", cwd=hostile)
+    assert (told.returncode, told.stdout) == (0, f"sprag {version('sprag')}\n"), told.stderr
+    done = run(*program, "run", "study.json", "-o", "rows.csv", "--processes", "1", cwd=hostile)
+    assert done.returncode == 0, done.stderr
+    assert len((hostile / "rows.csv").read_text().splitlines()) == 1 + 3
+
+
+def test_the_wheel_has_what_the_program_reads(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        (about,) = (archive.read(name).decode() for name in names if name.endswith(".dist-info/METADATA"))
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    wanted = {
+        name
+        for name in listed.split("\0")
+        if name.startswith(("sprag/", "engine/", "worker/", "service/", "migrations/"))
+    }
+    assert wanted <= names, sorted(wanted - names)
+    for line in ("Requires-Python: >=3.11", "Provides-Extra: server", "Provides-Extra: tables", "Keywords: "):
+        assert line in about
+    assert "License" not in about
+    assert "# Sprag" in about
