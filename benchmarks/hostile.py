@@ -39,10 +39,10 @@ def press(formula: str) -> dict[str, Any]:
     return made
 
 
-def long_axis() -> dict[str, Any]:
-    """The preset of the one pendulum with an axis of a million values."""
+def long_axis(values: int = 1_000_000) -> dict[str, Any]:
+    """The preset of the one pendulum with an axis of a million values, or of some other number."""
     made: dict[str, Any] = json.loads(preset_text("one_pendulum")[1])
-    made["axes"] = [{"path": "shaft.load", "linspace": [0.01, 0.5, 1_000_000]}]
+    made["axes"] = [{"path": "shaft.load", "linspace": [0.01, 0.5, values]}]
     return made
 
 
@@ -184,16 +184,16 @@ def come_and_go(service: Service, clients: int) -> None:
 
 
 def look_at_stored(service: Service, clients: int) -> None:
-    """Clients that open, copy, extend and export a stored study of a million values."""
-    study = service.submit(long_axis())
+    """Clients that open, copy, extend and export a stored study of nearly a million values."""
+    study = service.submit(long_axis(900_000))
     service.http.post(f"/studies/{study}:pause")
-    extension = json.dumps({"axes": [{"path": "excitation.frequency", "values": [20.0]}]}).encode()
+    extension = json.dumps({"axes": [{"path": "shaft.load", "values": [0.7]}]}).encode()
     ways = [
         ("GET", f"/api/v1/studies/{study}", None),
         ("GET", f"/studies/{study}", None),
         ("GET", f"/new?clone={study}", None),
         ("POST", f"/api/v1/studies/{study}:extend", extension),
-        ("GET", f"/api/v1/studies/{study}/rows?format=csv", None),
+        ("GET", f"/api/v1/studies/{study}/results?format=csv", None),
         ("GET", f"/api/v1/studies/{study}/curves?x=shaft.load&y=shaft.speed.mean", None),
     ]
     watch, began = Watch(service), time.perf_counter()
