@@ -21,7 +21,7 @@ from service.spec.catalogue import result_of, unit_of, unknown_result
 from worker import models
 from worker.codes import PENDING
 from worker.limits import MAX_CURVE_VALUES
-from worker.models import WorkerEnding
+from worker.models import WorkerEnding, regime_info
 
 if TYPE_CHECKING:
     from service.storage.records import CaseColumns
@@ -241,11 +241,6 @@ def draw(selection: Selection, fetch: Fetch) -> Curves:
         curves.append(Curve(line, y, endings[part], regimes and regimes[part]))
         start = part.stop
     return Curves(selection, tuple(curves))
-
-
-def regime_info(infos: Sequence[ResultInfo]) -> ResultInfo | None:
-    """The result that tells the kinds of motion apart; None where there is none."""
-    return next((info for info in infos if info.kind == "category"), None)
 
 
 def _with(names: list[str], regime: ResultInfo | None) -> list[str]:

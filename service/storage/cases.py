@@ -14,7 +14,7 @@ from service.storage.part import MAX_INTEGER
 from service.storage.records import CaseColumns, CaseRow, RowBlock
 from service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
 from worker import models
-from worker.models import WorkerEnding
+from worker.models import WorkerEnding, regime_info
 from worker.states import StudyState
 
 if TYPE_CHECKING:
@@ -57,25 +57,45 @@ class Cases(Orders):
         """At most ``limit`` finished cases with numbers above ``after_case``, in order; raises StudyNotFound."""
         with self.session.read() as connection:
             rows = self._rows(connection, study_id)
-            return _block(rows.infos, _read(connection, rows, after_case, limit, None))
+            return _block(rows.infos, _read(connection, rows, after_case, limit))
 
     def case_page(
-        self, study_id: str, after_case: int = -1, limit: int = BLOCK_ROWS, ending: str | None = None
+        self,
+        study_id: str,
+        after_case: int = -1,
+        limit: int = BLOCK_ROWS,
+        ending: str | None = None,
+        regime: str | None = None,
     ) -> RowBlock:
         """The same, and the cases that a cancelled study never ran in their places among them.
 
-        With ``ending`` only the cases that ended so.
+        With ``ending`` only the cases that ended so, with ``regime`` only those of that regime.
         """
         cancelled: str = WorkerEnding.CANCELLED.value
         with self.session.read() as connection:
             rows = self._rows(connection, study_id)
-            found = [] if ending == cancelled else _read(connection, rows, after_case, limit, ending)
-            if rows.cancelled and ending in {None, cancelled}:
+            found = [] if ending == cancelled else _read(connection, rows, after_case, limit, ending, regime)
+            if rows.cancelled and ending in {None, cancelled} and regime is None:
                 nothing = [None] * len(rows.infos)
                 left = itertools.islice(self._never_run(connection, rows, after_case), limit)
                 found = [*found, *((case, cancelled, "", *nothing) for case in left)]
                 found = sorted(found, key=lambda row: int(row[0]))[:limit]
         return _block(rows.infos, found)
+
+    def regimes(self, study_id: str) -> dict[str, int]:
+        """How many finished cases have which regime, the most frequent first; empty where there are no regimes.
+
+        Raises StudyNotFound.
+        """
+        with self.session.read() as connection:
+            rows = self._rows(connection, study_id)
+            info = regime_info(rows.infos)
+            if info is None:
+                return {}
+            column, count = rows.table.c[info.column], sa.func.count()
+            query = sa.select(column, count).where(rows.table.c.study == rows.number, column.is_not(None))
+            found = connection.execute(query.group_by(column).order_by(count.desc(), column)).all()
+        return {info.categories[code]: cases for code, cases in found}
 
     def iter_rows(self, study_id: str, block: int = BLOCK_ROWS) -> Iterator[RowBlock]:
         """Every finished case in order, ``block`` cases at a time, each block read in its own short transaction."""
@@ -141,13 +161,23 @@ class Cases(Orders):
 
 
 def _read(
-    connection: sa.Connection, rows: _Rows, after_case: int, limit: int, ending: str | None
+    connection: sa.Connection,
+    rows: _Rows,
+    after_case: int,
+    limit: int,
+    ending: str | None = None,
+    regime: str | None = None,
 ) -> Sequence[Sequence[Any]]:
     """Rows of the database: number, ending, flags, results."""
     c = rows.table.c
     query = sa.select(c.case_number, c.ending, c.flags, *(c[info.column] for info in rows.infos)).where(
         c.study == rows.number, c.case_number > min(after_case, MAX_INTEGER)
     )
+    if regime is not None:
+        info = regime_info(rows.infos)
+        if info is None or regime not in info.categories:
+            return []
+        query = query.where(c[info.column] == info.categories.index(regime))
     if ending is not None:
         ended = connection.execute(
             sa.select(ENDINGS.c.cases).where(ENDINGS.c.study == rows.number, ENDINGS.c.ending == ending)

@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from worker import models
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0014"
+HEAD_REVISION = "0015"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -144,10 +144,11 @@ def results_table(model: str, variant: str) -> sa.Table:
     name = results_name(model, variant)
     if name in METADATA.tables:
         return METADATA.tables[name]
-    results = (
-        sa.Column(info.column, sa.Double if info.kind == "real" else sa.Integer)
-        for info in models.result_infos(model, variant)
-    )
+    infos = models.result_infos(model, variant)
+    results = (sa.Column(info.column, sa.Double if info.kind == "real" else sa.Integer) for info in infos)
+    # Cases are counted and looked for by their categories.
+    categories = [info.column for info in infos if info.kind == "category"]
+    indexes = (sa.Index(f"ix_{name}_{column}", "study", column, "case_number") for column in categories)
     return sa.Table(
         name,
         METADATA,
@@ -156,6 +157,7 @@ def results_table(model: str, variant: str) -> sa.Table:
         sa.Column("ending", sa.String(40), nullable=False),
         sa.Column("flags", sa.Text, nullable=False),
         *results,
+        *indexes,
         sqlite_with_rowid=False,
     )
 

@@ -47,6 +47,7 @@ from worker.models.vibration_drive import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from worker.study import Study
@@ -113,6 +114,7 @@ __all__ = [
     "prepare",
     "presentation_of",
     "printed_symbol",
+    "regime_info",
     "register",
     "result_catalogue",
     "result_infos",
@@ -218,6 +220,11 @@ def result_catalogue(model: str) -> tuple[ResultInfo, ...]:
 def study_results(study: Study) -> tuple[ResultInfo, ...]:
     """Every result of the cases of ``study``."""
     return result_infos(study.model, variant_of(study))
+
+
+def regime_info(infos: Sequence[ResultInfo]) -> ResultInfo | None:
+    """The result that tells the kinds of motion apart; None where there is none."""
+    return next((info for info in infos if info.kind == "category"), None)
 
 
 def shape_of(study: Study) -> KernelShape:

@@ -48,13 +48,23 @@ def list_cases(
             json_schema_extra=one_of(map(str, models.ENDING_SENTENCES)),
         ),
     ] = None,
+    regime: Annotated[
+        str | None,
+        Query(
+            description="only cases of this regime, of a settled study",
+            examples=["periodic"],
+            json_schema_extra=one_of(models.REGIME_SENTENCES),
+        ),
+    ] = None,
 ) -> Response:
     """Finished cases, in order of their numbers; of a cancelled study also those that were never run."""
     if ending is not None and ending not in models.ENDING_SENTENCES:
         raise parameter_error("ending", "there is no such ending", shown(ending), ", ".join(models.ENDING_SENTENCES))
+    if regime is not None and regime not in models.REGIME_SENTENCES:
+        raise parameter_error("regime", "there is no such regime", shown(regime), ", ".join(models.REGIME_SENTENCES))
     after = _after(page_token)
     # One more than the page, which tells whether there is another.
-    block = context.store.case_page(study_id, after_case=after, limit=page_size + 1, ending=ending)
+    block = context.store.case_page(study_id, after_case=after, limit=page_size + 1, ending=ending, regime=regime)
     rows = list(rows_json(context.store.study(study_id), block))
     token = str(rows[page_size - 1]["case"]) if len(rows) > page_size else None
     return json_response({"cases": rows[:page_size], "next_page_token": token})

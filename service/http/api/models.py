@@ -93,6 +93,7 @@ class StudyDetail(StudySummary):
     combine: str = Field(description="grid: every combination, the first axis slowest; zip: the axes go together")
     axes: list[AxisInfo]
     physics_hash: str = Field(description="SHA-256 of what decides the numbers: equal for equal studies")
+    regimes: dict[str, int] = Field(description="number of cases of each regime; empty where cases have none")
     spec: dict[str, Any] = Field(description="the spec as it was submitted")
 
 

@@ -151,6 +151,7 @@ def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
     study = context.store.study(study_id)
     data = views.detail(record, progress, study, context.store.spec(study_id))
     data["warnings"] += context.unaffected.of(context.store, record)
+    data["regimes"] = context.store.regimes(study_id)
     response = json_response(data)
     # While it runs, the time left changes with no change of the study.
     return tagged(response, tag) if record.state.terminal else response

@@ -106,6 +106,8 @@ def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[dict[s
         inputs=inputs(study, frame["study"]["spec"]),
         run=run_inputs(study, frame["study"]["spec"]),
         fits=fits,
+        regimes=context.store.regimes(study_id),
+        regime_meanings=models.REGIME_SENTENCES,
     )
 
 

@@ -49,6 +49,7 @@ def cases_page(
     study_id: StudyId,
     sort: Annotated[str, Query(max_length=80)] = "",
     ending: Annotated[str, Query(max_length=40)] = "",
+    regime: Annotated[str, Query(max_length=40)] = "",
     after: Annotated[int, Query(ge=0, le=10**12)] = 0,
 ) -> Response:
     """Cases with the results that were chosen, sorted and filtered."""
@@ -66,10 +67,15 @@ def cases_page(
     faults: tuple[Any, ...] = ()
     found = TablePage([], None, 0)
     try:
-        found = _page(context, study_id, study, (sort, ending, at, after))
+        found = _page(context, study_id, study, _Wanted(sort, ending, regime, at, after))
     except SelectionError as error:
         faults = error.errors
-    kept = [("ending", ending), *(("at", f"{path}={value}") for path, value in at), *(("col", n) for n in names)]
+    kept = [
+        ("ending", ending),
+        ("regime", regime),
+        *(("at", f"{path}={value}") for path, value in at),
+        *(("col", n) for n in names),
+    ]
     return page(
         "cases.html",
         status=422 if faults else 200,
@@ -84,6 +90,8 @@ def cases_page(
         fixed=fixed_choices(study, (), at),
         sort=sort,
         ending=ending,
+        regime=regime,
+        regimes=list(models.REGIME_SENTENCES)[1:] if models.regime_info(infos) else [],
         flags=models.flags_of(study.model),
         sortable=study.cases <= MOST_SORTED or bool(at),
         most_sorted=MOST_SORTED,
@@ -93,37 +101,51 @@ def cases_page(
     )
 
 
-def _page(
-    context: Context, study_id: str, study: Study, wanted: tuple[str, str, tuple[tuple[str, str], ...], int]
-) -> TablePage:
-    sort, ending, at, after = wanted
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """Which cases are shown, in which order."""
+
+    sort: str
+    ending: str
+    regime: str
+    at: tuple[tuple[str, str], ...]
+    after: int
+
+
+def _page(context: Context, study_id: str, study: Study, wanted: _Wanted) -> TablePage:
+    ending, regime, after = wanted.ending, wanted.regime, wanted.after
     if ending and ending not in models.ENDING_SENTENCES:
         raise SelectionError([ErrorItem("there is no such ending", parameter="ending", value=ending)])
-    if not sort and not at:
-        block = context.store.case_page(study_id, after_case=after - 1, limit=_ROWS + 1, ending=ending or None)
+    if regime and regime not in models.REGIME_SENTENCES:
+        raise SelectionError([ErrorItem("there is no such regime", parameter="regime", value=regime)])
+    if not wanted.sort and not wanted.at:
+        block = context.store.case_page(study_id, after - 1, _ROWS + 1, ending or None, regime or None)
         rows = list(block.rows())
         more = rows[_ROWS].case if len(rows) > _ROWS else None
         return TablePage(rows[:_ROWS], more, None)
-    order = _ordered(context, study_id, study, sort, ending, at)
+    order = _ordered(context, study_id, study, wanted)
     part = order[after : after + _ROWS].tolist()
     found = [context.store.case_row(study_id, case) for case in part]
     more = after + _ROWS if after + _ROWS < order.size else None
     return TablePage([row for row in found if row is not None], more, int(order.size))
 
 
-def _ordered(
-    context: Context, study_id: str, study: Study, sort: str, ending: str, at: tuple[tuple[str, str], ...]
-) -> NDArray[np.int64]:
+def _ordered(context: Context, study_id: str, study: Study, wanted: _Wanted) -> NDArray[np.int64]:
     """Numbers of the finished cases that match, in the order of the table."""
+    sort, ending, at = wanted.sort, wanted.ending, wanted.at
     fixed = {study.axes[i].paths[0]: study.axes[i].value(index) for i, (_, index) in locate_axes(study, at).items()}
     cases = study.cases_at(fixed)
     if cases.size > MOST_SORTED:
         message = f"{cases.size:,} cases are too many to sort; hold further axes at a value, or take all results"
         raise SelectionError([ErrorItem(message, parameter="sort", allowed=f"<= {MOST_SORTED:,} cases")])
     name = sort.removeprefix("-")
-    by_result = result_of(models.study_results(study), name) is not None
-    columns = context.store.rows_for_cases(study_id, cases, [name] if by_result else [])
+    infos = models.study_results(study)
+    by_result, info = result_of(infos, name) is not None, models.regime_info(infos) if wanted.regime else None
+    read = dict.fromkeys([*([name] if by_result else []), *([info.name] if info else [])])
+    columns = context.store.rows_for_cases(study_id, cases, list(read))
     finished = np.array([bool(found) and (not ending or found == ending) for found in columns.endings], dtype=np.bool_)
+    if wanted.regime:
+        finished &= False if info is None else columns.values[info.name] == info.categories.index(wanted.regime)
     if by_result:
         keys = columns.values[name]
     elif study.axis_of(name) is not None:

@@ -15,12 +15,11 @@ import xarray as xr
 from engine.run import SettledRun
 from engine.vibration_drive.regimes import Regime
 from engine.vibration_drive.settle import settle
-from service.results.curves import regime_info
 from service.spec.document import parse_spec
 from tests.service.conftest import API, Service, made_up
 from tests.service.spec_sample import changed
 from worker import models
-from worker.models import ChunkResult
+from worker.models import ChunkResult, regime_info
 from worker.study import Study
 
 #: A case at a load, the same without one, and one whose motion is irregular: 25 Hz, 2 mm.
@@ -141,3 +140,29 @@ def test_a_settled_case_is_estimated_by_what_a_search_takes() -> None:
 def test_the_motion_of_a_settled_case_lasts_as_long_as_its_search_may(service: Service, study_id: str) -> None:
     study = service.store.study(study_id)
     assert models.extent(study, 1).end == pytest.approx(1000.0 / 25.0)
+
+
+def test_a_study_tells_how_many_cases_have_which_regime(service: Service, study_id: str) -> None:
+    assert service.get(f"/studies/{study_id}")["regimes"] == {"periodic": 1, "irregular": 1, "unsettled": 1}
+    page = service.http.get(f"/studies/{study_id}").text
+    assert "What motions settle to" in page
+    assert f"/studies/{study_id}/cases?regime=unsettled" in page
+    timed = service.submit(changed({"/run": {"duration": "60 periods"}}))
+    assert service.get(f"/studies/{timed}")["regimes"] == {}
+    assert "What motions settle to" not in service.http.get(f"/studies/{timed}").text
+
+
+def test_cases_are_filtered_by_regime(service: Service, study_id: str) -> None:
+    cases = f"/studies/{study_id}/cases"
+    assert [case["case"] for case in service.get(cases, regime="irregular")["cases"]] == [1]
+    assert service.get(cases, regime="held")["cases"] == []
+    assert service.get(cases, regime="irregular", ending="chatter")["cases"] == []
+    assert service.http.get(API + cases, params={"regime": "odd"}).status_code == 422
+    for sort in ("", "-shaft.load"):
+        page = service.http.get(cases, params={"regime": "unsettled", "sort": sort}).text
+        assert f"{cases}/3" in page
+        assert f'{cases}/1"' not in page
+    timed = service.submit(changed({"/run": {"duration": "60 periods"}}))
+    service.fill(timed)
+    assert service.get(f"/studies/{timed}/cases", regime="periodic")["cases"] == []
+    assert 'name="regime"' not in service.http.get(f"/studies/{timed}/cases").text
