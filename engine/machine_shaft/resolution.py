@@ -45,14 +45,39 @@ def near_singular(machine: Machine, d: Decomposition, rough: Bools) -> Bools:
     mechanism = machine.mechanism
     if mechanism is None or not mechanism.has_singular_positions:
         return np.zeros(len(rough), dtype=np.bool_)
+    wild = _wild_panels(machine, d.panels, len(rough))
+    return np.asarray((wild & rough & (d.panels.half > 0.0)).any(axis=1))
+
+
+def linkage_unresolved(machine: Machine, panels: Panels, cases: int, most: float) -> Bools:
+    """Cases whose linkage's own motion ``most`` panels do not resolve, (cases,); for formulas that tell nothing.
+
+    The panels are halved for the linkage alone, as they are for everything else in a case with formulas that do.
+    """
+    if machine.mechanism is None or not machine.mechanism.has_singular_positions:
+        return np.zeros(cases, dtype=np.bool_)
+    cuts = np.broadcast_to(panels.cuts, (cases, panels.cuts.shape[1]))
+    while True:
+        panels = Panels.over(machine.cycle, [cuts], 1)
+        wild = _wild_panels(machine, panels, cases) & (panels.half > 0.0)
+        few = (panels.half > 0.0).sum(axis=1) <= most
+        going = wild.any(axis=1) & few
+        if not going.any():
+            return np.asarray(wild.any(axis=1))
+        cuts = np.concatenate([panels.cuts, panels.middles(wild & going[:, None])], axis=1)
+
+
+def _wild_panels(machine: Machine, panels: Panels, cases: int) -> Bools:
+    """Panels that do not resolve the linkage's own motion, (cases, panels)."""
+    assert machine.mechanism is not None
     with np.errstate(all="ignore"):
-        motion = mechanism.motion(machine.mechanism_values, d.panels.angles)
-    shape = d.fields.inertia.shape
-    wild = np.zeros(rough.shape, dtype=np.bool_)
+        motion = machine.mechanism.motion(machine.mechanism_values, panels.angles)
+    shape = (cases, *panels.angles.shape[1:])
+    wild = np.zeros(shape[:2], dtype=np.bool_)
     for values in (np.broadcast_to(motion.inertia, shape), np.broadcast_to(motion.way_slope, shape)):
         with np.errstate(all="ignore"):
-            wild |= ~_resolved(d.panels, values, 1e-11)
-    return np.asarray((wild & rough & (d.panels.half > 0.0)).any(axis=1))
+            wild |= ~_resolved(panels, values, 1e-11)
+    return wild
 
 
 def _resolved(panels: Panels, values: Floats, limit: float) -> Bools:

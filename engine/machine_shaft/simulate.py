@@ -26,7 +26,7 @@ from engine.machine_shaft.problems import (
     UnbalancedWorkError,
 )
 from engine.machine_shaft.relations import check_relations
-from engine.machine_shaft.resolution import compare, near_singular, rough_pace, rough_panels
+from engine.machine_shaft.resolution import compare, linkage_unresolved, near_singular, rough_pace, rough_panels
 from engine.machine_shaft.results import result_infos
 from engine.machine_shaft.spec import MachineSpec
 from engine.machine_shaft.start import Shape, Stop, least_mean_speed, start_energy
@@ -143,7 +143,13 @@ def settle(spec: MachineSpec, columns: Columns, solved: Solved) -> Bools:
     singular = np.zeros_like(lost)
     if (lost | negative).any():
         # Beside a singular position an inertia is so large that any other looks like nothing but rounding.
-        singular = near_singular(Machine(spec, columns), solved.decomposition, solved.rough) & ~solved.unknown
+        singular = near_singular(Machine(spec, columns), solved.decomposition, solved.rough)
+        # Nothing was halved where a formula is unknown, which may be what the linkage makes of it.
+        rows = np.nonzero(solved.unknown)[0]
+        if rows.size:
+            panels = solved.decomposition.panels.take(rows)
+            machine = Machine(spec, columns.take(rows))
+            singular[rows] = linkage_unresolved(machine, panels, rows.size, MAX_PANELS * spec.cycle)
     lost = (lost & ~negative) | singular
     _stop(solved, slow & ~lost)
     solved.endings[lost] = _CODE[Ending.QUADRATURE_NOT_REACHED]

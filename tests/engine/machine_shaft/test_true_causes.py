@@ -109,6 +109,22 @@ def test_a_formula_too_rough_is_not_the_linkages_fault() -> None:
     assert ending_of(spec, numbers) is Ending.QUADRATURE_NOT_REACHED
 
 
+@pytest.mark.parametrize("text", ["1000*sqrt(1 - x)", "1000*x"])
+def test_a_formula_over_the_stroke_is_not_what_a_near_singular_linkage_fails_by(text: str) -> None:
+    spec = replace(PRESS, operation=OperationChoice("force", "formula", formula=text, over="stroke"))
+    numbers = {path: value for path, value in PRESS_NUMBERS.items() if not path.startswith("operation")}
+    numbers |= {"mechanism.slider_crank.rod": 0.1 * (1.0 + np.array([1e-5, 1e-8, 1e-10]))}
+    assert endings_of(spec, numbers, 3) == [Ending.OK, Ending.NEAR_SINGULAR, Ending.NEAR_SINGULAR]
+
+
+def test_a_formula_unknown_over_a_sound_linkage_is_the_formulas_fault() -> None:
+    spec = replace(PRESS, operation=OperationChoice("force", "formula", formula="1000*(1 - x)^0.3", over="stroke"))
+    numbers = {path: value for path, value in PRESS_NUMBERS.items() if not path.startswith("operation")}
+    rods = 0.1 * (1.0 + np.array([1e-5, 1e-8]))
+    endings = endings_of(spec, numbers | {"mechanism.slider_crank.rod": rods}, 2)
+    assert endings == [Ending.QUADRATURE_NOT_REACHED, Ending.NEAR_SINGULAR]
+
+
 def test_an_inertia_that_is_zero_at_dead_centre_is_not_positive() -> None:
     numbers = PRESS_NUMBERS | {
         "drive.inertia": 0.0, "mechanism.slider_crank.rod_mass": 0.0, "mechanism.slider_crank.rod_inertia": 0.0,
