@@ -169,6 +169,10 @@ class Server(uvicorn.Server):
             self._last.start()
         super().handle_exit(sig, frame)
 
+    def ended(self) -> None:
+        """Everything has ended in time: nothing is to be given up."""
+        self._last.cancel()
+
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Let requests end by themselves, then have them ended."""
         loop = asyncio.get_running_loop()
@@ -221,12 +225,14 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
             (announce or _say)(address)
             supervisor.start()
 
+        context = app.state.context
+        server = Server(config, context.ending, context.cut, _give_up, listening)
         try:
             with suppress(KeyboardInterrupt):
-                context = app.state.context
-                Server(config, context.ending, context.cut, _give_up, listening).run(sockets=[listener])
+                server.run(sockets=[listener])
         finally:
             supervisor.stop()
+            server.ended()
 
 
 def _say(address: str) -> None:

@@ -139,6 +139,12 @@ def test_the_address_is_told_while_the_processes_that_check_still_start(
     assert answers == [200, 503]
     assert workers_at_announcement == [0]
     assert [worker.asked for worker in workers] == [["terminate"]]
+    # Else it would end this process, too, half a minute later.
+    assert not [
+        thread
+        for thread in threading.enumerate()
+        if isinstance(thread, threading.Timer) and not thread.finished.is_set()
+    ]
 
 
 def test_a_supervisor_that_never_started_can_be_stopped() -> None:
