@@ -65,6 +65,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
     "Use a running service": {
         "submit": remote.submit,
         "extend": extend.extend,
+        "longer": extend.longer,
         "watch": remote.watch,
         "list": remote.list_studies,
         "pause": remote.pause,

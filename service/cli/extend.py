@@ -1,4 +1,4 @@
-"""``sprag extend``: further values and further cases for a study of a running service."""
+"""``sprag extend`` and ``sprag longer``: further cases, and more time for cases, of a study of a running service."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
 from service.cli.remote import connection, exit_as, follow, show_study
 from service.spec.numbers import parse_number
 from service.spec.report import Problem
-from worker.limits import MAX_BODY_BYTES
+from worker.limits import MAX_BODY_BYTES, MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
 
 
 def extend(
@@ -40,6 +40,33 @@ def extend(
         study = client.extend(study_id, addition)
         say(_what_is_new(old, study))
         say(*(f"warning: {warning}" for warning in study.get("warnings", ())))
+        if wait:
+            study = follow(client, study["id"], timeout)
+    show_study(study, as_json)
+    if wait:
+        exit_as(study)
+
+
+def longer(
+    study_id: StudyId,
+    regime: Annotated[str, typer.Option("--regime", metavar="REGIME", help="Regime of the cases.")] = "unsettled",
+    at_most: Annotated[
+        int | None,
+        typer.Option(
+            min=MIN_SETTLED_PERIODS,
+            max=MAX_SETTLED_PERIODS,
+            help="Excitation periods of each search; default: four times as many as before.",
+        ),
+    ] = None,
+    wait: Annotated[bool, typer.Option("--wait", help="Wait until the new study has ended.")] = False,
+    timeout: WaitTimeout = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Submit a study of the cases of another that are not settled, with more time for each."""
+    with connection(server, token) as client:
+        study = client.run_longer(study_id, regime, at_most)
         if wait:
             study = follow(client, study["id"], timeout)
     show_study(study, as_json)

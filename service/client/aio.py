@@ -264,6 +264,15 @@ class AsyncStudy:
         made = await self._client.request("POST", f"{self._path}:extend", json=addition, headers=headers)
         return AsyncStudy(self._client, made["id"])
 
+    async def run_longer(
+        self, regime: str = "unsettled", at_most: int | None = None, *, key: str | None = None
+    ) -> AsyncStudy:
+        """Submit a study of this one's cases of a regime, with more excitation periods for each search."""
+        query = [("regime", regime), *([] if at_most is None else [("at_most", str(at_most))])]
+        headers = {"Idempotency-Key": key or uuid.uuid4().hex}
+        made = await self._client.request("POST", f"{self._path}:longer", params=query, headers=headers)
+        return AsyncStudy(self._client, made["id"])
+
     async def act(self, verb: str) -> StudySummary:
         """Ask for "pause", "resume", "cancel" or "retry"."""
         return cast("StudySummary", await self._client.request("POST", f"{self._path}:{verb}"))

@@ -79,6 +79,16 @@ class ServiceClient:
         """
         return self._json("POST", f"{study_path(study_id)}:extend", json=addition, headers=_once(key))
 
+    def run_longer(
+        self, study_id: str, regime: str = "unsettled", at_most: int | None = None, key: str | None = None
+    ) -> dict[str, Any]:
+        """Submit a study of the cases of a settled study that have that regime, with more time for each search.
+
+        The same ``key`` submits it once, however often it is sent.
+        """
+        query = [("regime", regime), *([] if at_most is None else [("at_most", str(at_most))])]
+        return self._json("POST", f"{study_path(study_id)}:longer", params=query, headers=_once(key))
+
     def preview(self, spec: object) -> dict[str, Any]:
         """Number of cases, estimated time and size of a study that is not submitted."""
         return self._json("POST", "/studies:preview", json=spec)

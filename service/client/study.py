@@ -212,6 +212,10 @@ class Study:
         """
         return Study(self._client, self._client.plain.extend(self.id, extension(axes, cases, name), key)["id"])
 
+    def run_longer(self, regime: str = "unsettled", at_most: int | None = None, *, key: str | None = None) -> Study:
+        """Submit a study of this one's cases of a regime, with more excitation periods for each search."""
+        return Study(self._client, self._client.plain.run_longer(self.id, regime, at_most, key)["id"])
+
     def act(self, verb: str) -> StudySummary:
         """Ask for "pause", "resume", "cancel" or "retry"."""
         return cast("StudySummary", self._client.plain.act(self.id, verb))

@@ -15,6 +15,7 @@ from service.results.fits import fit_json, read_fit
 from service.schedules.fields import ScheduleFields, change_fields, read_fields
 from service.spec.document import load_spec, parse_spec
 from service.spec.extend import parse_extended
+from service.spec.longer import longer_spec
 from service.spec.machine.shaft_check import compile_elsewhere
 from service.storage.store import Store
 from worker import models
@@ -98,6 +99,24 @@ def extended_study(
     store = library.store
     parsed = parse_extended(store.spec(study_id), store.study(study_id), load_spec(content, form))
     return submission(parsed, store.chunking, store.reusable, now, finish_by=finish, given=given)
+
+
+def longer_study(
+    library: Library,
+    study_id: str,
+    regime: str,
+    at_most: int | None,
+    now: datetime,
+    given: Mapping[str, object],
+) -> Submission:
+    """The cases of a study that have that regime, with more time to settle.
+
+    There must be one. Raises SpecError and StudyNotFound.
+    """
+    store = library.store
+    cases = store.cases_of_regime(study_id, regime)
+    parsed = parse_spec(longer_spec(store.spec(study_id), store.study(study_id), cases, at_most))
+    return submission(parsed, store.chunking, store.reusable, now, given=given)
 
 
 def clutch_fit(content: bytes, form: Format) -> bytes:

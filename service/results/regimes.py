@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -65,6 +64,6 @@ def regimes_of(lists: Iterable[Sequence[str | None] | None]) -> list[str]:
     return [name for name in MARKS if name in occurring]
 
 
-def counted(counts: Counter[str]) -> str:
-    """How many cases have which regime, in words: ``486 periodic, 24 irregular``; most frequent first."""
-    return ", ".join(f"{count:,} {name}" for name, count in counts.most_common())
+def counted(counts: Mapping[str, int]) -> str:
+    """How many cases have which regime, in words: ``486 periodic, 24 irregular``."""
+    return ", ".join(f"{count:,} {name}" for name, count in counts.items())

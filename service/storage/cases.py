@@ -97,6 +97,18 @@ class Cases(Orders):
             found = connection.execute(query.group_by(column).order_by(count.desc(), column)).all()
         return {info.categories[code]: cases for code, cases in found}
 
+    def cases_of_regime(self, study_id: str, regime: str) -> NDArray[np.int64]:
+        """Numbers of the cases of a regime, ascending; raises StudyNotFound."""
+        with self.session.read() as connection:
+            rows = self._rows(connection, study_id)
+            info, c = regime_info(rows.infos), rows.table.c
+            if info is None:
+                return np.empty(0, dtype=np.int64)
+            code = info.categories.index(regime)
+            query = sa.select(c.case_number).where(c.study == rows.number, c[info.column] == code)
+            found = connection.execute(query.order_by(c.case_number)).scalars()
+            return np.fromiter(found, dtype=np.int64)
+
     def iter_rows(self, study_id: str, block: int = BLOCK_ROWS) -> Iterator[RowBlock]:
         """Every finished case in order, ``block`` cases at a time, each block read in its own short transaction."""
         after = -1

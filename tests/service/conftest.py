@@ -113,7 +113,7 @@ def made_up(study: Study) -> ChunkResult:
         if info.kind == "count":
             values[:, column] = np.arange(study.cases) + column
         if info.kind == "category":
-            values[:, column] = 1 + np.arange(study.cases) % (len(info.categories) - 1)
+            values[:, column] = len(info.categories) - 1 - np.arange(study.cases) % (len(info.categories) - 1)
     endings = ["chatter" if case % 5 == 4 else "ok" for case in range(study.cases)]
     flags = [models.WINDUP_OUT_OF_DATA if case % 4 == 3 else "" for case in range(study.cases)]
     values[[ending != "ok" for ending in endings]] = np.nan

@@ -23,8 +23,8 @@ from service.http.work import CHECK_PROBLEMS, Attended
 from service.jobs import checks
 from service.jobs.submission import Submission, take_in
 from service.schedules.deadline import ALLOWED, FinishError, finish_at
-from worker.limits import MAX_PAGE_SIZE, MAX_PRIORITY
-from worker.models import ENDING_SENTENCES, OK, WorkerEnding
+from worker.limits import MAX_PAGE_SIZE, MAX_PRIORITY, MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
+from worker.models import ENDING_SENTENCES, OK, REGIME_SENTENCES, WorkerEnding
 from worker.states import StudyState
 
 router = APIRouter(tags=["studies"], dependencies=[Depends(strict_query)])
@@ -243,6 +243,48 @@ async def extend_study(
         checks.extended_study, context.library, study_id, received.content, received.format, finish, now, given
     )
     return await run_in_threadpool(_take_in, context, made, idempotency_key, priority)
+
+
+@router.post(
+    "/studies/{study_id:study}:longer",
+    status_code=202,
+    response_model=m.StudySummary,
+    responses=located(202)
+    | problems(
+        "invalid-parameter",
+        *CHECK_PROBLEMS,
+        "study-not-found",
+        "invalid-spec",
+        "idempotency-conflict",
+        "storage-full",
+        "queue-full",
+    ),
+)
+async def run_longer(
+    context: Ctx,
+    work: Attended,
+    study_id: StudyId,
+    regime: Annotated[
+        str, Query(description="regime of the cases", json_schema_extra=one_of(REGIME_SENTENCES))
+    ] = "unsettled",
+    at_most: Annotated[
+        int | None,
+        Query(
+            ge=MIN_SETTLED_PERIODS,
+            le=MAX_SETTLED_PERIODS,
+            description="excitation periods of each search; by default four times as many as before",
+        ),
+    ] = None,
+    idempotency_key: ExtensionKey = None,
+) -> Response:
+    """Submit a study of the cases of a settled study that are not settled, with more time for each."""
+    there = await run_in_threadpool(context.store.regimes, study_id)
+    if regime not in there:
+        raise parameter_error("regime", "no case of this study has it", regime, ", ".join(there) or "none: not settled")
+    given = _given(regime=regime, at_most=at_most)
+    now = context.store.clock.now()
+    made = await work.check(checks.longer_study, context.library, study_id, regime, at_most, now, given)
+    return await run_in_threadpool(_take_in, context, made, idempotency_key, 0)
 
 
 @router.post(

@@ -20,12 +20,15 @@ from service.http.web.choice import characteristic, map_query, pairs_of
 from service.http.web.form.check import fits_of, has_measured_clutch
 from service.http.web.templates import page
 from service.http.work import Attended
+from service.jobs import checks
+from service.jobs.submission import take_in
 from service.results import exports
 from service.results.curves import select
 from service.results.defaults import caption, drawn_numbers
 from service.results.exports.inputs import inputs as every_input
 from service.results.exports.inputs import run_inputs
 from service.results.pictures import curves as pictures
+from service.results.regimes import DOUBTFUL
 from service.results.selection import SelectionError
 from service.spec.catalogue import parameter_of, unit_of
 from service.spec.numbers import parse_number
@@ -108,6 +111,7 @@ def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[dict[s
         fits=fits,
         regimes=context.store.regimes(study_id),
         regime_meanings=models.REGIME_SENTENCES,
+        to_run_longer=DOUBTFUL,
     )
 
 
@@ -150,6 +154,20 @@ def delete(context: Ctx, study_id: StudyId) -> Response:
     """The answer: the study is deleted, and the list of those that are left is shown."""
     context.store.delete_study(study_id)
     return RedirectResponse("/", status_code=303)
+
+
+@router.post("/studies/{study_id:study}/longer/{regime}")
+async def run_longer(context: Ctx, work: Attended, study_id: StudyId, regime: str) -> Response:
+    """The button beside the count of a regime: a study of its cases, with more time to settle."""
+    counts = await run_in_threadpool(context.store.regimes, study_id)
+    if regime not in counts:
+        raise ApiError("not-found", "No case of this study has this regime.")
+    now = context.store.clock.now()
+    made = await work.check(checks.longer_study, context.library, study_id, regime, None, now, {})
+    # Pressed twice it is one study, unless more cases have come to have the regime.
+    key = f"longer-{study_id}-{regime}-{counts[regime]}"
+    record = await run_in_threadpool(take_in, context.store, made, key)
+    return RedirectResponse(f"/studies/{record.id}", status_code=303)
 
 
 @router.post("/studies/{study_id:study}/{verb}")

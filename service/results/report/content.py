@@ -14,6 +14,7 @@ from service.results.defaults import main_query
 from service.results.exports.inputs import Input, inputs, run_inputs
 from service.results.exports.source import given_texts
 from service.results.pictures.curves import require_drawable
+from service.results.regimes import counted
 from service.results.selection import SelectionError
 from service.spec.catalogue import unit_of
 from worker import models
@@ -82,6 +83,7 @@ def report_of(store: Store, study_id: str) -> Report:
         store.iter_rows(study_id),
         partial(store.rows_for_cases, study_id),
         store.spec(study_id),
+        store.regimes(study_id),
     )
 
 
@@ -92,13 +94,17 @@ def make_report(
     blocks: Iterable[RowBlock],
     fetch: Fetch,
     spec: Mapping[str, Any],
+    regimes: Mapping[str, int],
 ) -> Report:
-    """The report of a study as it is now; reads all its rows once. ``spec`` is the user's own."""
+    """The report of a study as it is now; reads all its rows once. ``spec`` is the user's own.
+
+    ``regimes`` counts the cases of each regime, the most frequent first.
+    """
     infos = models.study_results(study)
     pictures, note = _pictures(study, infos, fetch)
     return Report(
         record.name or record.model,
-        _facts(record, study),
+        _facts(record, study) + ((("motions", counted(regimes)),) if regimes else ()),
         record.warnings,
         tuple(
             AxisRow(", ".join(a.paths), unit_of(study, a.paths[0]), len(a), a.values[0], a.values[-1])

@@ -55,8 +55,8 @@ def study_id(service: Service) -> str:
     return found
 
 
-def file(service: Service, study_id: str, form: str) -> httpx.Response:
-    response = service.http.get(f"{API}/studies/{study_id}/results", params={"format": form})
+def file(service: Service, study_id: str, form: str, part: str = "results") -> httpx.Response:
+    response = service.http.get(f"{API}/studies/{study_id}/{part}", params={"format": form})
     assert response.status_code == 200, response.text
     return response
 
@@ -166,3 +166,47 @@ def test_cases_are_filtered_by_regime(service: Service, study_id: str) -> None:
     service.fill(timed)
     assert service.get(f"/studies/{timed}/cases", regime="periodic")["cases"] == []
     assert 'name="regime"' not in service.http.get(f"/studies/{timed}/cases").text
+
+
+def test_unsettled_cases_are_run_longer(service: Service, study_id: str) -> None:
+    made = service.http.post(f"{API}/studies/{study_id}:longer")
+    assert made.status_code == 202, made.text
+    assert made.json()["cases"] == 1
+    old, new = service.store.study(study_id), service.store.study(made.json()["id"])
+    assert new.columns([0]) == old.columns([3])
+    assert new.run == old.run | {"at_most": 4000}
+    assert new.base == old.base
+    assert new.name == f"{old.name}, longer"
+
+
+def test_other_regimes_and_times_are_asked_for(service: Service, study_id: str) -> None:
+    query: dict[str, str] = {"regime": "irregular", "at_most": "20000"}
+    key = {"Idempotency-Key": "once"}
+    made = [service.http.post(f"{API}/studies/{study_id}:longer", params=query, headers=key).json() for _ in range(2)]
+    assert made[0]["id"] == made[1]["id"]
+    new = service.store.study(made[0]["id"])
+    assert (new.cases, new.run["at_most"]) == (1, 20_000)
+    assert new.case_parameters(0) == service.store.study(study_id).case_parameters(1)
+
+
+def test_what_cannot_be_run_longer_is_refused(service: Service, study_id: str) -> None:
+    timed = service.submit(changed({"/run": {"duration": "60 periods"}}))
+    for study, query in ((study_id, {"regime": "held"}), (timed, {}), (study_id, {"at_most": "99"})):
+        response = service.http.post(f"{API}/studies/{study}:longer", params=query)
+        assert response.status_code == 422
+        assert response.json()["errors"][0]["parameter"] in query or not query
+
+
+def test_the_page_of_a_study_has_a_button_that_runs_cases_longer(service: Service, study_id: str) -> None:
+    address = f"/studies/{study_id}/longer/unsettled"
+    page = service.http.get(f"/studies/{study_id}").text
+    assert f'action="{address}"' in page
+    assert f'action="/studies/{study_id}/longer/periodic"' not in page
+    shown = [service.http.post(address).headers["location"] for _ in range(2)]
+    assert shown[0] == shown[1]
+    assert service.store.study(shown[0].rpartition("/")[2]).run["at_most"] == 4000
+    assert service.http.post(f"/studies/{study_id}/longer/held").status_code == 404
+
+
+def test_the_report_counts_the_regimes(service: Service, study_id: str) -> None:
+    assert "1 periodic, 1 irregular, 1 unsettled" in file(service, study_id, "html", "report").text
