@@ -8,7 +8,7 @@ from collections import OrderedDict
 from contextlib import suppress
 from dataclasses import replace
 from datetime import timedelta
-from threading import Event, Lock
+from threading import Event, Lock, RLock
 from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
@@ -57,7 +57,7 @@ class Studies(Orders):
         self.chunking = chunking
         self._studies: OrderedDict[str, Study] = OrderedDict()
         self._lock = Lock()
-        self._reading = Lock()
+        self._reading = RLock()
         #: Set when a study is deleted, for `service.jobs.housekeeping`.
         self.deleted = Event()
 
