@@ -41,11 +41,12 @@ from worker.models import MAX_PENDULUMS
 router = APIRouter(include_in_schema=False)
 
 #: What an empty form begins with.
-_EMPTY: Final[Values] = {
+EMPTY_FORM: Final[Values] = {
     "pendulums": "1",
     "axes": "1",
     "/combine": "grid",
-    "/run/duration": "60 periods",
+    "/run/until": "settled",
+    "/run/at_most": "1000 periods",
     "/run/tolerance": "1e-9",
     "/run/reset": "contact",
     "/base/clutch/kind": "law",
@@ -65,7 +66,7 @@ async def new_study(
     """The form, empty or filled in from an example or from another study."""
     spec = await run_in_threadpool(_start, context, preset, clone)
     if spec is None:
-        values = {"/text": "", "format": "json"} if mode == "text" else with_clutch_defaults(dict(_EMPTY))
+        values = {"/text": "", "format": "json"} if mode == "text" else with_clutch_defaults(dict(EMPTY_FORM))
         return form_page(request, values, None)
     try:
         values = values_of(spec)

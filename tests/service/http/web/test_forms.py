@@ -16,7 +16,7 @@ from service.faults import ErrorItem
 from service.http.web.figures.motion import motion_figures
 from service.http.web.figures.thinning import thin
 from service.http.web.form.check import check_form, check_text, message
-from service.http.web.form.page import share_clutches
+from service.http.web.form.page import EMPTY_FORM, share_clutches
 from service.http.web.form.spec import field_of, plain, spec_of, values_of, with_clutch_defaults
 from service.http.web.templates import duration, fragment, time_left
 from service.presets import preset_names, preset_text
@@ -130,7 +130,9 @@ def test_faults_of_a_run_for_a_given_time(changes: dict[str, str], name: str, me
 
 
 def test_an_empty_form_asks_for_settled_motion_and_the_other_choice_for_60_periods() -> None:
+    assert "contradicts" not in str(check_form(EMPTY_FORM, Chunking()).faults)
     for values, run in (
+        (EMPTY_FORM, {"until": "settled", "at_most": "1000 periods", "tolerance": 1e-9}),
         ({}, {"until": "settled"}),
         ({"/run/until": "time"}, {"duration": "60 periods"}),
         ({"/run/until": "time", "/run/duration": "2 s"}, {"duration": "2 s"}),
