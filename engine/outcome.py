@@ -54,3 +54,79 @@ class Trajectory:
     along: str = "time"
     unit: str = "s"
     phi_c: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Engagement:
+    """One stretch in which a clutch transmits torque.
+
+    Attributes
+    ----------
+    clutch : int
+        Number of its pendulum, from 0.
+    start, end : float
+        Times in s.
+    order : int
+        1 for a clutch that begins while no other transmits torque, 2 for one that joins another, and so on.
+    torque_max : float
+        Largest torque, in N*m.
+    work_shaft, work_pendulum : float
+        Work in J that the clutch does on the shaft, and that its pendulum does on the clutch.
+    complete : bool
+        Whether it begins and ends in the part of the run that was looked at; else only that part of it is told.
+    """
+
+    clutch: int
+    start: float
+    end: float
+    order: int
+    torque_max: float
+    work_shaft: float
+    work_pendulum: float
+    complete: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PeriodMeans:
+    """One excitation period of a run.
+
+    Attributes
+    ----------
+    start : float
+        Time in s.
+    speed_mean, speed_max : float
+        Of the shaft, in rad/s.
+    torque_mean : float
+        Of all clutches on the shaft, in N*m.
+    """
+
+    start: float
+    speed_mean: float
+    speed_max: float
+    torque_mean: float
+
+
+@dataclass(frozen=True, slots=True)
+class Engagements:
+    """What the clutches of one case do, one after the other.
+
+    Attributes
+    ----------
+    start, end : float
+        The part of the run that the table is about, in s.
+    regime : str
+        Name of the settled motion's regime; "" for a run of a given time.
+    rows : tuple of Engagement
+        In order of their starts.
+    periods : tuple of PeriodMeans
+        Whole excitation periods, in order.
+    ending : Ending
+        Where it is not ok there are no rows and no periods.
+    """
+
+    start: float
+    end: float
+    regime: str
+    rows: tuple[Engagement, ...]
+    periods: tuple[PeriodMeans, ...]
+    ending: Ending

@@ -12,6 +12,7 @@ from engine.taylor.roots import MAX_DEGREE, work_stack
 from engine.vibration_drive.cases import SHAFT_COLUMNS, STOPS
 from engine.vibration_drive.characteristics import sum_columns
 from engine.vibration_drive.kernel import Kernel
+from engine.vibration_drive.pieces import piece_width
 from engine.vibration_drive.states import LANE_INTEGERS
 from engine.vibration_drive.strobes import from_rest, width
 
@@ -35,6 +36,8 @@ class Integration:
         Instantaneous values of case 0, and states of its shaft and clutches.
     recorded : int
         Times that were reached.
+    pieces : array, shape (pieces, piece_width(layout))
+        Steps of case 0 as ``pieces.Pieces`` reads them; rows that no step filled are NaN.
     """
 
     sums: Floats
@@ -42,6 +45,7 @@ class Integration:
     samples: Floats
     states: Ints
     recorded: int
+    pieces: Floats
 
 
 def integrate(
@@ -52,11 +56,14 @@ def integrate(
     starts: Floats | None = None,
     strobes: int = 0,
     times: Floats | None = None,
+    pieces: int = 0,
+    since: float = 0.0,
 ) -> Integration:
     """Run the cases of ``matrix`` (from ``cases.case_matrix``) from rest or from ``starts``.
 
     ``run`` gives tolerance, reset and budgets; the lengths of the runs stand in the matrix. ``strobes`` is the number
-    of strobes recorded of each case, ``times`` (in excitation periods) where case 0 is sampled.
+    of strobes recorded of each case, ``times`` (in excitation periods) where case 0 is sampled, ``pieces`` the most
+    steps of case 0 that are kept, from the time ``since`` (in excitation periods) on.
     """
     lay = kernel.LAYOUT
     cases, n = len(matrix), lay.n
@@ -66,6 +73,7 @@ def integrate(
     end = matrix[:, SHAFT_COLUMNS + 2 * (STOPS - 1)]
     samples = np.empty((len(asked), SHAFT_SAMPLES + n * PENDULUM_SAMPLES))
     states = np.zeros((len(asked), 1 + n), dtype=np.int64)
+    steps = np.full((pieces, piece_width(lay)), np.nan)
     # Guards (7 a pendulum and shaft at most) and extrema (13) that all lanes together can list in a step.
     listed = lay.lanes * (5 + 8 * n)
     done = kernel.integrate(
@@ -76,5 +84,6 @@ def integrate(
         np.zeros(MAX_DEGREE + 1), work_stack(),
         blocks_for(listed, lay.order), np.zeros((listed, 3), dtype=np.int64),
         np.zeros((lay.lanes, int(np.max(end, initial=0.0)) + 3)), sums, asked, samples, states,
+        since, steps,
     )  # fmt: skip
-    return Integration(sums, recorded, samples, states, done)
+    return Integration(sums, recorded, samples, states, done, steps)

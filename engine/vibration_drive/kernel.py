@@ -37,6 +37,7 @@ from engine.compile.jit import compiled, constant_record, lane_loops, lane_mask,
 from engine.vibration_drive.events import settle_guards
 from engine.vibration_drive.lanes import highest, load_case, look_for_events, next_stop, pack, record, settle
 from engine.vibration_drive.layout import Layout, as_record
+from engine.vibration_drive.pieces import keep
 from engine.vibration_drive.strobes import FRACTION
 from engine.vibration_drive.window import collect_peaks, settle_peaks
 
@@ -73,7 +74,7 @@ noted = lane_mask("!=", LAYOUT.attention, LAYOUT.lanes)
 @compiled
 def integrate(
     lay, cases, starts, strobes, tolerance, log2_tolerance, literal, most_steps, most_events, W, Z, g, stack, blocks,
-    meta, turns, sums, times, samples, states,
+    meta, turns, sums, times, samples, states, since, pieces,
 ):
     """Run every case, filling a lane again the moment its case ends; the number of samples recorded (of case 0)."""
     lay = fixed(lay)
@@ -82,11 +83,12 @@ def integrate(
     W, Z, g, stack, blocks, meta = (
         unmanaged(W), unmanaged(Z), unmanaged(g), unmanaged(stack), unmanaged(blocks), unmanaged(meta)
     )
-    samples, states = unmanaged(samples), unmanaged(states)
+    samples, states, pieces = unmanaged(samples), unmanaged(states), unmanaged(pieces)
     groups = min((cases.shape[0] + {group} - 1) // {group}, {groups})  # of lanes that are used
     busy = 0  # bit k: lane k has a case
     queue = 0
     recorded = 0
+    kept = 0
     while True:
         idle = ~busy & ((1 << groups * {group}) - 1)
         while idle != 0 and queue < cases.shape[0]:
@@ -118,6 +120,8 @@ def integrate(
         settle_peaks(W, lay, g, stack, blocks, meta, used)
         if recorded < times.shape[0]:
             recorded = record(W, Z, lay, 0, times, recorded, g, samples, states)
+        if kept < pieces.shape[0]:
+            kept = keep(W, Z, lay, 0, since, kept, pieces)
         advance(W, float(most_steps), 0.0, groups)
         left = busy & noted(W)
         before = busy
@@ -142,6 +146,7 @@ class Kernel(Protocol):
         self, lay: Layout, cases: Floats, starts: Floats, strobes: Floats, tolerance: float, log2_tolerance: float,
         literal: int, most_steps: int, most_events: int, W: Floats, Z: Ints, g: Floats, stack: Floats, blocks: Floats,
         meta: Ints, turns: Floats, sums: Floats, times: Floats, samples: Floats, states: Ints,
+        since: float, pieces: Floats,
     ) -> int: ...  # fmt: skip
 
 

@@ -12,7 +12,21 @@ from typing import Annotated
 
 import typer
 
-from service.cli import database, demo, doctor, extend, fit, local, pictures, processes, remote, schedule, settle, token
+from service.cli import (
+    database,
+    demo,
+    doctor,
+    engagements,
+    extend,
+    fit,
+    local,
+    pictures,
+    processes,
+    remote,
+    schedule,
+    settle,
+    token,
+)
 from service.cli.console import CommandFailureError, ExitCode, TroubleError, say, write_text
 from service.extras import command_for
 
@@ -53,6 +67,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "preview": local.preview,
         "settle": settle.settle,
         "trajectory": local.trajectory,
+        "engagements": engagements.engagements,
         "fit": fit.fit,
         "presets": local.presets,
     },

@@ -34,6 +34,7 @@ from service.client.wire import (
     Query,
     connection_options,
     document,
+    engagements_path,
     is_event,
     reason,
     refusal,
@@ -210,6 +211,10 @@ class AsyncStudy:
     async def sensitivity(self, y: str | Sequence[str]) -> dict[str, Any]:
         """Main effects of every axis on results, and shares of their variance."""
         return await self._get("/sensitivity", result_query(y))
+
+    async def engagements(self, case: int) -> dict[str, Any]:
+        """Every engagement of the clutches of one case, as `Study.engagements` gives them."""
+        return await self._client.request("GET", engagements_path(self.id, case))
 
     async def table(self) -> pd.DataFrame:
         """All rows as a pandas table."""

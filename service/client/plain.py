@@ -17,6 +17,7 @@ from service.client.wire import (
     Query,
     connection_options,
     document,
+    engagements_path,
     is_event,
     reason,
     refusal,
@@ -112,6 +113,10 @@ class ServiceClient:
     def cases(self, study_id: str, query: Query = ()) -> dict[str, Any]:
         """A page of case rows."""
         return self._json("GET", f"{study_path(study_id)}/cases", params=list(query))
+
+    def engagements(self, study_id: str, case: int) -> dict[str, Any]:
+        """The engagements of the clutches of one case, and the means of its excitation periods."""
+        return self._json("GET", engagements_path(study_id, case))
 
     def download(self, path: str, query: Query = ()) -> Iterator[bytes]:
         """The bytes of a document under the API, such as ``/studies/ID/results`` with ``format=csv``, as they come."""

@@ -156,6 +156,10 @@ class Study:
         """Main effects of every axis on results, and shares of their variance."""
         return self._client.plain.sensitivity(self.id, result_query(y))
 
+    def engagements(self, case: int) -> dict[str, Any]:
+        """Every engagement of the clutches of one case ("engagements"), and the means of its "periods"."""
+        return self._client.plain.engagements(self.id, case)
+
     def table(self) -> pd.DataFrame:
         """All rows with all results as a pandas table, NaN for what could not be computed."""
         return table_of(self.download("parquet"))

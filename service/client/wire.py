@@ -75,6 +75,11 @@ def study_path(study_id: str) -> str:
     return f"/studies/{quote(study_id, safe='')}"
 
 
+def engagements_path(study_id: str, case: int) -> str:
+    """Address of the engagements of a case under the API."""
+    return f"{study_path(study_id)}/cases/{case:d}/engagements"
+
+
 def schedule_path(schedule_id: str) -> str:
     """Address of a schedule under the API."""
     return f"/schedules/{quote(schedule_id, safe='')}"

@@ -15,7 +15,18 @@ from starlette.types import ASGIApp
 
 from service.http import handlers
 from service.http.access import Access
-from service.http.api import cases, catalogues, clutch_fits, curves, events, health, schedules, sensitivity, studies
+from service.http.api import (
+    cases,
+    catalogues,
+    clutch_fits,
+    curves,
+    engagements,
+    events,
+    health,
+    schedules,
+    sensitivity,
+    studies,
+)
 from service.http.api.document import build_openapi
 from service.http.computer import Computes, Limits, ProcessComputer
 from service.http.context import Context
@@ -25,6 +36,7 @@ from service.http.metrics import Metrics
 from service.http.shares import Shares
 from service.http.views import API_PREFIX
 from service.http.web import case, compare, laboratory, login, pages, results, study, table
+from service.http.web import engagements as engagement_pages
 from service.http.web import schedules as schedule_pages
 from service.http.web.form import page as form
 from service.jobs import checks
@@ -170,11 +182,23 @@ def create_app(
     if checker is not None:
         context.ready.set()
     api = APIRouter(prefix=API_PREFIX)
-    for module in (studies, events, curves, sensitivity, cases, clutch_fits, schedules, catalogues):
+    for module in (studies, events, curves, sensitivity, cases, engagements, clutch_fits, schedules, catalogues):
         api.include_router(module.router)
     app.include_router(api)
     app.include_router(health.router)
-    for page in (pages, form, study, results, table, case, compare, laboratory, schedule_pages, login):
+    for page in (
+        pages,
+        form,
+        study,
+        results,
+        table,
+        case,
+        engagement_pages,
+        compare,
+        laboratory,
+        schedule_pages,
+        login,
+    ):
         app.include_router(page.router)
     handlers.install(app)
     return app

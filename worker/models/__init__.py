@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from engine import ENGINE_VERSION, Ending, Run, Span
 from engine.catalogue import Parameter, ResultInfo
 from engine.machine_shaft.problems import ExpressionError, InsufficientInertiaError, MachineError
-from engine.outcome import Trajectory
+from engine.outcome import Engagements, Trajectory
 from engine.run import MEANS_FROM_PERIODS
 from engine.sources import engine_folder, source_hash
 from engine.vibration_drive.clutch import (
@@ -75,6 +75,7 @@ __all__ = [
     "ClutchLawError",
     "DegreeReport",
     "Ending",
+    "Engagements",
     "ExpressionError",
     "Extent",
     "InsufficientInertiaError",
@@ -103,6 +104,7 @@ __all__ = [
     "extent",
     "fit_clutch",
     "flags_of",
+    "has_clutches",
     "is_compiled",
     "is_settled",
     "kernel_source",
@@ -119,6 +121,7 @@ __all__ = [
     "result_catalogue",
     "result_infos",
     "run_chunk",
+    "run_engagements",
     "run_of",
     "run_task",
     "run_trajectory",
@@ -262,6 +265,16 @@ def extent(study: Study, case: int) -> Extent:
 def run_trajectory(study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
     """Instantaneous values of one case at ``points`` equally spaced places of its `extent`."""
     return model_of(study.model).trajectory(study, case, start, end, points)
+
+
+def has_clutches(study: Study) -> bool:
+    """Whether the machine of ``study`` has clutches."""
+    return model_of(study.model).has_clutches
+
+
+def run_engagements(study: Study, case: int) -> Engagements:
+    """What the clutches of one case do; ValueError where its machine has none."""
+    return model_of(study.model).engagements(study, case)
 
 
 def estimate_seconds_per_case(study: Study) -> float:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from engine import Ending
     from engine.catalogue import Parameter, ResultInfo
-    from engine.outcome import Trajectory
+    from engine.outcome import Engagements, Trajectory
     from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
     from worker.study import Study
 
@@ -81,6 +81,15 @@ class Model(Protocol):
     def trajectory(self, study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
         """Instantaneous values of one case at ``points`` equally spaced places of its `extent`."""
         ...
+
+    @property
+    def has_clutches(self) -> bool:
+        """Whether its machines have clutches, so that there are `engagements`."""
+        return False
+
+    def engagements(self, study: Study, case: int) -> Engagements:
+        """What the clutches of one case do; ValueError where there are none."""
+        raise ValueError(f"a machine of model {self.name} has no clutches")
 
     def estimate_seconds_per_case(self, study: Study) -> float:
         """Rough time of one case on one core, in s."""

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from engine.catalogue import Parameter, ResultInfo
-    from engine.outcome import Trajectory
+    from engine.outcome import Engagements, Trajectory
     from engine.run import Reset, Unit
     from worker.study import Study
 
@@ -204,6 +204,19 @@ class VibrationDrive(Model):
 
         columns = {**study.base, **study.case_parameters(case)}
         return trajectory(columns, run_of(study.run), np.linspace(start, end, points))
+
+    @property
+    def has_clutches(self) -> bool:
+        return True
+
+    def engagements(self, study: Study, case: int) -> Engagements:
+        """Of a settled study those of one turn of its motion, else those in the window."""
+        from engine.vibration_drive.engagements import engagements, settled_engagements
+
+        columns = {**study.base, **study.case_parameters(case)}
+        if is_settled(study.run):
+            return settled_engagements(columns, settings_of(study.run))
+        return engagements(columns, run_of(study.run))
 
     def estimate_seconds_per_case(self, study: Study) -> float:
         from engine.vibration_drive.simulate import estimate_seconds

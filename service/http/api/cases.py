@@ -90,12 +90,15 @@ def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
         names = [info.name for info in models.study_results(study)]
         row = CaseRow(case, PENDING, (), dict.fromkeys(names))
     own = f"{study_address(study_id)}/cases/{case}"
+    links = {"self": own, "study": study_address(study_id), "trajectory": f"{own}/trajectory"}
+    if models.has_clutches(study):
+        links["engagements"] = f"{own}/engagements"
     return json_response(
         {
             **row_json(row, parameters),
             "ending_meaning": models.ENDING_SENTENCES.get(row.ending, "The case has not been run yet."),
             "flag_meanings": {flag: models.flags_of(study.model).get(flag, "") for flag in row.flags},
-            "links": {"self": own, "study": study_address(study_id), "trajectory": f"{own}/trajectory"},
+            "links": links,
         }
     )
 

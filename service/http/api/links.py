@@ -43,7 +43,7 @@ _OF_A_STUDY: Final = (
     "get_sensitivity",
     "list_cases",
 )
-_OF_A_CASE: Final = ("get_case", "get_trajectory")
+_OF_A_CASE: Final = ("get_case", "get_trajectory", "get_engagements")
 _OF_A_SCHEDULE: Final = ("get_schedule", "change_schedule", "delete_schedule")
 _SPEC_TAKERS: Final = ("preview_study", "create_study")
 

@@ -94,6 +94,7 @@ def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = 
         figures=f"{own}/motion?{query}",
         picture=f"{own}/motion.svg?{query}",
         file=f"/api/v1{own}/trajectory?{query}&points={SAMPLES}&format=csv",
+        clutches=f"{own}/engagements" if models.has_clutches(study) else "",
         last=study.cases - 1,
     )
 

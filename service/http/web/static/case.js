@@ -1,4 +1,5 @@
-// The motion of a case: drawn by the figures of the server; a closer look is computed anew there.
+// The motion of a case: drawn by the figures of the server; a closer look is computed anew there. The table of its
+// engagements is taken from the page that has it.
 "use strict";
 
 const motion = document.getElementById("motion"), phase = document.getElementById("phase");
@@ -46,3 +47,12 @@ if (motion) {
     document.addEventListener("sprag:found", () => { if (motion.classList.contains("stale")) zoomTo(shown); });
   });
 }
+
+const engagements = document.getElementById("engagements");
+if (engagements) document.addEventListener("DOMContentLoaded", async () => {
+  try {
+    sprag.take(await sprag.page(engagements.dataset.engagements), "#engagements");
+  } catch (error) {
+    sprag.say(engagements, error.message);
+  }
+});

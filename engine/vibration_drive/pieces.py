@@ -1,0 +1,144 @@
+"""The steps of one case: where each begins, how long it lasts, and the polynomials of speeds and torques on it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.compile.jit import part
+from engine.vibration_drive import states as ev
+from engine.vibration_drive.layout import Layout
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Columns of a step: whole periods and part of the period at its start, its length in s, then the series of the shaft's
+#: speed; of each pendulum its clutch's state and number of engagements, then the series of its speed and its torque.
+WHOLE, FRACTION, LENGTH = range(3)
+HEAD = 3
+#: Points at which a polynomial is compared before its largest value is refined, and golden sections of that.
+_POINTS, _SECTIONS = 17, 40
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+
+
+def piece_width(lay: Layout) -> int:
+    """Columns of a step."""
+    return HEAD + lay.order + 1 + lay.n * 2 * (lay.order + 2)
+
+
+@part
+def keep(W: Floats, Z: Ints, lay: Layout, lane: int, since: float, done: int, pieces: Floats) -> int:
+    """Write a lane's step as row ``done`` unless it has no length or begins before ``since`` (in periods).
+
+    Series are written in fractions of the part of the step that is taken. Returns how many rows are written then.
+    """
+    lanes = lay.lanes
+    x = W[lay.x * lanes + lane]
+    length = x * W[lay.h * lanes + lane]
+    if not length > 0.0 or Z[lane, ev.PERIOD] + W[lay.f * lanes + lane] < since:
+        return done
+    out = pieces[done]
+    out[WHOLE] = Z[lane, ev.PERIOD]
+    out[FRACTION] = W[lay.f * lanes + lane]
+    out[LENGTH] = length
+    power = 1.0
+    for k in range(lay.order + 1):
+        column = HEAD + k
+        out[column] = power * W[(lay.speed + k) * lanes + lane]
+        for i in range(lay.n):
+            base = lay.pendulums + i * lay.stride
+            column = HEAD + lay.order + 1 + i * 2 * (lay.order + 2)
+            out[column] = Z[lane, i]
+            out[column + 1] = W[(base + lay.p_engagements) * lanes + lane]
+            out[column + 2 + k] = power * W[(base + lay.p_speed + k) * lanes + lane]
+            out[column + lay.order + 3 + k] = power * W[(base + lay.p_torque + k) * lanes + lane]
+        power *= x
+    return done + 1
+
+
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """Steps that follow each other; every series in fractions of its step, shape (steps, order + 1).
+
+    Attributes
+    ----------
+    whole : array, shape (steps,)
+        Whole excitation periods before the start of the step.
+    start, end : array, shape (steps,)
+        Times in excitation periods.
+    length : array, shape (steps,)
+        In s.
+    speed : array, shape (steps, order + 1)
+        Series of the shaft's speed.
+    states, counts : array, shape (steps, n)
+        State of each clutch, and how often it has engaged.
+    speeds, torques : array, shape (steps, n, order + 1)
+        Series of the pendulums' speeds and their clutches' torques.
+    """
+
+    whole: Ints
+    start: Floats
+    end: Floats
+    length: Floats
+    speed: Floats
+    states: Ints
+    counts: Floats
+    speeds: Floats
+    torques: Floats
+
+    @classmethod
+    def read(cls, lay: Layout, rows: Floats, period: float) -> "Pieces":
+        """The steps in the rows that ``keep`` has filled; ``period`` is the excitation's, in s."""
+        rows = rows[~np.isnan(rows[:, WHOLE])]
+        terms = lay.order + 1
+        pendulums = rows[:, HEAD + terms :].reshape(len(rows), lay.n, 2 + 2 * terms)
+        start = rows[:, WHOLE] + rows[:, FRACTION]
+        return cls(
+            rows[:, WHOLE].astype(np.int64), start, start + rows[:, LENGTH] / period, rows[:, LENGTH],
+            rows[:, HEAD : HEAD + terms], pendulums[:, :, 0].astype(np.int64), pendulums[:, :, 1],
+            pendulums[:, :, 2 : 2 + terms], pendulums[:, :, 2 + terms :],
+        )  # fmt: skip
+
+    def between(self, start: float, end: float) -> "Pieces":
+        """The steps within a time (in excitation periods) at whose ends steps end too."""
+        middle = 0.5 * (self.start + self.end)
+        kept = (middle > start) & (middle < end)
+        return Pieces(*(getattr(self, name)[kept] for name in Pieces.__slots__))
+
+
+def integrals(series: Floats, length: Floats) -> Floats:
+    """Integral of each series (rows) over its step."""
+    total: Floats = length * (series @ (1.0 / np.arange(1, series.shape[1] + 1)))
+    return total
+
+
+def products(one: Floats, other: Floats) -> Floats:
+    """Product of two series row by row, cut off at their order."""
+    out = np.zeros_like(one)
+    for k in range(one.shape[1]):
+        out[:, k] = np.sum(one[:, : k + 1] * other[:, k::-1], axis=1)
+    return out
+
+
+def largest(series: Floats) -> Floats:
+    """Largest value of each series (rows) on its step.
+
+    A step is short beside the motion, so that the largest of its points has the maximum between its neighbours.
+    """
+    grid = np.linspace(0.0, 1.0, _POINTS)
+    at = np.argmax(series @ (grid ** np.arange(series.shape[1])[:, np.newaxis]), axis=1)
+    low, high = grid[np.maximum(at - 1, 0)], grid[np.minimum(at + 1, _POINTS - 1)]
+    for _ in range(_SECTIONS):
+        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        falls = _at(series, left) > _at(series, right)
+        low, high = np.where(falls, low, left), np.where(falls, right, high)
+    ends = np.maximum(_at(series, np.zeros(len(series))), _at(series, np.ones(len(series))))
+    best: Floats = np.maximum(ends, _at(series, 0.5 * (low + high)))
+    return best
+
+
+def _at(series: Floats, x: Floats) -> Floats:
+    value = np.zeros(len(series))
+    for k in range(series.shape[1] - 1, -1, -1):
+        value = value * x + series[:, k]
+    return value

@@ -1,0 +1,67 @@
+"""The command that tells the engagements of a case."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from service.cli.console import ExitCode, WrongInputError, say, write_json
+from service.cli.files import output, read_study, to_file
+from service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
+from service.json_text import to_bytes
+from service.spec.report import Problem
+
+if TYPE_CHECKING:
+    from worker.study import Study
+
+
+class TableName(StrEnum):
+    """The tables of a case."""
+
+    ENGAGEMENTS = "engagements"
+    PERIODS = "periods"
+
+
+def engagements(
+    spec: SpecFile,
+    case: Annotated[int, typer.Option("--case", min=0, metavar="N", help="Number of the case, from 0.")] = 0,
+    points: PointsFile = None,
+    file: OutputFile = None,
+    table: Annotated[
+        TableName, typer.Option(help="Table of a CSV file: engagements, or means of excitation periods.")
+    ] = TableName.ENGAGEMENTS,
+    as_json: JsonFlag = False,
+) -> None:
+    """Write every engagement of the clutches of one case: start, end, order, torque, work. JSON has the periods too."""
+    from service.results.engagements import engagements_csv, engagements_json
+    from worker.models import ENDING_SENTENCES, OK, run_engagements
+
+    study = read_study(spec, points).study
+    _require(study, case)
+    with output(file) as write:
+        made = run_engagements(study, case)
+        name = (file or "").lower()
+        if name.endswith(".json") or (as_json and not name.endswith(".csv")):
+            write(to_bytes(engagements_json(made, case, study.case_parameters(case))) + b"\n")
+        else:
+            write(engagements_csv(made, table.value))
+    told = f"{len(made.rows)} engagements from {made.start:g} s to {made.end:g} s"
+    say(f"case {case}: {told if made.ending == OK else ENDING_SENTENCES[made.ending]}")
+    if as_json and to_file(file):
+        write_json({"file": file, "case": case, "ending": made.ending, "engagements": len(made.rows)})
+    if made.ending != OK:
+        raise typer.Exit(ExitCode.NOT_ALL_OK)
+
+
+def _require(study: Study, case: int) -> None:
+    """Raise WrongInputError for a number that no case has, or a machine without clutches."""
+    from worker.models import VIBRATION_DRIVE, has_clutches
+
+    if not has_clutches(study):
+        problem = Problem("/model", "has no clutches, so that nothing engages", study.model, allowed=VIBRATION_DRIVE)
+        raise WrongInputError("this study has no engagements", problems=[problem])
+    if case >= study.cases:
+        problem = Problem("--case", "there is no such case", case, allowed=f"0 .. {study.cases - 1}")
+        raise WrongInputError("an option is wrong", problems=[problem])

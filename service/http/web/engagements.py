@@ -1,0 +1,51 @@
+"""The table of a case's engagements: a page of its own, which the page of the case takes in."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fastapi import APIRouter
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from service.http.context import CaseNumber, Ctx, StudyId, study_with
+from service.http.web.study import study_frame
+from service.http.web.templates import page
+from service.http.work import Attended
+from service.results.engagements import require_clutches
+from worker import models
+
+if TYPE_CHECKING:
+    from worker.study import Study
+
+router = APIRouter(include_in_schema=False)
+
+#: Rows that a page shows.
+_SHOWN = 100
+
+
+@router.get("/studies/{study_id:study}/cases/{case:case}/engagements")
+async def engagements_page(context: Ctx, work: Attended, study_id: StudyId, case: CaseNumber) -> Response:
+    """What the clutches of a case do."""
+
+    def find() -> Study:
+        study = study_with(context, study_id, case)
+        require_clutches(study)
+        return study
+
+    study = await run_in_threadpool(find)
+    await work.load(models.shape_of(study))
+    made = await work.compute(models.run_engagements, study, case)
+    own = f"/studies/{study_id}/cases/{case}"
+    frame = await run_in_threadpool(study_frame, context, study_id)
+    return page(
+        "engagements.html",
+        **frame,
+        tab="/cases",
+        case=case,
+        made=made,
+        rows=made.rows[:_SHOWN],
+        sentence=models.ENDING_SENTENCES.get(made.ending, ""),
+        regime=models.REGIME_SENTENCES.get(made.regime, ""),
+        file=f"/api/v1{own}/engagements",
+    )

@@ -1,0 +1,67 @@
+"""The engagements of one case and the periods of its run: the document, and its tables as CSV."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from service.faults import FaultError
+from service.json_text import to_bytes
+from service.results.exports import table_csv
+from worker import models
+
+if TYPE_CHECKING:
+    from service.results.exports import Format
+    from worker.models import Engagements
+    from worker.study import Study
+
+Table = Literal["engagements", "periods"]
+TABLES: Final[tuple[Table, ...]] = ("engagements", "periods")
+
+#: Columns of each table in their order, with their units.
+COLUMNS: Final[dict[Table, dict[str, str]]] = {
+    "engagements": {
+        "clutch": "", "start": "s", "end": "s", "order": "", "torque_max": "N*m", "work_shaft": "J",
+        "work_pendulum": "J", "complete": "",
+    },
+    "periods": {"start": "s", "speed_mean": "rad/s", "speed_max": "rad/s", "torque_mean": "N*m"},
+}  # fmt: skip
+
+
+def require_clutches(study: Study) -> None:
+    """Raise FaultError where the study's machine has no clutches."""
+    if not models.has_clutches(study):
+        raise FaultError("not-found", f"A machine of model {study.model} has no clutches, so that nothing engages.")
+
+
+def engagements_file(study: Study, case: int, table: Table, form: Format) -> bytes:
+    """The case run again and written down. For the computing process."""
+    made = models.run_engagements(study, case)
+    if form == "csv":
+        return engagements_csv(made, table)
+    return to_bytes(engagements_json(made, case, study.case_parameters(case)))
+
+
+def engagements_json(made: Engagements, case: int, parameters: dict[str, float]) -> dict[str, Any]:
+    """Both tables as JSON data; ``parameters`` are the axis parameters of the case, SI."""
+    return {
+        "case": case,
+        "parameters": parameters,
+        "start": made.start,
+        "end": made.end,
+        "regime": made.regime or None,
+        "engagements": [asdict(row) for row in made.rows],
+        "periods": [asdict(row) for row in made.periods],
+        "ending": made.ending,
+    }
+
+
+def engagements_csv(made: Engagements, table: Table) -> bytes:
+    """One of the tables as CSV."""
+    rows = [asdict(row) for row in (made.rows if table == "engagements" else made.periods)]
+    columns = COLUMNS[table]
+    return table_csv(list(columns), [[_cell(row[name]) for row in rows] for name in columns])
+
+
+def _cell(value: object) -> object:
+    return str(value).lower() if isinstance(value, bool) else value
