@@ -26,6 +26,8 @@ _THREAD_VARIABLES = (
     "VECLIB_MAXIMUM_THREADS",
 )
 _PR_SET_PDEATHSIG = 1
+#: How much pool processes give way to others, to the process that answers requests above all.
+NICENESS = 10
 
 
 def single_threaded_children() -> None:
@@ -71,6 +73,8 @@ def start_pool_process(parent: int, prepare: Callable[[], None]) -> None:
     ignore_interrupts()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     end_with_parent(parent, signal.SIGKILL)
+    if hasattr(os, "nice"):
+        os.nice(NICENESS)
     prepare()
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from multiprocessing import get_context
 from typing import TYPE_CHECKING
 
 from tests.worker import fakes
-from worker.pool.processes import interrupts_held_back
+from worker.pool.child_process import ChildProcess
+from worker.pool.processes import NICENESS, interrupts_held_back
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -38,3 +40,13 @@ def test_pool_processes_are_started_so_and_then_ignore_interrupts() -> None:
         assert any(pool.ready(study) or pool.wait(60.0) for _ in range(3))
     finally:
         pool.close()
+
+
+def test_pool_processes_give_way_to_the_process_that_answers() -> None:
+    child = ChildProcess(fakes.prepare_nothing)
+    child.start()
+    try:
+        assert child.run(os.nice, (0,), 60.0) == min(os.nice(0) + NICENESS, 19)
+    finally:
+        child.close()
+        child.join()
