@@ -181,6 +181,24 @@ def test_a_machine_that_nothing_moves_has_an_empty_table() -> None:
     assert [each.speed_max for each in table.periods] == [0.0]
 
 
+def test_a_clutch_that_never_lets_go_is_told_over_the_whole_part() -> None:
+    # The spring presses the pendulum against the held shaft, and the damping keeps it there.
+    pressed = drive(
+        1,
+        **pendulum(0, backlash=0.0, initial_angle=-0.05, damping=2.0),
+        **clutch(0.0, 200.0),
+        shaft__load=10.0,
+        excitation__amplitude_x=1e-5,
+        excitation__amplitude_y=0.0,
+    )
+    table, row = settled(pressed)
+    (found,) = table.rows
+    assert row["pendulums.0.fraction.engaged"] == 1.0
+    assert (found.start, found.end, found.complete) == (table.start, pytest.approx(table.end), False)
+    assert found.torque_max == pytest.approx(row["pendulums.0.torque.max"], rel=1e-12)
+    assert found.torque_max > 0.9
+
+
 def test_without_a_load_no_clutch_works_once_settled() -> None:
     table, _ = settled(w1(25.0, 0.002, 0.0))
     assert (table.regime, table.rows, table.ending) == ("coasting", (), Ending.OK)
