@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 #: Regime of points that no line leads to: they are not of the settled machine.
 UNSETTLED: Final = "unsettled"
+#: Regimes that lead into each other: a drive without a load coasts at the limit of a vanishing load.
+_CONTINUOUS: Final = frozenset({"coasting", "periodic"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +42,7 @@ DOUBTFUL: Final = ("irregular", UNSETTLED)
 
 
 def stretches(regimes: Sequence[str | None] | None, points: int) -> list[NDArray[np.int64]]:
-    """Places of the points that a line joins: neighbours of one regime; an unsettled point stands alone.
+    """Places of the points that a line joins: neighbours of one regime, or coasting and periodic; no unsettled point.
 
     A point without a regime (it has no result) belongs to no stretch, unless the study knows no regimes at all.
     """
@@ -51,7 +53,7 @@ def stretches(regimes: Sequence[str | None] | None, points: int) -> list[NDArray
         if regime is None:
             continue
         before = regimes[place - 1] if place else None
-        if found and regime == before and regime != UNSETTLED:
+        if found and regime != UNSETTLED and (regime == before or {regime, before} == _CONTINUOUS):
             found[-1].append(place)
         else:
             found.append([place])

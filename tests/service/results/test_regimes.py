@@ -26,7 +26,8 @@ def joined(regimes: list[str | None] | None, points: int = 8) -> list[list[int]]
 
 
 def test_a_line_joins_neighbours_of_one_regime_and_no_unsettled_point() -> None:
-    assert joined(REGIMES) == [[0], [1, 2], [3], [4], [5], [6]]
+    assert joined(REGIMES) == [[0, 1, 2], [3], [4], [5], [6]]
+    assert joined(["held", "coasting", "periodic", "held"]) == [[0], [1, 2], [3]]
     assert joined(["irregular"] * 3) == [[0, 1, 2]]
     assert joined(["periodic", None, "periodic"]) == [[0], [2]]
     assert joined(None) == [list(range(8))]
@@ -64,7 +65,7 @@ def drawn() -> Curves:
 def test_a_figure_breaks_lines_and_marks_regimes() -> None:
     figure = curves_figure([("", drawn())])
     line, *marks = figure["data"]
-    assert line["customdata"] == [0, None, 1, 2, None, 3, None, 4, None, 5, None, 6]
+    assert line["customdata"] == [0, 1, 2, None, 3, None, 4, None, 5, None, 6]
     assert line["connectgaps"] is False
     assert {trace["name"]: trace["customdata"] for trace in marks} == {
         "periodic": [None], "coasting": [0], "irregular": [3], "unsettled": [5, 6],
