@@ -202,7 +202,7 @@ def _stepped(low: Floats, high: Floats, u: int, code: int) -> None:
         return
     p, q = np.sign(a), np.sign(b)
     if code == _FLOOR:
-        p, q = _floor(a), _floor(b)
+        p, q = _floors(a, b)
     elif code == _STEP:
         p, q = 1.0 if a >= 0.0 else 0.0, 1.0 if b >= 0.0 else 0.0
     if p == q:
@@ -212,15 +212,20 @@ def _stepped(low: Floats, high: Floats, u: int, code: int) -> None:
 
 
 @part
-def _floor(a: float) -> float:
-    """Floor as a number with a point."""
-    return float(np.floor(a))
+def _floors(a: float, b: float) -> tuple[float, float]:
+    """Floors of a number within a .. b, as numbers with a point.
+
+    An interval that begins or ends at a jump does so to rounding only: what is that near to a whole number belongs to
+    the other side, where the rest of the interval lies.
+    """
+    margin = min(8.0 * 2.0**-52 * max(abs(a), abs(b)), 0.25 * (b - a))
+    return float(np.floor(a + margin)), float(np.floor(b - margin))
 
 
 @part
 def _remainder(low: Floats, high: Floats, u: int, v: int, spare: int) -> None:
     iv.divide(low, high, u, v, spare)
-    p, q = _floor(low[spare, 0]), _floor(high[spare, 0])
+    p, q = _floors(low[spare, 0], high[spare, 0])
     if p == q:
         iv.constant(low, high, spare, p, p)
         iv.multiply(low, high, v, spare, spare + 1)

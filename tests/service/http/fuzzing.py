@@ -44,6 +44,7 @@ FURTHER_RULES: Final = (
     "create_study",
     "preview_study",
     "extend_study",
+    "run_longer",
     "create_schedule",
     "change_schedule",
     "fit_clutch",

@@ -84,7 +84,7 @@ def said(process: ChildProcess, function: Callable[..., Any], *args: Any) -> lis
 
 @pytest.mark.parametrize("function", [partial(writable, "a"), partial(parse_spec, PRESS)], ids=["picture", "shaft"])
 def test_what_is_loaded_for_the_first_is_not_counted(checking: ChildProcess, function: Callable[[], Any]) -> None:
-    models.load(models.machine_shaft.shape_of())  # into the cache on disk
+    models.warm_up(parse_spec(PRESS).study)  # into the cache on disk
     *before, (is_value, _) = said(checking, function)
     assert (before, is_value) == (["loading", "loaded"], True)
     *before, (is_value, _) = said(checking, function)
