@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -295,10 +296,8 @@ def test_the_demonstration(tmp_path: Path) -> None:
     assert "mean speed" in text
     assert max(map(len, text.splitlines())) <= 80
     assert "512 cases" in done.err
-    assert "http://127.0.0.1:" in done.err
     assert (tmp_path / "demo" / "curve.png").read_bytes().startswith(b"\x89PNG")
-    again = sprag("demo", "--exit", "--json", cwd=tmp_path)
-    speeds = again.data["curves"]["curves"][0]["y"]["shaft.speed.mean"]
-    assert speeds[0] > 10 * speeds[-1] > 0
+    address = re.search(r"http://127\.0\.0\.1:\d+", done.err)
+    assert address is not None
     with pytest.raises(httpx.ConnectError):
-        httpx.get(again.data["server"], timeout=60)
+        httpx.get(address[0], timeout=60)

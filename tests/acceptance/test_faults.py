@@ -10,7 +10,6 @@ import pytest
 
 from benchmarks.faults import harness
 from benchmarks.faults.badcases import badcases
-from benchmarks.faults.cache import cache
 from benchmarks.faults.clients import clients
 from benchmarks.faults.disk import file_limit
 from benchmarks.faults.kills import kills
@@ -31,10 +30,6 @@ def test_a_dispatcher_that_was_stopped_commits_nothing_and_gives_up(tmp_path: Pa
 
 def test_bad_cases_are_named_and_the_others_ok_until_a_retry_mends_them(tmp_path: Path) -> None:
     badcases(tmp_path, cases=16, crashing=1, hanging=1, seed=1, periods=4.0, chunk=2, timeout=2.0, timed=False)
-
-
-def test_a_damaged_kernel_cache_is_compiled_anew(tmp_path: Path) -> None:
-    cache(tmp_path, cases=64)
 
 
 def test_files_that_may_not_grow_hold_the_studies_until_they_may(tmp_path: Path) -> None:
