@@ -33,7 +33,7 @@ def test_bad_cases_are_named_and_the_others_ok_until_a_retry_mends_them(tmp_path
 
 
 def test_files_that_may_not_grow_hold_the_studies_until_they_may(tmp_path: Path) -> None:
-    file_limit(tmp_path, cases=8_000, studies=4)
+    file_limit(tmp_path, cases=8_000, studies=2)
 
 
 def test_a_power_cut_takes_nothing_that_was_acknowledged(tmp_path: Path) -> None:
