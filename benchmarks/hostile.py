@@ -158,8 +158,8 @@ def throw(service: Service, made: dict[str, Any], patience: float, clients: int)
     return watch, answers, time.perf_counter() - began
 
 
-def tell(name: str, watch: Watch, clients: int, seconds: float, answers: Counter[str]) -> None:
-    """Print what came of it."""
+def report(name: str, watch: Watch, clients: int, seconds: float, answers: Counter[str]) -> None:
+    """Print the measurements of one attack."""
     print(
         f"{name}: {clients} clients in {seconds:.1f} s, answers {dict(answers)}; "
         f"/livez at most {1e3 * max(watch.waits):.0f} ms of {len(watch.waits)}; "
@@ -178,7 +178,7 @@ def come_and_go(service: Service, clients: int) -> None:
         stayed = send(port, json.dumps(press("1")).encode(), _STAY)
         waited = time.perf_counter() - began
         answers = Counter(leaver.result() for leaver in leavers)
-    tell("clients that leave at once", watch, clients, time.perf_counter() - began, answers)
+    report("clients that leave at once", watch, clients, time.perf_counter() - began, answers)
     anew = {child.pid for child in psutil.Process(service.process.pid).children()} - children
     print(f"clients that leave at once: one that stays got {stayed} after {waited:.1f} s; {len(anew)} processes anew")
 
@@ -200,7 +200,7 @@ def look_at_stored(service: Service, clients: int) -> None:
     with watch.watching(), ThreadPoolExecutor(clients) as crowd:
         asked = [ways[number % len(ways)] for number in range(3 * clients)]
         answers = Counter(crowd.map(lambda way: request(port_of(service), *way, _STAY), asked))
-    tell("stored study of a million values", watch, clients, time.perf_counter() - began, answers)
+    report("stored study of a million values", watch, clients, time.perf_counter() - began, answers)
 
 
 def main() -> None:
@@ -211,7 +211,7 @@ def main() -> None:
     for name, (made, patience) in BOMBS.items():
         with running() as service:
             watch, answers, seconds = throw(service, made, patience, clients)
-            tell(name, watch, clients, seconds, answers)
+            report(name, watch, clients, seconds, answers)
             crowd = [threading.Thread(target=_fire, args=(service, made)) for _ in range(clients)]
             for thread in crowd:
                 thread.start()
@@ -227,7 +227,7 @@ def main() -> None:
 
 @contextmanager
 def running() -> Iterator[Service]:
-    """A service that can take work; to be stopped by whoever uses it."""
+    """A service that is ready to check specs; the caller stops it."""
     with tempfile.TemporaryDirectory() as folder:
         service = Service(Path(folder))
         service.start()

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 from service.jobs.dispatching import STANDBY_SECONDS, WorkerSettings, owner_name, pool, renewed_pool
 from service.results.exports.source import Source
 from service.stale_files import marked, sweep
+from service.storage.owners import run_owner
 from service.storage.part import SystemClock
 from service.storage.room import GOES_ON
 from service.storage.session import lock_of
 from service.storage.store import Store
-from service.storage.work import run_owner
 from worker.chunking import Chunking
 from worker.dispatcher import Dispatcher
 from worker.executors.inline import InlineExecutor

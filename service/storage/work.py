@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import sqlalchemy as sa
 
+from service.storage.owners import own_study, why_abandoned
 from service.storage.part import micros_of, moment, optional_moment
 from service.storage.records import DispatcherRecord
 from service.storage.reuse import Reuse, copy_rows, endings_of, mark_origin
@@ -39,19 +40,6 @@ _TERMINAL = [state.value for state in TERMINAL]
 CLAIMED = (CHUNKS.c.state == "claimed") & CHUNKS.c.study.in_(
     sa.select(STUDIES.c.number).where(STUDIES.c.state.not_in(_TERMINAL))
 )
-
-
-#: Between the process and the study in the name of an owner that runs one study only.
-_RUNS = " runs "
-_ABANDONED = (
-    "`sprag run` (process {process}) ended before its study did; resume the study to have a worker go on with it, or "
-    "give the same `sprag run` again, which takes the done cases from it"
-)
-
-
-def run_owner(process: str, study_id: str) -> str:
-    """The name of an owner that takes over for one study, of its own."""
-    return f"{process}{_RUNS}{study_id}"
 
 
 class _SourceGoneError(Exception):
@@ -87,12 +75,11 @@ class Work(Reuse):
         return epoch
 
     def _hold_abandoned(self, connection: sa.Connection, owner: str) -> None:
-        process, _, study_id = owner.partition(_RUNS)
-        row = connection.execute(
-            sa.select(STUDIES.c.number, STUDIES.c.state).where(STUDIES.c.id == study_id, STUDIES.c.deleted_at.is_(None))
-        ).one_or_none()
+        query = sa.select(STUDIES.c.number, STUDIES.c.state)
+        query = query.where(STUDIES.c.id == own_study(owner), STUDIES.c.deleted_at.is_(None))
+        row = connection.execute(query).one_or_none()
         if row is not None and StudyState(row.state) in {StudyState.QUEUED, StudyState.RUNNING}:
-            self._move(connection, row.number, StudyEvent.FAULT, _ABANDONED.format(process=process))
+            self._move(connection, row.number, StudyEvent.FAULT, why_abandoned(owner))
 
     def dispatcher(self) -> DispatcherRecord | None:
         """The dispatcher that took over last; None when there never was one."""

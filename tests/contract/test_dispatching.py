@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
+from service.storage.owners import run_owner
 from service.storage.store import Store
 from service.storage.tables import CHUNKS
-from service.storage.work import CLAIMED, run_owner
+from service.storage.work import CLAIMED
 from tests.contract.filling import SPEC, create, finish
 from tests.worker import fakes
 from worker.ports import Chunk, EpochLostError
