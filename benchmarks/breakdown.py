@@ -17,9 +17,9 @@ import numba
 import numpy as np
 
 from benchmarks.workloads import CASES, PERIODS, Timing, Workload, take_turns
-from engine.compile.ways import GROUP
-from engine.run import Run, Span
-from engine.vibration_drive import simulate as module
+from sprag.engine.compile.ways import GROUP
+from sprag.engine.run import Run, Span
+from sprag.engine.vibration_drive import simulate as module
 
 _LOOPS = 2000
 _MID_RUN = 700

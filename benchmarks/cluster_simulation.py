@@ -22,12 +22,12 @@ from pathlib import Path
 import numpy as np
 from distributed import Client, LocalCluster
 
-from service.storage.store import Store
-from worker import models
-from worker.chunking import Chunking
-from worker.executors.dask_tasks import introduce
-from worker.models import ChunkResult
-from worker.study import Axis, Study
+from sprag.service.storage.store import Store
+from sprag.worker import models
+from sprag.worker.chunking import Chunking
+from sprag.worker.executors.dask_tasks import introduce
+from sprag.worker.models import ChunkResult
+from sprag.worker.study import Axis, Study
 
 #: Bytes/s of the dispatcher's link: 10 Gbit/s.
 LINK = 1.25e9

@@ -13,12 +13,12 @@ import statistics
 import time
 
 from benchmarks.overhead import example
-from service.settings import available_cores
-from worker import models
-from worker.executors.dask import DaskExecutor
-from worker.executors.process_pool import ProcessPoolExecutor
-from worker.ports import Chunk, Executor, Fate
-from worker.study import Study
+from sprag.service.settings import available_cores
+from sprag.worker import models
+from sprag.worker.executors.dask import DaskExecutor
+from sprag.worker.executors.process_pool import ProcessPoolExecutor
+from sprag.worker.ports import Chunk, Executor, Fate
+from sprag.worker.study import Study
 
 
 def load(executor: Executor, study: Study, processes: int) -> None:

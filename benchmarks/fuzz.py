@@ -15,9 +15,9 @@ from pathlib import Path
 import httpx
 from pydantic import SecretStr
 
-from service.http.app import chunking, create_app
-from service.settings import Settings
-from service.storage.store import Store
+from sprag.service.http.app import chunking, create_app
+from sprag.service.settings import Settings
+from sprag.service.storage.store import Store
 from tests.service.conftest import InThread, Service
 from tests.service.http.fuzzing import fuzz, with_ids
 from tests.service.http.test_fuzzing import TOKEN, things

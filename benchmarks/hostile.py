@@ -25,7 +25,7 @@ from typing import Any
 import psutil
 
 from benchmarks.faults.harness import Service, until
-from service.presets import preset_text
+from sprag.service.presets import preset_text
 
 _LEAVE = 5.0
 _STAY = 600.0

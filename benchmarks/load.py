@@ -18,7 +18,7 @@ from urllib.parse import urlsplit
 
 import httpx
 
-from service.http.api.examples import SPEC
+from sprag.service.http.api.examples import SPEC
 from tests.acceptance.processes import service
 
 SLOW, STREAMS, CLIENTS = 200, 50, 16

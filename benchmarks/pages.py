@@ -21,12 +21,12 @@ from urllib.parse import urlencode
 import httpx
 import numpy as np
 
-from service.http.api.examples import SPEC
-from service.spec.document import parse_spec
-from service.storage.store import Store
-from worker import models
-from worker.chunking import Chunking
-from worker.models import ChunkResult
+from sprag.service.http.api.examples import SPEC
+from sprag.service.spec.document import parse_spec
+from sprag.service.storage.store import Store
+from sprag.worker import models
+from sprag.worker.chunking import Chunking
+from sprag.worker.models import ChunkResult
 
 _CURVE = 100_000
 #: One case in so many ends otherwise than ok.
@@ -107,7 +107,7 @@ def main() -> None:
             line = fill(store, [{"path": "shaft.load", "linspace": [0, 1, _CURVE]}], "A long curve")
         size = database.stat().st_size / 1e6
         print(f"{side * side + _CURVE:,} rows, {size:,.0f} MB, written in {time.perf_counter() - start:.0f} s")
-        command = [sys.executable, "-m", "service.cli", "serve", "--json", "--port", "0", "--db", str(database)]
+        command = [sys.executable, "-m", "sprag.service.cli", "serve", "--json", "--port", "0", "--db", str(database)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
             assert process.stdout is not None
             address = json.loads(process.stdout.readline())["address"]

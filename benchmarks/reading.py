@@ -25,14 +25,14 @@ from pathlib import Path
 import httpx
 import numpy as np
 
-from service.presets import preset_text
-from service.results.exports import FORMATS
-from service.spec.document import load_spec, parse_spec
-from service.storage.store import Store
-from worker import models
-from worker.chunking import Chunking
-from worker.models import ChunkResult
-from worker.study import Axis, Study
+from sprag.service.presets import preset_text
+from sprag.service.results.exports import FORMATS
+from sprag.service.spec.document import load_spec, parse_spec
+from sprag.service.storage.store import Store
+from sprag.worker import models
+from sprag.worker.chunking import Chunking
+from sprag.worker.models import ChunkResult
+from sprag.worker.study import Axis, Study
 
 #: Requests to each kind of answer before those that count.
 _WARM = 20
@@ -81,7 +81,18 @@ def serving(path: Path) -> Iterator[tuple[str, int]]:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    command = [sys.executable, "-m", "service.cli", "serve", "--db", str(path), "--port", str(port), "--processes", "1"]
+    command = [
+        sys.executable,
+        "-m",
+        "sprag.service.cli",
+        "serve",
+        "--db",
+        str(path),
+        "--port",
+        str(port),
+        "--processes",
+        "1",
+    ]
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     address = f"http://127.0.0.1:{port}"
     try:

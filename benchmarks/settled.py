@@ -17,15 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.workloads import CASES, W1, W2
-from engine.run import Run, SettledRun
-from engine.vibration_drive import orbits
-from engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count, with_lengths
-from engine.vibration_drive.integration import integrate
-from engine.vibration_drive.kernel import kernel, lane_count, order_for
-from engine.vibration_drive.regimes import Regime, settled_infos
-from engine.vibration_drive.settle import SettledBatch, settle
-from engine.vibration_drive.simulate import simulate
-from engine.vibration_drive.strobes import TURN
+from sprag.engine.run import Run, SettledRun
+from sprag.engine.vibration_drive import orbits
+from sprag.engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count, with_lengths
+from sprag.engine.vibration_drive.integration import integrate
+from sprag.engine.vibration_drive.kernel import kernel, lane_count, order_for
+from sprag.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag.engine.vibration_drive.settle import SettledBatch, settle
+from sprag.engine.vibration_drive.simulate import simulate
+from sprag.engine.vibration_drive.strobes import TURN
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

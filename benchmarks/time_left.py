@@ -20,13 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.overhead import timed
-from service.jobs.local import run_here
-from service.presets import preset_text
-from service.spec.document import load_spec, parse_spec
-from service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
-from service.storage.records import Progress
-from worker.order import order_of
-from worker.study import Axis, Study
+from sprag.service.jobs.local import run_here
+from sprag.service.presets import preset_text
+from sprag.service.spec.document import load_spec, parse_spec
+from sprag.service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
+from sprag.service.storage.records import Progress
+from sprag.worker.order import order_of
+from sprag.worker.study import Axis, Study
 
 Costs = NDArray[np.float64]
 

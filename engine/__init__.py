@@ -3,10 +3,19 @@
 It knows physics only, in SI units and radians. It imports the standard library, numpy, scipy and numba, nothing else.
 """
 
-from engine.endings import Ending
-from engine.run import Run, Span
+from importlib import import_module
+from typing import Any
+
+from sprag.engine.endings import Ending
+from sprag.engine.run import Run, Span
 
 #: Changes whenever a change of the engine can change a stored number.
 ENGINE_VERSION = "3"
 
 __all__ = ["ENGINE_VERSION", "Ending", "Run", "Span"]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "simulate":  # with frames, which the engine itself does not know
+        return import_module("sprag").simulate
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

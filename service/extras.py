@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from typing import Final
 
 #: Packages of the project: where one of these is not found, no extra helps.
-_OWN: Final = frozenset({"engine", "migrations", "service", "sprag", "worker"})
+_OWN: Final = frozenset({"sprag"})
 
 
 class MissingExtraError(ImportError):

@@ -29,7 +29,7 @@ class ErrorItem:
 
 
 class FaultError(Exception):
-    """Something that whoever asked for it is told of; how HTTP tells it stands in ``service.http.problems``.
+    """Something that whoever asked for it is told of; how HTTP tells it stands in ``sprag.service.http.problems``.
 
     Attributes
     ----------

@@ -14,7 +14,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from service.client import (
+    from sprag import engine
+    from sprag.frames import simulate
+    from sprag.local import run
+    from sprag.service.client import (
         AsyncClient,
         AsyncStudy,
         Client,
@@ -26,9 +29,7 @@ if TYPE_CHECKING:
         StudyTimeoutError,
         UnreachableError,
     )
-    from service.extras import MissingExtraError
-    from sprag import engine
-    from sprag.local import run
+    from sprag.service.extras import MissingExtraError
 
     __version__: str
 
@@ -59,6 +60,7 @@ __all__ = [
     "__version__",
     "engine",
     "run",
+    "simulate",
 ]
 
 
@@ -68,15 +70,17 @@ def __getattr__(name: str) -> Any:
 
         return version("sprag")
     if name in _OF_CLIENT:
-        return getattr(import_module("service.client"), name)
-    extras = import_module("service.extras")
+        return getattr(import_module("sprag.service.client"), name)
+    extras = import_module("sprag.service.extras")
     if name == "MissingExtraError":
         return extras.MissingExtraError
+    if name == "engine":
+        return import_module("sprag.engine")
     with extras.naming_extra(f"sprag.{name}"):
         if name == "run":
             return import_module("sprag.local").run
-        if name == "engine":
-            return import_module("sprag.engine")
+        if name == "simulate":
+            return import_module("sprag.frames").simulate
     raise AttributeError(f"module 'sprag' has no attribute {name!r}")
 
 

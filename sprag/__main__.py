@@ -14,6 +14,6 @@ def _leave_folder_out() -> None:
 
 if __name__ == "__main__":
     _leave_folder_out()
-    from service.cli import main
+    from sprag.service.cli import main
 
     main()

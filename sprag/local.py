@@ -6,21 +6,21 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from service.client.frames import table_of
-from service.client.queries import spec_of
-from service.jobs.local import pool_size, run_here, source_of
-from service.results.exports import export
-from service.settings import Settings
-from service.spec.catalogue import unit_of
-from service.spec.document import parse_spec
+from sprag.service.client.frames import table_of
+from sprag.service.client.queries import spec_of
+from sprag.service.jobs.local import pool_size, run_here, source_of
+from sprag.service.results.exports import export
+from sprag.service.settings import Settings
+from sprag.service.spec.catalogue import unit_of
+from sprag.service.spec.document import parse_spec
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from datetime import datetime
     from os import PathLike
 
-    from service.client.types import Spec
-    from service.storage.records import Progress
+    from sprag.service.client.types import Spec
+    from sprag.service.storage.records import Progress
 
 
 def run(

@@ -52,7 +52,7 @@ def _levels_of_before() -> Iterator[None]:
 @pytest.fixture
 def sprag(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Finished]:
     """Runs a command, such as ``sprag("fit", path, "--accuracy", "0.05")``, in this process."""
-    from service.cli.app import execute
+    from sprag.service.cli.app import execute
 
     monkeypatch.delenv("SPRAG_DEBUG", raising=False)
     monkeypatch.delenv("SPRAG_SERVER", raising=False)
@@ -83,7 +83,7 @@ def postgres_server() -> Iterator[postgres.Server]:
 
 @pytest.fixture(scope="session")
 def _ready_database(postgres_server: postgres.Server) -> str:
-    from service.storage.store import Store
+    from sprag.service.storage.store import Store
 
     url = postgres_server.url(postgres_server.new_database())
     Store.open(url).close()

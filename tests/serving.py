@@ -10,7 +10,7 @@ from typing import Any
 
 import uvicorn
 
-from service.http.timeouts import TimeoutProtocol
+from sprag.service.http.timeouts import TimeoutProtocol
 
 
 @contextmanager

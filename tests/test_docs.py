@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 import typer
 
-from engine.machine_shaft.results import MACHINE_RESULTS
-from engine.vibration_drive.regimes import settled_infos
-from service.cli.app import app
-from service.presets import ABOUT, preset_names, preset_text
-from service.settings import table
-from worker import limits, models
-from worker.codes import ENDING_CODES, FLAG_MASKS
-from worker.states import StudyState
+from sprag.engine.machine_shaft.results import MACHINE_RESULTS
+from sprag.engine.vibration_drive.regimes import settled_infos
+from sprag.service.cli.app import app
+from sprag.service.presets import ABOUT, preset_names, preset_text
+from sprag.service.settings import table
+from sprag.worker import limits, models
+from sprag.worker.codes import ENDING_CODES, FLAG_MASKS
+from sprag.worker.states import StudyState
 
 ROOT = Path(__file__).resolve().parents[1]
 REFERENCE = (ROOT / "docs" / "reference.md").read_text()

@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from worker import models
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from worker.study import Study
+    from sprag.worker.study import Study
 
 #: Work of one chunk on one core, in s: what a crash can cost, against what a commit costs.
 CHUNK_SECONDS = 1.0

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, assert_never
 
-from worker.models import WorkerEnding
-from worker.ports import Chunk, Fate
+from sprag.worker.models import WorkerEnding
+from sprag.worker.ports import Chunk, Fate
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

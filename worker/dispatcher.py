@@ -1,4 +1,4 @@
-"""The dispatcher: carries out what `worker.dispatch` decides, between the store and the executor."""
+"""The dispatcher: carries out what `sprag.worker.dispatch` decides, between the store and the executor."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from contextlib import suppress
 from itertools import groupby
 from typing import TYPE_CHECKING, assert_never
 
-from worker import dispatch
-from worker.dispatch import Dispatch
-from worker.ports import Chunk, EpochLostError, Fate, KernelError, Outcome, StoreFullError
-from worker.reuse import no_cases, taken
-from worker.states import StudyState
+from sprag.worker import dispatch
+from sprag.worker.dispatch import Dispatch
+from sprag.worker.ports import Chunk, EpochLostError, Fate, KernelError, Outcome, StoreFullError
+from sprag.worker.reuse import no_cases, taken
+from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from worker.models import ChunkResult
-    from worker.ports import ActiveStudy, Clock, Executor, Known, News, Store
-    from worker.study import Study
+    from sprag.worker.models import ChunkResult
+    from sprag.worker.ports import ActiveStudy, Clock, Executor, Known, News, Store
+    from sprag.worker.study import Study
 
 _LOG = logging.getLogger(__name__)
 

@@ -18,7 +18,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
 
-from worker import models
+from sprag.worker import models
 
 _SOURCES: Final = "engine sources"
 _FEATURES: Final = "processor features"

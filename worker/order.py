@@ -23,7 +23,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from worker.study import Study
+    from sprag.worker.study import Study
 
     Numbers = NDArray[np.int64]
 

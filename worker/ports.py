@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from worker.models import ChunkResult
-    from worker.states import StudyState
-    from worker.study import Study
+    from sprag.worker.models import ChunkResult
+    from sprag.worker.states import StudyState
+    from sprag.worker.study import Study
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from worker import models
-from worker.study import Axis
+from sprag.worker import models
+from sprag.worker.study import Axis
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from worker.study import Study
+    from sprag.worker.study import Study
 
     Cases = NDArray[np.int64]
     Values = NDArray[np.float64]

@@ -13,7 +13,7 @@ from typing import Any, Literal, cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_COLUMNS
+from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_COLUMNS
 
 Combine = Literal["grid", "zip"]
 
@@ -108,7 +108,7 @@ class Study:
     Raises
     ------
     ValueError
-        When the parts contradict each other (a path twice, unequal lengths, beyond `worker.limits`).
+        When the parts contradict each other (a path twice, unequal lengths, beyond `sprag.worker.limits`).
     """
 
     model: str

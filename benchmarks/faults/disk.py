@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.faults import harness
-from service.jobs.preview import estimated_bytes
-from service.storage.room import RESERVE_BYTES
+from sprag.service.jobs.preview import estimated_bytes
+from sprag.service.storage.room import RESERVE_BYTES
 
 _STATE = "SELECT state FROM studies WHERE id = ?"
 

@@ -18,15 +18,15 @@ import httpx
 import numpy as np
 import psutil
 
-from service.presets import preset_text
-from service.spec.document import load_spec, parse_spec
-from service.storage.session import sqlite_driver
-from service.storage.store import Store
-from worker import models
-from worker.study import Study
+from sprag.service.presets import preset_text
+from sprag.service.spec.document import load_spec, parse_spec
+from sprag.service.storage.session import sqlite_driver
+from sprag.service.storage.store import Store
+from sprag.worker import models
+from sprag.worker.study import Study
 
 ROOT = Path(__file__).resolve().parents[2]
-COMMAND = (sys.executable, "-m", "service.cli")
+COMMAND = (sys.executable, "-m", "sprag.service.cli")
 #: Generous: the machine may be busy.
 PATIENCE = 600.0
 _LOOK = 0.005

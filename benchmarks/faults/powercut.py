@@ -17,16 +17,16 @@ from typing import Any
 
 from benchmarks.faults.harness import environment
 from benchmarks.faults.syscalls import Call, Disk, record
-from service.storage.session import sqlite_driver
-from service.storage.store import Store
+from sprag.service.storage.session import sqlite_driver
+from sprag.service.storage.store import Store
 
 _PROGRAM = """
 import os
 import sys
 from pathlib import Path
-from service.storage.store import Store
+from sprag.service.storage.store import Store
 from tests.worker import fakes
-from worker.chunking import Chunking
+from sprag.worker.chunking import Chunking
 
 def say(text):
     os.write(1, text.encode() + b"\\n")

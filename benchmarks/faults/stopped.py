@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.faults import harness
-from service.storage.errors import DatabaseBusyError
-from service.storage.session import Session
-from service.storage.store import Store
-from worker.chunking import Chunking
+from sprag.service.storage.errors import DatabaseBusyError
+from sprag.service.storage.session import Session
+from sprag.service.storage.store import Store
+from sprag.worker.chunking import Chunking
 
 _LATEST = "SELECT epoch FROM dispatcher"
 

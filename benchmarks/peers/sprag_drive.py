@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.workloads import COMPARED, EVENTS, Ints, Outcome, Workload
-from engine.endings import ENDING_CODES, Ending
-from engine.run import Run
-from engine.vibration_drive.results import result_infos
-from engine.vibration_drive.simulate import simulate
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.run import Run
+from sprag.engine.vibration_drive.results import result_infos
+from sprag.engine.vibration_drive.simulate import simulate
 
 
 class SpragDrive:

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numba
 
-from engine.compile.ways import WAY
-from engine.sources import engine_folder, source_hash
+from sprag.engine.compile.ways import WAY
+from sprag.engine.sources import engine_folder, source_hash
 
 #: Environment variable that moves the cache.
 CACHE_VARIABLE = "SPRAG_KERNEL_CACHE"

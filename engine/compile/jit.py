@@ -2,11 +2,11 @@
 
 import numba
 
-from engine.compile.cache import cache_folder
-from engine.compile.ways import PLAIN, WAY
+from sprag.engine.compile.cache import cache_folder
+from sprag.engine.compile.ways import PLAIN, WAY
 
 if WAY == PLAIN:
-    from engine.compile.plain import (
+    from sprag.engine.compile.plain import (
         compiled,
         constant_record,
         inlined,
@@ -17,8 +17,8 @@ if WAY == PLAIN:
         unmanaged,
     )
 else:
-    from engine.compile.decorators import compiled, inlined, part, unmanaged
-    from engine.compile.lowering import constant_record, lane_loops, lane_mask, lowest
+    from sprag.engine.compile.decorators import compiled, inlined, part, unmanaged
+    from sprag.engine.compile.lowering import constant_record, lane_loops, lane_mask, lowest
 
 setattr(numba.config, "CACHE_DIR", str(cache_folder()))  # noqa: B010  (numba does not declare it)
 

@@ -17,7 +17,7 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-from engine.compile.ways import GROUP
+from sprag.engine.compile.ways import GROUP
 
 _DOUBLE = ir.DoubleType()
 _INT = ir.IntType(64)

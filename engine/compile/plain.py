@@ -15,7 +15,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from engine.compile.ways import GROUP
+from sprag.engine.compile.ways import GROUP
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, number_of, reduced
+from sprag.engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, number_of, reduced
 
 Floats = NDArray[np.float64]
 CamLaw = Literal["cycloidal", "polynomial_345"]

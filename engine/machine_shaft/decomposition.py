@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.machine_shaft.machine import Fields
-from engine.machine_shaft.panels import Crossings, Extremes, Panels, Points
-from engine.machine_shaft.start import Shape
+from sprag.engine.machine_shaft.machine import Fields
+from sprag.engine.machine_shaft.panels import Crossings, Extremes, Panels, Points
+from sprag.engine.machine_shaft.start import Shape
 
 Floats = NDArray[np.float64]
 

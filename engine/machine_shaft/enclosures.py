@@ -9,11 +9,11 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from engine.compile.jit import compiled, part
-from engine.machine_shaft import intervals as iv
-from engine.machine_shaft.expressions import Expression, Node
-from engine.machine_shaft.intervals import ORDERS
-from engine.machine_shaft.panels import POSITIONS, WEIGHTS
+from sprag.engine.compile.jit import compiled, part
+from sprag.engine.machine_shaft import intervals as iv
+from sprag.engine.machine_shaft.expressions import Expression, Node
+from sprag.engine.machine_shaft.intervals import ORDERS
+from sprag.engine.machine_shaft.panels import POSITIONS, WEIGHTS
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

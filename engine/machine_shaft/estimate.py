@@ -1,8 +1,8 @@
 """How long a case of a machine takes, from what the machine consists of (benchmarks/machine_shaft.py measures it)."""
 
-from engine.machine_shaft.expressions import Expression
-from engine.machine_shaft.simulate import PANELS
-from engine.machine_shaft.spec import MachineSpec
+from sprag.engine.machine_shaft.expressions import Expression
+from sprag.engine.machine_shaft.simulate import PANELS
+from sprag.engine.machine_shaft.spec import MachineSpec
 
 #: Times of a case by the benchmark, over that with the mean as midrange.
 _COST = {"midrange": 1.0, "angle": 2.2, "time": 1.7}

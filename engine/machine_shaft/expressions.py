@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.machine_shaft.problems import ExpressionError
+from sprag.engine.machine_shaft.problems import ExpressionError
 
 Floats = NDArray[np.float64]
 Value = Floats | float

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.machine_shaft.roots import bracketed_roots
-from engine.machine_shaft.spec import MeanSpeed
-from engine.machine_shaft.start import Shape, Stop, least_mean_speed, mean_speed
+from sprag.engine.machine_shaft.roots import bracketed_roots
+from sprag.engine.machine_shaft.spec import MeanSpeed
+from sprag.engine.machine_shaft.start import Shape, Stop, least_mean_speed, mean_speed
 
 Floats = NDArray[np.float64]
 

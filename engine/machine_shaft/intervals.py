@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.compile.jit import part
+from sprag.engine.compile.jit import part
 
 Floats = NDArray[np.float64]
 

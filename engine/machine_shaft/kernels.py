@@ -6,7 +6,7 @@ Arrays are C-contiguous float64. One case's numbers never depend on another's.
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.compile.jit import compiled
+from sprag.engine.compile.jit import compiled
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, number_of, reduced
+from sprag.engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, number_of, reduced
 
 Floats = NDArray[np.float64]
 

@@ -8,16 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from engine.machine_shaft.cams import Cam
-from engine.machine_shaft.expressions import RESERVED, Expression
-from engine.machine_shaft.linkages import CrankShaper, FourBar, SliderCrank, Whitworth
-from engine.machine_shaft.mechanisms import Mechanism, Motion
-from engine.machine_shaft.operations import Operation, Stroke, every_revolution, formula_breaks
-from engine.machine_shaft.parameters import parameters
-from engine.machine_shaft.pieces import Formula, Part
-from engine.machine_shaft.problems import ExpressionError, StructureError, TableError
-from engine.machine_shaft.spec import LINKED, MAX_CONSTANTS, MAX_STEPS, REVOLUTIONS, MachineSpec, MechanismChoice
-from engine.machine_shaft.tables import Curve, periodic
+from sprag.engine.machine_shaft.cams import Cam
+from sprag.engine.machine_shaft.expressions import RESERVED, Expression
+from sprag.engine.machine_shaft.linkages import CrankShaper, FourBar, SliderCrank, Whitworth
+from sprag.engine.machine_shaft.mechanisms import Mechanism, Motion
+from sprag.engine.machine_shaft.operations import Operation, Stroke, every_revolution, formula_breaks
+from sprag.engine.machine_shaft.parameters import parameters
+from sprag.engine.machine_shaft.pieces import Formula, Part
+from sprag.engine.machine_shaft.problems import ExpressionError, StructureError, TableError
+from sprag.engine.machine_shaft.spec import LINKED, MAX_CONSTANTS, MAX_STEPS, REVOLUTIONS, MachineSpec, MechanismChoice
+from sprag.engine.machine_shaft.tables import Curve, periodic
 
 Floats = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.machine_shaft.panels import Panels
-from engine.machine_shaft.spec import Motor
+from sprag.engine.machine_shaft.panels import Panels
+from sprag.engine.machine_shaft.spec import Motor
 
 Floats = NDArray[np.float64]
 

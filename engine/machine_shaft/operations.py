@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.machine_shaft.expressions import Expression
-from engine.machine_shaft.mechanisms import Mechanism, Values
-from engine.machine_shaft.roots import bracketed_roots, switches
-from engine.machine_shaft.spec import OperationChoice
-from engine.machine_shaft.tables import Curve, over_stroke, periodic
+from sprag.engine.machine_shaft.expressions import Expression
+from sprag.engine.machine_shaft.mechanisms import Mechanism, Values
+from sprag.engine.machine_shaft.roots import bracketed_roots, switches
+from sprag.engine.machine_shaft.spec import OperationChoice
+from sprag.engine.machine_shaft.tables import Curve, over_stroke, periodic
 
 Floats = NDArray[np.float64]
 

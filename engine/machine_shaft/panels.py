@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from engine.machine_shaft import kernels
+from sprag.engine.machine_shaft import kernels
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -4,8 +4,8 @@ import math
 from collections.abc import Mapping
 from itertools import chain
 
-from engine.catalogue import STANDARD_GRAVITY, Parameter
-from engine.machine_shaft.spec import MachineSpec, MechanismKind
+from sprag.engine.catalogue import STANDARD_GRAVITY, Parameter
+from sprag.engine.machine_shaft.spec import MachineSpec, MechanismKind
 
 _INF = math.inf
 _TURN = 2.0 * math.pi

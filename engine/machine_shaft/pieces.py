@@ -12,11 +12,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.machine_shaft.enclosures import Program
-from engine.machine_shaft.expressions import Expression
-from engine.machine_shaft.operations import Stroke
-from engine.machine_shaft.panels import NODES, POSITIONS, WEIGHTS, Panels, Points
-from engine.machine_shaft.roots import switches
+from sprag.engine.machine_shaft.enclosures import Program
+from sprag.engine.machine_shaft.expressions import Expression
+from sprag.engine.machine_shaft.operations import Stroke
+from sprag.engine.machine_shaft.panels import NODES, POSITIONS, WEIGHTS, Panels, Points
+from sprag.engine.machine_shaft.roots import switches
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -2,7 +2,7 @@
 
 import math
 
-from engine.endings import Ending
+from sprag.engine.endings import Ending
 
 
 class MachineError(ValueError):

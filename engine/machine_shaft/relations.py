@@ -1,9 +1,9 @@
 """Numbers that are each in range and do not go together: what a base machine is refused for before it is solved."""
 
-from engine.machine_shaft.machine import Columns
-from engine.machine_shaft.operations import reachable_pressure
-from engine.machine_shaft.problems import RelationError
-from engine.machine_shaft.spec import MachineSpec
+from sprag.engine.machine_shaft.machine import Columns
+from sprag.engine.machine_shaft.operations import reachable_pressure
+from sprag.engine.machine_shaft.problems import RelationError
+from sprag.engine.machine_shaft.spec import MachineSpec
 
 
 def check_relations(spec: MachineSpec, row: Columns) -> None:

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.machine_shaft.balance import largest_work
-from engine.machine_shaft.decomposition import Decomposition
-from engine.machine_shaft.machine import Columns, Machine
-from engine.machine_shaft.panels import Panels
-from engine.machine_shaft.pieces import Part, Pieces, missed
-from engine.machine_shaft.spec import MachineSpec
+from sprag.engine.machine_shaft.balance import largest_work
+from sprag.engine.machine_shaft.decomposition import Decomposition
+from sprag.engine.machine_shaft.machine import Columns, Machine
+from sprag.engine.machine_shaft.panels import Panels
+from sprag.engine.machine_shaft.pieces import Part, Pieces, missed
+from sprag.engine.machine_shaft.spec import MachineSpec
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

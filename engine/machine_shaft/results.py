@@ -1,6 +1,6 @@
 """The results of a machine shaft: names, units, meaning (docs/theory-machine-shaft.md)."""
 
-from engine.catalogue import ResultInfo
+from sprag.engine.catalogue import ResultInfo
 
 
 def _squares() -> tuple[ResultInfo, ...]:

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from engine.endings import ENDING_CODES, Ending
-from engine.machine_shaft.balance import balanced, largest_work
-from engine.machine_shaft.decomposition import Decomposition, characteristics
-from engine.machine_shaft.flywheel import required_inertia
-from engine.machine_shaft.machine import Columns, Fields, Machine, check_structure
-from engine.machine_shaft.motor import LimitCycle, limit_cycle
-from engine.machine_shaft.panels import Panels
-from engine.machine_shaft.pieces import Pieces, pieces
-from engine.machine_shaft.problems import (
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.machine_shaft.balance import balanced, largest_work
+from sprag.engine.machine_shaft.decomposition import Decomposition, characteristics
+from sprag.engine.machine_shaft.flywheel import required_inertia
+from sprag.engine.machine_shaft.machine import Columns, Fields, Machine, check_structure
+from sprag.engine.machine_shaft.motor import LimitCycle, limit_cycle
+from sprag.engine.machine_shaft.panels import Panels
+from sprag.engine.machine_shaft.pieces import Pieces, pieces
+from sprag.engine.machine_shaft.problems import (
     AssemblyError,
     InsufficientInertiaError,
     MachineError,
@@ -25,12 +25,12 @@ from engine.machine_shaft.problems import (
     QuadratureError,
     UnbalancedWorkError,
 )
-from engine.machine_shaft.relations import check_relations
-from engine.machine_shaft.resolution import compare, linkage_unresolved, near_singular, rough_pace, rough_panels
-from engine.machine_shaft.results import result_infos
-from engine.machine_shaft.spec import MachineSpec
-from engine.machine_shaft.start import Shape, Stop, least_mean_speed, start_energy
-from engine.outcome import Batch
+from sprag.engine.machine_shaft.relations import check_relations
+from sprag.engine.machine_shaft.resolution import compare, linkage_unresolved, near_singular, rough_pace, rough_panels
+from sprag.engine.machine_shaft.results import result_infos
+from sprag.engine.machine_shaft.spec import MachineSpec
+from sprag.engine.machine_shaft.start import Shape, Stop, least_mean_speed, start_energy
+from sprag.engine.outcome import Batch
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -326,7 +326,7 @@ def check(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> None:
     Raises
     ------
     MachineError
-        One of ``engine.machine_shaft.problems``.
+        One of ``sprag.engine.machine_shaft.problems``.
     """
     check_structure(model)
     row = Columns.of(model, columns, 1)

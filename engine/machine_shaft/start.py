@@ -6,8 +6,8 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from engine.machine_shaft.panels import Extremes, Panels, Points
-from engine.machine_shaft.spec import MeanSpeed
+from sprag.engine.machine_shaft.panels import Extremes, Panels, Points
+from sprag.engine.machine_shaft.spec import MeanSpeed
 
 Floats = NDArray[np.float64]
 

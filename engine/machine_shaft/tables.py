@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.machine_shaft.problems import TableError
+from sprag.engine.machine_shaft.problems import TableError
 
 if TYPE_CHECKING:
     # Imported where tables are made: whoever only reads catalogues does not wait for it.

@@ -5,13 +5,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from engine.endings import ENDING_CODES, Ending
-from engine.machine_shaft.decomposition import Decomposition
-from engine.machine_shaft.machine import Columns, Machine, check_structure
-from engine.machine_shaft.panels import Points
-from engine.machine_shaft.simulate import attempts, settle
-from engine.machine_shaft.spec import MachineSpec
-from engine.outcome import Trajectory
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.machine_shaft.decomposition import Decomposition
+from sprag.engine.machine_shaft.machine import Columns, Machine, check_structure
+from sprag.engine.machine_shaft.panels import Points
+from sprag.engine.machine_shaft.simulate import attempts, settle
+from sprag.engine.machine_shaft.spec import MachineSpec
+from sprag.engine.outcome import Trajectory
 
 Floats = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ and iterations that do not settle, are marked ``HARD`` and left to the functions
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.compile.jit import inlined
-from engine.taylor.straight import LaneCode, larger, smaller
+from sprag.engine.compile.jit import inlined
+from sprag.engine.taylor.straight import LaneCode, larger, smaller
 
 #: Polynomials in a block.
 SLOTS = 8

@@ -4,8 +4,8 @@ They are made in the vector loop, from the stored series; only lanes whose bound
 extremum get a second look (``lanes.look_for_events``, ``window.collect_peaks``).
 """
 
-from engine.taylor.straight import LaneCode, Span, horner, larger, primitive_span, rate_span, smaller, span
-from engine.vibration_drive.layout import Layout
+from sprag.engine.taylor.straight import LaneCode, Span, horner, larger, primitive_span, rate_span, smaller, span
+from sprag.engine.vibration_drive.layout import Layout
 
 #: Margin that says the step itself is too long, not that a guard is near.
 TOO_LONG = -1e308

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from engine.run import Run
-from engine.vibration_drive.parameters import MAX_COEFFICIENTS, MAX_PENDULUMS, PARAMETERS
+from sprag.engine.run import Run
+from sprag.engine.vibration_drive.parameters import MAX_COEFFICIENTS, MAX_PENDULUMS, PARAMETERS
 
 Floats = NDArray[np.float64]
 

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS
-from engine.vibration_drive.lanes import OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS
-from engine.vibration_drive.layout import Layout
-from engine.vibration_drive.results import result_infos
+from sprag.engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS
+from sprag.engine.vibration_drive.lanes import OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS
+from sprag.engine.vibration_drive.layout import Layout
+from sprag.engine.vibration_drive.results import result_infos
 
 Floats = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from engine.vibration_drive.clutch_law import MAX_ANGLE, is_number, torque
-from engine.vibration_drive.clutch_report import ClutchFitError
-from engine.vibration_drive.parameters import MAX_COEFFICIENTS
+from sprag.engine.vibration_drive.clutch_law import MAX_ANGLE, is_number, torque
+from sprag.engine.vibration_drive.clutch_report import ClutchFitError
+from sprag.engine.vibration_drive.parameters import MAX_COEFFICIENTS
 
 HIGHEST_DEGREE = MAX_COEFFICIENTS - 1
 MAX_TORQUE = 1e9  # N*m

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.polynomial import polynomial as poly
 from numpy.typing import ArrayLike, NDArray
 
-from engine.vibration_drive.clutch_report import ClutchLaw, ClutchLawError
-from engine.vibration_drive.parameters import CLUTCH_COEFFICIENT, MAX_COEFFICIENTS
+from sprag.engine.vibration_drive.clutch_report import ClutchLaw, ClutchLawError
+from sprag.engine.vibration_drive.parameters import CLUTCH_COEFFICIENT, MAX_COEFFICIENTS
 
 #: A value counts as negative when it is below zero by more than this share of the sum of its terms' magnitudes;
 #: less than that is rounding of a law that touches zero.

@@ -10,18 +10,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from engine.endings import ENDING_CODES, Ending
-from engine.outcome import Engagement, Engagements, PeriodMeans
-from engine.run import Run, SettledRun
-from engine.vibration_drive.automaton import Clutch
-from engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count, with_lengths
-from engine.vibration_drive.integration import integrate
-from engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
-from engine.vibration_drive.lanes import OUT_ENDING
-from engine.vibration_drive.pieces import Pieces, integrals, largest, products
-from engine.vibration_drive.regimes import Regime, settled_infos
-from engine.vibration_drive.settle import settle
-from engine.vibration_drive.strobes import BEGIN
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.outcome import Engagement, Engagements, PeriodMeans
+from sprag.engine.run import Run, SettledRun
+from sprag.engine.vibration_drive.automaton import Clutch
+from sprag.engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count, with_lengths
+from sprag.engine.vibration_drive.integration import integrate
+from sprag.engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
+from sprag.engine.vibration_drive.lanes import OUT_ENDING
+from sprag.engine.vibration_drive.pieces import Pieces, integrals, largest, products
+from sprag.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag.engine.vibration_drive.settle import settle
+from sprag.engine.vibration_drive.strobes import BEGIN
 
 Floats = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ data; the shaft's mobility is zero where it is held. A locked clutch has w' = sh
 
 import math
 
-from engine.taylor.straight import (
+from sprag.engine.taylor.straight import (
     LaneCode,
     exp2,
     log2,
@@ -22,7 +22,7 @@ from engine.taylor.straight import (
     smaller,
     square,
 )
-from engine.vibration_drive.layout import Layout
+from sprag.engine.vibration_drive.layout import Layout
 
 #: Share of the estimated convergence-limited step that is taken (Jorba and Zou 2005 take e^-2, which is far too careful
 #: here). With 0.75 there would be a tenth fewer steps, but three to five times the errors (benchmarks.engine).

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.run import Run
-from engine.taylor.batch import aligned_zeros, blocks_for
-from engine.taylor.roots import MAX_DEGREE, work_stack
-from engine.vibration_drive.cases import SHAFT_COLUMNS, STOPS
-from engine.vibration_drive.characteristics import sum_columns
-from engine.vibration_drive.kernel import Kernel
-from engine.vibration_drive.pieces import piece_width
-from engine.vibration_drive.states import LANE_INTEGERS
-from engine.vibration_drive.strobes import from_rest, width
+from sprag.engine.run import Run
+from sprag.engine.taylor.batch import aligned_zeros, blocks_for
+from sprag.engine.taylor.roots import MAX_DEGREE, work_stack
+from sprag.engine.vibration_drive.cases import SHAFT_COLUMNS, STOPS
+from sprag.engine.vibration_drive.characteristics import sum_columns
+from sprag.engine.vibration_drive.kernel import Kernel
+from sprag.engine.vibration_drive.pieces import piece_width
+from sprag.engine.vibration_drive.states import LANE_INTEGERS
+from sprag.engine.vibration_drive.strobes import from_rest, width
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -5,15 +5,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.vibration_drive import orbits
-from engine.vibration_drive.cases import with_lengths
-from engine.vibration_drive.characteristics import characteristics, combined
-from engine.vibration_drive.integration import integrate
-from engine.vibration_drive.newton import disturbed
-from engine.vibration_drive.regimes import Regime, means
-from engine.vibration_drive.results import result_infos
-from engine.vibration_drive.search import ROUND, Search
-from engine.vibration_drive.strobes import BEGIN
+from sprag.engine.vibration_drive import orbits
+from sprag.engine.vibration_drive.cases import with_lengths
+from sprag.engine.vibration_drive.characteristics import characteristics, combined
+from sprag.engine.vibration_drive.integration import integrate
+from sprag.engine.vibration_drive.newton import disturbed
+from sprag.engine.vibration_drive.regimes import Regime, means
+from sprag.engine.vibration_drive.results import result_infos
+from sprag.engine.vibration_drive.search import ROUND, Search
+from sprag.engine.vibration_drive.strobes import BEGIN
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

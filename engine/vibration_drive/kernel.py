@@ -18,13 +18,13 @@ import llvmlite.binding as llvm
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.compile.cache import cache_folder
-from engine.compile.ways import GROUP
-from engine.taylor.batch import ROWS, SLOTS, peaks_loop, roots_loop
-from engine.vibration_drive.advance import advance_loop
-from engine.vibration_drive.bounds import bounds_loop
-from engine.vibration_drive.equations import series_loop
-from engine.vibration_drive.layout import Layout, make_layout
+from sprag.engine.compile.cache import cache_folder
+from sprag.engine.compile.ways import GROUP
+from sprag.engine.taylor.batch import ROWS, SLOTS, peaks_loop, roots_loop
+from sprag.engine.vibration_drive.advance import advance_loop
+from sprag.engine.vibration_drive.bounds import bounds_loop
+from sprag.engine.vibration_drive.equations import series_loop
+from sprag.engine.vibration_drive.layout import Layout, make_layout
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -33,13 +33,13 @@ _MODULE = '''"""Generated kernel: {n} pendulum(s), {coefficients} clutch coeffic
 
 import numpy as np
 
-from engine.compile.jit import compiled, constant_record, lane_loops, lane_mask, lowest, unmanaged
-from engine.vibration_drive.events import settle_guards
-from engine.vibration_drive.lanes import highest, load_case, look_for_events, next_stop, pack, record, settle
-from engine.vibration_drive.layout import Layout, as_record
-from engine.vibration_drive.pieces import keep
-from engine.vibration_drive.strobes import FRACTION
-from engine.vibration_drive.window import collect_peaks, settle_peaks
+from sprag.engine.compile.jit import compiled, constant_record, lane_loops, lane_mask, lowest, unmanaged
+from sprag.engine.vibration_drive.events import settle_guards
+from sprag.engine.vibration_drive.lanes import highest, load_case, look_for_events, next_stop, pack, record, settle
+from sprag.engine.vibration_drive.layout import Layout, as_record
+from sprag.engine.vibration_drive.pieces import keep
+from sprag.engine.vibration_drive.strobes import FRACTION
+from sprag.engine.vibration_drive.window import collect_peaks, settle_peaks
 
 LAYOUT = {layout!r}
 RECORD = as_record(LAYOUT)

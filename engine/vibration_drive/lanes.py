@@ -5,20 +5,20 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.compile.jit import part
-from engine.compile.ways import GROUP
-from engine.endings import ENDING_CODES, Ending
-from engine.taylor.roots import evaluate
-from engine.vibration_drive import states as ev
-from engine.vibration_drive.advance import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR
-from engine.vibration_drive.automaton import Clutch, Shaft
-from engine.vibration_drive.bounds import TOO_LONG
-from engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS
-from engine.vibration_drive.events import collect_guards, transit
-from engine.vibration_drive.layout import Layout
-from engine.vibration_drive.states import count_event, law, set_clutch, set_shaft
-from engine.vibration_drive.strobes import FRACTION, begin_at, note
-from engine.vibration_drive.window import energy, primitive, sample, series, watch_extrema
+from sprag.engine.compile.jit import part
+from sprag.engine.compile.ways import GROUP
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.taylor.roots import evaluate
+from sprag.engine.vibration_drive import states as ev
+from sprag.engine.vibration_drive.advance import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR
+from sprag.engine.vibration_drive.automaton import Clutch, Shaft
+from sprag.engine.vibration_drive.bounds import TOO_LONG
+from sprag.engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS
+from sprag.engine.vibration_drive.events import collect_guards, transit
+from sprag.engine.vibration_drive.layout import Layout
+from sprag.engine.vibration_drive.states import count_event, law, set_clutch, set_shaft
+from sprag.engine.vibration_drive.strobes import FRACTION, begin_at, note
+from sprag.engine.vibration_drive.window import energy, primitive, sample, series, watch_extrema
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

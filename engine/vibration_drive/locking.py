@@ -10,10 +10,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.compile.jit import part
-from engine.vibration_drive.automaton import Band
-from engine.vibration_drive.layout import Layout
-from engine.vibration_drive.states import (
+from sprag.engine.compile.jit import part
+from sprag.engine.vibration_drive.automaton import Band
+from sprag.engine.vibration_drive.layout import Layout
+from sprag.engine.vibration_drive.states import (
     ENGAGED,
     FREE,
     LOCKED,

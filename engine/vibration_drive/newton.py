@@ -9,8 +9,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.compile.jit import compiled, part
-from engine.vibration_drive.orbits import list_free, same_states, tie
+from sprag.engine.compile.jit import compiled, part
+from sprag.engine.vibration_drive.orbits import list_free, same_states, tie
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

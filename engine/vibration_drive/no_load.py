@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS, with_lengths
-from engine.vibration_drive.integration import PENDULUM_SAMPLES, SHAFT_SAMPLES, integrate
-from engine.vibration_drive.layout import Layout
-from engine.vibration_drive.search import Search
-from engine.vibration_drive.strobes import BEGIN
+from sprag.engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS, with_lengths
+from sprag.engine.vibration_drive.integration import PENDULUM_SAMPLES, SHAFT_SAMPLES, integrate
+from sprag.engine.vibration_drive.layout import Layout
+from sprag.engine.vibration_drive.search import Search
+from sprag.engine.vibration_drive.strobes import BEGIN
 
 Floats = NDArray[np.float64]
 

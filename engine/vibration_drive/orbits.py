@@ -9,9 +9,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.compile.jit import compiled, part
-from engine.vibration_drive.automaton import Clutch, Shaft
-from engine.vibration_drive.strobes import (
+from sprag.engine.compile.jit import compiled, part
+from sprag.engine.vibration_drive.automaton import Clutch, Shaft
+from sprag.engine.vibration_drive.strobes import (
     ANGLE,
     CLUTCH,
     FALLS,

@@ -2,7 +2,7 @@
 
 import math
 
-from engine.catalogue import STANDARD_GRAVITY, Parameter
+from sprag.engine.catalogue import STANDARD_GRAVITY, Parameter
 
 MAX_PENDULUMS = 8
 MAX_COEFFICIENTS = 12

@@ -2,8 +2,8 @@
 
 from enum import IntEnum
 
-from engine.catalogue import ResultInfo
-from engine.vibration_drive.results import result_infos
+from sprag.engine.catalogue import ResultInfo
+from sprag.engine.vibration_drive.results import result_infos
 
 
 class Regime(IntEnum):

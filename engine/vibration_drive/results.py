@@ -1,6 +1,6 @@
 """The characteristics of a vibration drive: names, units, meaning (docs/theory.md, "Characteristics")."""
 
-from engine.catalogue import Kind, ResultInfo
+from sprag.engine.catalogue import Kind, ResultInfo
 
 
 def _shaft() -> tuple[ResultInfo, ...]:

@@ -9,14 +9,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.endings import ENDING_CODES, Ending
-from engine.run import Run, SettledRun
-from engine.vibration_drive import newton, orbits
-from engine.vibration_drive.cases import with_lengths
-from engine.vibration_drive.integration import Integration, integrate
-from engine.vibration_drive.kernel import Kernel
-from engine.vibration_drive.lanes import OUT_ENDING, OUT_EVENTS, OUT_STEPS
-from engine.vibration_drive.strobes import BEGIN, FRACTION, NOT_GIVEN, SHAFT, TURN, from_rest, width
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.run import Run, SettledRun
+from sprag.engine.vibration_drive import newton, orbits
+from sprag.engine.vibration_drive.cases import with_lengths
+from sprag.engine.vibration_drive.integration import Integration, integrate
+from sprag.engine.vibration_drive.kernel import Kernel
+from sprag.engine.vibration_drive.lanes import OUT_ENDING, OUT_EVENTS, OUT_STEPS
+from sprag.engine.vibration_drive.strobes import BEGIN, FRACTION, NOT_GIVEN, SHAFT, TURN, from_rest, width
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

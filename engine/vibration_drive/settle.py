@@ -7,19 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from engine.endings import ENDING_CODES, Ending
-from engine.run import MEANS_FROM_PERIODS, Run, SettledRun
-from engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count, with_lengths
-from engine.vibration_drive.characteristics import characteristics
-from engine.vibration_drive.irregular import BATCHES, Batches
-from engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
-from engine.vibration_drive.lanes import OUT_EVENTS, OUT_STEPS, RUNUP_SHARE
-from engine.vibration_drive.no_load import limit_of
-from engine.vibration_drive.orbits import distances
-from engine.vibration_drive.regimes import Regime, means, settled_infos
-from engine.vibration_drive.results import result_infos
-from engine.vibration_drive.search import ROUND, Orbits, Search, transient_rounds
-from engine.vibration_drive.strobes import BEGIN, SHAFT_SPEED
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.run import MEANS_FROM_PERIODS, Run, SettledRun
+from sprag.engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count, with_lengths
+from sprag.engine.vibration_drive.characteristics import characteristics
+from sprag.engine.vibration_drive.irregular import BATCHES, Batches
+from sprag.engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
+from sprag.engine.vibration_drive.lanes import OUT_EVENTS, OUT_STEPS, RUNUP_SHARE
+from sprag.engine.vibration_drive.no_load import limit_of
+from sprag.engine.vibration_drive.orbits import distances
+from sprag.engine.vibration_drive.regimes import Regime, means, settled_infos
+from sprag.engine.vibration_drive.results import result_infos
+from sprag.engine.vibration_drive.search import ROUND, Orbits, Search, transient_rounds
+from sprag.engine.vibration_drive.strobes import BEGIN, SHAFT_SPEED
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -43,7 +43,7 @@ class SettledBatch:
     values : array, shape (cases, results)
         Results in the order of ``settled_infos(pendulums)``; NaN where a value could not be computed.
     endings : int8 array, shape (cases,)
-        Index into ``engine.endings.ENDING_CODES``.
+        Index into ``sprag.engine.endings.ENDING_CODES``.
     regimes : int8 array, shape (cases,)
         Members of ``Regime``.
     points : array, shape (cases, strobes.width(n))

@@ -8,16 +8,16 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from engine.endings import ENDING_CODES
-from engine.outcome import Batch, Trajectory
-from engine.run import Run, SettledRun
-from engine.vibration_drive.automaton import Clutch, Shaft
-from engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count
-from engine.vibration_drive.characteristics import characteristics
-from engine.vibration_drive.integration import PENDULUM_SAMPLES, SHAFT_SAMPLES, integrate
-from engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
-from engine.vibration_drive.lanes import OUT_ENDING
-from engine.vibration_drive.parameters import PARAMETERS
+from sprag.engine.endings import ENDING_CODES
+from sprag.engine.outcome import Batch, Trajectory
+from sprag.engine.run import Run, SettledRun
+from sprag.engine.vibration_drive.automaton import Clutch, Shaft
+from sprag.engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count
+from sprag.engine.vibration_drive.characteristics import characteristics
+from sprag.engine.vibration_drive.integration import PENDULUM_SAMPLES, SHAFT_SAMPLES, integrate
+from sprag.engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
+from sprag.engine.vibration_drive.lanes import OUT_ENDING
+from sprag.engine.vibration_drive.parameters import PARAMETERS
 
 Floats = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ def simulate(columns: Mapping[str, ArrayLike], run: Run, *, cases: int) -> Batch
 
 def characteristics_names(pendulums: int) -> tuple[str, ...]:
     """Names of the result columns of a drive with that many pendulums."""
-    from engine.vibration_drive.results import result_infos
+    from sprag.engine.vibration_drive.results import result_infos
 
     return tuple(info.name for info in result_infos(pendulums))
 
@@ -153,7 +153,7 @@ def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike) -> 
 
 def warm_up(pendulums: int, coefficients: int, tolerance: float) -> None:
     """Generate and compile the kernel of a shape, and what settles motions, so that others load them from the cache."""
-    from engine.vibration_drive.settle import settle
+    from sprag.engine.vibration_drive.settle import settle
 
     columns: dict[str, float] = {"excitation.frequency": 1.0, "shaft.inertia": 1.0, "shaft.load": 1.0}
     for i in range(pendulums):

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.compile.jit import inlined, part
-from engine.vibration_drive.automaton import CLUTCH_THRESHOLD, Band, Clutch, Shaft, Threshold
-from engine.vibration_drive.layout import Layout
+from sprag.engine.compile.jit import inlined, part
+from sprag.engine.vibration_drive.automaton import CLUTCH_THRESHOLD, Band, Clutch, Shaft, Threshold
+from sprag.engine.vibration_drive.layout import Layout
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

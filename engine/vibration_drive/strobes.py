@@ -10,9 +10,9 @@ resets, waits for the relative speed to fall through zero. These decide the moti
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.compile.jit import part
-from engine.vibration_drive.layout import Layout
-from engine.vibration_drive.states import (
+from sprag.engine.compile.jit import part
+from sprag.engine.vibration_drive.layout import Layout
+from sprag.engine.vibration_drive.states import (
     BEYOND,
     ENGAGED,
     FREE,

@@ -5,12 +5,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.compile.jit import inlined, part
-from engine.taylor.batch import HARD, KNOWN, RESULT, SLOTS, STATUS, slot_start, take
-from engine.taylor.roots import RECIPROCAL, evaluate, largest
-from engine.vibration_drive.automaton import Clutch
-from engine.vibration_drive.layout import Layout
-from engine.vibration_drive.states import NEVER, stored_energy, total
+from sprag.engine.compile.jit import inlined, part
+from sprag.engine.taylor.batch import HARD, KNOWN, RESULT, SLOTS, STATUS, slot_start, take
+from sprag.engine.taylor.roots import RECIPROCAL, evaluate, largest
+from sprag.engine.vibration_drive.automaton import Clutch
+from sprag.engine.vibration_drive.layout import Layout
+from sprag.engine.vibration_drive.states import NEVER, stored_energy, total
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -14,7 +14,7 @@ def main() -> NoReturn:
         if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler)
     try:
-        from service.cli.app import execute
+        from sprag.service.cli.app import execute
 
         code = execute(sys.argv[1:])
     except KeyboardInterrupt:  # while the program is still being loaded, or already done

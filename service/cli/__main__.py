@@ -1,6 +1,6 @@
-"""``python -m service.cli``: the same as ``sprag``, where the script is not on the path."""
+"""``python -m sprag.service.cli``: the same as ``sprag``, where the script is not on the path."""
 
-from service.cli import main
+from sprag.service.cli import main
 
 if __name__ == "__main__":
     main()

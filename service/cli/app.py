@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from service.cli import (
+from sprag.service.cli import (
     database,
     demo,
     doctor,
@@ -27,8 +27,8 @@ from service.cli import (
     settle,
     token,
 )
-from service.cli.console import CommandFailureError, ExitCode, TroubleError, say, write_text
-from service.extras import command_for
+from sprag.service.cli.console import CommandFailureError, ExitCode, TroubleError, say, write_text
+from sprag.service.extras import command_for
 
 #: Set to anything to see where a fault of the program lies.
 DEBUG_VARIABLE = "SPRAG_DEBUG"
@@ -126,7 +126,7 @@ class _PipeClosedError(Exception):
 
 
 def _invoke(arguments: Sequence[str]) -> int:
-    from worker.ports import ExecutorError, StoreError
+    from sprag.worker.ports import ExecutorError, StoreError
 
     as_json = "--json" in arguments
     try:

@@ -15,7 +15,7 @@ from dataclasses import asdict
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Final
 
-from service.spec.report import Problem
+from sprag.service.spec.report import Problem
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -144,7 +144,7 @@ def cell_text(cell: object) -> str:
 
 def ending_lines(endings: Mapping[str, int]) -> Iterator[str]:
     """A line for each ending but ok: how many cases ended so, and what it means."""
-    from worker.models import ENDING_SENTENCES
+    from sprag.worker.models import ENDING_SENTENCES
 
     for name, count in endings.items():
         if name != OK:

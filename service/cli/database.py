@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.console import TroubleError, WrongInputError, say, write_json
-from service.cli.options import Database, JsonFlag
-from service.cli.settings import read_settings
+from sprag.service.cli.console import TroubleError, WrongInputError, say, write_json
+from sprag.service.cli.options import Database, JsonFlag
+from sprag.service.cli.settings import read_settings
 
 if TYPE_CHECKING:
-    from service.storage.session import Session
+    from sprag.service.storage.session import Session
 
 app = typer.Typer(help="Upgrade, check and back up the database.", no_args_is_help=True, rich_markup_mode="rich")
 
@@ -23,7 +23,7 @@ app = typer.Typer(help="Upgrade, check and back up the database.", no_args_is_he
 @app.command()
 def upgrade(db: Database = None, as_json: JsonFlag = False) -> None:
     """Bring the database to the revision this program needs; a new one is made ready."""
-    from service.storage.maintenance import upgrade as bring_up
+    from sprag.service.storage.maintenance import upgrade as bring_up
 
     with _opened(db, existing=False) as session:
         before, after = bring_up(session)
@@ -38,7 +38,7 @@ def upgrade(db: Database = None, as_json: JsonFlag = False) -> None:
 @app.command()
 def check(db: Database = None, as_json: JsonFlag = False) -> None:
     """Look the whole database over; takes minutes on a large one. Exit code 3 when something is wrong."""
-    from service.storage.maintenance import check as look_over
+    from sprag.service.storage.maintenance import check as look_over
 
     with _opened(db) as session:
         report = look_over(session)
@@ -58,7 +58,7 @@ def backup(
     as_json: JsonFlag = False,
 ) -> None:
     """Write a consistent copy of the database, while others go on working with it."""
-    from service.storage.maintenance import backup as write_copy
+    from sprag.service.storage.maintenance import backup as write_copy
 
     target = Path(file)
     if target.exists():
@@ -84,7 +84,7 @@ def prune(
     """Delete every study that ended longer ago than that, with all its results."""
     from datetime import timedelta
 
-    from service.storage.store import Store
+    from sprag.service.storage.store import Store
 
     with _opened(db) as session:
         location = session.url.render_as_string(hide_password=False)
@@ -104,7 +104,7 @@ def _opened(db: str | None, *, existing: bool = True) -> Iterator[Session]:
     from sqlalchemy.engine import make_url
     from sqlalchemy.exc import ArgumentError
 
-    from service.storage.session import Session
+    from sprag.service.storage.session import Session
 
     location = read_settings(database=db).database_url
     with suppress(ArgumentError, ValueError):  # which the session tells better
@@ -122,7 +122,7 @@ def _opened(db: str | None, *, existing: bool = True) -> Iterator[Session]:
 @app.command()
 def clock(db: Database = None) -> None:
     """Say that the clock of this machine is right, after it jumped ahead or the worker was away for long."""
-    from service.storage.store import Store
+    from sprag.service.storage.store import Store
 
     with _opened(db) as session:
         url = session.url.render_as_string(hide_password=False)

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.console import ExitCode, TroubleError, say, show_table, write_json
-from service.cli.files import file_failure, write_pieces
-from service.cli.options import JsonFlag
-from service.cli.remote import connection, follow
+from sprag.service.cli.console import ExitCode, TroubleError, say, show_table, write_json
+from sprag.service.cli.files import file_failure, write_pieces
+from sprag.service.cli.options import JsonFlag
+from sprag.service.cli.remote import connection, follow
 
 if TYPE_CHECKING:
-    from service.client import ServiceClient
+    from sprag.service.client import ServiceClient
 
 PRESET = "one_pendulum"
 _STOP_SECONDS = 15.0
@@ -61,7 +61,7 @@ def demo(
 @contextmanager
 def _service(database: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     """A service on a free port of this machine; ended, with all its processes, when the block is left."""
-    command = [sys.executable, "-m", "service.cli", "serve", "--json", "--port", "0", "--db", str(database)]
+    command = [sys.executable, "-m", "sprag.service.cli", "serve", "--json", "--port", "0", "--db", str(database)]
     # Settings meant for a service that others use would keep the demonstration from its own.
     environment = {name: value for name, value in os.environ.items() if name not in ("SPRAG_TOKEN", "SPRAG_HOST")}
     process = subprocess.Popen(  # noqa: S603 - this program itself
@@ -95,9 +95,9 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
 
 def _show(client: ServiceClient, picture: Path, as_json: bool) -> dict[str, Any]:
     """Submit the study, follow it, show its curve and write the picture; the study at its end."""
-    from service.presets import preset_text
-    from service.spec.text import load_spec
-    from worker.models import cache_folder
+    from sprag.service.presets import preset_text
+    from sprag.service.spec.text import load_spec
+    from sprag.worker.models import cache_folder
 
     _, text = preset_text(PRESET)
     spec = load_spec(text, "json")
@@ -121,7 +121,7 @@ def _show(client: ServiceClient, picture: Path, as_json: bool) -> dict[str, Any]
 
 def _show_curve(curves: dict[str, Any]) -> None:
     """The mechanical characteristic as a table, the mean speed also as a bar."""
-    from worker.models import OK
+    from sprag.worker.models import OK
 
     (drawn,) = curves["curves"]
     columns = [[None if value is None else f"{value:.4g}" for value in drawn["y"][name]] for name, _ in _TABLE]

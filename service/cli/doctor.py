@@ -16,11 +16,11 @@ from typing import Annotated, Any
 
 import typer
 
-from service.cli.console import TroubleError, WrongInputError, console, write_json, write_text
-from service.cli.options import Database, JsonFlag
-from service.cli.settings import read_settings
-from service.spec.report import Problem
-from worker.limits import MAX_TOLERANCE, MIN_TOLERANCE
+from sprag.service.cli.console import TroubleError, WrongInputError, console, write_json, write_text
+from sprag.service.cli.options import Database, JsonFlag
+from sprag.service.cli.settings import read_settings
+from sprag.service.spec.report import Problem
+from sprag.worker.limits import MAX_TOLERANCE, MIN_TOLERANCE
 
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sqlalchemy", "fastapi", "uvicorn")
 #: The kernel that is printed unless its shape is given.
@@ -79,7 +79,7 @@ def doctor(
 
 
 def _show_kernel(shape: dict[str, Any], as_json: bool) -> None:
-    from worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, kernel_source
+    from sprag.worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, kernel_source
 
     for name, most in (("pendulums", MAX_PENDULUMS), ("coefficients", MAX_COEFFICIENTS)):
         if shape[name] > most:
@@ -125,16 +125,16 @@ def _versions() -> tuple[bool, str]:
 
 
 def _sqlite() -> tuple[bool, str]:
-    from service.storage.session import sqlite_version, sqlite_warning
+    from sprag.service.storage.session import sqlite_version, sqlite_warning
 
     warning = sqlite_warning()
     return warning is None, warning or ".".join(map(str, sqlite_version()))
 
 
 def _database(url: str, file: Path | None) -> tuple[bool, str]:
-    from service.storage.maintenance import revision
-    from service.storage.session import Session
-    from service.storage.tables import HEAD_REVISION
+    from sprag.service.storage.maintenance import revision
+    from sprag.service.storage.session import Session
+    from sprag.service.storage.tables import HEAD_REVISION
 
     if file is not None and not file.exists():
         return True, f"{file} (not made yet)"
@@ -150,8 +150,8 @@ def _database(url: str, file: Path | None) -> tuple[bool, str]:
 
 def _rights(file: Path) -> tuple[bool, str]:
     """Whether the database and its backups are private; earlier versions created them readable by everybody."""
-    from service.jobs.maintenance import backups
-    from service.storage.private_files import readable_by_others
+    from sprag.service.jobs.maintenance import backups
+    from sprag.service.storage.private_files import readable_by_others
 
     folder = read_settings().backup_folder
     copies = [path for _, path in backups(Path(folder).expanduser())] if folder else []
@@ -163,8 +163,8 @@ def _rights(file: Path) -> tuple[bool, str]:
 
 
 def _clock(url: str, file: Path | None) -> tuple[bool, str]:
-    from service.storage.clock_watch import clock_problem
-    from service.storage.store import Store
+    from sprag.service.storage.clock_watch import clock_problem
+    from sprag.service.storage.store import Store
 
     now = f"it is {datetime.now(UTC).isoformat(timespec='seconds')}"
     if file is not None and not file.exists():
@@ -181,7 +181,7 @@ def _disk(location: Path) -> tuple[bool, str]:
 
 
 def _backups() -> tuple[bool, str]:
-    from service.jobs.maintenance import backups
+    from sprag.service.jobs.maintenance import backups
 
     folder = read_settings().backup_folder
     if not folder:
@@ -194,7 +194,7 @@ def _backups() -> tuple[bool, str]:
 
 
 def _cache() -> tuple[bool, str]:
-    from worker.models import cache_folder, cache_is_wanted
+    from sprag.worker.models import cache_folder, cache_is_wanted
 
     folder = cache_folder()
     folder.mkdir(parents=True, exist_ok=True)
@@ -206,7 +206,7 @@ def _cache() -> tuple[bool, str]:
 
 
 def _known_values() -> tuple[bool, str]:
-    from service.jobs.self_check import check_known_values
+    from sprag.service.jobs.self_check import check_known_values
 
     wrong, largest = check_known_values()
     if wrong:

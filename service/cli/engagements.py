@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.console import ExitCode, WrongInputError, say, write_json
-from service.cli.files import output, read_study, to_file
-from service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
-from service.json_text import to_bytes
-from service.spec.report import Problem
+from sprag.service.cli.console import ExitCode, WrongInputError, say, write_json
+from sprag.service.cli.files import output, read_study, to_file
+from sprag.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
+from sprag.service.json_text import to_bytes
+from sprag.service.spec.report import Problem
 
 if TYPE_CHECKING:
-    from worker.study import Study
+    from sprag.worker.study import Study
 
 
 class TableName(StrEnum):
@@ -35,8 +35,8 @@ def engagements(
     as_json: JsonFlag = False,
 ) -> None:
     """Write every engagement of the clutches of one case: start, end, order, torque, work. JSON has the periods too."""
-    from service.results.engagements import engagements_csv, engagements_json
-    from worker.models import ENDING_SENTENCES, OK, run_engagements
+    from sprag.service.results.engagements import engagements_csv, engagements_json
+    from sprag.worker.models import ENDING_SENTENCES, OK, run_engagements
 
     study = read_study(spec, points).study
     _require(study, case)
@@ -57,7 +57,7 @@ def engagements(
 
 def _require(study: Study, case: int) -> None:
     """Raise WrongInputError for a number that no case has, or a machine without clutches."""
-    from worker.models import VIBRATION_DRIVE, has_clutches
+    from sprag.worker.models import VIBRATION_DRIVE, has_clutches
 
     if not has_clutches(study):
         problem = Problem("/model", "has no clutches, so that nothing engages", study.model, allowed=VIBRATION_DRIVE)

@@ -7,13 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
-from service.cli.console import WrongInputError, say
-from service.cli.files import decode, read_bytes
-from service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, WaitTimeout
-from service.cli.remote import connection, exit_as, follow, show_study
-from service.spec.numbers import parse_number
-from service.spec.report import Problem
-from worker.limits import MAX_BODY_BYTES, MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
+from sprag.service.cli.console import WrongInputError, say
+from sprag.service.cli.files import decode, read_bytes
+from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, WaitTimeout
+from sprag.service.cli.remote import connection, exit_as, follow, show_study
+from sprag.service.spec.numbers import parse_number
+from sprag.service.spec.report import Problem
+from sprag.worker.limits import MAX_BODY_BYTES, MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
 
 
 def extend(

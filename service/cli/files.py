@@ -14,13 +14,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Literal
 
-from service.cli.console import CommandFailureError, TroubleError, WrongInputError
-from service.spec.report import Problem, SpecError
-from service.stale_files import mark, sweep
-from worker.limits import MAX_BODY_BYTES
+from sprag.service.cli.console import CommandFailureError, TroubleError, WrongInputError
+from sprag.service.spec.report import Problem, SpecError
+from sprag.service.stale_files import mark, sweep
+from sprag.worker.limits import MAX_BODY_BYTES
 
 if TYPE_CHECKING:
-    from service.spec.document import ParsedSpec
+    from sprag.service.spec.document import ParsedSpec
 
 #: Largest measured-data file that is read: far more rows than any clutch test has.
 MAX_DATA_BYTES = 16 * 1024 * 1024
@@ -84,7 +84,7 @@ def read_spec(path: str, points: str | None = None, limit: int = MAX_DATA_BYTES)
     bytes.
     Raises WrongInputError with every problem found.
     """
-    from service.spec.text import load_spec
+    from sprag.service.spec.text import load_spec
 
     if path == points == "-":
         problem = Problem("--points", "standard input is the spec already", allowed="a file")
@@ -105,7 +105,7 @@ def read_study(path: str, points: str | None = None) -> ParsedSpec:
 
     Raises WrongInputError with every problem found.
     """
-    from service.spec.document import parse_spec
+    from sprag.service.spec.document import parse_spec
 
     data = read_spec(path, points)
     with naming_points(points):

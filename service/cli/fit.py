@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.console import WrongInputError, say, show_table, write_json, write_text
-from service.cli.files import MAX_DATA_BYTES, decode, read_bytes
-from service.cli.options import JsonFlag
-from service.spec.numbers import parse_number
-from service.spec.report import Problem, shorten
+from sprag.service.cli.console import WrongInputError, say, show_table, write_json, write_text
+from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes
+from sprag.service.cli.options import JsonFlag
+from sprag.service.spec.numbers import parse_number
+from sprag.service.spec.report import Problem, shorten
 
 if TYPE_CHECKING:
-    from service.spec.measured import MeasuredData
-    from worker.models import ClutchFit, DegreeReport
+    from sprag.service.spec.measured import MeasuredData
+    from sprag.worker.models import ClutchFit, DegreeReport
 
 _DEGREE_COLUMNS = (
     ("degree", True),
@@ -60,7 +60,7 @@ def fit(
         angles_include_backlash=angles_include_backlash,
     )
     if as_json:
-        from service.results.fits import fit_json
+        from sprag.service.results.fits import fit_json
 
         report = fit_json(made)
         write_json(report | {"warnings": [*measured.warnings, *report["warnings"]]})
@@ -70,7 +70,7 @@ def fit(
 
 def _quantity(option: str, text: str, unit: str) -> float:
     """The SI number of an option: a plain number in ``unit`` or a text with its own unit."""
-    from service.spec.units import QuantityError, parse_quantity
+    from sprag.service.spec.units import QuantityError, parse_quantity
 
     number = parse_number(text)
     try:
@@ -80,8 +80,8 @@ def _quantity(option: str, text: str, unit: str) -> float:
 
 
 def _measured(path: str) -> MeasuredData:
-    from service.spec.measured import MeasuredDataError, parse_measured
-    from service.spec.units import parse_quantity
+    from sprag.service.spec.measured import MeasuredDataError, parse_measured
+    from sprag.service.spec.units import parse_quantity
 
     try:
         return parse_measured(decode(path, read_bytes(path, MAX_DATA_BYTES)), parse_quantity)
@@ -90,7 +90,7 @@ def _measured(path: str) -> MeasuredData:
 
 
 def _fitted(measured: MeasuredData, *, accuracy: float, **options: Any) -> ClutchFit:
-    from worker.models import ClutchFitError, fit_clutch
+    from sprag.worker.models import ClutchFitError, fit_clutch
 
     try:
         return fit_clutch(measured.rows, accuracy, **options)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.console import (
+from sprag.service.cli.console import (
     ExitCode,
     WrongInputError,
     duration_text,
@@ -23,23 +23,23 @@ from service.cli.console import (
     write_json,
     write_text,
 )
-from service.cli.files import output, read_study, to_file
-from service.cli.options import ChunkCases, FinishBy, Fresh, JsonFlag, OutputFile, PointsFile, Processes, SpecFile
-from service.cli.remote import TableFormat, table_format
-from service.cli.settings import read_settings
-from service.spec.report import Problem
-from worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
+from sprag.service.cli.files import output, read_study, to_file
+from sprag.service.cli.options import ChunkCases, FinishBy, Fresh, JsonFlag, OutputFile, PointsFile, Processes, SpecFile
+from sprag.service.cli.remote import TableFormat, table_format
+from sprag.service.cli.settings import read_settings
+from sprag.service.spec.report import Problem
+from sprag.worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from service.jobs.local import LocalRun
-    from service.results.exports import Format
-    from service.results.report import ReportFormat
-    from service.settings import Settings
-    from service.spec.document import ParsedSpec
-    from worker.models import Trajectory
-    from worker.study import Study
+    from sprag.service.jobs.local import LocalRun
+    from sprag.service.results.exports import Format
+    from sprag.service.results.report import ReportFormat
+    from sprag.service.settings import Settings
+    from sprag.service.spec.document import ParsedSpec
+    from sprag.worker.models import Trajectory
+    from sprag.worker.study import Study
 
 
 class ValueFormat(StrEnum):
@@ -92,8 +92,8 @@ def preview(
     as_json: JsonFlag = False,
 ) -> None:
     """Tell what a study would be: number of cases, time, size, first cases. Nothing is run."""
-    from service.jobs.preview import preview_json
-    from worker.chunking import Chunking
+    from sprag.service.jobs.preview import preview_json
+    from sprag.worker.chunking import Chunking
 
     finish = _finish(finish_by)
     left = None if finish is None else (finish - datetime.now(UTC)).total_seconds()
@@ -123,8 +123,8 @@ def preview(
 
 def _reusable(settings: Settings, parsed: ParsedSpec) -> int:
     """Cases that studies of the database have; none where there is no database yet."""
-    from service.storage.session import Session
-    from service.storage.store import Store
+    from sprag.service.storage.session import Session
+    from sprag.service.storage.store import Store
 
     session = Session(settings.database_url)
     session.close()
@@ -151,7 +151,7 @@ def trajectory(
     as_json: JsonFlag = False,
 ) -> None:
     """Write the instantaneous values of one case: angles, speeds, torques, powers, states."""
-    from worker.models import ENDING_SENTENCES, OK
+    from sprag.worker.models import ENDING_SENTENCES, OK
 
     study = read_study(spec).study
     with output(file) as write:
@@ -176,9 +176,9 @@ def _is_json(form: ValueFormat | None, file: str | None, as_json: bool) -> bool:
 
 
 def _trajectory(study: Study, case: int, start: str | None, end: str | None, points: int) -> Trajectory:
-    from service.faults import FaultError
-    from service.results.trajectories import span
-    from worker.models import run_trajectory
+    from sprag.service.faults import FaultError
+    from sprag.service.results.trajectories import span
+    from sprag.worker.models import run_trajectory
 
     if case >= study.cases:
         problem = Problem("--case", "there is no such case", case, allowed=f"0 .. {study.cases - 1}")
@@ -194,8 +194,8 @@ def _trajectory(study: Study, case: int, start: str | None, end: str | None, poi
 
 
 def _trajectory_bytes(made: Trajectory, study: Study, case: int, as_json: bool) -> bytes:
-    from service.json_text import to_bytes
-    from service.results.trajectories import trajectory_csv, trajectory_json
+    from sprag.service.json_text import to_bytes
+    from sprag.service.results.trajectories import trajectory_csv, trajectory_json
 
     if not as_json:
         return trajectory_csv(made)
@@ -209,8 +209,8 @@ def presets(
     as_json: JsonFlag = False,
 ) -> None:
     """List the studies that come with the program, or print the spec of one."""
-    from service.presets import ABOUT, preset_names, preset_text
-    from service.spec.report import did_you_mean
+    from sprag.service.presets import ABOUT, preset_names, preset_text
+    from sprag.service.spec.report import did_you_mean
 
     names = preset_names()
     if name is None:
@@ -245,8 +245,8 @@ def run(
     as_json: JsonFlag = False,
 ) -> None:
     """Run a study here, without a service: rows or a report to standard output or FILE, progress on standard error."""
-    from service.jobs.local import pool_size, run_here
-    from service.results.unaffected import Unaffected
+    from sprag.service.jobs.local import pool_size, run_here
+    from sprag.service.results.unaffected import Unaffected
 
     finish = _finish(finish_by)
     parsed = read_study(spec, points)
@@ -295,7 +295,7 @@ def run(
 @contextmanager
 def _telling_what_is_kept() -> Iterator[None]:
     """Tell after Ctrl-C what became of the study, and how to go on with it."""
-    from service.jobs.local import RunInterruptedError
+    from sprag.service.jobs.local import RunInterruptedError
 
     try:
         yield
@@ -310,7 +310,7 @@ def _telling_what_is_kept() -> Iterator[None]:
 
 def _finish(text: str | None) -> datetime | None:
     """The deadline that an option names; WrongInputError when it cannot be kept."""
-    from service.schedules.deadline import ALLOWED, FinishError, finish_at
+    from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
 
     try:
         return None if text is None else finish_at(text, datetime.now(UTC))
@@ -321,10 +321,10 @@ def _finish(text: str | None) -> datetime | None:
 
 def _rows(done: LocalRun, study: Study, form: Format | ReportFormat) -> Iterator[bytes]:
     """The rows of a finished study as the service exports them, or its report."""
-    from service.jobs.local import source_of
-    from service.results.exports import export
-    from service.results.report import write_report
-    from service.results.report.content import report_of
+    from sprag.service.jobs.local import source_of
+    from sprag.service.results.exports import export
+    from sprag.service.results.report import write_report
+    from sprag.service.results.report.content import report_of
 
     if form == "html" or form == "pdf":  # noqa: PLR1714 - so that the types are told apart
         return iter([write_report(report_of(done.store, done.record.id), form)])

@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 import typer
 
-from service.cli.console import OK, WrongInputError, cell_text, say, show_table, write_json
-from service.cli.files import write_pieces
-from service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
-from service.cli.remote import connection
-from service.spec.report import Problem
+from sprag.service.cli.console import OK, WrongInputError, cell_text, say, show_table, write_json
+from sprag.service.cli.files import write_pieces
+from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
+from sprag.service.cli.remote import connection
+from sprag.service.spec.report import Problem
 
 HeldAt = Annotated[
     list[str] | None, typer.Option("--at", metavar="PATH=VALUE", help="Value at which another axis is held.")

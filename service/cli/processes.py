@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from service.cli.console import TroubleError, WrongInputError, write_json
-from service.cli.options import ChunkCases, Database, JsonFlag, Processes
-from service.cli.settings import read_settings
+from sprag.service.cli.console import TroubleError, WrongInputError, write_json
+from sprag.service.cli.options import ChunkCases, Database, JsonFlag, Processes
+from sprag.service.cli.settings import read_settings
 
 Host = Annotated[
     str | None, typer.Option("--host", metavar="ADDRESS", help="Address to listen on; default: this machine only.")
@@ -26,9 +26,9 @@ def serve(
     as_json: JsonFlag = False,
 ) -> None:
     """Start the service and its worker; Ctrl-C ends both. With --json the address comes on standard output."""
-    from service.http.server import AddressError
-    from service.http.server import serve as run_service
-    from service.settings import UnsafeSettingsError
+    from sprag.service.http.server import AddressError
+    from sprag.service.http.server import serve as run_service
+    from sprag.service.settings import UnsafeSettingsError
 
     settings = read_settings(host=host, port=port, database=db, processes=processes, chunk_cases=chunk)
 
@@ -56,8 +56,8 @@ def worker(
     ] = False,
 ) -> None:
     """Run the studies of a database without a service; Ctrl-C ends it."""
-    from service import logs
-    from service.jobs.dispatching import run_dispatcher, stop_on_signals, worker_settings
+    from sprag.service import logs
+    from sprag.service.jobs.dispatching import run_dispatcher, stop_on_signals, worker_settings
 
     settings = read_settings(database=db, processes=processes)
     logs.configure(settings.log_format, requests=False)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from service.cli.console import (
+from sprag.service.cli.console import (
     OK,
     CommandFailureError,
     ExitCode,
@@ -22,8 +22,8 @@ from service.cli.console import (
     show_table,
     write_json,
 )
-from service.cli.files import naming_points, read_spec, to_file, write_pieces
-from service.cli.options import (
+from sprag.service.cli.files import naming_points, read_spec, to_file, write_pieces
+from sprag.service.cli.options import (
     DEFAULT_SERVER,
     FinishBy,
     Fresh,
@@ -36,13 +36,13 @@ from service.cli.options import (
     Token,
     WaitTimeout,
 )
-from service.formats import FORMATS, REPORT_FORMATS, Format, ReportFormat, format_of
-from service.spec.report import Problem
-from worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
-from worker.states import TERMINAL, StudyState
+from sprag.service.formats import FORMATS, REPORT_FORMATS, Format, ReportFormat, format_of
+from sprag.service.spec.report import Problem
+from sprag.worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
+from sprag.worker.states import TERMINAL, StudyState
 
 if TYPE_CHECKING:
-    from service.client import Query, RefusedError, ServiceClient
+    from sprag.service.client import Query, RefusedError, ServiceClient
 
 #: A parameter with its sign, as the service's messages write it: "by=", "at=shaft.load=0.2".
 _PARAMETER_IN_TEXT = re.compile(r"(?<![\w.-])(x|y|by|at)=(?=(\w?))")
@@ -70,7 +70,7 @@ class TableFormat(StrEnum):
 @contextmanager
 def connection(server: str, token: str | None) -> Iterator[ServiceClient]:
     """A client of the service; its failures become failures of the command."""
-    from service.client import RefusedError, ServiceClient, StudyTimeoutError, UnreachableError
+    from sprag.service.client import RefusedError, ServiceClient, StudyTimeoutError, UnreachableError
 
     try:
         client = ServiceClient(server, token)
@@ -167,7 +167,7 @@ def follow(
     A held study is not left by itself: its reason is said, and the watching goes on until it is resumed or cancelled.
     So is a service that does not answer, unless ``patient`` is false: then that is the failure of the command.
     """
-    from service.client.waiting import Waiting, wait_for
+    from sprag.service.client.waiting import Waiting, wait_for
 
     told: set[str | None] = set()
     with progress_bar(study_id) as update:

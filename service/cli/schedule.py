@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.console import WrongInputError, say, show_table, write_json
-from service.cli.files import read_spec
-from service.cli.options import DEFAULT_SERVER, Fresh, JsonFlag, Server, SpecFile, Token
-from service.cli.remote import PriorityOption, connection
-from service.spec.report import Problem
-from worker.limits import MAX_PRIORITY
+from sprag.service.cli.console import WrongInputError, say, show_table, write_json
+from sprag.service.cli.files import read_spec
+from sprag.service.cli.options import DEFAULT_SERVER, Fresh, JsonFlag, Server, SpecFile, Token
+from sprag.service.cli.remote import PriorityOption, connection
+from sprag.service.spec.report import Problem
+from sprag.worker.limits import MAX_PRIORITY
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from service.cli.console import WrongInputError
-from service.spec.report import Problem, shorten
+from sprag.service.cli.console import WrongInputError
+from sprag.service.spec.report import Problem, shorten
 
 if TYPE_CHECKING:
-    from service.settings import Settings
+    from sprag.service.settings import Settings
 
 
 def read_settings(**options: object) -> Settings:
@@ -18,7 +18,7 @@ def read_settings(**options: object) -> Settings:
     """
     from pydantic import ValidationError
 
-    from service.settings import ENV_PREFIX, Settings, SettingsFileError
+    from sprag.service.settings import ENV_PREFIX, Settings, SettingsFileError
 
     given = {name: value for name, value in options.items() if value is not None}
     try:

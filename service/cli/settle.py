@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.console import ExitCode, WrongInputError, progress_bar, say, show_table, write_json
-from service.cli.files import output, read_study, to_file
-from service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
-from service.json_text import to_bytes
-from service.spec.report import Problem
-from worker.limits import MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
+from sprag.service.cli.console import ExitCode, WrongInputError, progress_bar, say, show_table, write_json
+from sprag.service.cli.files import output, read_study, to_file
+from sprag.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
+from sprag.service.json_text import to_bytes
+from sprag.service.spec.report import Problem
+from sprag.worker.limits import MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
 
 if TYPE_CHECKING:
-    from service.storage.records import RowBlock
-    from worker.study import Study
+    from sprag.service.storage.records import RowBlock
+    from sprag.worker.study import Study
 
 #: Cases that are settled side by side: enough to fill the engine, few enough to show progress.
 _BATCH = 512
@@ -42,8 +42,8 @@ def settle(
     as_json: JsonFlag = False,
 ) -> None:
     """Find the settled motion of cases: its regime, order, stability and characteristics."""
-    from service.results.exports import Source, csv_pieces, rows_json
-    from worker.models import OK, study_results
+    from sprag.service.results.exports import Source, csv_pieces, rows_json
+    from sprag.worker.models import OK, study_results
 
     study = _settled(read_study(spec, points).study, at_most)
     cases = _chosen(study, case)
@@ -67,7 +67,7 @@ def settle(
 
 def _settled(study: Study, at_most: int | None) -> Study:
     """The study, run until it is settled; WrongInputError where its model has no motion that settles."""
-    from worker.models import VIBRATION_DRIVE, settled_study
+    from sprag.worker.models import VIBRATION_DRIVE, settled_study
 
     if study.model != VIBRATION_DRIVE:
         problem = Problem("/model", "has no motion that settles", study.model, allowed=VIBRATION_DRIVE)
@@ -93,9 +93,9 @@ def _blocks(study: Study, cases: list[int]) -> list[RowBlock]:
     """The rows of the cases, run here."""
     import numpy as np
 
-    from service.storage.records import RowBlock
-    from worker.models import run_chunk, study_results
-    from worker.reuse import taken
+    from sprag.service.storage.records import RowBlock
+    from sprag.worker.models import run_chunk, study_results
+    from sprag.worker.reuse import taken
 
     blocks = []
     with progress_bar(study.name or "study") as update:
@@ -109,7 +109,7 @@ def _blocks(study: Study, cases: list[int]) -> list[RowBlock]:
 
 def _show(block: RowBlock) -> None:
     """One case as a table for people, without what it has no value of."""
-    from worker.models import ENDING_SENTENCES, OK, REGIME_SENTENCES
+    from sprag.worker.models import ENDING_SENTENCES, OK, REGIME_SENTENCES
 
     (row,) = block.rows()
     meaning = REGIME_SENTENCES[str(row.results["regime"])] if row.ending == OK else ENDING_SENTENCES[row.ending]

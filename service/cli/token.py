@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.console import WrongInputError, say, show_table, write_json
-from service.cli.options import Database, JsonFlag
-from service.cli.settings import read_settings
-from service.storage.scopes import TokenScope
+from sprag.service.cli.console import WrongInputError, say, show_table, write_json
+from sprag.service.cli.options import Database, JsonFlag
+from sprag.service.cli.settings import read_settings
+from sprag.service.storage.scopes import TokenScope
 
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from service.storage.store import Store
-    from service.storage.tokens import TokenRecord
+    from sprag.service.storage.store import Store
+    from sprag.service.storage.tokens import TokenRecord
 
 app = typer.Typer(
     help="Create, list and revoke tokens; alone: make a secret for SPRAG_TOKEN.",
@@ -76,7 +76,7 @@ def revoke(
     as_json: JsonFlag = False,
 ) -> None:
     """Make a token worthless, and end the sessions of browsers that logged in with it; within two seconds."""
-    from service.storage.errors import TokenNotFound
+    from sprag.service.storage.errors import TokenNotFound
 
     with _store(db) as store:
         try:
@@ -90,7 +90,7 @@ def revoke(
 
 
 def _store(db: str | None) -> Store:
-    from service.storage.store import Store
+    from sprag.service.storage.store import Store
 
     return Store.open(read_settings(database=db).database_url)
 

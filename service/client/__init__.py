@@ -1,6 +1,6 @@
 """The service as a Python program uses it.
 
-    from service.client import Client
+    from sprag.service.client import Client
 
     with Client() as sprag:
         study = sprag.submit("study.json").wait(progress=True)
@@ -11,12 +11,12 @@
 `RefusedError` carries the service's problem document. pandas and xarray are loaded only where they are asked for.
 """
 
-from service.client.aio import AsyncClient, AsyncStudy
-from service.client.errors import RefusedError, ServiceError, SpecFileError, StudyTimeoutError, UnreachableError
-from service.client.frames import Curves
-from service.client.plain import ServiceClient
-from service.client.study import Client, Study
-from service.client.wire import Query
+from sprag.service.client.aio import AsyncClient, AsyncStudy
+from sprag.service.client.errors import RefusedError, ServiceError, SpecFileError, StudyTimeoutError, UnreachableError
+from sprag.service.client.frames import Curves
+from sprag.service.client.plain import ServiceClient
+from sprag.service.client.study import Client, Study
+from sprag.service.client.wire import Query
 
 __all__ = [
     "AsyncClient",

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 import httpx
 
-from service.client.errors import ServiceError, UnreachableError
-from service.client.frames import Curves, grid_of, table_of
-from service.client.queries import (
+from sprag.service.client.errors import ServiceError, UnreachableError
+from sprag.service.client.frames import Curves, grid_of, table_of
+from sprag.service.client.queries import (
     Progressing,
     Value,
     curve_query,
@@ -25,9 +25,9 @@ from service.client.queries import (
     result_query,
     spec_of,
 )
-from service.client.study import DEFAULT_SERVER
-from service.client.waiting import Waiting
-from service.client.wire import (
+from sprag.service.client.study import DEFAULT_SERVER
+from sprag.service.client.waiting import Waiting
+from sprag.service.client.wire import (
     API,
     EVENTS_TIMEOUT,
     FILE_TIMEOUT,
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from service.client.types import Preview, Spec, StudyDetail, StudySummary
+    from sprag.service.client.types import Preview, Spec, StudyDetail, StudySummary
 
 
 class AsyncClient:
@@ -225,7 +225,7 @@ class AsyncStudy:
         return grid_of(await self.download("netcdf"))
 
     async def download(self, form: str) -> bytes:
-        """All rows in a format of `service.results.exports`, or the report as "html" or "pdf"."""
+        """All rows in a format of `sprag.service.results.exports`, or the report as "html" or "pdf"."""
         return await self._client.read(*self._rows(form))
 
     async def export(self, file: str | PathLike[str], form: str | None = None) -> Path:

@@ -6,14 +6,14 @@ import io
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from service.extras import naming_extra
-from worker.codes import ENDING_CODES, PENDING
+from sprag.service.extras import naming_extra
+from sprag.worker.codes import ENDING_CODES, PENDING
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from service.client.types import CurvesData
+    from sprag.service.client.types import CurvesData
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ from typing import Any
 
 import httpx
 
-from service.client.errors import UnreachableError
-from service.client.wire import (
+from sprag.service.client.errors import UnreachableError
+from sprag.service.client.wire import (
     API,
     EVENTS_TIMEOUT,
     FILE_TIMEOUT,

@@ -9,12 +9,12 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
-from service.client.errors import SpecFileError
+from sprag.service.client.errors import SpecFileError
 
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from service.client.types import Spec, StudyDetail
+    from sprag.service.client.types import Spec, StudyDetail
 
 Value = float | int | str
 
@@ -75,7 +75,7 @@ def finish_text(when: str | datetime) -> str:
 
 def form_of(path: Path) -> str:
     """The format that the ending of a file's name tells; ValueError when it tells none."""
-    from service.formats import format_of
+    from sprag.service.formats import format_of
 
     ending = path.suffix[1:].lower()
     form = ending if ending in ("html", "pdf") else format_of(path.name)

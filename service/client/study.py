@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from service.client.frames import Curves, grid_of, table_of
-from service.client.plain import ServiceClient
-from service.client.queries import (
+from sprag.service.client.frames import Curves, grid_of, table_of
+from sprag.service.client.plain import ServiceClient
+from sprag.service.client.queries import (
     Progressing,
     Value,
     curve_query,
@@ -20,7 +20,7 @@ from service.client.queries import (
     result_query,
     spec_of,
 )
-from service.client.waiting import Waiting, wait_for
+from sprag.service.client.waiting import Waiting, wait_for
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from service.client.types import Preview, Spec, StudyDetail, StudySummary
+    from sprag.service.client.types import Preview, Spec, StudyDetail, StudySummary
 
 DEFAULT_SERVER = "http://127.0.0.1:8000"
 
@@ -123,7 +123,7 @@ class Study:
         """Wait until the study has ended, or its time is over; gives the study itself.
 
         While the service does not answer, for instance because it is restarted, the waiting goes on; a warning in the
-        log (``service.client.waiting``) says so.
+        log (``sprag.service.client.waiting``) says so.
 
         Parameters
         ----------
@@ -169,7 +169,7 @@ class Study:
         return grid_of(self.download("netcdf"))
 
     def download(self, form: str) -> bytes:
-        """All rows in a format of `service.results.exports`, or the report as "html" or "pdf"."""
+        """All rows in a format of `sprag.service.results.exports`, or the report as "html" or "pdf"."""
         return b"".join(self._pieces(form))
 
     def export(self, file: str | PathLike[str], form: str | None = None) -> Path:

@@ -11,12 +11,12 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from service.client.errors import RefusedError, ServiceError, StudyTimeoutError, UnreachableError
-from service.client.wire import SILENCE
-from worker.states import TERMINAL
+from sprag.service.client.errors import RefusedError, ServiceError, StudyTimeoutError, UnreachableError
+from sprag.service.client.wire import SILENCE
+from sprag.worker.states import TERMINAL
 
 if TYPE_CHECKING:
-    from service.client.plain import ServiceClient
+    from sprag.service.client.plain import ServiceClient
 
 _LOG = logging.getLogger(__name__)
 

@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 import httpx
 
-from service.client.errors import RefusedError, ServiceError, UnreachableError
+from sprag.service.client.errors import RefusedError, ServiceError, UnreachableError
 
 #: Seconds without a byte after which a stream of events is given up; the service sends one every 15 s.
 SILENCE: Final = 30.0

@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 from starlette.concurrency import run_in_threadpool
 
-from service.http.attempts import Attempts
-from service.storage.scopes import TokenScope
-from service.storage.sessions import SessionSecrets
-from service.storage.tokens import TokenRecord, digest_of
+from sprag.service.http.attempts import Attempts
+from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.sessions import SessionSecrets
+from sprag.service.storage.tokens import TokenRecord, digest_of
 
 if TYPE_CHECKING:
-    from service.settings import Settings
+    from sprag.service.settings import Settings
 
 COOKIE: Final = "sprag_session"
 SESSION_SECONDS: Final = 12 * 3600

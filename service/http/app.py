@@ -13,9 +13,9 @@ from fastapi import APIRouter, FastAPI
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp
 
-from service.http import handlers
-from service.http.access import Access
-from service.http.api import (
+from sprag.service.http import handlers
+from sprag.service.http.access import Access
+from sprag.service.http.api import (
     cases,
     catalogues,
     clutch_fits,
@@ -27,31 +27,31 @@ from service.http.api import (
     sensitivity,
     studies,
 )
-from service.http.api.document import build_openapi
-from service.http.computer import Computes, Limits, ProcessComputer
-from service.http.context import Context
-from service.http.drain import Drain
-from service.http.guard import Guard
-from service.http.metrics import Metrics
-from service.http.shares import Shares
-from service.http.views import API_PREFIX
-from service.http.web import case, compare, laboratory, login, pages, results, study, table
-from service.http.web import engagements as engagement_pages
-from service.http.web import schedules as schedule_pages
-from service.http.web.form import page as form
-from service.jobs import checks
-from service.jobs.housekeeping import Housekeeping
-from service.logs import Noted, RequestLog
-from service.settings import Settings, UnsafeSettingsError
-from service.spec.schema.axes import extension_schema
-from service.spec.schema.document import spec_schema
-from service.storage.readiness import Readiness
-from service.storage.store import Store
-from worker.chunking import Chunking
-from worker.limits import COMPUTATION_BYTES, MAX_CHECKS, MAX_CHECKS_EACH, MAX_COMPUTATIONS
-from worker.pool.child_pool import JobStoppedError
-from worker.pool.child_process import ProcessDiedError, ProcessStartError
-from worker.ports import StoreError
+from sprag.service.http.api.document import build_openapi
+from sprag.service.http.computer import Computes, Limits, ProcessComputer
+from sprag.service.http.context import Context
+from sprag.service.http.drain import Drain
+from sprag.service.http.guard import Guard
+from sprag.service.http.metrics import Metrics
+from sprag.service.http.shares import Shares
+from sprag.service.http.views import API_PREFIX
+from sprag.service.http.web import case, compare, laboratory, login, pages, results, study, table
+from sprag.service.http.web import engagements as engagement_pages
+from sprag.service.http.web import schedules as schedule_pages
+from sprag.service.http.web.form import page as form
+from sprag.service.jobs import checks
+from sprag.service.jobs.housekeeping import Housekeeping
+from sprag.service.logs import Noted, RequestLog
+from sprag.service.settings import Settings, UnsafeSettingsError
+from sprag.service.spec.schema.axes import extension_schema
+from sprag.service.spec.schema.document import spec_schema
+from sprag.service.storage.readiness import Readiness
+from sprag.service.storage.store import Store
+from sprag.worker.chunking import Chunking
+from sprag.worker.limits import COMPUTATION_BYTES, MAX_CHECKS, MAX_CHECKS_EACH, MAX_COMPUTATIONS
+from sprag.worker.pool.child_pool import JobStoppedError
+from sprag.worker.pool.child_process import ProcessDiedError, ProcessStartError
+from sprag.worker.ports import StoreError
 
 _LOG = logging.getLogger("sprag.service")
 #: Seconds before processes that did not start are tried again.

@@ -19,7 +19,7 @@ import anyio
 from starlette.datastructures import Headers
 from starlette.types import Scope
 
-from service.http.problems import ApiError
+from sprag.service.http.problems import ApiError
 
 _LOG = logging.getLogger("sprag.access")
 

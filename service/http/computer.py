@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Protocol, TypeVar, TypeVarTuple
 
-from service.http.problems import ApiError
-from worker import models
-from worker.limits import LOAD_SECONDS
-from worker.pool.child_pool import ChildPool, Job, JobStoppedError
-from worker.pool.child_process import ProcessDiedError, ProcessStartError
-from worker.pool.processes import limit_memory, single_threaded_children
+from sprag.service.http.problems import ApiError
+from sprag.worker import models
+from sprag.worker.limits import LOAD_SECONDS
+from sprag.worker.pool.child_pool import ChildPool, Job, JobStoppedError
+from sprag.worker.pool.child_process import ProcessDiedError, ProcessStartError
+from sprag.worker.pool.processes import limit_memory, single_threaded_children
 
 Args = TypeVarTuple("Args")
 R = TypeVar("R")

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Final, cast
 from fastapi import Depends, Path, Request
 from starlette.convertors import Convertor, register_url_convertor
 
-from service.http.computer import Computes
-from service.http.problems import ApiError
-from service.http.shares import Shares
-from service.jobs.checks import Library
-from service.results.unaffected import Unaffected
-from service.settings import Settings
-from service.storage.store import Store
-from worker.limits import MAX_CASES, MAX_CHECKS_EACH, MAX_COMPUTATIONS_EACH, MAX_STREAMS
+from sprag.service.http.computer import Computes
+from sprag.service.http.problems import ApiError
+from sprag.service.http.shares import Shares
+from sprag.service.jobs.checks import Library
+from sprag.service.results.unaffected import Unaffected
+from sprag.service.settings import Settings
+from sprag.service.storage.store import Store
+from sprag.worker.limits import MAX_CASES, MAX_CHECKS_EACH, MAX_COMPUTATIONS_EACH, MAX_STREAMS
 
 if TYPE_CHECKING:
-    from worker.study import Study
+    from sprag.worker.study import Study
 
 CaseNumber = Annotated[
     int,

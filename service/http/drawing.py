@@ -10,15 +10,15 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response
 
-from service.http.respond import entity_tag, not_modified, tagged
-from service.http.work import Work
-from service.jobs import answers
-from service.results.defaults import drawn_numbers
-from service.results.pictures import curves as pictures
+from sprag.service.http.respond import entity_tag, not_modified, tagged
+from sprag.service.http.work import Work
+from sprag.service.jobs import answers
+from sprag.service.results.defaults import drawn_numbers
+from sprag.service.results.pictures import curves as pictures
 
 if TYPE_CHECKING:
-    from service.http.context import Context
-    from service.storage.records import StudyRecord
+    from sprag.service.http.context import Context
+    from sprag.service.storage.records import StudyRecord
 
 #: matplotlib puts its styles into the picture, which the pages' policy forbids; a picture can do nothing else.
 _PICTURE_POLICY = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
@@ -67,7 +67,7 @@ def attached(filename: str) -> dict[str, str]:
 
 
 def placed(context: Context, drawing: Drawing) -> Response | Drawing:
-    """A drawing of `service.jobs.answers`: at once where it has few numbers, else still to be made, elsewhere."""
+    """A drawing of `sprag.service.jobs.answers`: at once where it has few numbers, else still to be made, elsewhere."""
     _, study_id, query, *_ = drawing.args
     return drawing if drawn_numbers(context.store.study(study_id), query) > answers.FEW else drawing.here()
 

@@ -10,14 +10,14 @@ from starlette.requests import ClientDisconnect, Request, cookie_parser
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.http.access import ASKING, OPEN, Access, Grant
-from service.http.problems import ApiError, problem_response
-from service.http.web.problem_page import problem_page
-from service.http.web.way_in import LOGIN_PATH, way_in
-from service.settings import Settings
-from service.storage.errors import StoreError
-from service.storage.scopes import TokenScope
-from worker.limits import BODY_SECONDS, MAX_BODY_BYTES
+from sprag.service.http.access import ASKING, OPEN, Access, Grant
+from sprag.service.http.problems import ApiError, problem_response
+from sprag.service.http.web.problem_page import problem_page
+from sprag.service.http.web.way_in import LOGIN_PATH, way_in
+from sprag.service.settings import Settings
+from sprag.service.storage.errors import StoreError
+from sprag.service.storage.scopes import TokenScope
+from sprag.worker.limits import BODY_SECONDS, MAX_BODY_BYTES
 
 _LOG = logging.getLogger("sprag.service")
 

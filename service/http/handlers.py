@@ -13,13 +13,13 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 
-from service.faults import ErrorItem, FaultError, parameter_error, shown
-from service.http.problems import ApiError, api_error, problem_response
-from service.http.web.problem_page import problem_page
-from service.results.selection import SelectionError
-from service.spec.report import SpecError, spec_items
-from service.storage import errors as storage
-from worker.states import TransitionError
+from sprag.service.faults import ErrorItem, FaultError, parameter_error, shown
+from sprag.service.http.problems import ApiError, api_error, problem_response
+from sprag.service.http.web.problem_page import problem_page
+from sprag.service.results.selection import SelectionError
+from sprag.service.spec.report import SpecError, spec_items
+from sprag.service.storage import errors as storage
+from sprag.worker.states import TransitionError
 
 _log = logging.getLogger("sprag.service")
 

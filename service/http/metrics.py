@@ -15,13 +15,13 @@ from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, H
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from worker.states import StudyState
+from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from service.storage.figures import FinishedWork
-    from service.storage.store import Store
+    from sprag.service.storage.figures import FinishedWork
+    from sprag.service.storage.store import Store
 
 CONTENT_TYPE: Final = CONTENT_TYPE_LATEST
 METHODS: Final = frozenset({"GET", "HEAD", "POST", "PATCH", "DELETE"})

@@ -7,8 +7,8 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
-from service.faults import ErrorItem, FaultError
-from service.json_text import to_bytes
+from sprag.service.faults import ErrorItem, FaultError
+from sprag.service.json_text import to_bytes
 
 PROBLEM_MEDIA_TYPE = "application/problem+json"
 PROBLEM_PATH = "/problems/"

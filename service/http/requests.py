@@ -8,9 +8,9 @@ from typing import Literal
 from fastapi import Request
 from fastapi.dependencies.models import Dependant
 
-from service.faults import ErrorItem, shown
-from service.http.problems import ApiError
-from service.spec.report import did_you_mean
+from sprag.service.faults import ErrorItem, shown
+from sprag.service.http.problems import ApiError
+from sprag.service.spec.report import did_you_mean
 
 BodyFormat = Literal["json", "toml"]
 _FORMATS: dict[str, BodyFormat] = {"application/json": "json", "application/toml": "toml"}

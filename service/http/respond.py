@@ -12,9 +12,9 @@ from starlette.concurrency import iterate_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 
-from service.faults import parameter_error, shown
-from service.http.problems import ApiError
-from service.json_text import to_bytes
+from sprag.service.faults import parameter_error, shown
+from sprag.service.http.problems import ApiError
+from sprag.service.json_text import to_bytes
 
 JSON = "application/json"
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from service.http.respond import timestamp
-from service.http.views import API_PREFIX, study_address
-from service.storage.schedules import RunRecord, ScheduleRecord
+from sprag.service.http.respond import timestamp
+from sprag.service.http.views import API_PREFIX, study_address
+from sprag.service.storage.schedules import RunRecord, ScheduleRecord
 
 
 def schedule_address(schedule_id: str) -> str:

@@ -17,12 +17,12 @@ from typing import Protocol
 import psutil
 import uvicorn
 
-from service import logs
-from service.http.app import create_app
-from service.http.timeouts import TimeoutProtocol
-from service.jobs.dispatching import start_dispatcher_process, worker_settings
-from service.settings import Settings
-from worker.limits import MAX_CONNECTIONS
+from sprag.service import logs
+from sprag.service.http.app import create_app
+from sprag.service.http.timeouts import TimeoutProtocol
+from sprag.service.jobs.dispatching import start_dispatcher_process, worker_settings
+from sprag.service.settings import Settings
+from sprag.worker.limits import MAX_CONNECTIONS
 
 _LOG = logging.getLogger("sprag.service")
 

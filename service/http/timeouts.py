@@ -10,7 +10,7 @@ from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from worker.limits import HEAD_SECONDS, WRITE_SECONDS
+from sprag.worker.limits import HEAD_SECONDS, WRITE_SECONDS
 
 
 class TimeoutProtocol(H11Protocol):

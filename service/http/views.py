@@ -6,14 +6,14 @@ from dataclasses import asdict
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
-from service.http.respond import timestamp
-from service.presets import ABOUT, preset_text
-from service.spec.catalogue import axes_json
-from service.spec.document import format_of, load_spec, parse_spec
+from sprag.service.http.respond import timestamp
+from sprag.service.presets import ABOUT, preset_text
+from sprag.service.spec.catalogue import axes_json
+from sprag.service.spec.document import format_of, load_spec, parse_spec
 
 if TYPE_CHECKING:
-    from service.storage.records import Progress, StudyRecord
-    from worker.study import Study
+    from sprag.service.storage.records import Progress, StudyRecord
+    from sprag.worker.study import Study
 
 API_PREFIX: Final = "/api/v1"
 

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Annotated, Final, TypeVar, TypeVarTuple, cast
 from fastapi import Depends, Request
 from starlette.requests import ClientDisconnect
 
-from service.http.access import OPEN
-from service.spec.machine.shaft_check import NotCompiledError
+from sprag.service.http.access import OPEN
+from sprag.service.spec.machine.shaft_check import NotCompiledError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
     from typing import Any
 
-    from service.http.access import Grant
-    from service.http.computer import Computes
-    from service.http.context import Context
-    from service.http.shares import Shares
-    from worker.models import KernelShape
+    from sprag.service.http.access import Grant
+    from sprag.service.http.computer import Computes
+    from sprag.service.http.context import Context
+    from sprag.service.http.shares import Shares
+    from sprag.worker.models import KernelShape
 
 #: What can become of anything that is checked, whatever it is.
 CHECK_PROBLEMS: Final = ("too-costly", "not-computed", "too-many-requests", "unavailable")

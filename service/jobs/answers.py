@@ -9,15 +9,15 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
-from service.json_text import to_bytes
-from service.results import exports
-from service.results.curves import draw, draw_map, select
-from service.results.pictures import curves as pictures
-from worker import models
+from sprag.service.json_text import to_bytes
+from sprag.service.results import exports
+from sprag.service.results.curves import draw, draw_map, select
+from sprag.service.results.pictures import curves as pictures
+from sprag.worker import models
 
 if TYPE_CHECKING:
-    from service.jobs.checks import Library
-    from service.results.curves import CurveQuery, Curves, Map
+    from sprag.service.jobs.checks import Library
+    from sprag.service.results.curves import CurveQuery, Curves, Map
 
 #: Numbers of curves or a map that are read and written in some ten milliseconds.
 FEW: Final = 20_000

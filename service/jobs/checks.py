@@ -8,25 +8,25 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from service.jobs.preview import preview_json
-from service.jobs.submission import Submission, hash_of, submission
-from service.json_text import to_bytes
-from service.results.fits import fit_json, read_fit
-from service.schedules.fields import ScheduleFields, change_fields, read_fields
-from service.spec.document import load_spec, parse_spec
-from service.spec.extend import parse_extended
-from service.spec.longer import longer_spec
-from service.spec.machine.shaft_check import compile_elsewhere
-from service.storage.store import Store
-from worker import models
-from worker.pool.child_process import uncounted
+from sprag.service.jobs.preview import preview_json
+from sprag.service.jobs.submission import Submission, hash_of, submission
+from sprag.service.json_text import to_bytes
+from sprag.service.results.fits import fit_json, read_fit
+from sprag.service.schedules.fields import ScheduleFields, change_fields, read_fields
+from sprag.service.spec.document import load_spec, parse_spec
+from sprag.service.spec.extend import parse_extended
+from sprag.service.spec.longer import longer_spec
+from sprag.service.spec.machine.shaft_check import compile_elsewhere
+from sprag.service.storage.store import Store
+from sprag.worker import models
+from sprag.worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from datetime import datetime
 
-    from service.spec.text import Format
-    from worker.chunking import Chunking
+    from sprag.service.spec.text import Format
+    from sprag.worker.chunking import Chunking
 
 
 def prepare() -> None:

@@ -12,29 +12,29 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from service import logs
-from service.jobs.housekeeping import Housekeeping
-from service.jobs.maintenance import Maintenance, MaintenancePlan
-from service.jobs.scheduler import Scheduler
-from service.logs import LogFormat
-from service.storage.part import SILENT_SECONDS, SystemClock
-from service.storage.readiness import LOCKED_SECONDS
-from service.storage.session import lock_of
-from service.storage.store import Store
-from worker import models
-from worker.chunking import Chunking
-from worker.dispatcher import Dispatcher
-from worker.pool.processes import end_with_parent, ignore_interrupts, interrupts_held_back
-from worker.ports import EpochLostError, ExecutorError, StoreError
+from sprag.service import logs
+from sprag.service.jobs.housekeeping import Housekeeping
+from sprag.service.jobs.maintenance import Maintenance, MaintenancePlan
+from sprag.service.jobs.scheduler import Scheduler
+from sprag.service.logs import LogFormat
+from sprag.service.storage.part import SILENT_SECONDS, SystemClock
+from sprag.service.storage.readiness import LOCKED_SECONDS
+from sprag.service.storage.session import lock_of
+from sprag.service.storage.store import Store
+from sprag.worker import models
+from sprag.worker.chunking import Chunking
+from sprag.worker.dispatcher import Dispatcher
+from sprag.worker.pool.processes import end_with_parent, ignore_interrupts, interrupts_held_back
+from sprag.worker.ports import EpochLostError, ExecutorError, StoreError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from multiprocessing.context import SpawnProcess
     from types import FrameType
 
-    from service.settings import Settings
-    from service.storage.lock import OneHolder
-    from worker.ports import Executor
+    from sprag.service.settings import Settings
+    from sprag.service.storage.lock import OneHolder
+    from sprag.worker.ports import Executor
 
 _LOG = logging.getLogger(__name__)
 
@@ -97,14 +97,14 @@ def pool(settings: WorkerSettings) -> Executor:
     """Where the chunks of these settings run: a process pool, whose processes start with the first, or Dask."""
     if settings.executor != "pool":
         return _cluster(settings)
-    from worker.executors.process_pool import ProcessPoolExecutor
+    from sprag.worker.executors.process_pool import ProcessPoolExecutor
 
     return ProcessPoolExecutor(settings.processes, chunk_timeout=settings.chunk_timeout)
 
 
 def _cluster(settings: WorkerSettings, *, renew: bool = False) -> Executor:
     try:
-        from worker.executors.dask import DaskExecutor
+        from sprag.worker.executors.dask import DaskExecutor
     except ImportError:
         raise ExecutorError("Dask is not installed: pip install 'sprag[cluster]'") from None
     url = settings.executor if "://" in settings.executor else ""

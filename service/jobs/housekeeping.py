@@ -7,10 +7,10 @@ import threading
 import time
 from typing import TYPE_CHECKING, Final
 
-from service.storage.errors import StoreError
+from sprag.service.storage.errors import StoreError
 
 if TYPE_CHECKING:
-    from service.storage.store import Store
+    from sprag.service.storage.store import Store
 
 _LOG = logging.getLogger("sprag.housekeeping")
 

@@ -10,28 +10,28 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from service.jobs.dispatching import STANDBY_SECONDS, WorkerSettings, owner_name, pool, renewed_pool
-from service.results.exports.source import Source
-from service.stale_files import marked, sweep
-from service.storage.owners import run_owner
-from service.storage.part import SystemClock
-from service.storage.room import GOES_ON
-from service.storage.session import lock_of
-from service.storage.store import Store
-from worker.chunking import Chunking
-from worker.dispatcher import Dispatcher
-from worker.executors.inline import InlineExecutor
-from worker.models import estimate_seconds_per_case, study_results
-from worker.ports import ExecutorError, StoreError
-from worker.states import StudyState, TransitionError
+from sprag.service.jobs.dispatching import STANDBY_SECONDS, WorkerSettings, owner_name, pool, renewed_pool
+from sprag.service.results.exports.source import Source
+from sprag.service.stale_files import marked, sweep
+from sprag.service.storage.owners import run_owner
+from sprag.service.storage.part import SystemClock
+from sprag.service.storage.room import GOES_ON
+from sprag.service.storage.session import lock_of
+from sprag.service.storage.store import Store
+from sprag.worker.chunking import Chunking
+from sprag.worker.dispatcher import Dispatcher
+from sprag.worker.executors.inline import InlineExecutor
+from sprag.worker.models import estimate_seconds_per_case, study_results
+from sprag.worker.ports import ExecutorError, StoreError
+from sprag.worker.states import StudyState, TransitionError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
     from datetime import datetime
 
-    from service.storage.records import Progress, StudyRecord
-    from worker.ports import Executor
-    from worker.study import Study
+    from sprag.service.storage.records import Progress, StudyRecord
+    from sprag.worker.ports import Executor
+    from sprag.worker.study import Study
 
 _FOLDER_PREFIX = "sprag-run-"
 #: What the reason of a study that is held for want of room ends with; true of services, and not here.

@@ -15,15 +15,15 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from service.schedules.times import Timing, read_time_of_day
-from service.stale_files import sweep
-from service.storage.clock_watch import ClockWatch
-from service.storage.errors import StoreError
-from service.storage.maintenance import PART_SUFFIX
-from service.storage.private_files import PRIVATE_FOLDER_MODE
+from sprag.service.schedules.times import Timing, read_time_of_day
+from sprag.service.stale_files import sweep
+from sprag.service.storage.clock_watch import ClockWatch
+from sprag.service.storage.errors import StoreError
+from sprag.service.storage.maintenance import PART_SUFFIX
+from sprag.service.storage.private_files import PRIVATE_FOLDER_MODE
 
 if TYPE_CHECKING:
-    from service.storage.store import Store
+    from sprag.service.storage.store import Store
 
 _LOG = logging.getLogger("sprag.maintenance")
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from service.results.fits import fit_json
-from service.schedules.deadline import finish_warnings
-from service.spec.catalogue import axes_json
-from worker import models
-from worker.chunking import work_of
+from sprag.service.results.fits import fit_json
+from sprag.service.schedules.deadline import finish_warnings
+from sprag.service.spec.catalogue import axes_json
+from sprag.worker import models
+from sprag.worker.chunking import work_of
 
 if TYPE_CHECKING:
-    from service.spec.document import ParsedSpec
-    from worker.chunking import Chunking
-    from worker.study import Study
+    from sprag.service.spec.document import ParsedSpec
+    from sprag.worker.chunking import Chunking
+    from sprag.worker.study import Study
 
 _FIRST_CASES = 5
 #: Bytes of a row beside its results: key, case number, ending, flags and SQLite's own header.

@@ -11,14 +11,14 @@ import threading
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
-from service.storage.errors import StoreError
-from worker.states import StudyState
+from sprag.service.storage.errors import StoreError
+from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from service.storage.schedules import OpenRun, ScheduleRecord
-    from service.storage.store import Store
+    from sprag.service.storage.schedules import OpenRun, ScheduleRecord
+    from sprag.service.storage.store import Store
 
 _LOG = logging.getLogger("sprag.schedules")
 
@@ -103,10 +103,10 @@ class Scheduler(threading.Thread):
     def _submit(self, run: OpenRun) -> None:
         from dataclasses import replace
 
-        from service.faults import FaultError
-        from service.jobs.submission import accept
-        from service.spec.document import parse_spec
-        from service.spec.report import SpecError
+        from sprag.service.faults import FaultError
+        from sprag.service.jobs.submission import accept
+        from sprag.service.spec.document import parse_spec
+        from sprag.service.spec.report import SpecError
 
         try:
             parsed = parse_spec(run.fields.spec)
@@ -133,7 +133,7 @@ class Scheduler(threading.Thread):
 
 def _finish_of(run: OpenRun) -> datetime | None:
     """The deadline of a run; None where it has none."""
-    from service.schedules.deadline import run_finish_at
+    from sprag.service.schedules.deadline import run_finish_at
 
     text = run.fields.finish_by
     return None if text is None else run_finish_at(text, run.fields.timing.zone, run.begun_at)

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
-from worker.models import MACHINE_SHAFT, OK, run_chunk, study_results
-from worker.study import Study
+from sprag.worker.models import MACHINE_SHAFT, OK, run_chunk, study_results
+from sprag.worker.study import Study
 
 #: Largest relative difference that is sound.
 TOLERANCE = 1e-8

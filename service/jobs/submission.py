@@ -7,22 +7,22 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from service.faults import FaultError
-from service.jobs.preview import estimated_bytes, estimated_seconds
-from service.schedules.deadline import finish_warnings
-from service.storage.room import RESERVE_BYTES
-from service.storage.studies import study_row
-from worker.limits import MAX_WAITING_STUDIES
+from sprag.service.faults import FaultError
+from sprag.service.jobs.preview import estimated_bytes, estimated_seconds
+from sprag.service.schedules.deadline import finish_warnings
+from sprag.service.storage.room import RESERVE_BYTES
+from sprag.service.storage.studies import study_row
+from sprag.worker.limits import MAX_WAITING_STUDIES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from datetime import datetime
 
-    from service.spec.document import ParsedSpec
-    from service.storage.records import StudyRecord
-    from service.storage.store import Store
-    from worker.chunking import Chunking
-    from worker.study import Study
+    from sprag.service.spec.document import ParsedSpec
+    from sprag.service.storage.records import StudyRecord
+    from sprag.service.storage.store import Store
+    from sprag.worker.chunking import Chunking
+    from sprag.worker.study import Study
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class Submission:
     Attributes
     ----------
     row : dict
-        See `service.storage.studies.study_row`.
+        See `sprag.service.storage.studies.study_row`.
     body_hash : str
         Of the spec and the parameters of the request, for the idempotency key.
     bytes : int

@@ -15,18 +15,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from service.faults import ErrorItem
-from service.results.selection import Fixed, SelectionError, axis_name, held_text, listed, locate_axes, require_axis
-from service.spec.catalogue import result_of, unit_of, unknown_result
-from worker import models
-from worker.codes import PENDING
-from worker.limits import MAX_CURVE_VALUES
-from worker.models import WorkerEnding, regime_info
+from sprag.service.faults import ErrorItem
+from sprag.service.results.selection import (
+    Fixed,
+    SelectionError,
+    axis_name,
+    held_text,
+    listed,
+    locate_axes,
+    require_axis,
+)
+from sprag.service.spec.catalogue import result_of, unit_of, unknown_result
+from sprag.worker import models
+from sprag.worker.codes import PENDING
+from sprag.worker.limits import MAX_CURVE_VALUES
+from sprag.worker.models import WorkerEnding, regime_info
 
 if TYPE_CHECKING:
-    from service.storage.records import CaseColumns
-    from worker.models import ResultInfo
-    from worker.study import Study
+    from sprag.service.storage.records import CaseColumns
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Study
 
 #: Results of cases, aligned with them: (case numbers, result names) -> columns.
 Fetch = Callable[[NDArray[np.int64], Sequence[str]], "CaseColumns"]

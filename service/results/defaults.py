@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from service.results.curves import CurveQuery
-from service.results.selection import axis_name, held_text
-from service.spec.catalogue import unit_of
-from worker import models
+from sprag.service.results.curves import CurveQuery
+from sprag.service.results.selection import axis_name, held_text
+from sprag.service.spec.catalogue import unit_of
+from sprag.worker import models
 
 if TYPE_CHECKING:
-    from worker.models import ResultInfo
-    from worker.study import Axis, Study
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Axis, Study
 
 #: Curves that can be told apart by colour.
 _MOST_CURVES: Final = 8

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from service.faults import FaultError
-from service.json_text import to_bytes
-from service.results.exports import table_csv
-from worker import models
+from sprag.service.faults import FaultError
+from sprag.service.json_text import to_bytes
+from sprag.service.results.exports import table_csv
+from sprag.worker import models
 
 if TYPE_CHECKING:
-    from service.results.exports import Format
-    from worker.models import Engagements
-    from worker.study import Study
+    from sprag.service.results.exports import Format
+    from sprag.worker.models import Engagements
+    from sprag.worker.study import Study
 
 Table = Literal["engagements", "periods"]
 TABLES: Final[tuple[Table, ...]] = ("engagements", "periods")

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-from service.spec.fields import placed, read_number, read_object
-from service.spec.machine.clutch import read_clutch
-from service.spec.report import Report
-from worker import models
+from sprag.service.spec.fields import placed, read_number, read_object
+from sprag.service.spec.machine.clutch import read_clutch
+from sprag.service.spec.report import Report
+from sprag.worker import models
 
 if TYPE_CHECKING:
-    from worker.models import ClutchFit
+    from sprag.worker.models import ClutchFit
 
 #: Fields of a request for a fit.
 REQUEST_FIELDS: Final = ("data", "accuracy", "max_degree", "through_origin", "angles_include_backlash", "backlash")

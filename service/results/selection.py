@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from service.faults import ErrorItem, shown
-from service.spec.catalogue import unit_of
-from service.spec.report import did_you_mean, quantity_text
-from service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
-from worker.study import SAME_VALUE
+from sprag.service.faults import ErrorItem, shown
+from sprag.service.spec.catalogue import unit_of
+from sprag.service.spec.report import did_you_mean, quantity_text
+from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
+from sprag.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
-    from worker.study import Axis, Study
+    from sprag.worker.study import Axis, Study
 
 #: Fixed axes: position of the axis -> (the path it was named by, position of the value on it).
 Fixed = dict[int, tuple[str, int]]

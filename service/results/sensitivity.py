@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from service.faults import ErrorItem
-from service.results.curves import Fetch, numbers
-from service.results.selection import SelectionError, axis_name, listed
-from service.results.sensitivity_design import (
+from sprag.service.faults import ErrorItem
+from sprag.service.results.curves import Fetch, numbers
+from sprag.service.results.selection import SelectionError, axis_name, listed
+from sprag.service.results.sensitivity_design import (
     factorial_table,
     going_together,
     is_factorial,
@@ -27,14 +27,14 @@ from service.results.sensitivity_design import (
     scattered,
     why_no_shares,
 )
-from service.spec.catalogue import result_of, unit_of, unknown_result
-from worker import models
+from sprag.service.spec.catalogue import result_of, unit_of, unknown_result
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from worker.models import ResultInfo
-    from worker.study import Axis, Study
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Axis, Study
 
     Numbers = NDArray[np.float64]
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from service.faults import parameter_error, shown
-from service.json_text import to_bytes
-from service.results.curves import numbers
-from service.results.exports import table_csv
-from service.spec.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
-from worker import models
+from sprag.service.faults import parameter_error, shown
+from sprag.service.json_text import to_bytes
+from sprag.service.results.curves import numbers
+from sprag.service.results.exports import table_csv
+from sprag.service.spec.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
+from sprag.worker import models
 
 if TYPE_CHECKING:
-    from service.results.exports import Format
-    from worker.models import Extent, Trajectory
-    from worker.study import Study
+    from sprag.service.results.exports import Format
+    from sprag.worker.models import Extent, Trajectory
+    from sprag.worker.study import Study
 
 
 def span(study: Study, case: int, start: str | None, end: str | None) -> tuple[float, float]:

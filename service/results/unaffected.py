@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from service.results.curves import Fetch
-from worker import models
+from sprag.service.results.curves import Fetch
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from service.storage.records import StudyRecord
-    from service.storage.store import Store
-    from worker.study import Study
+    from sprag.service.storage.records import StudyRecord
+    from sprag.service.storage.store import Store
+    from sprag.worker.study import Study
 
     Cases = NDArray[np.int64]
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from markupsafe import Markup
 
-from worker import models
+from sprag.worker import models
 
 #: Narrow blank without a line break: between thousands, as ISO 80000 writes them.
 _THIN: Final = "\N{NARROW NO-BREAK SPACE}"

@@ -6,13 +6,13 @@ from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Final
 from zoneinfo import ZoneInfo
 
-from service.schedules.times import TimingError, read_time_of_day
-from service.spec.units import QuantityError, parse_quantity
-from worker.limits import MAX_FINISH_DAYS
-from worker.order import coverage, order_of
+from sprag.service.schedules.times import TimingError, read_time_of_day
+from sprag.service.spec.units import QuantityError, parse_quantity
+from sprag.worker.limits import MAX_FINISH_DAYS
+from sprag.worker.order import coverage, order_of
 
 if TYPE_CHECKING:
-    from worker.study import Study
+    from sprag.worker.study import Study
 
 #: Least time that a deadline leaves, in s: a shorter one is a slip.
 _LEAST_SECONDS: Final = 1.0

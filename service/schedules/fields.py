@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 from zoneinfo import ZoneInfo
 
-from service.schedules.deadline import ALLOWED_OF_RUNS, FinishError, check_run_finish
-from service.schedules.times import Timing, TimingError, Window, check_cron, read_moment, read_time_of_day, zones
-from service.spec.document import parse_spec
-from service.spec.fields import read_flag, read_object, read_whole
-from service.spec.report import Problem, Report, SpecError, did_you_mean
-from worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
+from sprag.service.schedules.deadline import ALLOWED_OF_RUNS, FinishError, check_run_finish
+from sprag.service.schedules.times import Timing, TimingError, Window, check_cron, read_moment, read_time_of_day, zones
+from sprag.service.spec.document import parse_spec
+from sprag.service.spec.fields import read_flag, read_object, read_whole
+from sprag.service.spec.report import Problem, Report, SpecError, did_you_mean
+from sprag.worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -6,13 +6,13 @@ import re
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from service.spec.fields import placed
-from service.spec.report import did_you_mean
-from worker import models
-from worker.models import Parameter, ResultInfo
+from sprag.service.spec.fields import placed
+from sprag.service.spec.report import did_you_mean
+from sprag.worker import models
+from sprag.worker.models import Parameter, ResultInfo
 
 if TYPE_CHECKING:
-    from worker.study import Study
+    from sprag.worker.study import Study
 
 _INDEX = re.compile(r"\.(\d+)(?=\.|$)")
 

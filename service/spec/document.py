@@ -11,18 +11,18 @@ from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
-from service.spec.axes.design import read_design
-from service.spec.fields import read_object
-from service.spec.machine.registry import part_of
-from service.spec.report import Problem, Report, SpecError, did_you_mean
-from service.spec.text import Format, load_spec
-from worker import models
-from worker.limits import MAX_NAME_LENGTH
-from worker.study import Study
+from sprag.service.spec.axes.design import read_design
+from sprag.service.spec.fields import read_object
+from sprag.service.spec.machine.registry import part_of
+from sprag.service.spec.report import Problem, Report, SpecError, did_you_mean
+from sprag.service.spec.text import Format, load_spec
+from sprag.worker import models
+from sprag.worker.limits import MAX_NAME_LENGTH
+from sprag.worker.study import Study
 
 if TYPE_CHECKING:
-    from service.spec.machine.machine import Machine
-    from worker.models import ClutchFit
+    from sprag.service.spec.machine.machine import Machine
+    from sprag.worker.models import ClutchFit
 
 __all__ = ["VERSION", "ParsedSpec", "Problem", "SpecError", "format_of", "load_spec", "parse_spec"]
 

@@ -9,15 +9,15 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
-from service.spec.axes.axes import axis_values
-from service.spec.document import ParsedSpec, parse_spec
-from service.spec.fields import read_object
-from service.spec.machine.registry import part_of
-from service.spec.report import Problem, Report, SpecError, join, quantity_text
+from sprag.service.spec.axes.axes import axis_values
+from sprag.service.spec.document import ParsedSpec, parse_spec
+from sprag.service.spec.fields import read_object
+from sprag.service.spec.machine.registry import part_of
+from sprag.service.spec.report import Problem, Report, SpecError, join, quantity_text
 
 if TYPE_CHECKING:
-    from service.spec.machine.machine import Machine
-    from worker.study import Study
+    from sprag.service.spec.machine.machine import Machine
+    from sprag.worker.study import Study
 
 FIELDS: Final = ("axes", "cases", "name")
 

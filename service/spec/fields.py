@@ -7,9 +7,9 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
-from service.spec.report import Report, join
-from service.spec.units import QuantityError, example, parse_exact, to_float
-from worker.models import Parameter
+from sprag.service.spec.report import Report, join
+from sprag.service.spec.units import QuantityError, example, parse_exact, to_float
+from sprag.worker.models import Parameter
 
 
 def coefficient_unit(index: int) -> str:

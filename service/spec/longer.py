@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from service.spec.run import TIMED_FIELDS
-from worker.limits import MAX_NAME_LENGTH, MAX_SETTLED_PERIODS
-from worker.models import SETTLED
+from sprag.service.spec.run import TIMED_FIELDS
+from sprag.worker.limits import MAX_NAME_LENGTH, MAX_SETTLED_PERIODS
+from sprag.worker.models import SETTLED
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from worker.study import Study
+    from sprag.worker.study import Study
 
 #: How many times as long a search may take by default.
 TIMES: Final = 4

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from service.spec.numbers import parse_number
-from service.spec.report import Problem
-from worker.limits import MAX_CLUTCH_ROWS
+from sprag.service.spec.numbers import parse_number
+from sprag.service.spec.report import Problem
+from sprag.worker.limits import MAX_CLUTCH_ROWS
 
 #: Problems told of one file; a file of another kind has one in every line.
 _MAX_PROBLEMS = 20

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from service.faults import ErrorItem
-from worker.limits import MAX_PROBLEMS
+from sprag.service.faults import ErrorItem
+from sprag.worker.limits import MAX_PROBLEMS
 
 _LONGEST_TEXT = 60
 _LONGEST_LIST = 6

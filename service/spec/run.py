@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from service.spec.fields import read_object, read_whole
-from service.spec.report import Report, did_you_mean, join
-from service.spec.units import PERIOD_NAMES, QuantityError, exact_number, parse_exact, split_quantity, to_float
-from worker.limits import (
+from sprag.service.spec.fields import read_object, read_whole
+from sprag.service.spec.report import Report, did_you_mean, join
+from sprag.service.spec.units import PERIOD_NAMES, QuantityError, exact_number, parse_exact, split_quantity, to_float
+from sprag.worker.limits import (
     MAX_ORBIT_PERIODS,
     MAX_RUN_PERIODS,
     MAX_SETTLED,
@@ -18,7 +18,7 @@ from worker.limits import (
     MIN_SETTLED_PERIODS,
     MIN_TOLERANCE,
 )
-from worker.models import MEANS_FROM_PERIODS, SETTLED
+from sprag.worker.models import MEANS_FROM_PERIODS, SETTLED
 
 if TYPE_CHECKING:
     import numpy as np

@@ -8,8 +8,8 @@ import re
 import tomllib
 from typing import Any, Final, Literal
 
-from service.spec.report import Problem, Report, SpecError, join
-from worker.limits import MAX_BODY_BYTES, MAX_DEPTH, MAX_INTEGER_DIGITS
+from sprag.service.spec.report import Problem, Report, SpecError, join
+from sprag.worker.limits import MAX_BODY_BYTES, MAX_DEPTH, MAX_INTEGER_DIGITS
 
 _LONGEST_BITS: Final = math.ceil(MAX_INTEGER_DIGITS * math.log2(10))
 

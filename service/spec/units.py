@@ -20,7 +20,7 @@ from typing import Final
 
 import pint
 
-from worker.limits import MAX_QUANTITY_LENGTH
+from sprag.worker.limits import MAX_QUANTITY_LENGTH
 
 #: Words that mean the period of the excitation, for times of a run.
 PERIOD_NAMES: Final = frozenset({"period", "periods", "cycle", "cycles"})

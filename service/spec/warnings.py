@@ -10,10 +10,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from service.spec.axes.axes import varied_values
-from service.spec.report import Report
-from worker.models import machine_shaft
-from worker.study import Axis, Study
+from sprag.service.spec.axes.axes import varied_values
+from sprag.service.spec.report import Report
+from sprag.worker.models import machine_shaft
+from sprag.worker.study import Axis, Study
 
 #: Combinations of the axes involved that are looked at one by one; of more, only the ends of the axes.
 _MOST_COMBINATIONS: Final = 100_000

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sqlalchemy as sa
 
-from service.storage.order import Orders
-from service.storage.part import MAX_INTEGER
-from service.storage.records import CaseColumns, CaseRow, RowBlock
-from service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
-from worker import models
-from worker.models import WorkerEnding, regime_info
-from worker.states import StudyState
+from sprag.service.storage.order import Orders
+from sprag.service.storage.part import MAX_INTEGER
+from sprag.service.storage.records import CaseColumns, CaseRow, RowBlock
+from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
+from sprag.worker import models
+from sprag.worker.models import WorkerEnding, regime_info
+from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

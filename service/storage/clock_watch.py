@@ -12,7 +12,7 @@ from threading import Lock
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from service.storage.store import Store
+    from sprag.service.storage.store import Store
 
 _LOG = logging.getLogger("sprag.clock")
 

@@ -1,6 +1,6 @@
 """What can go wrong with the database, each in one plain sentence."""
 
-from worker.ports import StoreError, StoreFullError
+from sprag.worker.ports import StoreError, StoreFullError
 
 __all__ = [
     "DatabaseBusyError",

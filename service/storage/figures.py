@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import sqlalchemy as sa
 
-from service.storage.part import EPOCH, Part, moment
-from service.storage.tables import CHUNKS, DISPATCHER, ENDINGS, HELD_AT_DEADLINE, STUDIES
-from worker.states import TERMINAL
+from sprag.service.storage.part import EPOCH, Part, moment
+from sprag.service.storage.tables import CHUNKS, DISPATCHER, ENDINGS, HELD_AT_DEADLINE, STUDIES
+from sprag.worker.states import TERMINAL
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -10,8 +10,8 @@ import socket
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
-from service.storage.private_files import create_private
-from worker.pool.process_table import start_time
+from sprag.service.storage.private_files import create_private
+from sprag.worker.pool.process_table import start_time
 
 if TYPE_CHECKING:
     pass

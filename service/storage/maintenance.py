@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING
 
 import sqlalchemy as sa
 
-from service.stale_files import mark, sweep
-from service.storage.errors import DatabaseError, SchemaError
-from service.storage.private_files import create_private, sync_folder
-from service.storage.records import CheckReport
-from service.storage.session import damaged, sqlite_version, sqlite_warning
-from service.storage.tables import HEAD_REVISION
+from sprag.service.stale_files import mark, sweep
+from sprag.service.storage.errors import DatabaseError, SchemaError
+from sprag.service.storage.private_files import create_private, sync_folder
+from sprag.service.storage.records import CheckReport
+from sprag.service.storage.session import damaged, sqlite_version, sqlite_warning
+from sprag.service.storage.tables import HEAD_REVISION
 
 if TYPE_CHECKING:
-    from service.storage.session import Session
+    from sprag.service.storage.session import Session
 
 #: Bytes of a database up to which it is looked over at every start: that takes less than a second.
 CHECKED_BYTES = 256_000_000
@@ -72,7 +72,7 @@ def known_revisions() -> list[str]:
 
 
 def _migrations() -> Path:
-    import migrations
+    from sprag import migrations
 
     return Path(migrations.__path__[0])
 

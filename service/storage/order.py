@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import sqlalchemy as sa
 
-from service.storage.part import Part
-from service.storage.tables import CHUNKS, STUDIES
-from worker.order import coverage, order_of
-from worker.study import Study
+from sprag.service.storage.part import Part
+from sprag.service.storage.tables import CHUNKS, STUDIES
+from sprag.worker.order import coverage, order_of
+from sprag.worker.study import Study
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from service.storage.session import Session
-    from worker.order import Coverage, Order
-    from worker.ports import Chunk, Clock
+    from sprag.service.storage.session import Session
+    from sprag.worker.order import Coverage, Order
+    from sprag.worker.ports import Chunk, Clock
 
 #: Studies whose orders are kept in memory; each is a few numbers for every value of an axis, or of the list.
 _KEPT: Final = 16

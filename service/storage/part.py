@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
 
-from service.storage.errors import StudyNotFound
-from service.storage.tables import DISPATCHER, STUDIES
-from worker.ports import EpochLostError
-from worker.states import StudyEvent, StudyState, follow
+from sprag.service.storage.errors import StudyNotFound
+from sprag.service.storage.tables import DISPATCHER, STUDIES
+from sprag.worker.ports import EpochLostError
+from sprag.worker.states import StudyEvent, StudyState, follow
 
 if TYPE_CHECKING:
-    from service.storage.session import Session
-    from worker.ports import Clock
+    from sprag.service.storage.session import Session
+    from sprag.worker.ports import Clock
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 

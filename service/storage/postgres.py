@@ -14,7 +14,7 @@ import psycopg
 import sqlalchemy as sa
 from sqlalchemy.engine import URL
 
-from service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError
+from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -98,7 +98,7 @@ def estimate(
     cases_done : int, optional
         Cases with an ending; those of ``recent`` unless given.
     sampled : bool
-        Whether the cases that are done lie among those that are left (`worker.order`).
+        Whether the cases that are done lie among those that are left (`sprag.worker.order`).
     """
     if not recent:
         return None, None

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 import sqlalchemy as sa
 
-from service.storage.part import Part
-from service.storage.tables import CHUNKS, STUDIES, results_table
+from sprag.service.storage.part import Part
+from sprag.service.storage.tables import CHUNKS, STUDIES, results_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -6,13 +6,13 @@ from contextlib import suppress
 from threading import Lock
 from typing import TYPE_CHECKING, Final
 
-from service.storage.clock_watch import clock_problem
-from service.storage.errors import DatabaseError
-from service.storage.part import SILENT_SECONDS
-from worker.ports import StoreError
+from sprag.service.storage.clock_watch import clock_problem
+from sprag.service.storage.errors import DatabaseError
+from sprag.service.storage.part import SILENT_SECONDS
+from sprag.worker.ports import StoreError
 
 if TYPE_CHECKING:
-    from service.storage.store import Store
+    from sprag.service.storage.store import Store
 
 #: Seconds that the write lock may be held by others: far longer than any write transaction of Sprag takes.
 LOCKED_SECONDS: Final = 5.0

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
-from service.storage.part import moment, optional_moment
-from service.storage.tables import HELD_AT_DEADLINE
-from worker.states import StudyState
+from sprag.service.storage.part import moment, optional_moment
+from sprag.service.storage.tables import HELD_AT_DEADLINE
+from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     import sqlalchemy as sa
     from numpy.typing import NDArray
 
-    from worker.models import ResultInfo
-    from worker.order import Coverage
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.order import Coverage
 
 
 @dataclass(frozen=True, slots=True)

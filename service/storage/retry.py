@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sqlalchemy as sa
 
-from service.storage.errors import NothingToRetry
-from service.storage.order import Orders
-from service.storage.records import StudyRecord, record_of
-from service.storage.tables import CHUNKS, ENDINGS, RECORD_COLUMNS, STUDIES, results_table
-from worker import models
-from worker.chunking import MAX_CHUNKS
-from worker.states import StudyEvent, StudyState, follow
+from sprag.service.storage.errors import NothingToRetry
+from sprag.service.storage.order import Orders
+from sprag.service.storage.records import StudyRecord, record_of
+from sprag.service.storage.tables import CHUNKS, ENDINGS, RECORD_COLUMNS, STUDIES, results_table
+from sprag.worker import models
+from sprag.worker.chunking import MAX_CHUNKS
+from sprag.worker.states import StudyEvent, StudyState, follow
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from worker.order import Order
+    from sprag.worker.order import Order
 
 #: First and number of chunk places that follow one another: case numbers, or positions in the study's order.
 Run = tuple[int, int]

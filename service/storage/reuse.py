@@ -11,22 +11,22 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import sqlalchemy as sa
 
-from service.storage.cases import conditions
-from service.storage.order import Orders
-from service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, results_table
-from worker import fingerprint, models
-from worker.models import WorkerEnding
-from worker.order import order_of
-from worker.ports import Known
-from worker.reuse import Wanted, kin_hash, shared_cases, span
-from worker.states import StudyState
-from worker.study import Study
+from sprag.service.storage.cases import conditions
+from sprag.service.storage.order import Orders
+from sprag.service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, results_table
+from sprag.worker import fingerprint, models
+from sprag.worker.models import WorkerEnding
+from sprag.worker.order import order_of
+from sprag.worker.ports import Known
+from sprag.worker.reuse import Wanted, kin_hash, shared_cases, span
+from sprag.worker.states import StudyState
+from sprag.worker.study import Study
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from service.storage.session import Session
-    from worker.ports import Chunk, Clock
+    from sprag.service.storage.session import Session
+    from sprag.worker.ports import Chunk, Clock
 
     Cases = NDArray[np.int64]
 

@@ -15,17 +15,17 @@ from typing import TYPE_CHECKING
 
 import sqlalchemy as sa
 
-from service.storage.errors import DatabaseFullError
-from service.storage.part import Part
-from service.storage.private_files import create_private
-from service.storage.tables import STUDIES, WAITS_FOR_ROOM
-from service.storage.work import return_claims
-from worker.states import StudyEvent, StudyState
+from sprag.service.storage.errors import DatabaseFullError
+from sprag.service.storage.part import Part
+from sprag.service.storage.private_files import create_private
+from sprag.service.storage.tables import STUDIES, WAITS_FOR_ROOM
+from sprag.service.storage.work import return_claims
+from sprag.worker.states import StudyEvent, StudyState
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from service.storage.session import Session
+    from sprag.service.storage.session import Session
 
 #: Bytes kept free for the chunks that are being run, and for saying that nothing more is.
 RESERVE_BYTES = 4 * 1024 * 1024
@@ -82,7 +82,7 @@ def _within(session: Session) -> tuple[int, int]:
 
 
 class Room(Part):
-    """Studies held while the disk is full. Part of `worker.ports.Store`."""
+    """Studies held while the disk is full. Part of `sprag.worker.ports.Store`."""
 
     def room(self) -> int:
         """Bytes that the database can still take."""

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from service.storage.tables import KEY_COLUMNS, results_table
-from worker import models
+from sprag.service.storage.tables import KEY_COLUMNS, results_table
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from worker.models import ChunkResult
+    from sprag.worker.models import ChunkResult
 
 
 @lru_cache(maxsize=64)

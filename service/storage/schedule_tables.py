@@ -1,8 +1,8 @@
-"""The tables of schedules. Times are microseconds since 1970-01-01 UTC, as in `service.storage.tables`."""
+"""The tables of schedules. Times are microseconds since 1970-01-01 UTC, as in `sprag.service.storage.tables`."""
 
 import sqlalchemy as sa
 
-from service.storage.tables import METADATA
+from sprag.service.storage.tables import METADATA
 
 SCHEDULES = sa.Table(
     "schedules",

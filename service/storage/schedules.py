@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
-from service.schedules.fields import ScheduleFields
-from service.schedules.times import Timing, Window, read_time_of_day
-from service.storage.errors import IdempotencyConflict, ScheduleNotFound, TooManySchedules
-from service.storage.part import EPOCH, Part, moment, optional_moment
-from service.storage.schedule_tables import SCHEDULE_RUNS, SCHEDULES
-from service.storage.tables import STUDIES, WAITS_FOR_WINDOW
-from worker.limits import MAX_SCHEDULES
-from worker.states import TERMINAL, StudyEvent, StudyState
+from sprag.service.schedules.fields import ScheduleFields
+from sprag.service.schedules.times import Timing, Window, read_time_of_day
+from sprag.service.storage.errors import IdempotencyConflict, ScheduleNotFound, TooManySchedules
+from sprag.service.storage.part import EPOCH, Part, moment, optional_moment
+from sprag.service.storage.schedule_tables import SCHEDULE_RUNS, SCHEDULES
+from sprag.service.storage.tables import STUDIES, WAITS_FOR_WINDOW
+from sprag.worker.limits import MAX_SCHEDULES
+from sprag.worker.states import TERMINAL, StudyEvent, StudyState
 
 if TYPE_CHECKING:
     from datetime import datetime

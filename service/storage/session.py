@@ -1,6 +1,6 @@
 """Opening the database: driver, pragmas, transactions, and one sentence for whatever fails.
 
-What is particular to a PostgreSQL server is in `service.storage.postgres`; here are SQLite's files.
+What is particular to a PostgreSQL server is in `sprag.service.storage.postgres`; here are SQLite's files.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 from sqlalchemy.engine import URL, make_url
 
-from service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError, EndingError
-from service.storage.lock import DispatcherLock
-from service.storage.private_files import PRIVATE_FOLDER_MODE, create_private
-from worker.ports import StoreError
+from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError, EndingError
+from sprag.service.storage.lock import DispatcherLock
+from sprag.service.storage.private_files import PRIVATE_FOLDER_MODE, create_private
+from sprag.worker.ports import StoreError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from types import ModuleType
 
-    from service.storage.lock import OneHolder
-    from worker.ports import News
+    from sprag.service.storage.lock import OneHolder
+    from sprag.worker.ports import News
 
 #: Seconds a connection waits for another writer before it gives up.
 BUSY_SECONDS = 30.0
@@ -348,7 +348,7 @@ def damaged(path: Path) -> str:
 def _postgres() -> ModuleType:
     """The module for servers, whose driver is installed only where it is wanted."""
     try:
-        from service.storage import postgres
+        from sprag.service.storage import postgres
     except ImportError:
         raise DatabaseError("PostgreSQL needs a driver that is not installed: pip install 'sprag[postgres]'") from None
     return postgres

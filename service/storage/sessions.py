@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final
 
 import sqlalchemy as sa
 
-from service.storage.part import Part
-from service.storage.tables import METADATA
+from sprag.service.storage.part import Part
+from sprag.service.storage.tables import METADATA
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

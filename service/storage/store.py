@@ -4,27 +4,27 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Self
 
-from service.storage import maintenance
-from service.storage.cases import Cases
-from service.storage.figures import Totals
-from service.storage.part import SystemClock
-from service.storage.purging import Purging
-from service.storage.retry import Retries
-from service.storage.room import Room
-from service.storage.schedules import Schedules
-from service.storage.session import Session
-from service.storage.sessions import Sessions
-from service.storage.studies import Studies
-from service.storage.tokens import Tokens
-from service.storage.work import Work
-from worker.chunking import Chunking
+from sprag.service.storage import maintenance
+from sprag.service.storage.cases import Cases
+from sprag.service.storage.figures import Totals
+from sprag.service.storage.part import SystemClock
+from sprag.service.storage.purging import Purging
+from sprag.service.storage.retry import Retries
+from sprag.service.storage.room import Room
+from sprag.service.storage.schedules import Schedules
+from sprag.service.storage.session import Session
+from sprag.service.storage.sessions import Sessions
+from sprag.service.storage.studies import Studies
+from sprag.service.storage.tokens import Tokens
+from sprag.service.storage.work import Work
+from sprag.worker.chunking import Chunking
 
 if TYPE_CHECKING:
     from pathlib import Path
     from types import TracebackType
 
-    from service.storage.records import CheckReport
-    from worker.ports import Clock
+    from sprag.service.storage.records import CheckReport
+    from sprag.worker.ports import Clock
 
 
 class Store(Studies, Purging, Retries, Cases, Room, Schedules, Sessions, Tokens, Totals, Work):

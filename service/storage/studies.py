@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
 
-from service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyEnded, StudyNotFound
-from service.storage.order import Orders
-from service.storage.part import MAX_INTEGER, SILENT_SECONDS, announce, micros_of, moment, optional_moment
-from service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
-from service.storage.records import Progress, StudyPage, StudyRecord, record_of
-from service.storage.schedules import unbind
-from service.storage.tables import (
+from sprag.service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyEnded, StudyNotFound
+from sprag.service.storage.order import Orders
+from sprag.service.storage.part import MAX_INTEGER, SILENT_SECONDS, announce, micros_of, moment, optional_moment
+from sprag.service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
+from sprag.service.storage.records import Progress, StudyPage, StudyRecord, record_of
+from sprag.service.storage.schedules import unbind
+from sprag.service.storage.tables import (
     CHUNKS,
     DISPATCHER,
     ENDINGS,
@@ -29,19 +29,19 @@ from service.storage.tables import (
     STUDIES,
     WAITS_FOR_WINDOW,
 )
-from worker import models
-from worker.chunking import Chunking, spans
-from worker.limits import MAX_AXIS_VALUES
-from worker.reuse import kin_hash
-from worker.states import TERMINAL, StudyEvent, StudyState
-from worker.study import Study
+from sprag.worker import models
+from sprag.worker.chunking import Chunking, spans
+from sprag.worker.limits import MAX_AXIS_VALUES
+from sprag.worker.reuse import kin_hash
+from sprag.worker.states import TERMINAL, StudyEvent, StudyState
+from sprag.worker.study import Study
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from datetime import datetime
 
-    from service.storage.session import Session
-    from worker.ports import Clock
+    from sprag.service.storage.session import Session
+    from sprag.worker.ports import Clock
 
 MAX_PAGE = 1000
 #: Studies kept in memory after they were read, and the values of their axes in all, 8 bytes each.
@@ -58,7 +58,7 @@ class Studies(Orders):
         self._studies: OrderedDict[str, Study] = OrderedDict()
         self._lock = Lock()
         self._reading = RLock()
-        #: Set when a study is deleted, for `service.jobs.housekeeping`.
+        #: Set when a study is deleted, for `sprag.service.jobs.housekeeping`.
         self.deleted = Event()
 
     def create_study(

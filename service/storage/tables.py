@@ -4,7 +4,7 @@ from functools import cache
 
 import sqlalchemy as sa
 
-from worker import models
+from sprag.worker import models
 
 #: Revision of the schema below; the last file in migrations/versions.
 HEAD_REVISION = "0015"
@@ -48,7 +48,7 @@ STUDIES = sa.Table(
     sa.Column("priority", sa.Integer, nullable=False, server_default="0"),
     # What a paused study waits for (`WAITS_FOR_ROOM` and below); NULL where somebody paused it, or a fault.
     sa.Column("waits_for", sa.String(12)),
-    # Equal for studies that may have cases in common (`worker.reuse`).
+    # Equal for studies that may have cases in common (`sprag.worker.reuse`).
     sa.Column("kin_hash", sa.String(64), nullable=False, server_default="", index=True),
     # 1: every case is run, whatever other studies have.
     sa.Column("fresh", sa.Integer, nullable=False, server_default="0"),
@@ -56,9 +56,9 @@ STUDIES = sa.Table(
     sa.Column("reused", sa.Integer, nullable=False, server_default="0"),
     # When the study is held, whatever is done then; NULL where it takes as long as it takes.
     sa.Column("finish_by", sa.BigInteger),
-    # 1: it is run coarse to fine, and its chunks are ranges of positions in that order (`worker.order`).
+    # 1: it is run coarse to fine, and its chunks are ranges of positions in that order (`sprag.worker.order`).
     sa.Column("coarse", sa.Integer, nullable=False, server_default="0"),
-    # Of the processes that computed its rows (`worker.fingerprint`); NULL: no rows yet, "": unknown, or several.
+    # Of the processes that computed its rows (`sprag.worker.fingerprint`); NULL: no rows yet, "": unknown, or several.
     sa.Column("fingerprint", sa.String(64)),
     sqlite_autoincrement=True,
 )

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Final
 
 import sqlalchemy as sa
 
-from service.storage.errors import TokenNotFound
-from service.storage.part import Part, moment, optional_moment
-from service.storage.scopes import TokenScope
-from service.storage.tables import METADATA
+from sprag.service.storage.errors import TokenNotFound
+from sprag.service.storage.part import Part, moment, optional_moment
+from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.tables import METADATA
 
 if TYPE_CHECKING:
     from datetime import datetime

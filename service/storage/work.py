@@ -1,4 +1,4 @@
-"""The dispatcher's side of the store: epochs, claims, rows. Implements `worker.ports.Store`."""
+"""The dispatcher's side of the store: epochs, claims, rows. Implements `sprag.worker.ports.Store`."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import sqlalchemy as sa
 
-from service.storage.owners import own_study, why_abandoned
-from service.storage.part import micros_of, moment, optional_moment
-from service.storage.records import DispatcherRecord
-from service.storage.reuse import Reuse, copy_rows, endings_of, mark_origin
-from service.storage.rows import target, tuples, without_collector
-from service.storage.tables import (
+from sprag.service.storage.owners import own_study, why_abandoned
+from sprag.service.storage.part import micros_of, moment, optional_moment
+from sprag.service.storage.records import DispatcherRecord
+from sprag.service.storage.reuse import Reuse, copy_rows, endings_of, mark_origin
+from sprag.service.storage.rows import target, tuples, without_collector
+from sprag.service.storage.tables import (
     CHUNKS,
     DISPATCHER,
     ENDINGS,
@@ -22,17 +22,17 @@ from service.storage.tables import (
     STUDIES,
     WAITS_FOR_ROOM,
 )
-from worker import models
-from worker.models import ChunkResult
-from worker.ports import ActiveStudy, Chunk
-from worker.states import TERMINAL, StudyEvent, StudyState
-from worker.study import Study
+from sprag.worker import models
+from sprag.worker.models import ChunkResult
+from sprag.worker.ports import ActiveStudy, Chunk
+from sprag.worker.states import TERMINAL, StudyEvent, StudyState
+from sprag.worker.study import Study
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from datetime import datetime
 
-    from worker.ports import Known
+    from sprag.worker.ports import Known
 
 _WAITING = {"state": "waiting", "epoch": None, "claimed_at": None}
 _TERMINAL = [state.value for state in TERMINAL]

@@ -24,7 +24,8 @@ SMALL = EXAMPLES / "measured_clutch.json"
 INTERRUPTIBLE = [
     sys.executable,
     "-c",
-    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from service.cli import main; main()",
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "from sprag.service.cli import main; main()",
 ]
 
 

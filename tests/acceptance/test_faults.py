@@ -15,7 +15,7 @@ from benchmarks.faults.disk import file_limit
 from benchmarks.faults.kills import kills
 from benchmarks.faults.powercut import powercut
 from benchmarks.faults.stopped import stopped
-from service.storage.session import sqlite_driver
+from sprag.service.storage.session import sqlite_driver
 from tests.acceptance.processes import sprag
 
 

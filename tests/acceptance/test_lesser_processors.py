@@ -15,8 +15,8 @@ ROOT = Path(__file__).resolve().parents[2]
 _PROGRAM = """
 import sys
 import numpy as np
-from engine.run import Run
-from engine.vibration_drive.simulate import simulate
+from sprag.engine.run import Run
+from sprag.engine.vibration_drive.simulate import simulate
 from tests.engine.vibration_drive.drive import batch_of, drive, periods
 
 loads = np.linspace(0.0, 0.4, 40)

@@ -14,7 +14,7 @@ from packaging.requirements import Requirement
 
 from tests.acceptance.processes import ROOT
 
-PACKAGES = ("sprag", "engine", "worker", "service", "migrations")
+PACKAGES = ("sprag", "engine", "worker", "service", "migrations")  # folders; all are parts of sprag
 #: Extras of the program itself, beside its dependencies.
 RUNTIME = ("tables", "server", "postgres", "cluster")
 CONSTRAINTS = (ROOT / "constraints.txt").read_text()

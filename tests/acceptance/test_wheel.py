@@ -43,7 +43,10 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
         if name.startswith(("sprag/", "engine/", "worker/", "service/", "migrations/", "README.md", "pyproject.toml")):
             target = folder / "sources" / name
             target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes((ROOT / name).read_bytes())
+            if (ROOT / name).is_symlink():
+                target.symlink_to((ROOT / name).readlink())
+            else:
+                target.write_bytes((ROOT / name).read_bytes())
     build = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-index", "--no-build-isolation", "-w", folder]
     done = run(*build, folder / "sources", cwd=folder)
     assert done.returncode == 0, done.stderr
@@ -62,7 +65,9 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     install = [sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index"]
     done = run(*install, "--ignore-installed", wheel, cwd=folder)
     assert done.returncode == 0, done.stderr
-    where = run(python, "-c", "import service, sprag; print(service.__file__, sprag.__file__)", cwd=folder)
+    where = run(
+        python, "-c", "import sprag, sprag.service as service; print(service.__file__, sprag.__file__)", cwd=folder
+    )
     assert where.stdout.count(str(own)) == 2, where
     return folder / "bin"
 
@@ -89,17 +94,27 @@ def test_what_lies_in_the_folder_changes_nothing(installed: Path, hostile: Path,
     assert len((hostile / "rows.csv").read_text().splitlines()) == 1 + 3
 
 
+def test_a_script_in_that_folder_changes_nothing(installed: Path, hostile: Path) -> None:
+    script = hostile / "script.py"
+    run_it = "print(len(sprag.run('study.json', processes=1)), len(sprag.engine.ENGINE_VERSION) > 0)"
+    script.write_text(f"import sprag\n\nif __name__ == '__main__':\n    {run_it}\n")
+    done = run(installed / "python", script, cwd=hostile)
+    assert (done.returncode, done.stdout) == (0, "3 True\n"), done.stderr
+
+
 def test_the_wheel_has_what_the_program_reads(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
         (about,) = (archive.read(name).decode() for name in names if name.endswith(".dist-info/METADATA"))
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     wanted = {
-        name
+        name if name.startswith("sprag/") else f"sprag/{name}"
         for name in listed.split("\0")
         if name.startswith(("sprag/", "engine/", "worker/", "service/", "migrations/"))
+        and not (ROOT / name).is_symlink()
     }
     assert wanted <= names, sorted(wanted - names)
+    assert {name.partition("/")[0] for name in names if ".dist-info/" not in name} == {"sprag"}
     for line in ("Requires-Python: >=3.11", "Provides-Extra: server", "Provides-Extra: tables", "Keywords: "):
         assert line in about
     assert "License" not in about

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from service.storage import session
-from service.storage.store import Store
+from sprag.service.storage import session
+from sprag.service.storage.store import Store
+from sprag.worker.chunking import Chunking
 from tests.worker import fakes
-from worker.chunking import Chunking
 
 
 @pytest.fixture(params=["pysqlite3", "sqlite3", "postgresql"])

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from service.storage.records import StudyRecord
-from service.storage.store import Store
+from sprag.service.storage.records import StudyRecord
+from sprag.service.storage.store import Store
+from sprag.worker import models
 from tests.worker import fakes
-from worker import models
 
 SPEC = {"sprag": 1, "name": "Füllung", "axes": [{"path": "shaft.load", "values": ["0.1 N*m"]}]}
 

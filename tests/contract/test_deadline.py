@@ -9,16 +9,16 @@ from datetime import timedelta
 import numpy as np
 import pytest
 
-from service.storage.errors import NothingToRetry
-from service.storage.records import InTime, StudyRecord
-from service.storage.store import Store
+from sprag.service.storage.errors import NothingToRetry
+from sprag.service.storage.records import InTime, StudyRecord
+from sprag.service.storage.store import Store
+from sprag.worker import models
+from sprag.worker.chunking import Chunking
+from sprag.worker.models import ChunkResult
+from sprag.worker.ports import Chunk
+from sprag.worker.states import StudyState
+from sprag.worker.study import Axis, Study
 from tests.worker import fakes
-from worker import models
-from worker.chunking import Chunking
-from worker.models import ChunkResult
-from worker.ports import Chunk
-from worker.states import StudyState
-from worker.study import Axis, Study
 
 HOUR = timedelta(hours=1)
 #: Nine values: both ends, the middle, the quarters, the eighths.

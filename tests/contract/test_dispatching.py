@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from service.storage.owners import run_owner
-from service.storage.store import Store
-from service.storage.tables import CHUNKS
-from service.storage.work import CLAIMED
+from sprag.service.storage.owners import run_owner
+from sprag.service.storage.store import Store
+from sprag.service.storage.tables import CHUNKS
+from sprag.service.storage.work import CLAIMED
+from sprag.worker.ports import Chunk, EpochLostError
+from sprag.worker.states import StudyState
 from tests.contract.filling import SPEC, create, finish
 from tests.worker import fakes
-from worker.ports import Chunk, EpochLostError
-from worker.states import StudyState
 
 
 def test_claims_are_granted_once_and_only_while_the_study_may_run(store: Store) -> None:

@@ -10,16 +10,16 @@ from typing import Any
 import pytest
 import sqlalchemy as sa
 
-from service.storage import reuse
-from service.storage.records import StudyRecord
-from service.storage.store import Store
-from service.storage.tables import CHUNKS, STUDIES
+from sprag.service.storage import reuse
+from sprag.service.storage.records import StudyRecord
+from sprag.service.storage.store import Store
+from sprag.service.storage.tables import CHUNKS, STUDIES
+from sprag.worker import reuse as physics
+from sprag.worker.chunking import Chunking
+from sprag.worker.states import StudyState
+from sprag.worker.study import Axis, Study
 from tests import postgres
 from tests.worker import fakes
-from worker import reuse as physics
-from worker.chunking import Chunking
-from worker.states import StudyState
-from worker.study import Axis, Study
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from service.storage.store import Store
+from sprag.service.storage.store import Store
+from sprag.worker import models
+from sprag.worker.chunking import Chunking
 from tests.contract.filling import create, finish
 from tests.worker import fakes
-from worker import models
-from worker.chunking import Chunking
 
 
 def test_rows_come_back_bit_for_bit(store: Store) -> None:

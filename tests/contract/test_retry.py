@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.storage.errors import NothingToRetry, StudyNotFound
-from service.storage.records import StudyRecord
-from service.storage.store import Store
+from sprag.service.storage.errors import NothingToRetry, StudyNotFound
+from sprag.service.storage.records import StudyRecord
+from sprag.service.storage.store import Store
+from sprag.worker import models
+from sprag.worker.chunking import Chunking
+from sprag.worker.models import ChunkResult
+from sprag.worker.ports import Chunk
+from sprag.worker.states import StudyState, TransitionError
 from tests import postgres
 from tests.worker import fakes
-from worker import models
-from worker.chunking import Chunking
-from worker.models import ChunkResult
-from worker.ports import Chunk
-from worker.states import StudyState, TransitionError
 
 
 @pytest.fixture(scope="module", params=["sqlite", "postgresql"])

@@ -7,14 +7,14 @@ from functools import partial
 
 import pytest
 
-from service.storage import session
-from service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyNotFound
-from service.storage.store import Store
+from sprag.service.storage import session
+from sprag.service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyNotFound
+from sprag.service.storage.store import Store
+from sprag.worker import models
+from sprag.worker.ports import Chunk
+from sprag.worker.states import StudyState, TransitionError
 from tests.contract.filling import SPEC, create, finish
 from tests.worker import fakes
-from worker import models
-from worker.ports import Chunk
-from worker.states import StudyState, TransitionError
 
 
 def test_a_study_comes_back_as_it_was_given(store: Store) -> None:

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from engine.endings import ENDING_CODES, Ending
-from engine.run import Run, Span
-from engine.vibration_drive.parameters import PARAMETERS
-from engine.vibration_drive.simulate import trajectory
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.run import Run, Span
+from sprag.engine.vibration_drive.parameters import PARAMETERS
+from sprag.engine.vibration_drive.simulate import trajectory
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, clutch, drive, one, pendulum, periods
 
 RUN = periods(6.0, 3.0, 6.0)
@@ -142,7 +142,7 @@ def test_the_step_budget_follows_the_duration() -> None:
 
 def test_a_run_with_more_steps_than_the_least_budget_ends_well(monkeypatch: pytest.MonkeyPatch) -> None:
     """As a run of 300,000 periods does, which takes 7.2 million steps: the duration gives the budget, not the floor."""
-    monkeypatch.setattr("engine.run._LEAST_STEPS", 200)
+    monkeypatch.setattr("sprag.engine.run._LEAST_STEPS", 200)
     row = one(drive(1), periods(30.0, 10.0, 30.0))
     assert row["run.steps"] > 400
     assert Results(drive(1), periods(30.0, 10.0, 30.0, max_steps=200), 1).endings == [Ending.STEP_BUDGET]

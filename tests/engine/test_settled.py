@@ -12,18 +12,18 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.workloads import W1
-from engine.endings import ENDING_CODES, Ending
-from engine.run import Run, SettledRun, Span
-from engine.vibration_drive.cases import case_matrix, with_lengths
-from engine.vibration_drive.characteristics import characteristics, combined
-from engine.vibration_drive.integration import integrate
-from engine.vibration_drive.kernel import kernel, lane_count, order_for
-from engine.vibration_drive.no_load import limit_speed
-from engine.vibration_drive.regimes import Regime, settled_infos
-from engine.vibration_drive.results import result_infos
-from engine.vibration_drive.settle import SettledBatch, settle
-from engine.vibration_drive.simulate import simulate
-from engine.vibration_drive.strobes import BEGIN, FRACTION
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.run import Run, SettledRun, Span
+from sprag.engine.vibration_drive.cases import case_matrix, with_lengths
+from sprag.engine.vibration_drive.characteristics import characteristics, combined
+from sprag.engine.vibration_drive.integration import integrate
+from sprag.engine.vibration_drive.kernel import kernel, lane_count, order_for
+from sprag.engine.vibration_drive.no_load import limit_speed
+from sprag.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag.engine.vibration_drive.results import result_infos
+from sprag.engine.vibration_drive.settle import SettledBatch, settle
+from sprag.engine.vibration_drive.simulate import simulate
+from sprag.engine.vibration_drive.strobes import BEGIN, FRACTION
 
 REFERENCE = Path(__file__).resolve().parents[1] / "data" / "reference" / "settled.json"
 #: Results that depend on how the motion was come to, or are zero up to rounding.

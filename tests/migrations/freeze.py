@@ -9,10 +9,10 @@ import sqlite3
 import tempfile
 from pathlib import Path
 
-from service.storage.store import Store
-from service.storage.tables import HEAD_REVISION
+from sprag.service.storage.store import Store
+from sprag.service.storage.tables import HEAD_REVISION
+from sprag.worker.chunking import Chunking
 from tests.worker import fakes
-from worker.chunking import Chunking
 
 FOLDER = Path(__file__).parent / "frozen"
 

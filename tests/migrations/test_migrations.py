@@ -14,18 +14,18 @@ from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.migration import MigrationContext
 
-import migrations
-from service.spec.document import parse_spec
-from service.storage import maintenance
-from service.storage.errors import DatabaseError, SchemaError
-from service.storage.session import Session, sqlite_driver
-from service.storage.store import Store
-from service.storage.tables import HEAD_REVISION, all_tables
+import sprag.migrations as migrations
+from sprag.service.spec.document import parse_spec
+from sprag.service.storage import maintenance
+from sprag.service.storage.errors import DatabaseError, SchemaError
+from sprag.service.storage.session import Session, sqlite_driver
+from sprag.service.storage.store import Store
+from sprag.service.storage.tables import HEAD_REVISION, all_tables
+from sprag.worker.states import StudyState
 from tests import postgres
 from tests.migrations.freeze import FOLDER
 from tests.service.spec_sample import changed
 from tests.worker import fakes
-from worker.states import StudyState
 
 FROZEN = sorted(FOLDER.glob("*.sql"))
 

@@ -14,13 +14,13 @@ import pytest
 from anyio.from_thread import BlockingPortal, start_blocking_portal
 from fastapi import FastAPI
 
-from service.http.app import chunking, create_app
-from service.settings import Settings
-from service.storage.store import Store
+from sprag.service.http.app import chunking, create_app
+from sprag.service.settings import Settings
+from sprag.service.storage.store import Store
+from sprag.worker import models
+from sprag.worker.models import ChunkResult, KernelShape
+from sprag.worker.study import Study
 from tests.service.timed_spec import SPEC
-from worker import models
-from worker.models import ChunkResult, KernelShape
-from worker.study import Study
 
 API = "/api/v1"
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from service.spec.document import ParsedSpec, Problem, SpecError, parse_spec
+from sprag.service.spec.document import ParsedSpec, Problem, SpecError, parse_spec
 
 #: The example of the spec's own documentation.
 SPEC: dict[str, Any] = {

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from service.logs import REQUEST_HEADER, JsonFormatter, configure
+from sprag.service.logs import REQUEST_HEADER, JsonFormatter, configure
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from engine.machine_shaft.simulate import simulate
-from engine.machine_shaft.spec import MachineSpec
-from engine.machine_shaft.trajectory import trajectory
-from service.http.api import models as m
-from service.jobs.local import run_here
-from service.spec.document import format_of, load_spec, parse_spec
-from service.storage.store import Store
+from sprag.engine.machine_shaft.simulate import simulate
+from sprag.engine.machine_shaft.spec import MachineSpec
+from sprag.engine.machine_shaft.trajectory import trajectory
+from sprag.service.http.api import models as m
+from sprag.service.jobs.local import run_here
+from sprag.service.spec.document import format_of, load_spec, parse_spec
+from sprag.service.storage.store import Store
+from sprag.worker import models
+from sprag.worker.executors.inline import InlineExecutor
 from tests.service.spec.machine.test_shaft import PRESS, changed
-from worker import models
-from worker.executors.inline import InlineExecutor
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

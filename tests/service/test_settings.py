@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import pytest
 from pydantic import ValidationError
 
-from service.cli.console import WrongInputError
-from service.cli.settings import read_settings
-from service.settings import Settings, available_cores, default_database_path, table
+from sprag.service.cli.console import WrongInputError
+from sprag.service.cli.settings import read_settings
+from sprag.service.settings import Settings, available_cores, default_database_path, table
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from service.cli.files import output
-from service.jobs.local import run_here
-from service.stale_files import YOUNG_SECONDS, mark, sweep
+from sprag.service.cli.files import output
+from sprag.service.jobs.local import run_here
+from sprag.service.stale_files import YOUNG_SECONDS, mark, sweep
+from sprag.worker.executors.inline import InlineExecutor
 from tests.worker import fakes
-from worker.executors.inline import InlineExecutor
 
 if TYPE_CHECKING:
     from pathlib import Path

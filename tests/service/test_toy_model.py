@@ -13,24 +13,24 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine import Ending
-from engine.catalogue import Parameter, ResultInfo
-from engine.outcome import Trajectory
-from service.results.exports import MEDIA_TYPES
-from service.settings import Settings
-from service.spec.document import SpecError, parse_spec
-from service.spec.extend import parse_extended
-from service.spec.schema.document import spec_schema
-from service.storage.part import SystemClock
-from service.storage.session import Session
-from service.storage.tables import METADATA, results_table
-from worker import models
-from worker.dispatcher import Dispatcher
-from worker.executors.inline import InlineExecutor
-from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
-from worker.models.model import Model
-from worker.models.presentation import Presentation
-from worker.study import Study
+from sprag.engine import Ending
+from sprag.engine.catalogue import Parameter, ResultInfo
+from sprag.engine.outcome import Trajectory
+from sprag.service.results.exports import MEDIA_TYPES
+from sprag.service.settings import Settings
+from sprag.service.spec.document import SpecError, parse_spec
+from sprag.service.spec.extend import parse_extended
+from sprag.service.spec.schema.document import spec_schema
+from sprag.service.storage.part import SystemClock
+from sprag.service.storage.session import Session
+from sprag.service.storage.tables import METADATA, results_table
+from sprag.worker import models
+from sprag.worker.dispatcher import Dispatcher
+from sprag.worker.executors.inline import InlineExecutor
+from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
+from sprag.worker.models.model import Model
+from sprag.worker.models.presentation import Presentation
+from sprag.worker.study import Study
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 import sprag
-from engine.vibration_drive.simulate import simulate as plain_simulate
+from sprag.engine.vibration_drive.simulate import simulate as plain_simulate
 from tests.engine.vibration_drive.drive import drive, periods
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -77,7 +77,7 @@ def test_a_study_of_a_file_and_a_database(tmp_path: Path) -> None:
 
 
 def test_what_is_wrong_with_a_study_is_named() -> None:
-    from service.spec.report import SpecError
+    from sprag.service.spec.report import SpecError
 
     with pytest.raises(SpecError) as refused:
         sprag.run(SPEC | {"base": SPEC["base"] | {"shaft": {"inertia": -1.0}}})
@@ -128,7 +128,7 @@ for name in ("numpy", "pandas", "numba", "sqlalchemy", "fastapi", "pyarrow", "py
     sys.modules[name] = None
 import sprag
 sprag.Client, sprag.AsyncClient, sprag.RefusedError, sprag.__version__
-for ask in (lambda: sprag.run, lambda: sprag.engine):
+for ask in (lambda: sprag.run, lambda: sprag.simulate):
     try:
         ask()
     except sprag.MissingExtraError as error:
@@ -138,7 +138,7 @@ for ask in (lambda: sprag.run, lambda: sprag.engine):
     assert done.returncode == 0, done.stderr
     first, second = done.stdout.splitlines()
     assert re.fullmatch(r"sprag\.run needs the package '\w+': pip install \"sprag\[server\]\"", first)
-    assert re.fullmatch(r"sprag\.engine needs the package '\w+': pip install \"sprag\[server\]\"", second)
+    assert re.fullmatch(r"sprag\.simulate needs the package '\w+': pip install \"sprag\[server\]\"", second)
 
 
 #: As if only what the base installation has were there.
@@ -165,15 +165,15 @@ for name in ("numpy", "pandas", "xarray", "numba", "sqlalchemy", "fastapi", "pyd
 )
 def test_commands_for_a_running_service_need_no_extra(command: list[str]) -> None:
     arguments = [*command, "--server", "http://127.0.0.1:9"]
-    done = python("-c", f"{BASE_ONLY}\nsys.argv[1:] = {arguments}\nfrom service.cli import main\nmain()")
+    done = python("-c", f"{BASE_ONLY}\nsys.argv[1:] = {arguments}\nfrom sprag.service.cli import main\nmain()")
     assert (done.returncode, "No Sprag service at http://127.0.0.1:9" in done.stderr) == (3, True), done.stderr
 
 
 def test_answers_are_shown_without_an_extra() -> None:
     program = """
-from service.cli.console import OK
-from service.cli.pictures import show_curves
-from service.cli.remote import show_study
+from sprag.service.cli.console import OK
+from sprag.service.cli.pictures import show_curves
+from sprag.service.cli.remote import show_study
 progress = {"done": 2, "total": 2, "ok": 1, "endings": {OK: 1, "chatter": 1}}
 about = {"id": "st_1", "name": "one", "model": "m", "state": "finished", "time_over": False}
 show_study({**about, "progress": progress}, False)
@@ -188,8 +188,8 @@ show_curves({"x": {"path": "shaft.load", "unit": "N*m"}, "results": results, "un
 
 
 def test_the_name_of_the_good_ending_is_that_of_the_models() -> None:
-    from service.cli.console import OK
-    from worker import models
+    from sprag.service.cli.console import OK
+    from sprag.worker import models
 
     assert OK == models.OK
 
@@ -199,7 +199,7 @@ def test_tables_name_the_extra_that_they_need() -> None:
 import sys
 sys.modules["pandas"] = sys.modules["xarray"] = None
 import sprag
-from service.client.frames import grid_of, table_of
+from sprag.service.client.frames import grid_of, table_of
 data = {"x": {"path": "x"}, "curves": [], "results": {}, "units": {}}
 for ask in (lambda: table_of(b""), lambda: grid_of(b""), sprag.Curves(data).to_pandas, sprag.Curves(data).to_xarray):
     try:
@@ -213,7 +213,7 @@ for ask in (lambda: table_of(b""), lambda: grid_of(b""), sprag.Curves(data).to_p
 
 def test_a_command_names_the_extra_that_it_needs() -> None:
     blocked = "import sys; sys.modules.update(dict.fromkeys(['numpy', 'sqlalchemy', 'pydantic_settings', 'pydantic']))"
-    command = f"{blocked}; sys.argv[1:] = ['run', 'examples/press.toml']; from service.cli import main; main()"
+    command = f"{blocked}; sys.argv[1:] = ['run', 'examples/press.toml']; from sprag.service.cli import main; main()"
     done = python("-c", command)
     assert done.returncode == 3
     assert 'pip install "sprag[server]"' in done.stderr

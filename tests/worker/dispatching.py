@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from service.storage.part import SystemClock
-from service.storage.records import StudyRecord
-from service.storage.store import Store
-from tests.worker import fakes
-from worker.dispatcher import (
+from sprag.service.storage.part import SystemClock
+from sprag.service.storage.records import StudyRecord
+from sprag.service.storage.store import Store
+from sprag.worker.dispatcher import (
     Dispatcher,
 )
-from worker.executors.inline import InlineExecutor
-from worker.models import ChunkResult, ChunkTask
-from worker.ports import Executor, Outcome
-from worker.states import StudyState
+from sprag.worker.executors.inline import InlineExecutor
+from sprag.worker.models import ChunkResult, ChunkTask
+from sprag.worker.ports import Executor, Outcome
+from sprag.worker.states import StudyState
+from tests.worker import fakes
 
 
 def submit(store: Store, cases: int = 20, name: str = "a study") -> StudyRecord:

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from worker import models
-from worker.executors.process_pool import ProcessPoolExecutor
-from worker.models import ChunkResult, ChunkTask, KernelShape
-from worker.pool.child_process import uncounted
-from worker.study import Axis, Study
+from sprag.worker import models
+from sprag.worker.executors.process_pool import ProcessPoolExecutor
+from sprag.worker.models import ChunkResult, ChunkTask, KernelShape
+from sprag.worker.pool.child_process import uncounted
+from sprag.worker.study import Axis, Study
 
 BASE = {
     "excitation.frequency": 25.0,

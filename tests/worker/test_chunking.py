@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sprag.worker.chunking import CHUNK_SECONDS, MAX_CHUNKS, MIN_CASES, Chunking, chunk_cases, spans, work_of
 from tests.worker import fakes
-from worker.chunking import CHUNK_SECONDS, MAX_CHUNKS, MIN_CASES, Chunking, chunk_cases, spans, work_of
 
 
 @given(cases=st.integers(1, 10_000), size=st.integers(1, 600))

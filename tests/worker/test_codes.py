@@ -1,7 +1,7 @@
 """Numbers of endings and flags: files written long ago still mean the same."""
 
-from worker import models
-from worker.codes import ENDING_CODES, FLAG_MASKS, PENDING
+from sprag.worker import models
+from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING
 
 #: What files that exist hold. Lines are added here, never changed or taken away.
 GIVEN = {

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.worker.world import World
-from worker.dispatch import (
+from sprag.worker.dispatch import (
     Broken,
     Cancelled,
     Dispatch,
@@ -29,7 +28,8 @@ from worker.dispatch import (
     disjoint,
     pieces,
 )
-from worker.ports import Chunk, Fate
+from sprag.worker.ports import Chunk, Fate
+from tests.worker.world import World
 
 
 @given(

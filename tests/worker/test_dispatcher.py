@@ -8,23 +8,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from service.storage.part import SystemClock
-from service.storage.records import StudyRecord
-from service.storage.store import Store
-from tests.worker import fakes
-from tests.worker.dispatching import Prompt, after, endings, submit, work
-from worker.chunking import Chunking
-from worker.dispatcher import (
+from sprag.service.storage.part import SystemClock
+from sprag.service.storage.records import StudyRecord
+from sprag.service.storage.store import Store
+from sprag.worker.chunking import Chunking
+from sprag.worker.dispatcher import (
     HEARTBEAT_SECONDS,
     OPEN_STUDIES,
     POLL_SECONDS,
     QUIET_POLL_SECONDS,
     Dispatcher,
 )
-from worker.executors.inline import InlineExecutor
-from worker.models import ChunkResult, ChunkTask
-from worker.ports import ActiveStudy, EpochLostError, Executor
-from worker.states import StudyState
+from sprag.worker.executors.inline import InlineExecutor
+from sprag.worker.models import ChunkResult, ChunkTask
+from sprag.worker.ports import ActiveStudy, EpochLostError, Executor
+from sprag.worker.states import StudyState
+from tests.worker import fakes
+from tests.worker.dispatching import Prompt, after, endings, submit, work
 
 
 @pytest.fixture

@@ -8,15 +8,15 @@ import sys
 
 import pytest
 
+from sprag.worker import fingerprint
 from tests.conftest import ROOT
-from worker import fingerprint
 
 OWN = {"numpy": "2.1", "processor features": "avx avx2 fma", "numba settings": ""}
 
 
 def collected(**environment: str) -> str:
     """The digest of a process of its own."""
-    command = [sys.executable, "-c", "from worker import fingerprint; print(fingerprint.digest())"]
+    command = [sys.executable, "-c", "from sprag.worker import fingerprint; print(fingerprint.digest())"]
     return subprocess.run(
         command, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT), **environment}, capture_output=True, text=True,
         check=True, timeout=240,

@@ -8,20 +8,20 @@ from pathlib import Path
 
 import pytest
 
-from service.storage.store import Store
-from tests.worker import fakes
-from tests.worker.dispatching import Prompt, endings, submit, work
-from worker.chunking import Chunking
-from worker.dispatcher import (
+from sprag.service.storage.store import Store
+from sprag.worker.chunking import Chunking
+from sprag.worker.dispatcher import (
     COMPILING,
     NOTE_SECONDS,
     POLL_SECONDS,
     Dispatcher,
 )
-from worker.executors.inline import InlineExecutor
-from worker.ports import KernelError, Outcome, StoreFullError
-from worker.states import StudyState
-from worker.study import Study
+from sprag.worker.executors.inline import InlineExecutor
+from sprag.worker.ports import KernelError, Outcome, StoreFullError
+from sprag.worker.states import StudyState
+from sprag.worker.study import Study
+from tests.worker import fakes
+from tests.worker.dispatching import Prompt, endings, submit, work
 
 
 @pytest.fixture

@@ -8,10 +8,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sprag.worker import models
+from sprag.worker.reuse import Wanted, kin_hash, shared_cases, span, taken
+from sprag.worker.study import Axis, Study
 from tests.worker.fakes import BASE, RUN
-from worker import models
-from worker.reuse import Wanted, kin_hash, shared_cases, span, taken
-from worker.study import Axis, Study
 
 PATHS = ("shaft.load", "excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y")
 NUMBERS = (0.1, 2e-3, 3e-3, 25.0, 30.0)

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from worker.limits import MAX_AXES, MAX_CASES
-from worker.study import Axis, Study
+from sprag.worker.limits import MAX_AXES, MAX_CASES
+from sprag.worker.study import Axis, Study
 
 RUN = {
     "duration": [60.0, "periods"],
@@ -30,7 +30,7 @@ def study(*axes: Axis, combine: str = "grid", **changes: object) -> Study:
 
 
 def told_apart(items: list[float]) -> bool:
-    """Whether no two values are taken for one (`worker.study.SAME_VALUE`)."""
+    """Whether no two values are taken for one (`sprag.worker.study.SAME_VALUE`)."""
     return not any(math.isclose(a, b, rel_tol=2e-9) for a, b in itertools.pairwise(sorted(items)))
 
 

@@ -6,8 +6,8 @@ from collections.abc import Collection
 from dataclasses import replace
 from random import Random
 
-from worker.chunking import spans
-from worker.dispatch import (
+from sprag.worker.chunking import spans
+from sprag.worker.dispatch import (
     Commit,
     Dispatch,
     Ended,
@@ -24,7 +24,7 @@ from worker.dispatch import (
     Split,
     Stop,
 )
-from worker.ports import Chunk, Fate
+from sprag.worker.ports import Chunk, Fate
 
 #: More than any study here needs, even with every case run alone twice.
 MOST_ENDS = 5_000

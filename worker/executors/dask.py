@@ -23,20 +23,20 @@ import dask
 from distributed import LocalCluster
 from distributed.scheduler import KilledWorker
 
-from worker import fingerprint, models
-from worker.executors.dask_jobs import Job, Waiting, Worker, refusals
-from worker.executors.dask_link import Link, value_of
-from worker.executors.dask_tasks import INTRODUCE, load_kernel, run_chunk, scheduler_address
-from worker.executors.process_pool import MAX_LOADS, SPARE_CHUNKS
-from worker.limits import WALL_TIMES
-from worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
+from sprag.worker import fingerprint, models
+from sprag.worker.executors.dask_jobs import Job, Waiting, Worker, refusals
+from sprag.worker.executors.dask_link import Link, value_of
+from sprag.worker.executors.dask_tasks import INTRODUCE, load_kernel, run_chunk, scheduler_address
+from sprag.worker.executors.process_pool import MAX_LOADS, SPARE_CHUNKS
+from sprag.worker.limits import WALL_TIMES
+from sprag.worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from distributed import Future
 
-    from worker.study import Study
+    from sprag.worker.study import Study
 
 _LOG = logging.getLogger(__name__)
 

@@ -1,4 +1,4 @@
-"""What `worker.executors.dask` knows of its workers and of what they are busy with."""
+"""What `sprag.worker.executors.dask` knows of its workers and of what they are busy with."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
     from distributed import Future
 
-    from worker import models
+    from sprag.worker import models
 
 
 @dataclass(eq=False, slots=True)

@@ -1,4 +1,4 @@
-"""The connection of `worker.executors.dask` to a scheduler, which may be lost and found again."""
+"""The connection of `sprag.worker.executors.dask` to a scheduler, which may be lost and found again."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from distributed import Client
 from distributed.client import AllExit
 
-from worker.executors.dask_tasks import blame_at_once, end_worker
+from sprag.worker.executors.dask_tasks import blame_at_once, end_worker
 
 if TYPE_CHECKING:
     from collections.abc import Callable

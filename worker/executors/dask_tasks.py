@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from distributed import Security
 
-from worker import fingerprint, models
-from worker.limits import LOAD_SECONDS
-from worker.pool.processes import within_processor_time
-from worker.ports import ExecutorError
+from sprag.worker import fingerprint, models
+from sprag.worker.limits import LOAD_SECONDS
+from sprag.worker.pool.processes import within_processor_time
+from sprag.worker.ports import ExecutorError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,7 +29,7 @@ _loaded: set[models.KernelShape] = set()
 
 #: Calls `introduce`, as an expression for ``eval``. A function is imported as soon as a message with it comes in; a
 #: worker that cannot import Sprag would end for that, be started again for ever, and never say why.
-INTRODUCE: Final = "__import__('worker.executors.dask_tasks', fromlist=['']).introduce('{}')"
+INTRODUCE: Final = "__import__('sprag.worker.executors.dask_tasks', fromlist=['']).introduce('{}')"
 
 
 def introduce(discard: str) -> dict[str, str]:

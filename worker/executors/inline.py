@@ -6,13 +6,13 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING
 
-from worker import models
-from worker.ports import Chunk, Fate, Outcome
+from sprag.worker import models
+from sprag.worker.ports import Chunk, Fate, Outcome
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from worker.study import Study
+    from sprag.worker.study import Study
 
 
 class InlineExecutor:

@@ -8,20 +8,20 @@ from functools import partial
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
-from worker import fingerprint, models
-from worker.fingerprint import prepare_as
-from worker.limits import LOAD_SECONDS, WALL_TIMES
-from worker.pool.child_pool import ChildPool, JobStoppedError
-from worker.pool.child_process import ProcessDiedError, ProcessStartError
-from worker.pool.processes import single_threaded_children, within_processor_time
-from worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
+from sprag.worker import fingerprint, models
+from sprag.worker.fingerprint import prepare_as
+from sprag.worker.limits import LOAD_SECONDS, WALL_TIMES
+from sprag.worker.pool.child_pool import ChildPool, JobStoppedError
+from sprag.worker.pool.child_process import ProcessDiedError, ProcessStartError
+from sprag.worker.pool.processes import single_threaded_children, within_processor_time
+from sprag.worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from concurrent.futures import Future
 
-    from worker.pool.child_pool import Job
-    from worker.study import Study
+    from sprag.worker.pool.child_pool import Job
+    from sprag.worker.study import Study
 
 #: Chunks beyond one for each process, so that a process that is through finds the next one waiting.
 SPARE_CHUNKS = 2

@@ -11,13 +11,13 @@ from contextlib import suppress
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
-from engine import ENGINE_VERSION, Ending, Run, Span
-from engine.catalogue import Parameter, ResultInfo
-from engine.machine_shaft.problems import ExpressionError, InsufficientInertiaError, MachineError
-from engine.outcome import Engagements, Trajectory
-from engine.run import MEANS_FROM_PERIODS
-from engine.sources import engine_folder, source_hash
-from engine.vibration_drive.clutch import (
+from sprag.engine import ENGINE_VERSION, Ending, Run, Span
+from sprag.engine.catalogue import Parameter, ResultInfo
+from sprag.engine.machine_shaft.problems import ExpressionError, InsufficientInertiaError, MachineError
+from sprag.engine.outcome import Engagements, Trajectory
+from sprag.engine.run import MEANS_FROM_PERIODS
+from sprag.engine.sources import engine_folder, source_hash
+from sprag.engine.vibration_drive.clutch import (
     ClutchFit,
     ClutchFitError,
     ClutchLaw,
@@ -26,18 +26,18 @@ from engine.vibration_drive.clutch import (
     check_law,
     fit_clutch,
 )
-from engine.vibration_drive.parameters import (
+from sprag.engine.vibration_drive.parameters import (
     CLUTCH_COEFFICIENT,
     CLUTCH_WINDUP_LIMIT,
     MAX_COEFFICIENTS,
     MAX_PENDULUMS,
 )
-from worker.models import machine_shaft, vibration_drive
-from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
-from worker.models.model import Model, all_models, model_names, model_of, register, unregister
-from worker.models.presentation import Panel, Presentation
-from worker.models.settled import REGIME_SENTENCES, SETTLED, is_settled, settled_study
-from worker.models.vibration_drive import (
+from sprag.worker.models import machine_shaft, vibration_drive
+from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
+from sprag.worker.models.model import Model, all_models, model_names, model_of, register, unregister
+from sprag.worker.models.presentation import Panel, Presentation
+from sprag.worker.models.settled import REGIME_SENTENCES, SETTLED, is_settled, settled_study
+from sprag.worker.models.vibration_drive import (
     NOT_SETTLED,
     WINDUP_OUT_OF_DATA,
     coefficients,
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from worker.study import Study
+    from sprag.worker.study import Study
 
 __all__ = [
     "CLUTCH_COEFFICIENT",
@@ -246,7 +246,7 @@ def run_task(task: ChunkTask) -> ChunkResult:
 
     A physical failure is an ending in the result, never an exception; what is raised here is a fault of the program.
     """
-    from engine.faults import inject
+    from sprag.engine.faults import inject
 
     inject(task.columns, task.count)
     return model_of(task.shape.model).run(task)
@@ -319,27 +319,27 @@ def warm_up(study: Study) -> None:
 
 def cache_folder() -> Path:
     """Folder of the compiled kernels, made if need be."""
-    from engine.compile.cache import cache_folder as engine_cache_folder
+    from sprag.engine.compile.cache import cache_folder as engine_cache_folder
 
     return engine_cache_folder()
 
 
 def compiler() -> str:
     """The way in which this process compiles kernels."""
-    from engine.compile.ways import WAY
+    from sprag.engine.compile.ways import WAY
 
     return WAY
 
 
 def discard_compiled() -> None:
     """Throw away every compiled kernel of this engine that lies in the cache on disk, because some may be damaged."""
-    from engine.compile.cache import discard
+    from sprag.engine.compile.cache import discard
 
     discard()
 
 
 def cache_is_wanted() -> bool:
     """Whether that folder is the one the user wants, not the stand-in for one that cannot be written."""
-    from engine.compile.cache import is_wanted
+    from sprag.engine.compile.cache import is_wanted
 
     return is_wanted(cache_folder())

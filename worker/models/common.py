@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from engine.endings import ENDING_CODES
+from sprag.engine.endings import ENDING_CODES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

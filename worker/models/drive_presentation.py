@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from worker.models.presentation import Panel, Presentation
+from sprag.worker.models.presentation import Panel, Presentation
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from engine import Ending
-from engine.machine_shaft.parameters import parameters as _engine_parameters
-from engine.machine_shaft.problems import ExpressionError, MachineError, RelationError
-from engine.machine_shaft.results import result_infos
-from engine.machine_shaft.spec import (
+from sprag.engine import Ending
+from sprag.engine.machine_shaft.parameters import parameters as _engine_parameters
+from sprag.engine.machine_shaft.problems import ExpressionError, MachineError, RelationError
+from sprag.engine.machine_shaft.results import result_infos
+from sprag.engine.machine_shaft.spec import (
     LINKED,
     MAX_CONSTANTS,
     MAX_STEPS,
@@ -25,20 +25,20 @@ from engine.machine_shaft.spec import (
     MechanismChoice,
     OperationChoice,
 )
-from engine.machine_shaft.tables import MAX_ROWS
-from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
-from worker.models.model import Model
-from worker.models.shaft_presentation import PRESENTATION
+from sprag.engine.machine_shaft.tables import MAX_ROWS
+from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
+from sprag.worker.models.model import Model
+from sprag.worker.models.shaft_presentation import PRESENTATION
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import ArrayLike, NDArray
 
-    from engine.catalogue import Parameter, ResultInfo
-    from engine.machine_shaft.spec import MechanismKind
-    from engine.outcome import Trajectory
-    from worker.study import Study
+    from sprag.engine.catalogue import Parameter, ResultInfo
+    from sprag.engine.machine_shaft.spec import MechanismKind
+    from sprag.engine.outcome import Trajectory
+    from sprag.worker.study import Study
 
 __all__ = [
     "LINKED",
@@ -115,21 +115,21 @@ def _parameters(structure: str) -> dict[str, Parameter]:
 
 def check_structure(structure: Mapping[str, Any]) -> None:
     """Raise MachineError where the structure makes no machine."""
-    from engine.machine_shaft.machine import check_structure as engine_check
+    from sprag.engine.machine_shaft.machine import check_structure as engine_check
 
     engine_check(spec_of(structure))
 
 
 def check(structure: Mapping[str, Any], values: Mapping[str, float]) -> None:
     """Raise MachineError where the machine has no steady motion, with all that is known about why."""
-    from engine.machine_shaft.simulate import check as engine_check
+    from sprag.engine.machine_shaft.simulate import check as engine_check
 
     engine_check(spec_of(structure), values)
 
 
 def base_results(structure: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, float]:
     """Results of the machine with these numbers, by name; NaN for those that it does not have."""
-    from engine.machine_shaft.simulate import simulate
+    from sprag.engine.machine_shaft.simulate import simulate
 
     found = simulate(spec_of(structure), values, cases=1).values[0]
     return {info.name: float(value) for info, value in zip(result_infos(), found, strict=True)}
@@ -137,7 +137,7 @@ def base_results(structure: Mapping[str, Any], values: Mapping[str, float]) -> d
 
 def reachable_pressure(suction: ArrayLike, clearance: ArrayLike, exponent: ArrayLike) -> NDArray[np.float64]:
     """Pressure in Pa to which a compressor can bring its gas."""
-    from engine.machine_shaft.operations import reachable_pressure as engine_pressure
+    from sprag.engine.machine_shaft.operations import reachable_pressure as engine_pressure
 
     return engine_pressure(*(np.asarray(part, dtype=np.float64) for part in (suction, clearance, exponent)))
 
@@ -173,7 +173,7 @@ class MachineShaft(Model):
         return SHAPE
 
     def run(self, task: ChunkTask) -> ChunkResult:
-        from engine.machine_shaft.simulate import simulate
+        from sprag.engine.machine_shaft.simulate import simulate
 
         batch = simulate(spec_of(task.structure), task.columns, cases=task.count)
         return chunk_result(task.first, batch.endings, [""] * task.count, batch.values)
@@ -185,13 +185,13 @@ class MachineShaft(Model):
 
     def trajectory(self, study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
         """Tables over ``points`` equally spaced angles of the shaft from ``start`` to ``end`` (rad)."""
-        from engine.machine_shaft.trajectory import trajectory
+        from sprag.engine.machine_shaft.trajectory import trajectory
 
         columns = {**study.base, **study.case_parameters(case)}
         return trajectory(spec_of(study.structure), columns, np.linspace(start, end, points))
 
     def estimate_seconds_per_case(self, study: Study) -> float:
-        from engine.machine_shaft.estimate import estimate_seconds
+        from sprag.engine.machine_shaft.estimate import estimate_seconds
 
         return estimate_seconds(spec_of(study.structure))
 
@@ -200,7 +200,7 @@ class MachineShaft(Model):
         return 10.0
 
     def prepare(self) -> None:
-        import engine.machine_shaft.simulate  # noqa: F401
+        import sprag.engine.machine_shaft.simulate  # noqa: F401
 
     def load(self, shape: KernelShape) -> None:
         _run_each_kind()
@@ -208,8 +208,8 @@ class MachineShaft(Model):
 
 def _run_each_kind() -> None:
     """Run a case of each kind, which compiles what all machines share."""
-    from engine.machine_shaft.simulate import simulate
-    from engine.machine_shaft.trajectory import trajectory
+    from sprag.engine.machine_shaft.simulate import simulate
+    from sprag.engine.machine_shaft.trajectory import trajectory
 
     for mean, balance in product(("midrange", "angle", "time"), ("scale", "motor")):
         spec = MachineSpec(

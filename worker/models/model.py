@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from worker.models.presentation import Presentation
+from sprag.worker.models.presentation import Presentation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from engine import Ending
-    from engine.catalogue import Parameter, ResultInfo
-    from engine.outcome import Engagements, Trajectory
-    from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
-    from worker.study import Study
+    from sprag.engine import Ending
+    from sprag.engine.catalogue import Parameter, ResultInfo
+    from sprag.engine.outcome import Engagements, Trajectory
+    from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
+    from sprag.worker.study import Study
 
 
 class Model(Protocol):

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, cast
 
-from engine.run import SettledRun
-from engine.vibration_drive.regimes import Regime
+from sprag.engine.run import SettledRun
+from sprag.engine.vibration_drive.regimes import Regime
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from engine.run import Reset
-    from worker.study import Study
+    from sprag.engine.run import Reset
+    from sprag.worker.study import Study
 
 #: What `Study.run` has under "until" where cases are run until they are settled.
 SETTLED: Final = "settled"

@@ -9,29 +9,29 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
-from engine import Ending, Run, Span
-from engine.vibration_drive.parameters import (
+from sprag.engine import Ending, Run, Span
+from sprag.engine.vibration_drive.parameters import (
     CLUTCH_COEFFICIENT,
     CLUTCH_WINDUP_LIMIT,
     MAX_PENDULUMS,
     PARAMETERS,
 )
-from engine.vibration_drive.regimes import Regime, settled_infos
-from engine.vibration_drive.results import result_infos
-from worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
-from worker.models.drive_presentation import PRESENTATION
-from worker.models.model import Model
-from worker.models.settled import REGIME_FLAGS, is_settled, mean_periods, settings_of
+from sprag.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag.engine.vibration_drive.results import result_infos
+from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
+from sprag.worker.models.drive_presentation import PRESENTATION
+from sprag.worker.models.model import Model
+from sprag.worker.models.settled import REGIME_FLAGS, is_settled, mean_periods, settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from numpy.typing import NDArray
 
-    from engine.catalogue import Parameter, ResultInfo
-    from engine.outcome import Engagements, Trajectory
-    from engine.run import Reset, Unit
-    from worker.study import Study
+    from sprag.engine.catalogue import Parameter, ResultInfo
+    from sprag.engine.outcome import Engagements, Trajectory
+    from sprag.engine.run import Reset, Unit
+    from sprag.worker.study import Study
 
 MODEL = "vibration-drive"
 
@@ -138,8 +138,8 @@ def _mean_periods(study: Study) -> float:
 
 def kernel_source(pendulums: int, coefficients: int, tolerance: float) -> str:
     """Text of the generated kernel of vibration drives of that shape, for this machine; nothing is compiled."""
-    from engine.vibration_drive.kernel import lane_count, order_for, source
-    from engine.vibration_drive.layout import make_layout
+    from sprag.engine.vibration_drive.kernel import lane_count, order_for, source
+    from sprag.engine.vibration_drive.layout import make_layout
 
     return source(make_layout(pendulums, coefficients, order_for(tolerance), lane_count()))
 
@@ -178,8 +178,8 @@ class VibrationDrive(Model):
         return KernelShape(MODEL, DriveKey(pendulums(study), coefficients(study), run_of(study.run).tolerance))
 
     def run(self, task: ChunkTask) -> ChunkResult:
-        from engine.vibration_drive.settle import settle
-        from engine.vibration_drive.simulate import simulate
+        from sprag.engine.vibration_drive.settle import settle
+        from sprag.engine.vibration_drive.simulate import simulate
 
         number = _key_of(task.shape).pendulums
         if is_settled(task.run):
@@ -200,7 +200,7 @@ class VibrationDrive(Model):
 
     def trajectory(self, study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
         """Instantaneous values at ``points`` equally spaced times from ``start`` to ``end`` (s)."""
-        from engine.vibration_drive.simulate import trajectory
+        from sprag.engine.vibration_drive.simulate import trajectory
 
         columns = {**study.base, **study.case_parameters(case)}
         return trajectory(columns, run_of(study.run), np.linspace(start, end, points))
@@ -211,7 +211,7 @@ class VibrationDrive(Model):
 
     def engagements(self, study: Study, case: int) -> Engagements:
         """Of a settled study those of one turn of its motion, else those in the window."""
-        from engine.vibration_drive.engagements import engagements, settled_engagements
+        from sprag.engine.vibration_drive.engagements import engagements, settled_engagements
 
         columns = {**study.base, **study.case_parameters(case)}
         if is_settled(study.run):
@@ -219,7 +219,7 @@ class VibrationDrive(Model):
         return engagements(columns, run_of(study.run))
 
     def estimate_seconds_per_case(self, study: Study) -> float:
-        from engine.vibration_drive.simulate import estimate_seconds
+        from sprag.engine.vibration_drive.simulate import estimate_seconds
 
         return estimate_seconds(*_key_of(self.shape_of(study)), _mean_periods(study))
 
@@ -228,10 +228,10 @@ class VibrationDrive(Model):
         return 7.0 + 0.9 * (_key_of(shape).pendulums - 1)
 
     def prepare(self) -> None:
-        import engine.vibration_drive.simulate  # noqa: F401
+        import sprag.engine.vibration_drive.simulate  # noqa: F401
 
     def load(self, shape: KernelShape) -> None:
-        from engine.vibration_drive.simulate import warm_up
+        from sprag.engine.vibration_drive.simulate import warm_up
 
         warm_up(*_key_of(shape))
 

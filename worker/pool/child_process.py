@@ -16,7 +16,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import wait
 from typing import TYPE_CHECKING, Any
 
-from worker.pool.processes import interrupts_held_back, start_pool_process
+from sprag.worker.pool.processes import interrupts_held_back, start_pool_process
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -8,23 +8,23 @@ from fastapi import APIRouter, Depends, Query, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from service.faults import parameter_error, shown
-from service.http.api import models as m
-from service.http.api.document import files, format_query, one_of, problems
-from service.http.context import CaseNumber, Ctx, StudyId, study_with
-from service.http.requests import strict_query
-from service.http.respond import choose_format, json_response
-from service.http.views import study_address
-from service.http.work import Attended
-from service.results import trajectories
-from service.results.exports import MEDIA_TYPES, Format, row_json, rows_json
-from service.storage.records import CaseRow
-from worker import models
-from worker.codes import PENDING
-from worker.limits import MAX_PAGE_SIZE, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
+from sprag.service.faults import parameter_error, shown
+from sprag.service.http.api import models as m
+from sprag.service.http.api.document import files, format_query, one_of, problems
+from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
+from sprag.service.http.requests import strict_query
+from sprag.service.http.respond import choose_format, json_response
+from sprag.service.http.views import study_address
+from sprag.service.http.work import Attended
+from sprag.service.results import trajectories
+from sprag.service.results.exports import MEDIA_TYPES, Format, row_json, rows_json
+from sprag.service.storage.records import CaseRow
+from sprag.worker import models
+from sprag.worker.codes import PENDING
+from sprag.worker.limits import MAX_PAGE_SIZE, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 
 if TYPE_CHECKING:
-    from worker.study import Study
+    from sprag.worker.study import Study
 
 router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
 

@@ -7,15 +7,15 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Path, Request
 
-from service.http.api import models as m
-from service.http.api.document import not_modified as documented_304
-from service.http.api.document import problems
-from service.http.problems import ApiError
-from service.http.requests import strict_query
-from service.http.respond import entity_tag, json_response, not_modified, tagged
-from service.http.views import preset_of
-from service.presets import preset_names
-from worker import models
+from sprag.service.http.api import models as m
+from sprag.service.http.api.document import not_modified as documented_304
+from sprag.service.http.api.document import problems
+from sprag.service.http.problems import ApiError
+from sprag.service.http.requests import strict_query
+from sprag.service.http.respond import entity_tag, json_response, not_modified, tagged
+from sprag.service.http.views import preset_of
+from sprag.service.presets import preset_names
+from sprag.worker import models
 
 router = APIRouter(tags=["models"], dependencies=[Depends(strict_query)])
 

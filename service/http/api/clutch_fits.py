@@ -7,16 +7,16 @@ from typing import Annotated, Any, Final
 from fastapi import APIRouter, Depends
 from starlette.responses import Response
 
-from service.http.api import examples
-from service.http.api import models as m
-from service.http.api.document import body, problems
-from service.http.problems import ApiError
-from service.http.requests import Body, read_body, strict_query
-from service.http.respond import JSON
-from service.http.work import CHECK_PROBLEMS, Attended
-from service.jobs import checks
-from service.spec.report import SpecError, spec_items
-from worker import models
+from sprag.service.http.api import examples
+from sprag.service.http.api import models as m
+from sprag.service.http.api.document import body, problems
+from sprag.service.http.problems import ApiError
+from sprag.service.http.requests import Body, read_body, strict_query
+from sprag.service.http.respond import JSON
+from sprag.service.http.work import CHECK_PROBLEMS, Attended
+from sprag.service.jobs import checks
+from sprag.service.spec.report import SpecError, spec_items
+from sprag.worker import models
 
 router = APIRouter(tags=["clutch"], dependencies=[Depends(strict_query)])
 

@@ -7,24 +7,24 @@ from typing import TYPE_CHECKING, Annotated
 from fastapi import APIRouter, Depends, Query, Request
 from starlette.responses import Response
 
-from service.faults import parameter_error, shown
-from service.http.api import models as m
-from service.http.api.document import files, format_query, problems
-from service.http.api.document import not_modified as documented_304
-from service.http.context import Ctx, StudyId
-from service.http.drawing import Drawing, attached, conditional, picture, picture_of, placed
-from service.http.requests import strict_query
-from service.http.respond import JSON, choose_format, streamed
-from service.http.work import CHECK_PROBLEMS, Attended
-from service.jobs import answers
-from service.results import exports, report
-from service.results.curves import CurveQuery
-from service.results.pictures import curves as pictures
-from service.results.report.content import report_of
-from worker import models
+from sprag.service.faults import parameter_error, shown
+from sprag.service.http.api import models as m
+from sprag.service.http.api.document import files, format_query, problems
+from sprag.service.http.api.document import not_modified as documented_304
+from sprag.service.http.context import Ctx, StudyId
+from sprag.service.http.drawing import Drawing, attached, conditional, picture, picture_of, placed
+from sprag.service.http.requests import strict_query
+from sprag.service.http.respond import JSON, choose_format, streamed
+from sprag.service.http.work import CHECK_PROBLEMS, Attended
+from sprag.service.jobs import answers
+from sprag.service.results import exports, report
+from sprag.service.results.curves import CurveQuery
+from sprag.service.results.pictures import curves as pictures
+from sprag.service.results.report.content import report_of
+from sprag.worker import models
 
 if TYPE_CHECKING:
-    from service.storage.records import StudyRecord
+    from sprag.service.storage.records import StudyRecord
 
 router = APIRouter(prefix="/studies/{study_id:study}", tags=["results"], dependencies=[Depends(strict_query)])
 

@@ -9,10 +9,10 @@ from typing import Any, Final
 from fastapi import FastAPI, Header, Query
 from fastapi.openapi.utils import get_openapi
 
-from service.faults import ErrorItem
-from service.http.api.links import add_links
-from service.http.problems import PROBLEM_MEDIA_TYPE, PROBLEM_TYPES, Problem, ProblemType, problem_json
-from service.http.views import API_PREFIX
+from sprag.service.faults import ErrorItem
+from sprag.service.http.api.links import add_links
+from sprag.service.http.problems import PROBLEM_MEDIA_TYPE, PROBLEM_TYPES, Problem, ProblemType, problem_json
+from sprag.service.http.views import API_PREFIX
 
 _METRICS: Final = "/metrics"
 _SCHEMAS: Final = "#/components/schemas/"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from service.http.api.models import Body
+from sprag.service.http.api.models import Body
 
 
 class EngagementRow(Body):

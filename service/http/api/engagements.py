@@ -8,19 +8,19 @@ from fastapi import APIRouter, Depends, Query, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from service.faults import parameter_error, shown
-from service.http.api.document import files, format_query, one_of, problems
-from service.http.api.engagement_models import EngagementTables
-from service.http.context import CaseNumber, Ctx, StudyId, study_with
-from service.http.requests import strict_query
-from service.http.respond import choose_format
-from service.http.work import Attended
-from service.results.engagements import TABLES, Table, engagements_file, require_clutches
-from service.results.exports import MEDIA_TYPES, Format
-from worker import models
+from sprag.service.faults import parameter_error, shown
+from sprag.service.http.api.document import files, format_query, one_of, problems
+from sprag.service.http.api.engagement_models import EngagementTables
+from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
+from sprag.service.http.requests import strict_query
+from sprag.service.http.respond import choose_format
+from sprag.service.http.work import Attended
+from sprag.service.results.engagements import TABLES, Table, engagements_file, require_clutches
+from sprag.service.results.exports import MEDIA_TYPES, Format
+from sprag.worker import models
 
 if TYPE_CHECKING:
-    from worker.study import Study
+    from sprag.worker.study import Study
 
 router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
 

@@ -12,14 +12,14 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 from starlette.types import Receive, Scope, Send
 
-from service.http import views
-from service.http.api.document import files, problems
-from service.http.context import Context, Ctx, StudyId
-from service.http.problems import ApiError
-from service.http.requests import strict_query
-from service.json_text import to_bytes
-from service.storage.errors import StoreError
-from service.storage.records import Progress, StudyRecord
+from sprag.service.http import views
+from sprag.service.http.api.document import files, problems
+from sprag.service.http.context import Context, Ctx, StudyId
+from sprag.service.http.problems import ApiError
+from sprag.service.http.requests import strict_query
+from sprag.service.json_text import to_bytes
+from sprag.service.storage.errors import StoreError
+from sprag.service.storage.records import Progress, StudyRecord
 
 router = APIRouter(tags=["studies"], dependencies=[Depends(strict_query)])
 

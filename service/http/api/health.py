@@ -7,14 +7,14 @@ from typing import Any, cast
 from fastapi import APIRouter, Depends, Request
 from starlette.responses import Response
 
-from service.http.api.document import files, problems
-from service.http.api.models import Health
-from service.http.context import Context
-from service.http.metrics import CONTENT_TYPE, Metrics
-from service.http.problems import ApiError
-from service.http.requests import strict_query
-from service.http.respond import json_response
-from service.storage.readiness import Readiness
+from sprag.service.http.api.document import files, problems
+from sprag.service.http.api.models import Health
+from sprag.service.http.context import Context
+from sprag.service.http.metrics import CONTENT_TYPE, Metrics
+from sprag.service.http.problems import ApiError
+from sprag.service.http.requests import strict_query
+from sprag.service.http.respond import json_response
+from sprag.service.storage.readiness import Readiness
 
 router = APIRouter(tags=["health"], dependencies=[Depends(strict_query)])
 

@@ -1,4 +1,4 @@
-"""Bodies of the answers about schedules, as `service.http.api.models` has the others."""
+"""Bodies of the answers about schedules, as `sprag.service.http.api.models` has the others."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import Field
 
-from service.http.api.models import Body
+from sprag.service.http.api.models import Body
 
 
 class ScheduleRun(Body):

@@ -11,21 +11,21 @@ from starlette.concurrency import run_in_threadpool
 from starlette.convertors import register_url_convertor
 from starlette.responses import Response
 
-from service.http.api import examples
-from service.http.api import schedule_models as m
-from service.http.api.document import body, key_header, located, problems
-from service.http.context import ID_PATTERN, Context, Ctx, StudyIdConvertor
-from service.http.problems import ApiError
-from service.http.requests import Body, read_body, strict_query
-from service.http.respond import json_response
-from service.http.schedule_views import detail, schedule_address, summary
-from service.http.work import CHECK_PROBLEMS, Attended, Work
-from service.jobs import checks
-from service.schedules.deadline import ALLOWED_OF_RUNS
-from service.schedules.fields import ScheduleFields
-from service.spec.report import SpecError, spec_items
-from service.storage.schedules import ScheduleRecord
-from worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
+from sprag.service.http.api import examples
+from sprag.service.http.api import schedule_models as m
+from sprag.service.http.api.document import body, key_header, located, problems
+from sprag.service.http.context import ID_PATTERN, Context, Ctx, StudyIdConvertor
+from sprag.service.http.problems import ApiError
+from sprag.service.http.requests import Body, read_body, strict_query
+from sprag.service.http.respond import json_response
+from sprag.service.http.schedule_views import detail, schedule_address, summary
+from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
+from sprag.service.jobs import checks
+from sprag.service.schedules.deadline import ALLOWED_OF_RUNS
+from sprag.service.schedules.fields import ScheduleFields
+from sprag.service.spec.report import SpecError, spec_items
+from sprag.service.storage.schedules import ScheduleRecord
+from sprag.worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
 
 router = APIRouter(tags=["schedules"], dependencies=[Depends(strict_query)])
 

@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 from fastapi import APIRouter, Depends, Query, Request
 from starlette.responses import Response
 
-from service.http.api import models as m
-from service.http.api.document import files, format_query, problems
-from service.http.api.document import not_modified as documented_304
-from service.http.context import Ctx, StudyId
-from service.http.drawing import Drawing, attachment, conditional, picture, picture_of
-from service.http.requests import strict_query
-from service.http.respond import choose_format, json_response
-from service.http.work import CHECK_PROBLEMS, Attended
-from service.results import exports
-from service.results.pictures import curves as pictures
-from service.results.pictures.sensitivity import draw_sensitivity
-from service.results.sensitivity import Sensitivity, sensitivity
+from sprag.service.http.api import models as m
+from sprag.service.http.api.document import files, format_query, problems
+from sprag.service.http.api.document import not_modified as documented_304
+from sprag.service.http.context import Ctx, StudyId
+from sprag.service.http.drawing import Drawing, attachment, conditional, picture, picture_of
+from sprag.service.http.requests import strict_query
+from sprag.service.http.respond import choose_format, json_response
+from sprag.service.http.work import CHECK_PROBLEMS, Attended
+from sprag.service.results import exports
+from sprag.service.results.pictures import curves as pictures
+from sprag.service.results.pictures.sensitivity import draw_sensitivity
+from sprag.service.results.sensitivity import Sensitivity, sensitivity
 
 if TYPE_CHECKING:
-    from service.storage.records import StudyRecord
+    from sprag.service.storage.records import StudyRecord
 
 router = APIRouter(prefix="/studies/{study_id:study}", tags=["results"], dependencies=[Depends(strict_query)])
 

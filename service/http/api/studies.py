@@ -10,22 +10,22 @@ from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from service.faults import parameter_error
-from service.http import views
-from service.http.api import examples
-from service.http.api import models as m
-from service.http.api.document import body, key_header, located, one_of, problems
-from service.http.api.document import not_modified as documented_304
-from service.http.context import Context, Ctx, StudyId
-from service.http.requests import Body, read_body, strict_query
-from service.http.respond import JSON, entity_tag, json_response, not_modified, tagged
-from service.http.work import CHECK_PROBLEMS, Attended
-from service.jobs import checks
-from service.jobs.submission import Submission, take_in
-from service.schedules.deadline import ALLOWED, FinishError, finish_at
-from worker.limits import MAX_PAGE_SIZE, MAX_PRIORITY, MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
-from worker.models import ENDING_SENTENCES, OK, REGIME_SENTENCES, WorkerEnding
-from worker.states import StudyState
+from sprag.service.faults import parameter_error
+from sprag.service.http import views
+from sprag.service.http.api import examples
+from sprag.service.http.api import models as m
+from sprag.service.http.api.document import body, key_header, located, one_of, problems
+from sprag.service.http.api.document import not_modified as documented_304
+from sprag.service.http.context import Context, Ctx, StudyId
+from sprag.service.http.requests import Body, read_body, strict_query
+from sprag.service.http.respond import JSON, entity_tag, json_response, not_modified, tagged
+from sprag.service.http.work import CHECK_PROBLEMS, Attended
+from sprag.service.jobs import checks
+from sprag.service.jobs.submission import Submission, take_in
+from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
+from sprag.worker.limits import MAX_PAGE_SIZE, MAX_PRIORITY, MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
+from sprag.worker.models import ENDING_SENTENCES, OK, REGIME_SENTENCES, WorkerEnding
+from sprag.worker.states import StudyState
 
 router = APIRouter(tags=["studies"], dependencies=[Depends(strict_query)])
 

@@ -9,24 +9,24 @@ from fastapi import APIRouter, Query, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from service.faults import FaultError
-from service.http.context import CaseNumber, Context, Ctx, StudyId, study_with
-from service.http.drawing import picture
-from service.http.respond import entity_tag, json_response, not_modified, tagged
-from service.http.web.figures.motion import SAMPLES, motion_figures
-from service.http.web.study import study_frame
-from service.http.web.templates import page
-from service.http.work import Attended
-from service.results import trajectories
-from service.results.defaults import main_results
-from service.results.pictures.motion import draw_motion
-from service.results.selection import axis_name
-from service.spec.catalogue import unit_of
-from worker import models
-from worker.codes import PENDING
+from sprag.service.faults import FaultError
+from sprag.service.http.context import CaseNumber, Context, Ctx, StudyId, study_with
+from sprag.service.http.drawing import picture
+from sprag.service.http.respond import entity_tag, json_response, not_modified, tagged
+from sprag.service.http.web.figures.motion import SAMPLES, motion_figures
+from sprag.service.http.web.study import study_frame
+from sprag.service.http.web.templates import page
+from sprag.service.http.work import Attended
+from sprag.service.results import trajectories
+from sprag.service.results.defaults import main_results
+from sprag.service.results.pictures.motion import draw_motion
+from sprag.service.results.selection import axis_name
+from sprag.service.spec.catalogue import unit_of
+from sprag.worker import models
+from sprag.worker.codes import PENDING
 
 if TYPE_CHECKING:
-    from worker.study import Study
+    from sprag.worker.study import Study
 
 router = APIRouter(include_in_schema=False)
 

@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from service.faults import ErrorItem
-from service.results.curves import CurveQuery
-from service.results.defaults import main_query, main_results, usual_value
-from service.results.selection import SelectionError
+from sprag.service.faults import ErrorItem
+from sprag.service.results.curves import CurveQuery
+from sprag.service.results.defaults import main_query, main_results, usual_value
+from sprag.service.results.selection import SelectionError
 
 if TYPE_CHECKING:
     from starlette.datastructures import QueryParams
 
-    from worker.models import ResultInfo
-    from worker.study import Axis, Study
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Axis, Study
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,29 +11,29 @@ from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from service.faults import ErrorItem
-from service.http import views
-from service.http.context import Context, Ctx
-from service.http.drawing import Drawing, picture
-from service.http.respond import entity_tag, json_response, not_modified, tagged
-from service.http.web.choice import held, varying_axes
-from service.http.web.figures.curves import curves_figure
-from service.http.web.study import fixed_choices
-from service.http.web.templates import page
-from service.http.work import Attended
-from service.results.curves import CurveQuery, Curves, draw, select
-from service.results.defaults import main_query
-from service.results.pictures.compare import draw_compare
-from service.results.selection import SelectionError
-from service.spec.catalogue import unit_of
-from worker import models
+from sprag.service.faults import ErrorItem
+from sprag.service.http import views
+from sprag.service.http.context import Context, Ctx
+from sprag.service.http.drawing import Drawing, picture
+from sprag.service.http.respond import entity_tag, json_response, not_modified, tagged
+from sprag.service.http.web.choice import held, varying_axes
+from sprag.service.http.web.figures.curves import curves_figure
+from sprag.service.http.web.study import fixed_choices
+from sprag.service.http.web.templates import page
+from sprag.service.http.work import Attended
+from sprag.service.results.curves import CurveQuery, Curves, draw, select
+from sprag.service.results.defaults import main_query
+from sprag.service.results.pictures.compare import draw_compare
+from sprag.service.results.selection import SelectionError
+from sprag.service.spec.catalogue import unit_of
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from starlette.datastructures import QueryParams
 
-    from service.storage.records import StudyRecord
-    from worker.models import ResultInfo
-    from worker.study import Study
+    from sprag.service.storage.records import StudyRecord
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Study
 
 router = APIRouter(include_in_schema=False)
 

@@ -8,15 +8,15 @@ from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from service.http.context import CaseNumber, Ctx, StudyId, study_with
-from service.http.web.study import study_frame
-from service.http.web.templates import page
-from service.http.work import Attended
-from service.results.engagements import require_clutches
-from worker import models
+from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
+from sprag.service.http.web.study import study_frame
+from sprag.service.http.web.templates import page
+from sprag.service.http.work import Attended
+from sprag.service.results.engagements import require_clutches
+from sprag.worker import models
 
 if TYPE_CHECKING:
-    from worker.study import Study
+    from sprag.worker.study import Study
 
 router = APIRouter(include_in_schema=False)
 

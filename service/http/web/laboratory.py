@@ -12,31 +12,31 @@ from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from service.http.context import Ctx
-from service.http.drawing import picture
-from service.http.problems import ApiError
-from service.http.respond import json_response
-from service.http.views import preset_of
-from service.http.web.figures.shaft import SAMPLES, machine_case, overridden
-from service.http.web.form.check import message
-from service.http.web.form.page import form_page, look_over
-from service.http.web.form.spec import plain
-from service.http.web.templates import fragment, page, spec_text
-from service.http.work import Attended, Work
-from service.presets import preset_names
-from service.results.pictures.motion import draw_motion
-from service.results.wording import number, words
-from service.spec.catalogue import parameter_of
-from service.spec.document import parse_spec
-from service.spec.numbers import parse_number
-from service.spec.report import SpecError, spec_items
-from service.spec.units import QuantityError, parse_quantity, split_quantity
-from worker import models
+from sprag.service.http.context import Ctx
+from sprag.service.http.drawing import picture
+from sprag.service.http.problems import ApiError
+from sprag.service.http.respond import json_response
+from sprag.service.http.views import preset_of
+from sprag.service.http.web.figures.shaft import SAMPLES, machine_case, overridden
+from sprag.service.http.web.form.check import message
+from sprag.service.http.web.form.page import form_page, look_over
+from sprag.service.http.web.form.spec import plain
+from sprag.service.http.web.templates import fragment, page, spec_text
+from sprag.service.http.work import Attended, Work
+from sprag.service.presets import preset_names
+from sprag.service.results.pictures.motion import draw_motion
+from sprag.service.results.wording import number, words
+from sprag.service.spec.catalogue import parameter_of
+from sprag.service.spec.document import parse_spec
+from sprag.service.spec.numbers import parse_number
+from sprag.service.spec.report import SpecError, spec_items
+from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from worker.study import Study
+    from sprag.worker.study import Study
 
 router = APIRouter(include_in_schema=False)
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
 
-from service.http.access import COOKIE, SESSION_SECONDS
-from service.http.problems import ApiError
-from service.http.web.form.values import Form
-from service.http.web.way_in import LOGIN_PATH, access_of, kept_form, kept_page, login_page, within
-from service.storage.scopes import TokenScope
+from sprag.service.http.access import COOKIE, SESSION_SECONDS
+from sprag.service.http.problems import ApiError
+from sprag.service.http.web.form.values import Form
+from sprag.service.http.web.way_in import LOGIN_PATH, access_of, kept_form, kept_page, login_page, within
+from sprag.service.storage.scopes import TokenScope
 
 router = APIRouter(include_in_schema=False)
 

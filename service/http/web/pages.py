@@ -11,16 +11,16 @@ from typing import Annotated, Final
 from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
-from service.http import views
-from service.http.context import Ctx
-from service.http.problems import PROBLEM_TYPES, ApiError
-from service.http.respond import entity_tag, json_response, not_modified, tagged
-from service.http.views import preset_of
-from service.http.web import apidoc
-from service.http.web.apidoc import with_token_needed
-from service.http.web.templates import page
-from service.presets import preset_names
-from worker.states import StudyState
+from sprag.service.http import views
+from sprag.service.http.context import Ctx
+from sprag.service.http.problems import PROBLEM_TYPES, ApiError
+from sprag.service.http.respond import entity_tag, json_response, not_modified, tagged
+from sprag.service.http.views import preset_of
+from sprag.service.http.web import apidoc
+from sprag.service.http.web.apidoc import with_token_needed
+from sprag.service.http.web.templates import page
+from sprag.service.presets import preset_names
+from sprag.worker.states import StudyState
 
 router = APIRouter(include_in_schema=False)
 
@@ -95,7 +95,7 @@ def _file(name: str) -> tuple[bytes, str]:
     if name == PLOTLY:
         content = files("plotly").joinpath("package_data", PLOTLY).read_bytes()
         return content, entity_tag(PLOTLY, version("plotly"))
-    content = files("service.http.web").joinpath("static", name).read_bytes()
+    content = files("sprag.service.http.web").joinpath("static", name).read_bytes()
     return content, entity_tag(name, content.hex())
 
 

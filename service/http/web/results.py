@@ -8,24 +8,24 @@ from urllib.parse import urlencode
 from fastapi import APIRouter, Query, Request
 from starlette.responses import RedirectResponse, Response
 
-from service.http import views
-from service.http.context import Ctx, StudyId
-from service.http.drawing import Drawing, conditional, placed
-from service.http.respond import JSON, json_response
-from service.http.web.choice import MapQuery, curve_query, map_query, pairs_of, varying_axes
-from service.http.web.figures import answers
-from service.http.web.study import fixed_choices, study_frame
-from service.http.web.templates import page
-from service.http.work import Attended
-from service.results.curves import CurveQuery, select
-from service.results.pictures import curves as pictures
-from service.results.selection import SelectionError
-from service.spec.catalogue import unit_of
-from worker import models
+from sprag.service.http import views
+from sprag.service.http.context import Ctx, StudyId
+from sprag.service.http.drawing import Drawing, conditional, placed
+from sprag.service.http.respond import JSON, json_response
+from sprag.service.http.web.choice import MapQuery, curve_query, map_query, pairs_of, varying_axes
+from sprag.service.http.web.figures import answers
+from sprag.service.http.web.study import fixed_choices, study_frame
+from sprag.service.http.web.templates import page
+from sprag.service.http.work import Attended
+from sprag.service.results.curves import CurveQuery, select
+from sprag.service.results.pictures import curves as pictures
+from sprag.service.results.selection import SelectionError
+from sprag.service.spec.catalogue import unit_of
+from sprag.worker import models
 
 if TYPE_CHECKING:
-    from service.storage.records import StudyRecord
-    from worker.study import Study
+    from sprag.service.storage.records import StudyRecord
+    from sprag.worker.study import Study
 
 router = APIRouter(include_in_schema=False)
 

@@ -11,21 +11,21 @@ from fastapi import APIRouter, Query
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
-from service.http.context import Context, Ctx
-from service.http.problems import ApiError
-from service.http.schedule_views import summary
-from service.http.views import preset_of
-from service.http.web.form.spec import Values
-from service.http.web.form.values import Form
-from service.http.web.templates import page
-from service.http.work import Attended, Work
-from service.jobs import checks
-from service.presets import preset_names
-from service.schedules.fields import ScheduleFields, change_fields
-from service.schedules.times import zones
-from service.spec.report import SpecError
-from service.storage.errors import StudyNotFound, TooManySchedules
-from worker.limits import MAX_PRIORITY
+from sprag.service.http.context import Context, Ctx
+from sprag.service.http.problems import ApiError
+from sprag.service.http.schedule_views import summary
+from sprag.service.http.views import preset_of
+from sprag.service.http.web.form.spec import Values
+from sprag.service.http.web.form.values import Form
+from sprag.service.http.web.templates import page
+from sprag.service.http.work import Attended, Work
+from sprag.service.jobs import checks
+from sprag.service.presets import preset_names
+from sprag.service.schedules.fields import ScheduleFields, change_fields
+from sprag.service.schedules.times import zones
+from sprag.service.spec.report import SpecError
+from sprag.service.storage.errors import StudyNotFound, TooManySchedules
+from sprag.worker.limits import MAX_PRIORITY
 
 router = APIRouter(include_in_schema=False)
 

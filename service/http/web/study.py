@@ -12,37 +12,37 @@ from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
-from service.http import views
-from service.http.context import Context, Ctx, StudyId
-from service.http.problems import ApiError
-from service.http.respond import timestamp
-from service.http.web.choice import characteristic, map_query, pairs_of
-from service.http.web.form.check import fits_of, has_measured_clutch
-from service.http.web.templates import page
-from service.http.work import Attended
-from service.jobs import checks
-from service.jobs.submission import take_in
-from service.results import exports
-from service.results.curves import select
-from service.results.defaults import caption, drawn_numbers
-from service.results.exports.inputs import inputs as every_input
-from service.results.exports.inputs import run_inputs
-from service.results.pictures import curves as pictures
-from service.results.regimes import DOUBTFUL
-from service.results.selection import SelectionError
-from service.spec.catalogue import parameter_of, unit_of
-from service.spec.numbers import parse_number
-from worker import models
-from worker.states import TRANSITIONS, StudyEvent, StudyState
+from sprag.service.http import views
+from sprag.service.http.context import Context, Ctx, StudyId
+from sprag.service.http.problems import ApiError
+from sprag.service.http.respond import timestamp
+from sprag.service.http.web.choice import characteristic, map_query, pairs_of
+from sprag.service.http.web.form.check import fits_of, has_measured_clutch
+from sprag.service.http.web.templates import page
+from sprag.service.http.work import Attended
+from sprag.service.jobs import checks
+from sprag.service.jobs.submission import take_in
+from sprag.service.results import exports
+from sprag.service.results.curves import select
+from sprag.service.results.defaults import caption, drawn_numbers
+from sprag.service.results.exports.inputs import inputs as every_input
+from sprag.service.results.exports.inputs import run_inputs
+from sprag.service.results.pictures import curves as pictures
+from sprag.service.results.regimes import DOUBTFUL
+from sprag.service.results.selection import SelectionError
+from sprag.service.spec.catalogue import parameter_of, unit_of
+from sprag.service.spec.numbers import parse_number
+from sprag.worker import models
+from sprag.worker.states import TRANSITIONS, StudyEvent, StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from starlette.datastructures import QueryParams
 
-    from service.http.web.figures.fit import FitChart
-    from service.results.curves import CurveQuery
-    from worker.study import Study
+    from sprag.service.http.web.figures.fit import FitChart
+    from sprag.service.results.curves import CurveQuery
+    from sprag.worker.study import Study
 
 router = APIRouter(include_in_schema=False)
 

@@ -10,19 +10,19 @@ import numpy as np
 from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
-from service.faults import ErrorItem
-from service.http.context import Context, Ctx, StudyId
-from service.http.web.study import fixed_choices, study_frame
-from service.http.web.templates import page
-from service.results.selection import SelectionError, locate_axes
-from service.spec.catalogue import result_of, unit_of
-from worker import models
+from sprag.service.faults import ErrorItem
+from sprag.service.http.context import Context, Ctx, StudyId
+from sprag.service.http.web.study import fixed_choices, study_frame
+from sprag.service.http.web.templates import page
+from sprag.service.results.selection import SelectionError, locate_axes
+from sprag.service.spec.catalogue import result_of, unit_of
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from service.storage.records import CaseRow
-    from worker.study import Study
+    from sprag.service.storage.records import CaseRow
+    from sprag.worker.study import Study
 
 router = APIRouter(include_in_schema=False)
 

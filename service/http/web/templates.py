@@ -12,15 +12,15 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 from starlette.responses import Response
 
-from service.http.access import ASKING
-from service.results.wording import number, symbol, unit_text, words
-from service.storage.scopes import TokenScope
+from sprag.service.http.access import ASKING
+from sprag.service.results.wording import number, symbol, unit_text, words
+from sprag.service.storage.scopes import TokenScope
 
 
 @lru_cache(maxsize=1)
 def _templates() -> Environment:
     environment = Environment(
-        loader=PackageLoader("service.http.web"),
+        loader=PackageLoader("sprag.service.http.web"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

@@ -12,16 +12,16 @@ from urllib.parse import quote, urlsplit
 
 from starlette.responses import RedirectResponse
 
-from service.http.access import COOKIE, Access, Grant
-from service.http.web.form.values import read_form
-from service.http.web.templates import page
+from sprag.service.http.access import COOKIE, Access, Grant
+from sprag.service.http.web.form.values import read_form
+from sprag.service.http.web.templates import page
 
 if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.responses import Response
 
-    from service.http.problems import ApiError
-    from service.http.web.form.spec import Values
+    from sprag.service.http.problems import ApiError
+    from sprag.service.http.web.form.spec import Values
 
 LOGIN_PATH: Final = "/login"
 #: Field of the login that says that a form is to be sent afterwards, and what the names of its fields begin with.

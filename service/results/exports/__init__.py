@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from service.formats import FORMATS, MEDIA_TYPES, SUFFIXES, Format, format_of
-from service.results.exports.source import Source
-from service.results.exports.text import (
+from sprag.service.formats import FORMATS, MEDIA_TYPES, SUFFIXES, Format, format_of
+from sprag.service.results.exports.source import Source
+from sprag.service.results.exports.text import (
     csv_pieces,
     escape,
     json_lines_pieces,
@@ -47,17 +47,17 @@ def export(source: Source, form: Format) -> Iterator[bytes]:
     if form == "jsonl":
         return json_lines_pieces(source)
     if form == "parquet":
-        from service.results.exports.arrow import parquet_pieces
+        from sprag.service.results.exports.arrow import parquet_pieces
 
         return parquet_pieces(source)
     if form == "arrow":
-        from service.results.exports.arrow import arrow_pieces
+        from sprag.service.results.exports.arrow import arrow_pieces
 
         return arrow_pieces(source)
     if form == "xlsx":
-        from service.results.exports.xlsx import xlsx_pieces
+        from sprag.service.results.exports.xlsx import xlsx_pieces
 
         return xlsx_pieces(source)
-    from service.results.exports.netcdf import netcdf_pieces
+    from sprag.service.results.exports.netcdf import netcdf_pieces
 
     return netcdf_pieces(source)

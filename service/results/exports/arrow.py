@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import pyarrow as pa
 
-from service.results.exports.inputs import description_of
-from service.results.exports.source import machine
-from service.spec.catalogue import unit_of
+from sprag.service.results.exports.inputs import description_of
+from sprag.service.results.exports.source import machine
+from sprag.service.spec.catalogue import unit_of
 
 if TYPE_CHECKING:
-    from service.results.exports.source import Source
-    from service.storage.records import RowBlock
+    from sprag.service.results.exports.source import Source
+    from sprag.service.storage.records import RowBlock
 
 #: Rows of one group of a Parquet file: some 20 MB of numbers.
 _GROUP_ROWS: Final = 50_000

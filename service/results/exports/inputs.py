@@ -9,11 +9,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from service.spec.catalogue import parameter_of, unit_of
-from service.spec.machine.registry import part_of
+from sprag.service.spec.catalogue import parameter_of, unit_of
+from sprag.service.spec.machine.registry import part_of
 
 if TYPE_CHECKING:
-    from worker.study import Study
+    from sprag.worker.study import Study
 
 #: Where the value of an input is from; "" where the user's own spec is not known.
 Origin = Literal["given", "default", "fitted", "axes", ""]

@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from service.results.exports.inputs import description_of
-from service.results.exports.source import machine
-from service.results.exports.spool import spooled
-from service.spec.catalogue import unit_of
-from worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, flags_mask
+from sprag.service.results.exports.inputs import description_of
+from sprag.service.results.exports.source import machine
+from sprag.service.results.exports.spool import spooled
+from sprag.service.spec.catalogue import unit_of
+from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, flags_mask
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from service.results.exports.source import Source
-    from worker.models import ResultInfo
-    from worker.study import Axis, Study
+    from sprag.service.results.exports.source import Source
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Axis, Study
 
 _CONVENTIONS: Final = "CF-1.11"
 _CASE: Final = "case"

@@ -7,12 +7,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
-from service.results.exports.inputs import choices, defaults
+from sprag.service.results.exports.inputs import choices, defaults
 
 if TYPE_CHECKING:
-    from service.storage.records import RowBlock
-    from worker.models import ResultInfo
-    from worker.study import Study
+    from sprag.service.storage.records import RowBlock
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Study
 
 
 #: Parts of a spec that describe the machine and its run; the axes stand in the rows themselves.

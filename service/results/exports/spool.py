@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final
 
-from service.stale_files import marked, sweep
+from sprag.service.stale_files import marked, sweep
 
 _PREFIX: Final = "sprag-export-"
 _PIECE: Final = 1 << 20

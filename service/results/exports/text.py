@@ -7,14 +7,14 @@ import io
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, Final
 
-from service.json_text import to_bytes
-from service.results.exports.source import machine
-from service.spec.catalogue import unit_of
+from sprag.service.json_text import to_bytes
+from sprag.service.results.exports.source import machine
+from sprag.service.spec.catalogue import unit_of
 
 if TYPE_CHECKING:
-    from service.results.exports.source import Source
-    from service.storage.records import CaseRow, RowBlock
-    from worker.study import Study
+    from sprag.service.results.exports.source import Source
+    from sprag.service.storage.records import CaseRow, RowBlock
+    from sprag.worker.study import Study
 
 #: A spreadsheet takes a cell that begins like this for a formula.
 _FORMULA_STARTS: Final = ("=", "+", "-", "@", "\t", "\r")

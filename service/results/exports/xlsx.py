@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any, Final
 import xlsxwriter
 from xlsxwriter.worksheet import Worksheet
 
-from service.results.exports.inputs import inputs, run_inputs
-from service.results.exports.source import given_texts
-from service.results.exports.spool import spooled
-from service.spec.catalogue import unit_of
+from sprag.service.results.exports.inputs import inputs, run_inputs
+from sprag.service.results.exports.source import given_texts
+from sprag.service.results.exports.spool import spooled
+from sprag.service.spec.catalogue import unit_of
 
 if TYPE_CHECKING:
-    from service.results.exports.source import Source
-    from service.storage.records import RowBlock
+    from sprag.service.results.exports.source import Source
+    from sprag.service.storage.records import RowBlock
 
 #: Rows of a sheet, the two of names and units included; more cases go on on a further sheet.
 SHEET_ROWS: Final = 1_048_576

@@ -6,7 +6,7 @@ import itertools
 import math
 from typing import TYPE_CHECKING, Final
 
-from service.results.pictures.curves import (
+from sprag.service.results.pictures.curves import (
     MAX_PICTURE_CURVES,
     MAX_PICTURE_POINTS,
     Picture,
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
-    from service.results.curves import Curves
+    from sprag.service.results.curves import Curves
 
 
 _COLUMNS: Final = 2

@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 
-from service.faults import ErrorItem
-from service.results.regimes import DOUBTFUL, MARKED, MARKS, regimes_of, stretches
-from service.results.selection import SelectionError
-from worker.pool.child_process import uncounted
+from sprag.service.faults import ErrorItem
+from sprag.service.results.regimes import DOUBTFUL, MARKED, MARKS, regimes_of, stretches
+from sprag.service.results.selection import SelectionError
+from sprag.worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from service.results.curves import Curves, Map
-    from worker.models import ResultInfo
+    from sprag.service.results.curves import Curves, Map
+    from sprag.worker.models import ResultInfo
 
 Picture = Literal["svg", "png", "pdf"]
 PICTURES: Final[tuple[Picture, ...]] = get_args(Picture)

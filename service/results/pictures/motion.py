@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from service.results.pictures.curves import Picture, axis_label, render
-from service.results.pictures.shaft import draw_shaft
-from service.results.pictures.states import OTHER_LOOK, spans_of
-from service.results.wording import words
+from sprag.service.results.pictures.curves import Picture, axis_label, render
+from sprag.service.results.pictures.shaft import draw_shaft
+from sprag.service.results.pictures.states import OTHER_LOOK, spans_of
+from sprag.service.results.wording import words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from worker.models import Presentation, Trajectory
+    from sprag.worker.models import Presentation, Trajectory
 
 
 def draw_motion(made: Trajectory, shown: Presentation, title: str, picture: Picture) -> bytes:

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from service.faults import ErrorItem
-from service.results.pictures.curves import Picture, axis_label, head, render
-from service.results.selection import SelectionError
+from sprag.service.faults import ErrorItem
+from sprag.service.results.pictures.curves import Picture, axis_label, head, render
+from sprag.service.results.selection import SelectionError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from service.results.sensitivity import Sensitivity
+    from sprag.service.results.sensitivity import Sensitivity
 
 MOST_RESULTS: Final = 8
 #: Characters of a line of notes that surely fit into the width of a picture.

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from service.results.pictures.curves import Picture, axis_label, render
+from sprag.service.results.pictures.curves import Picture, axis_label, render
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from worker.models import Presentation, Trajectory
+    from sprag.worker.models import Presentation, Trajectory
 
 
 def draw_shaft(made: Trajectory, shown: Presentation, title: str, picture: Picture) -> bytes:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
-from service.formats import REPORT_FORMATS, ReportFormat
+from sprag.service.formats import REPORT_FORMATS, ReportFormat
 
 if TYPE_CHECKING:
-    from service.results.report.content import Report
+    from sprag.service.results.report.content import Report
 
 __all__ = ["MEDIA_TYPES", "REPORT_FORMATS", "ReportFormat", "write_report"]
 
@@ -19,7 +19,7 @@ def write_report(report: Report, form: ReportFormat) -> bytes:
     """The document. Libraries are loaded for the format that is asked for."""
     writer: Callable[[Report], bytes]
     if form == "html":
-        from service.results.report.html import html_report as writer
+        from sprag.service.results.report.html import html_report as writer
     else:
-        from service.results.report.pdf import pdf_report as writer
+        from sprag.service.results.report.pdf import pdf_report as writer
     return writer(report)

@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from service.results.curves import Curves, Fetch, draw, select
-from service.results.defaults import main_query
-from service.results.exports.inputs import Input, inputs, run_inputs
-from service.results.exports.source import given_texts
-from service.results.pictures.curves import require_drawable
-from service.results.regimes import counted
-from service.results.selection import SelectionError
-from service.spec.catalogue import unit_of
-from worker import models
+from sprag.service.results.curves import Curves, Fetch, draw, select
+from sprag.service.results.defaults import main_query
+from sprag.service.results.exports.inputs import Input, inputs, run_inputs
+from sprag.service.results.exports.source import given_texts
+from sprag.service.results.pictures.curves import require_drawable
+from sprag.service.results.regimes import counted
+from sprag.service.results.selection import SelectionError
+from sprag.service.spec.catalogue import unit_of
+from sprag.worker import models
 
 if TYPE_CHECKING:
-    from service.storage.records import RowBlock, StudyRecord
-    from service.storage.store import Store
-    from worker.models import ResultInfo
-    from worker.study import Study
+    from sprag.service.storage.records import RowBlock, StudyRecord
+    from sprag.service.storage.store import Store
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Study
 
 #: Half widths of means stand in the table, beside their means.
 _HALF_WIDTH: Final = ".half_width"

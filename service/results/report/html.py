@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
-from service.results.pictures.curves import draw_curves
+from sprag.service.results.pictures.curves import draw_curves
 
 if TYPE_CHECKING:
-    from service.results.curves import Curves
-    from service.results.report.content import Report
+    from sprag.service.results.curves import Curves
+    from sprag.service.results.report.content import Report
 
 
 @lru_cache(maxsize=1)
 def _template() -> Template:
     environment = Environment(
-        loader=PackageLoader("service.results.report"),
+        loader=PackageLoader("sprag.service.results.report"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

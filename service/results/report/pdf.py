@@ -7,15 +7,15 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
-from service.results.pictures.curves import load_matplotlib, paint_curves, painting, writable
-from service.results.report.html import input_text, number_text
+from sprag.service.results.pictures.curves import load_matplotlib, paint_curves, painting, writable
+from sprag.service.results.report.html import input_text, number_text
 
 if TYPE_CHECKING:
     from matplotlib.backends.backend_pdf import PdfPages
     from matplotlib.figure import Figure
 
-    from service.results.exports.inputs import Input
-    from service.results.report.content import Report
+    from sprag.service.results.exports.inputs import Input
+    from sprag.service.results.report.content import Report
 
 _A4: Final = (8.27, 11.69)
 _LINES: Final = 66

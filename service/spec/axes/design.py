@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
-from service.spec.axes.axes import check_paths, expand, read_axes, read_axis
-from service.spec.axes.blocks import (
+from sprag.service.spec.axes.axes import check_paths, expand, read_axes, read_axis
+from sprag.service.spec.axes.blocks import (
     Block,
     as_axes,
     chosen,
@@ -25,19 +25,19 @@ from service.spec.axes.blocks import (
     product,
     side_by_side,
 )
-from service.spec.axes.exclude import kept, read_exclude
-from service.spec.axes.points import read_points
-from service.spec.axes.sample import read_sample
-from service.spec.axes.values import count_text
-from service.spec.fields import read_object
-from service.spec.report import Report, did_you_mean, join, quantity_text
-from worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_COLUMNS
+from sprag.service.spec.axes.exclude import kept, read_exclude
+from sprag.service.spec.axes.points import read_points
+from sprag.service.spec.axes.sample import read_sample
+from sprag.service.spec.axes.values import count_text
+from sprag.service.spec.fields import read_object
+from sprag.service.spec.report import Report, did_you_mean, join, quantity_text
+from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_COLUMNS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from service.spec.machine.machine import Machine
-    from worker.study import Axis, Combine
+    from sprag.service.spec.machine.machine import Machine
+    from sprag.worker.study import Axis, Combine
 
 COMBINE: Final = ("grid", "zip", "union")
 GROUP_FIELDS: Final = ("combine", "axes")

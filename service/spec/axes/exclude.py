@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from service.spec.fields import read_number, read_object
-from service.spec.report import Report, join
-from worker.limits import MAX_AXIS_VALUES
-from worker.study import SAME_VALUE
+from sprag.service.spec.fields import read_number, read_object
+from sprag.service.spec.report import Report, join
+from sprag.worker.limits import MAX_AXIS_VALUES
+from sprag.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from service.spec.machine.machine import Machine
+    from sprag.service.spec.machine.machine import Machine
 
 FIELDS: Final = ("above", "below", "at_least", "at_most", "is")
 #: path -> [(field, value)]: all of them must hold for a case to be excluded

@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from service.spec.axes.axes import read_paths
-from service.spec.axes.blocks import Block
-from service.spec.fields import exact, read_object
-from service.spec.numbers import parse_number
-from service.spec.report import Report, join, shorten_text
-from service.spec.units import QuantityError, to_float
-from worker.limits import MAX_AXIS_VALUES, MAX_COLUMNS
+from sprag.service.spec.axes.axes import read_paths
+from sprag.service.spec.axes.blocks import Block
+from sprag.service.spec.fields import exact, read_object
+from sprag.service.spec.numbers import parse_number
+from sprag.service.spec.report import Report, join, shorten_text
+from sprag.service.spec.units import QuantityError, to_float
+from sprag.worker.limits import MAX_AXIS_VALUES, MAX_COLUMNS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from service.spec.machine.machine import Machine
-    from worker.models import Parameter
+    from sprag.service.spec.machine.machine import Machine
+    from sprag.worker.models import Parameter
 
 FIELDS: Final = ("points",)
 #: "shaft.load", "shaft.load [N*mm]", "shaft.load (N*mm)"

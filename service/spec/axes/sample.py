@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from service.spec.axes.axes import read_paths
-from service.spec.axes.blocks import Block
-from service.spec.fields import read_number, read_object, read_whole
-from service.spec.report import Report, did_you_mean, join
-from worker.limits import MAX_AXES, MAX_AXIS_VALUES
+from sprag.service.spec.axes.axes import read_paths
+from sprag.service.spec.axes.blocks import Block
+from sprag.service.spec.fields import read_number, read_object, read_whole
+from sprag.service.spec.report import Report, did_you_mean, join
+from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from service.spec.machine.machine import Machine
+    from sprag.service.spec.machine.machine import Machine
 
 FIELDS: Final = ("sample", "count", "seed", "ranges")
 METHODS: Final = ("latin_hypercube", "sobol", "saltelli")

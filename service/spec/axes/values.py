@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from service.spec.fields import read_exact, read_number, read_whole
-from service.spec.report import Report, join
-from service.spec.units import QuantityError, parse_exact, to_float
-from worker.limits import MAX_AXIS_VALUES
-from worker.models import Parameter
+from sprag.service.spec.fields import read_exact, read_number, read_whole
+from sprag.service.spec.report import Report, join
+from sprag.service.spec.units import QuantityError, parse_exact, to_float
+from sprag.worker.limits import MAX_AXIS_VALUES
+from sprag.worker.models import Parameter
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

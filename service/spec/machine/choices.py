@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 from inspect import signature
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from worker import models
+from sprag.worker import models
 
 if TYPE_CHECKING:
-    from worker.study import Study
+    from sprag.worker.study import Study
 
 #: Options of the fit of a clutch law, and what they mean.
 _FIT_OPTIONS: Final = {

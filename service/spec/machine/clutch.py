@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from service.spec.fields import missing, placed, read_flag, read_number, read_object, read_whole
-from service.spec.report import Report, join, quantity_text
-from worker import models
-from worker.limits import MAX_CLUTCH_LAWS, MAX_CLUTCH_ROWS
-from worker.models import CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, Parameter
+from sprag.service.spec.fields import missing, placed, read_flag, read_number, read_object, read_whole
+from sprag.service.spec.report import Report, join, quantity_text
+from sprag.worker import models
+from sprag.worker.limits import MAX_CLUTCH_LAWS, MAX_CLUTCH_ROWS
+from sprag.worker.models import CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, Parameter
 
 if TYPE_CHECKING:
-    from worker.models import ClutchFit
-    from worker.study import Axis, Combine
+    from sprag.worker.models import ClutchFit
+    from sprag.worker.study import Axis, Combine
 
 _BY_LAW = ("coefficients", "windup_limit")
 _BY_DATA = ("data", "accuracy", "max_degree", "through_origin", "angles_include_backlash")

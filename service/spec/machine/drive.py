@@ -7,14 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from service.spec.fields import placed, read_number, read_object, read_parameters
-from service.spec.machine.clutch import Clutch, read_clutch
-from service.spec.machine.machine import Machine
-from service.spec.report import Report, did_you_mean, join
-from worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, VIBRATION_DRIVE, Parameter, parameter_catalogue
+from sprag.service.spec.fields import placed, read_number, read_object, read_parameters
+from sprag.service.spec.machine.clutch import Clutch, read_clutch
+from sprag.service.spec.machine.machine import Machine
+from sprag.service.spec.report import Report, did_you_mean, join
+from sprag.worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, VIBRATION_DRIVE, Parameter, parameter_catalogue
 
 if TYPE_CHECKING:
-    from worker.models import ClutchFit
+    from sprag.worker.models import ClutchFit
 
 _PENDULUM_PATH = re.compile(r"pendulums\.([0-9]{1,9})\.(.+)")
 _CLUTCH_PATH = re.compile(r"(?:pendulums\.[0-9]{1,9}\.)?clutch\.(.+)")

@@ -10,11 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from service.spec.fields import missing, read_number
-from service.spec.report import Report, did_you_mean, join
+from sprag.service.spec.fields import missing, read_number
+from sprag.service.spec.report import Report, did_you_mean, join
 
 if TYPE_CHECKING:
-    from worker.models import ClutchFit, Parameter
+    from sprag.worker.models import ClutchFit, Parameter
 
 
 @dataclass

@@ -9,27 +9,27 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from service.spec.axes.axes import varied_values
-from service.spec.machine.choices import Choice, drive_choices, shaft_choices
-from service.spec.machine.clutch import check_laws
-from service.spec.machine.drive import Drive, read_drive
-from service.spec.machine.machine import read_plain
-from service.spec.machine.shaft import read_shaft
-from service.spec.run import read_run, refuse_run
-from service.spec.schema.axes import object_schema
-from service.spec.schema.drive import drive_schema, run_schema
-from service.spec.schema.quantity import plain_schema
-from service.spec.schema.shaft import shaft_schema
-from service.spec.warnings import warn_machine_shaft, warn_vibration_drive
-from worker import models
+from sprag.service.spec.axes.axes import varied_values
+from sprag.service.spec.machine.choices import Choice, drive_choices, shaft_choices
+from sprag.service.spec.machine.clutch import check_laws
+from sprag.service.spec.machine.drive import Drive, read_drive
+from sprag.service.spec.machine.machine import read_plain
+from sprag.service.spec.machine.shaft import read_shaft
+from sprag.service.spec.run import read_run, refuse_run
+from sprag.service.spec.schema.axes import object_schema
+from sprag.service.spec.schema.drive import drive_schema, run_schema
+from sprag.service.spec.schema.quantity import plain_schema
+from sprag.service.spec.schema.shaft import shaft_schema
+from sprag.service.spec.warnings import warn_machine_shaft, warn_vibration_drive
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from service.spec.machine.machine import Machine
-    from service.spec.report import Report
-    from service.spec.schema.axes import Schema
-    from worker.study import Axis, Combine, Study
+    from sprag.service.spec.machine.machine import Machine
+    from sprag.service.spec.report import Report
+    from sprag.service.spec.schema.axes import Schema
+    from sprag.worker.study import Axis, Combine, Study
 
     Axes = tuple[Axis, ...]
 

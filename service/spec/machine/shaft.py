@@ -10,11 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from service.spec.catalogue import general_path
-from service.spec.fields import read_object
-from service.spec.machine.machine import Machine, read_numbers
-from service.spec.machine.shaft_check import check_machine
-from service.spec.machine.shaft_parts import (
+from sprag.service.spec.catalogue import general_path
+from sprag.service.spec.fields import read_object
+from sprag.service.spec.machine.machine import Machine, read_numbers
+from sprag.service.spec.machine.shaft_check import check_machine
+from sprag.service.spec.machine.shaft_parts import (
     read_balance,
     read_choice,
     read_constants,
@@ -24,9 +24,9 @@ from service.spec.machine.shaft_parts import (
     read_operation,
     read_phi_c,
 )
-from service.spec.report import Report, did_you_mean
-from worker import models
-from worker.models import machine_shaft
+from sprag.service.spec.report import Report, did_you_mean
+from sprag.worker import models
+from sprag.worker.models import machine_shaft
 
 FIELDS: Final = (
     "cycle", "mean_speed", "mean_speed_is", "drive", "mechanism", "operation", "balance", "phi_c", "constants",

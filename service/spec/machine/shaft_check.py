@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from functools import cache, partial
 from typing import Any, Final
 
-from service.spec.report import Report
-from worker.models import (
+from sprag.service.spec.report import Report
+from sprag.worker.models import (
     Ending,
     ExpressionError,
     InsufficientInertiaError,
@@ -17,7 +17,7 @@ from worker.models import (
     load,
     machine_shaft,
 )
-from worker.pool.child_process import uncounted
+from sprag.worker.pool.child_process import uncounted
 
 #: Where the fault of a machine that ends so is told.
 _POINTERS: Final[dict[Ending | None, str]] = {

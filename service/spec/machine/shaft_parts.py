@@ -7,11 +7,11 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from service.spec.fields import read_number, read_object, read_whole
-from service.spec.report import Report, did_you_mean, join
-from service.spec.units import QuantityError, parse_quantity
-from worker import models
-from worker.models import Parameter, machine_shaft
+from sprag.service.spec.fields import read_number, read_object, read_whole
+from sprag.service.spec.report import Report, did_you_mean, join
+from sprag.service.spec.units import QuantityError, parse_quantity
+from sprag.worker import models
+from sprag.worker.models import Parameter, machine_shaft
 
 BALANCES: Final = ("constant", "scale", "refuse", "motor")
 LAWS: Final = ("cycloidal", "polynomial_345")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from service.spec.axes.design import COMBINE
-from service.spec.axes.exclude import FIELDS as EXCLUDE_FIELDS
-from service.spec.axes.sample import LARGEST_SEED, METHODS, SCALES
-from worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_TIED_PATHS
+from sprag.service.spec.axes.design import COMBINE
+from sprag.service.spec.axes.exclude import FIELDS as EXCLUDE_FIELDS
+from sprag.service.spec.axes.sample import LARGEST_SEED, METHODS, SCALES
+from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_TIED_PATHS
 
 Schema = dict[str, Any]
 

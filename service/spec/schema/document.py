@@ -1,15 +1,15 @@
 """The spec as a JSON Schema (2020-12), made from the engine's catalogue: for the API's description and for forms.
 
 The schema says what a field is called, its unit, range, default and meaning. What depends on several fields (windows
-inside the run, sizes of grids, clutch laws) only `service.spec.document.parse_spec` checks.
+inside the run, sizes of grids, clutch laws) only `sprag.service.spec.document.parse_spec` checks.
 """
 
 from __future__ import annotations
 
-from service.spec.axes.design import COMBINE
-from service.spec.document import UNNAMED, VERSION
-from service.spec.machine.registry import part_of
-from service.spec.schema.axes import (
+from sprag.service.spec.axes.design import COMBINE
+from sprag.service.spec.document import UNNAMED, VERSION
+from sprag.service.spec.machine.registry import part_of
+from sprag.service.spec.schema.axes import (
     COMBINE_HELP,
     Schema,
     axis_schema,
@@ -19,8 +19,8 @@ from service.spec.schema.axes import (
     points_schema,
     sample_schema,
 )
-from worker import models
-from worker.limits import MAX_AXES, MAX_NAME_LENGTH
+from sprag.worker import models
+from sprag.worker.limits import MAX_AXES, MAX_NAME_LENGTH
 
 
 def spec_schema() -> Schema:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from service.spec.fields import placed
-from service.spec.run import RESETS, SETTLED_DEFAULTS, SETTLED_FIELDS, TIMED_FIELDS
-from service.spec.schema.axes import Schema, object_schema
-from service.spec.schema.quantity import quantity_schema
-from worker import models
-from worker.limits import (
+from sprag.service.spec.fields import placed
+from sprag.service.spec.run import RESETS, SETTLED_DEFAULTS, SETTLED_FIELDS, TIMED_FIELDS
+from sprag.service.spec.schema.axes import Schema, object_schema
+from sprag.service.spec.schema.quantity import quantity_schema
+from sprag.worker import models
+from sprag.worker.limits import (
     MAX_CLUTCH_ROWS,
     MAX_ORBIT_PERIODS,
     MAX_SETTLED,
@@ -17,7 +17,7 @@ from worker.limits import (
     MIN_SETTLED_PERIODS,
     MIN_TOLERANCE,
 )
-from worker.models import CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, MAX_PENDULUMS, SETTLED, Parameter
+from sprag.worker.models import CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, MAX_PENDULUMS, SETTLED, Parameter
 
 
 def drive_schema() -> Schema:

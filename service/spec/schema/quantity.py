@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from service.spec.schema.axes import Schema, object_schema
-from service.spec.units import example
-from worker.limits import MAX_QUANTITY_LENGTH
-from worker.models import Parameter
+from sprag.service.spec.schema.axes import Schema, object_schema
+from sprag.service.spec.units import example
+from sprag.worker.limits import MAX_QUANTITY_LENGTH
+from sprag.worker.models import Parameter
 
 _TEXT: Final[Schema] = {"type": "string", "minLength": 1, "maxLength": MAX_QUANTITY_LENGTH}
 

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from service.spec.machine.shaft import MEAN_SPEEDS
-from service.spec.machine.shaft_parts import BALANCES, INTERPOLATIONS, MECHANISM_CHOICES, MOTORS, OPERATION_CHOICES
-from service.spec.schema.axes import Schema, object_schema
-from service.spec.schema.quantity import quantity_schema
-from worker import models
-from worker.models import Parameter, machine_shaft
+from sprag.service.spec.machine.shaft import MEAN_SPEEDS
+from sprag.service.spec.machine.shaft_parts import (
+    BALANCES,
+    INTERPOLATIONS,
+    MECHANISM_CHOICES,
+    MOTORS,
+    OPERATION_CHOICES,
+)
+from sprag.service.spec.schema.axes import Schema, object_schema
+from sprag.service.spec.schema.quantity import quantity_schema
+from sprag.worker import models
+from sprag.worker.models import Parameter, machine_shaft
 
 _TEXT: Final[Schema] = {"type": "string", "minLength": 1}
 _NUMBER: Final[Schema] = {"type": ["number", "string"]}

@@ -8,8 +8,8 @@ from typing import Any, cast
 import numba
 import pytest
 
-from engine.compile.jit import compiled, inlined, part
-from engine.compile.program import ProgramCompiler
+from sprag.engine.compile.jit import compiled, inlined, part
+from sprag.engine.compile.program import ProgramCompiler
 
 
 @part

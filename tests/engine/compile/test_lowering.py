@@ -11,10 +11,10 @@ import numba
 import numpy as np
 import pytest
 
-from engine.compile.lowering import constant_record, lane_loops, lane_mask, lowest
-from engine.compile.ways import GROUP
-from engine.taylor.batch import aligned_zeros
-from engine.taylor.straight import (
+from sprag.engine.compile.lowering import constant_record, lane_loops, lane_mask, lowest
+from sprag.engine.compile.ways import GROUP
+from sprag.engine.taylor.batch import aligned_zeros
+from sprag.engine.taylor.straight import (
     LaneCode,
     Span,
     exp2,

@@ -18,7 +18,7 @@ import pytest
 from numba.core import cgutils, types
 from numba.core.registry import cpu_target
 
-from engine.compile import decorators, lowering, plain, program
+from sprag.engine.compile import decorators, lowering, plain, program
 
 COMPILE = Path(program.__file__).parent
 

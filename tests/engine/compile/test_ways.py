@@ -14,13 +14,13 @@ ROOT = Path(__file__).resolve().parents[3]
 _PROGRAM = """
 import sys
 import numpy as np
-from engine.vibration_drive.simulate import simulate
+from sprag.engine.vibration_drive.simulate import simulate
 from tests.engine.vibration_drive.drive import batch_of, drive, periods
 
 loads = np.linspace(0.0, 0.4, 40)
 run = periods(12.0, 8.0, 12.0, tolerance=1e-4)
 batch = simulate(batch_of([drive(1, shaft__load=load) for load in loads]), run, cases=40)
-inside = [name for name in ("decorators", "lowering", "program") if f"engine.compile.{name}" in sys.modules]
+inside = [name for name in ("decorators", "lowering", "program") if f"sprag.engine.compile.{name}" in sys.modules]
 sys.stdout.write(f"{inside} {batch.values.tobytes().hex()}")
 """
 
@@ -55,7 +55,7 @@ def test_an_unknown_way_is_refused_by_name() -> None:
 
 def test_the_ways_share_no_cache(tmp_path: Path) -> None:
     """numba would load code of one way into a process of the other."""
-    ask = "from engine.compile.cache import cache_folder; print(cache_folder())"
+    ask = "from sprag.engine.compile.cache import cache_folder; print(cache_folder())"
     folders = {
         subprocess.run(
             [sys.executable, "-c", ask],

@@ -8,10 +8,10 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from engine.endings import ENDING_CODES, Ending
-from engine.machine_shaft.results import result_infos
-from engine.machine_shaft.simulate import simulate
-from engine.machine_shaft.spec import MachineSpec, MechanismChoice, OperationChoice
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.machine_shaft.results import result_infos
+from sprag.engine.machine_shaft.simulate import simulate
+from sprag.engine.machine_shaft.spec import MachineSpec, MechanismChoice, OperationChoice
 
 NAMES = tuple(info.name for info in result_infos())
 RPM = math.pi / 30.0

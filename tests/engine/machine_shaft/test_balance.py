@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from engine.endings import Ending
-from engine.machine_shaft.machine import Columns, Machine
-from engine.machine_shaft.motor import motor_torque, steady_speed
-from engine.machine_shaft.spec import Drive, MachineSpec, Motor, OperationChoice
-from engine.machine_shaft.trajectory import trajectory
+from sprag.engine.endings import Ending
+from sprag.engine.machine_shaft.machine import Columns, Machine
+from sprag.engine.machine_shaft.motor import motor_torque, steady_speed
+from sprag.engine.machine_shaft.spec import Drive, MachineSpec, Motor, OperationChoice
+from sprag.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS, ending_of, one
 
 PLAIN = MachineSpec(balance="refuse", operation=OperationChoice("torque", "constant"))

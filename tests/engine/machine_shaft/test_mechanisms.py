@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from engine.machine_shaft.cams import Cam
-from engine.machine_shaft.linkages import CrankShaper, FourBar, SliderCrank, Whitworth
-from engine.machine_shaft.mechanisms import Mechanism
-from engine.machine_shaft.operations import Stroke
+from sprag.engine.machine_shaft.cams import Cam
+from sprag.engine.machine_shaft.linkages import CrankShaper, FourBar, SliderCrank, Whitworth
+from sprag.engine.machine_shaft.mechanisms import Mechanism
+from sprag.engine.machine_shaft.operations import Stroke
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -11,9 +11,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import erf
 
-from engine.endings import ENDING_CODES, Ending
-from engine.machine_shaft.simulate import simulate
-from engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.machine_shaft.simulate import simulate
+from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
 from tests.engine.machine_shaft.machines import NAMES, one, results_of
 
 Floats = NDArray[np.float64]

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.machine_shaft.spec import During, MachineSpec, MechanismChoice, OperationChoice
-from engine.machine_shaft.tables import Table
-from engine.machine_shaft.trajectory import trajectory
+from sprag.engine.machine_shaft.spec import During, MachineSpec, MechanismChoice, OperationChoice
+from sprag.engine.machine_shaft.tables import Table
+from sprag.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS, one
 
 CRANK, ROD = 0.1, 0.4

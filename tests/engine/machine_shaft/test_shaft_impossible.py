@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.endings import ENDING_CODES, Ending
-from engine.machine_shaft.problems import AssemblyError, ExpressionError, RelationError, TableError
-from engine.machine_shaft.simulate import check, simulate
-from engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
-from engine.machine_shaft.tables import Table
-from engine.machine_shaft.trajectory import trajectory
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.machine_shaft.problems import AssemblyError, ExpressionError, RelationError, TableError
+from sprag.engine.machine_shaft.simulate import check, simulate
+from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
+from sprag.engine.machine_shaft.tables import Table
+from sprag.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import NAMES, PRESS, PRESS_NUMBERS, ending_of, one, results_of
 
 FLAT: dict[str, Any] = {"mean_speed": 10.0, "drive.inertia": 2.0}

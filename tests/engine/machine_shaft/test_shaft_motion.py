@@ -13,13 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from engine.endings import ENDING_CODES, Ending
-from engine.machine_shaft.machine import Columns, Machine
-from engine.machine_shaft.simulate import simulate
-from engine.machine_shaft.spec import Drive, MachineSpec, MeanSpeed, MechanismChoice, OperationChoice
-from engine.machine_shaft.tables import Table
-from engine.machine_shaft.trajectory import trajectory
-from engine.outcome import Trajectory
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.machine_shaft.machine import Columns, Machine
+from sprag.engine.machine_shaft.simulate import simulate
+from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MeanSpeed, MechanismChoice, OperationChoice
+from sprag.engine.machine_shaft.tables import Table
+from sprag.engine.machine_shaft.trajectory import trajectory
+from sprag.engine.outcome import Trajectory
 from tests.engine.machine_shaft.machines import NAMES, PRESS, PRESS_NUMBERS, RPM, one, results_of
 
 ANGLES = np.linspace(0.0, 2.0 * math.pi, 257)

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.endings import ENDING_CODES, Ending
-from engine.machine_shaft.estimate import estimate_seconds
-from engine.machine_shaft.parameters import parameters
-from engine.machine_shaft.problems import (
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.machine_shaft.estimate import estimate_seconds
+from sprag.engine.machine_shaft.parameters import parameters
+from sprag.engine.machine_shaft.problems import (
     AssemblyError,
     ExpressionError,
     InsufficientInertiaError,
@@ -25,11 +25,11 @@ from engine.machine_shaft.problems import (
     TableError,
     UnbalancedWorkError,
 )
-from engine.machine_shaft.results import result_infos
-from engine.machine_shaft.simulate import check, simulate
-from engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
-from engine.machine_shaft.tables import Table
-from engine.machine_shaft.trajectory import trajectory
+from sprag.engine.machine_shaft.results import result_infos
+from sprag.engine.machine_shaft.simulate import check, simulate
+from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
+from sprag.engine.machine_shaft.tables import Table
+from sprag.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import NAMES, PRESS, PRESS_NUMBERS, RPM
 
 FLAT: dict[str, Any] = {"mean_speed": 10.0, "drive.inertia": 2.0}

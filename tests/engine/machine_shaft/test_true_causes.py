@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.endings import ENDING_CODES, Ending
-from engine.machine_shaft.problems import MotorOverrunError, MotorStalledError, NearSingularError
-from engine.machine_shaft.simulate import check, simulate
-from engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.machine_shaft.problems import MotorOverrunError, MotorStalledError, NearSingularError
+from sprag.engine.machine_shaft.simulate import check, simulate
+from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
 from tests.engine.machine_shaft.machines import NAMES, PRESS, PRESS_NUMBERS, ending_of, one
 
 MOTOR = {

@@ -9,9 +9,9 @@ import numba
 import numpy as np
 import pytest
 
-from engine.compile.lowering import lane_loops
-from engine.compile.ways import GROUP
-from engine.taylor.batch import (
+from sprag.engine.compile.lowering import lane_loops
+from sprag.engine.compile.ways import GROUP
+from sprag.engine.taylor.batch import (
     FOUND,
     HARD,
     KNOWN,
@@ -23,7 +23,7 @@ from engine.taylor.batch import (
     peaks_loop,
     roots_loop,
 )
-from engine.taylor.roots import MAX_DEGREE, NO_ROOT, work_stack
+from sprag.engine.taylor.roots import MAX_DEGREE, NO_ROOT, work_stack
 from tests.engine.taylor.polynomials import first_root, largest, put, slot_start, take
 
 ORDER = 10

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.endings import ENDING_CODES, Ending
-from engine.outcome import Trajectory
-from engine.run import Run, Span
-from engine.vibration_drive.results import result_infos
-from engine.vibration_drive.simulate import simulate
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.outcome import Trajectory
+from sprag.engine.run import Run, Span
+from sprag.engine.vibration_drive.results import result_infos
+from sprag.engine.vibration_drive.simulate import simulate
 
 Columns = dict[str, Any]
 

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine.vibration_drive.clutch import HIGHEST_DEGREE, ClutchError, ClutchFitError, fit_clutch, torque
-from engine.vibration_drive.singular_values import singular_values
+from sprag.engine.vibration_drive.clutch import HIGHEST_DEGREE, ClutchError, ClutchFitError, fit_clutch, torque
+from sprag.engine.vibration_drive.singular_values import singular_values
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "clutch_measured.csv"
 

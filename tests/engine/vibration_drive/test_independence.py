@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.run import Run
-from engine.vibration_drive import simulate as front
+from sprag.engine.run import Run
+from sprag.engine.vibration_drive import simulate as front
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, drive, periods
 
 CASES = 64

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.outcome import Trajectory
-from engine.run import Run, Span
-from engine.vibration_drive.simulate import trajectory
+from sprag.engine.outcome import Trajectory
+from sprag.engine.run import Run, Span
+from sprag.engine.vibration_drive.simulate import trajectory
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, clutch, column, drive, one, periods
 
 EXTREMA = {

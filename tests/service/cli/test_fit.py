@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from service.cli.fit import law_text
+from sprag.service.cli.fit import law_text
 
 Sprag = Callable[..., Any]
 

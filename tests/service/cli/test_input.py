@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.endings import Ending
+from sprag.engine.endings import Ending
+from sprag.worker import models
+from sprag.worker.models import Trajectory
+from sprag.worker.study import Study
 from tests.wrong_specs import WRONG, changed
-from worker import models
-from worker.models import Trajectory
-from worker.study import Study
 
 Sprag = Callable[..., Any]
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from service.cli.remote import refusal
-from service.client import RefusedError
+from sprag.service.cli.remote import refusal
+from sprag.service.client import RefusedError
 
 
 def test_parameters_are_called_as_the_options_are() -> None:

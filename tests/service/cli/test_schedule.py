@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from service.cli.app import execute
+from sprag.service.cli.app import execute
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ Run = Callable[..., tuple[int, str, str]]
 @pytest.fixture
 def run(service: Service, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
     """Runs a command; exit code, standard output, standard error."""
-    from service import client
+    from sprag.service import client
 
     class Connected(client.ServiceClient):
         def __init__(self, server: str, token: str | None = None) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from engine.vibration_drive.regimes import settled_infos
+from sprag.engine.vibration_drive.regimes import settled_infos
 from tests.conftest import Finished
 
 Sprag = Callable[..., Finished]
@@ -73,7 +73,7 @@ def test_a_case_that_ends_otherwise_is_told(sprag: Sprag, examples: Path, tmp_pa
 
 
 def test_every_regime_is_in_the_reference() -> None:
-    from engine.vibration_drive.regimes import Regime
+    from sprag.engine.vibration_drive.regimes import Regime
 
     page = (Path(__file__).resolve().parents[3] / "docs" / "reference.md").read_text(encoding="utf-8")
     for regime in Regime:

@@ -8,6 +8,6 @@ HEAVY = ("fastapi", "httpx", "matplotlib", "numba", "numpy", "pint", "plotly", "
 
 
 def test_the_command_line_loads_no_heavy_library() -> None:
-    code = f"import sys, service.cli.app; print(*[name for name in {HEAVY!r} if name in sys.modules])"
+    code = f"import sys, sprag.service.cli.app; print(*[name for name in {HEAVY!r} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from service.cli.app import execute
-from service.storage.store import Store
-from service.storage.tokens import digest_of
+from sprag.service.cli.app import execute
+from sprag.service.storage.store import Store
+from sprag.service.storage.tokens import digest_of
 
 if TYPE_CHECKING:
-    from service.settings import Settings
+    from sprag.service.settings import Settings
 
 
 def test_tokens_are_created_listed_and_revoked(settings: Settings, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,7 +11,7 @@ import pytest
 POSIX = ("fcntl", "grp", "posix", "pwd", "resource", "termios", "tty")
 SERVER = (
     "alembic",
-    "engine",
+    "sprag.engine",
     "fastapi",
     "jinja2",
     "matplotlib",
@@ -30,7 +30,7 @@ genuine = builtins.__import__
 
 def refuse(name, globals=None, *rest):
     importer = (globals or {{}}).get("__name__", "")
-    if importer.partition(".")[0] in ("service", "worker") and name.partition(".")[0] in {posix}:
+    if importer.startswith(("sprag.service", "sprag.worker")) and name.partition(".")[0] in {posix}:
         raise ImportError(f"{{importer}} imports {{name}}")
     return genuine(name, globals, *rest)
 
@@ -46,14 +46,20 @@ def imported(module: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize(
-    "module", ["service.client", *(f"service.client.{name}" for name in ("aio", "frames", "plain", "queries", "study"))]
+    "module",
+    [
+        "sprag.service.client",
+        *(f"sprag.service.client.{name}" for name in ("aio", "frames", "plain", "queries", "study")),
+    ],
 )
 def test_the_client_is_imported_without_the_rest(module: str) -> None:
     done = imported(module)
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize(("module", "missing"), [("service.stale_files", "fcntl"), ("service.http.app", "fastapi")])
+@pytest.mark.parametrize(
+    ("module", "missing"), [("sprag.service.stale_files", "fcntl"), ("sprag.service.http.app", "fastapi")]
+)
 def test_the_modules_are_really_refused(module: str, missing: str) -> None:
     done = imported(module)
     assert done.returncode != 0

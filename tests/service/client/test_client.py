@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from service.client import RefusedError, ServiceClient, UnreachableError
+from sprag.service.client import RefusedError, ServiceClient, UnreachableError
 
 Sprag = Callable[..., Any]
 

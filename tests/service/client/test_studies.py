@@ -16,7 +16,7 @@ import pandas as pd
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from service.client import (
+from sprag.service.client import (
     AsyncClient,
     AsyncStudy,
     Client,
@@ -27,11 +27,11 @@ from service.client import (
     StudyTimeoutError,
     UnreachableError,
 )
-from service.client.types import StudyDetail
+from sprag.service.client.types import StudyDetail
 from tests.service.conftest import PortalTransport, Service
 
 if TYPE_CHECKING:
-    from worker.models import ChunkResult
+    from sprag.worker.models import ChunkResult
 
 SPEED = "shaft.speed.mean"
 

@@ -10,8 +10,8 @@ from typing import Any
 import httpx
 import pytest
 
-from service.cli import remote
-from service.client import (
+from sprag.service.cli import remote
+from sprag.service.client import (
     AsyncClient,
     Client,
     RefusedError,
@@ -61,8 +61,8 @@ def sleeps(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     async def sleep(seconds: float) -> None:
         noted.append(seconds)
 
-    monkeypatch.setattr("service.client.waiting.time.sleep", noted.append)
-    monkeypatch.setattr("service.client.aio.asyncio.sleep", sleep)
+    monkeypatch.setattr("sprag.service.client.waiting.time.sleep", noted.append)
+    monkeypatch.setattr("sprag.service.client.aio.asyncio.sleep", sleep)
     return noted
 
 
@@ -96,7 +96,7 @@ def test_a_restart_is_waited_over_and_told(wait: Waits, sleeps: list[float], cap
     running, seen = study("running"), list[str]()
     looks = [running, running, running, DOWN, PROXY, BUSY, running, running, study("finished")]
     scripted = Scripted(looks, [[EVENT], [EVENT, EVENT]])
-    with caplog.at_level(logging.WARNING, "service.client.waiting"):
+    with caplog.at_level(logging.WARNING, "sprag.service.client.waiting"):
         wait(scripted, progress=lambda study: seen.append(study["state"]))
     assert not scripted.looks
     assert seen == ["running"] * 4 + ["finished"]

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from service.http.computer import MAX_WAITING, Limits, ProcessComputer
-from service.http.problems import ApiError
+from sprag.service.http.computer import MAX_WAITING, Limits, ProcessComputer
+from sprag.service.http.problems import ApiError
+from sprag.worker import models
+from sprag.worker.limits import COMPUTATION_BYTES
+from sprag.worker.pool.child_process import ProcessStartError
 from tests.worker import fakes
-from worker import models
-from worker.limits import COMPUTATION_BYTES
-from worker.pool.child_process import ProcessStartError
 
 if TYPE_CHECKING:
     from anyio.from_thread import BlockingPortal

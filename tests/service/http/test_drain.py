@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import anyio
 import pytest
 
-from service.http.drain import Drain
-from service.json_text import to_bytes
-from service.storage.errors import EndingError
+from sprag.service.http.drain import Drain
+from sprag.service.json_text import to_bytes
+from sprag.service.storage.errors import EndingError
 from tests.service.conftest import API, Service
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def test_no_write_begins_after_the_cut_and_the_one_under_way_is_kept(service: Se
 
 @pytest.mark.parametrize("address", ["/studies", "/studies:preview"])
 def test_a_check_that_is_cut_off_is_told_to_come_back(service: Service, spec: Any, address: str) -> None:
-    from service.http.computer import Limits, ProcessComputer
+    from sprag.service.http.computer import Limits, ProcessComputer
 
     computer = ProcessComputer(Limits(60.0, 2**30))
     service.checker.run = computer.run  # type: ignore[method-assign]

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import httpx
 import pytest
 
-from service.http.api import sensitivity
-from service.http.timeouts import TimeoutProtocol
+from sprag.service.http.api import sensitivity
+from sprag.service.http.timeouts import TimeoutProtocol
 from tests.service.conftest import API, Service
 from tests.service.http.test_timeouts import serving
 

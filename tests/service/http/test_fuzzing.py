@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import SecretStr
 
-from service.http.api.schedules import EXAMPLE
-from service.http.app import create_app
-from service.http.problems import ApiError
+from sprag.service.http.api.schedules import EXAMPLE
+from sprag.service.http.app import create_app
+from sprag.service.http.problems import ApiError
 from tests.service.http.fuzzing import CHECKS, fuzz, with_ids
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     import httpx
 
-    from service.settings import Settings
+    from sprag.service.settings import Settings
     from tests.service.conftest import Service
 
 #: A spec has thousands of bounds, and a report takes a second to print: left to ``python -m benchmarks.fuzz``.

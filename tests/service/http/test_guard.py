@@ -10,12 +10,12 @@ import httpx
 import pytest
 from pydantic import SecretStr
 
-from service.http.app import create_app
-from service.http.guard import OPEN_PATHS, Guard
-from service.settings import Settings, UnsafeSettingsError
+from sprag.service.http.app import create_app
+from sprag.service.http.guard import OPEN_PATHS, Guard
+from sprag.service.settings import Settings, UnsafeSettingsError
+from sprag.worker.limits import MAX_BODY_BYTES
 from tests.service.http.routes import every_route
 from tests.service.timed_spec import SPEC
-from worker.limits import MAX_BODY_BYTES
 
 if TYPE_CHECKING:
     from anyio.from_thread import BlockingPortal

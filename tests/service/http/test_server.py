@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import httpx
 import pytest
 
-from service.http.server import AddressError, Supervisor, serve
+from sprag.service.http.server import AddressError, Supervisor, serve
 
 if TYPE_CHECKING:
-    from service.settings import Settings
+    from sprag.service.settings import Settings
     from tests.service.conftest import Service
 
 
@@ -133,8 +133,8 @@ def test_the_address_is_told_while_the_processes_that_check_still_start(
         workers_at_announcement.append(len(workers))
         threading.Thread(target=ask, args=(address,)).start()
 
-    monkeypatch.setattr("service.http.app._make_ready", never_ready)
-    monkeypatch.setattr("service.http.server.start_dispatcher_process", start)
+    monkeypatch.setattr("sprag.service.http.app._make_ready", never_ready)
+    monkeypatch.setattr("sprag.service.http.server.start_dispatcher_process", start)
     serve(settings.model_copy(update={"port": 0}), announce=announce)
     assert answers == [200, 503]
     assert workers_at_announcement == [0]

@@ -14,15 +14,15 @@ import httpx
 import pytest
 from pydantic import SecretStr
 
-from service.http import access
-from service.http.app import create_app
-from service.settings import Settings
-from service.storage.errors import TokenNotFound
-from service.storage.scopes import TokenScope
-from service.storage.store import Store
+from sprag.service.http import access
+from sprag.service.http.app import create_app
+from sprag.service.settings import Settings
+from sprag.service.storage.errors import TokenNotFound
+from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.store import Store
+from sprag.worker.states import StudyState
 from tests.service.http.routes import every_route
 from tests.service.timed_spec import SPEC
-from worker.states import StudyState
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
@@ -193,7 +193,7 @@ def test_a_session_ends_in_time_and_cannot_be_made_up(office: Office, monkeypatc
         assert stranger.get("/", headers=sent).status_code == 303, made_up
     assert browser.get("/").status_code == 200
     late = time.time() + access.SESSION_SECONDS + 1.0
-    monkeypatch.setattr("service.http.access.time.time", lambda: late)
+    monkeypatch.setattr("sprag.service.http.access.time.time", lambda: late)
     assert office.browser().get("/", headers={"Cookie": f"{access.COOKIE}={value}"}).status_code == 303
 
 

@@ -12,14 +12,14 @@ import httpx
 import pytest
 import uvicorn
 
-from service.http import guard
-from service.http.api import events
-from service.http.context import Places
-from service.http.timeouts import TimeoutProtocol
-from service.jobs.submission import accept
-from service.spec.document import parse_spec
+from sprag.service.http import guard
+from sprag.service.http.api import events
+from sprag.service.http.context import Places
+from sprag.service.http.timeouts import TimeoutProtocol
+from sprag.service.jobs.submission import accept
+from sprag.service.spec.document import parse_spec
+from sprag.worker import limits
 from tests.service.conftest import API, Service
-from worker import limits
 
 #: Far less than a person waits, far more than a request takes.
 SHORT = 0.3
@@ -134,7 +134,7 @@ def test_streams_of_events_have_a_number_of_places(service: Service) -> None:
 
 
 def test_the_queue_has_an_end(service: Service, monkeypatch: pytest.MonkeyPatch, spec: dict[str, Any]) -> None:
-    monkeypatch.setattr("service.jobs.submission.MAX_WAITING_STUDIES", 2)
+    monkeypatch.setattr("sprag.service.jobs.submission.MAX_WAITING_STUDIES", 2)
     first = service.submit()
     service.submit()
     refused = service.http.post(f"{API}/studies", json=spec)

@@ -16,15 +16,15 @@ import psutil
 import pytest
 from starlette.requests import ClientDisconnect, Request
 
-from service.http.access import Grant
-from service.http.computer import Limits, ProcessComputer
-from service.http.problems import ApiError
-from service.http.shares import Shares
-from service.http.work import Work
-from service.storage.scopes import TokenScope
+from sprag.service.http.access import Grant
+from sprag.service.http.computer import Limits, ProcessComputer
+from sprag.service.http.problems import ApiError
+from sprag.service.http.shares import Shares
+from sprag.service.http.work import Work
+from sprag.service.storage.scopes import TokenScope
+from sprag.worker import models
 from tests.service.conftest import API, InThread, Service
 from tests.worker import fakes
-from worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -210,7 +210,9 @@ def test_what_has_to_be_compiled_first_is_compiled_by_the_engines_process(
     service: Service, portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     press = service.get("/presets/press")["spec"]
-    monkeypatch.setattr("service.spec.machine.shaft_check._compiles_here", False)
-    monkeypatch.setattr("service.spec.machine.shaft_check.is_compiled", lambda _shape: bool(service.computer.loads))
+    monkeypatch.setattr("sprag.service.spec.machine.shaft_check._compiles_here", False)
+    monkeypatch.setattr(
+        "sprag.service.spec.machine.shaft_check.is_compiled", lambda _shape: bool(service.computer.loads)
+    )
     assert service.http.post(f"{API}/studies:preview", json=press).status_code == 200
     assert service.computer.loads

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from service.jobs.housekeeping import Housekeeping
-from service.storage import purging
-from service.storage.errors import DatabaseBusyError, StudyNotFound
-from service.storage.records import StudyRecord
-from service.storage.store import Store
+from sprag.service.jobs.housekeeping import Housekeeping
+from sprag.service.storage import purging
+from sprag.service.storage.errors import DatabaseBusyError, StudyNotFound
+from sprag.service.storage.records import StudyRecord
+from sprag.service.storage.store import Store
+from sprag.worker.chunking import Chunking
 from tests.worker import fakes
-from worker.chunking import Chunking
 
 SECONDS = 120.0
 
@@ -88,7 +88,7 @@ def test_a_purge_that_fails_is_tried_again(
         patch.setattr(store, "purge_steps", busy)
         keeping.purge()
     assert "removed later: busy" in caplog.text
-    monkeypatch.setattr("service.jobs.housekeeping.LOOK_SECONDS", 0.0)
+    monkeypatch.setattr("sprag.service.jobs.housekeeping.LOOK_SECONDS", 0.0)
     keeping.start()
     for _ in range(1000):
         if not count(store, "studies"):

@@ -14,20 +14,20 @@ import numpy as np
 import psutil
 import pytest
 
-from service.jobs import dispatching
-from service.jobs.dispatching import StopFlag, WorkerSettings, run_dispatcher, start_dispatcher_process
-from service.jobs.local import RunInterruptedError, StudyHeldError, run_here
-from service.storage import room
-from service.storage.lock import DispatcherLock
-from service.storage.records import Progress
-from service.storage.store import Store
+from sprag.service.jobs import dispatching
+from sprag.service.jobs.dispatching import StopFlag, WorkerSettings, run_dispatcher, start_dispatcher_process
+from sprag.service.jobs.local import RunInterruptedError, StudyHeldError, run_here
+from sprag.service.storage import room
+from sprag.service.storage.lock import DispatcherLock
+from sprag.service.storage.records import Progress
+from sprag.service.storage.store import Store
+from sprag.worker import models
+from sprag.worker.chunking import Chunking
+from sprag.worker.executors.inline import InlineExecutor
+from sprag.worker.ports import EpochLostError, Executor
+from sprag.worker.states import StudyState
 from tests.conftest import Finished
 from tests.worker import fakes
-from worker import models
-from worker.chunking import Chunking
-from worker.executors.inline import InlineExecutor
-from worker.ports import EpochLostError, Executor
-from worker.states import StudyState
 
 DEADLINE = 120.0
 
@@ -222,7 +222,7 @@ def test_a_dispatcher_process_runs_studies_and_ends_in_order(url: str) -> None:
 
 PARENT = """
 import os, sys
-from service.jobs.dispatching import WorkerSettings, start_dispatcher_process
+from sprag.service.jobs.dispatching import WorkerSettings, start_dispatcher_process
 if __name__ == "__main__":
     print(start_dispatcher_process(WorkerSettings(sys.argv[1], 2, 600.0)).pid, flush=True)
     sys.stdin.read()
@@ -308,7 +308,7 @@ def test_ctrl_c_tells_what_is_kept_and_how_to_go_on(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("service.jobs.local.Dispatcher.run", interrupt)
+        patch.setattr("sprag.service.jobs.local.Dispatcher.run", interrupt)
         stopped = sprag("run", examples / "press.toml", "--db", tmp_path / "kept.sqlite3", "-o", tmp_path / "rows.csv")
     assert stopped.code == 130
     assert "is cancelled: 0 of" in stopped.err

@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from service.cli.app import execute
-from service.jobs.dispatching import worker_settings
-from service.jobs.maintenance import Maintenance, MaintenancePlan, backups
-from service.jobs.submission import accept
-from service.spec.document import parse_spec
-from service.storage.errors import StudyNotFound
-from service.storage.store import Store
+from sprag.service.cli.app import execute
+from sprag.service.jobs.dispatching import worker_settings
+from sprag.service.jobs.maintenance import Maintenance, MaintenancePlan, backups
+from sprag.service.jobs.submission import accept
+from sprag.service.spec.document import parse_spec
+from sprag.service.storage.errors import StudyNotFound
+from sprag.service.storage.store import Store
 from tests.service.timed_spec import SPEC
 from tests.worker.fakes import HandClock
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from service.settings import Settings
+    from sprag.service.settings import Settings
 
 DAY = 86_400.0  # s
 

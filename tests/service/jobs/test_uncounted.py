@@ -12,13 +12,13 @@ from typing import Any
 
 import pytest
 
-from service.jobs import checks
-from service.results.pictures.curves import writable
-from service.spec.document import parse_spec
+from sprag.service.jobs import checks
+from sprag.service.results.pictures.curves import writable
+from sprag.service.spec.document import parse_spec
+from sprag.worker import models
+from sprag.worker.pool import child_process
+from sprag.worker.pool.child_process import ChildProcess, uncounted
 from tests.worker import fakes
-from worker import models
-from worker.pool import child_process
-from worker.pool.child_process import ChildProcess, uncounted
 
 PRESS = tomllib.loads((Path(__file__).resolve().parents[3] / "examples" / "press.toml").read_text())
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from service.results.curves import select
-from service.results.defaults import caption, drawn_numbers, main_query, query_pairs
-from service.spec.document import parse_spec
-from worker import models
+from sprag.service.results.curves import select
+from sprag.service.results.defaults import caption, drawn_numbers, main_query, query_pairs
+from sprag.service.spec.document import parse_spec
+from sprag.worker import models
 
 if TYPE_CHECKING:
-    from service.results.curves import CurveQuery
+    from sprag.service.results.curves import CurveQuery
 
 
 def query_of(spec: dict[str, Any], **changes: Any) -> CurveQuery | None:

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from service.http.web.figures.curves import curves_figure, map_figure
-from service.results.curves import CurveQuery, Curves, draw, draw_map, select
-from service.results.pictures.curves import draw_curves
-from service.results.pictures.curves import draw_map as paint_map
-from service.results.regimes import MARKS, counted, regimes_of, stretches
-from service.spec.document import parse_spec
-from service.storage.records import CaseColumns
+from sprag.service.http.web.figures.curves import curves_figure, map_figure
+from sprag.service.results.curves import CurveQuery, Curves, draw, draw_map, select
+from sprag.service.results.pictures.curves import draw_curves
+from sprag.service.results.pictures.curves import draw_map as paint_map
+from sprag.service.results.regimes import MARKS, counted, regimes_of, stretches
+from sprag.service.spec.document import parse_spec
+from sprag.service.storage.records import CaseColumns
+from sprag.worker import models
+from sprag.worker.study import Study
 from tests.service.spec_sample import changed
-from worker import models
-from worker.study import Study
 
 REGIMES = ["coasting", "periodic", "periodic", "irregular", "periodic", "unsettled", "unsettled", None]
 

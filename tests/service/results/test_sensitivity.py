@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from service.http.api import models as m
-from service.results.curves import Fetch
-from service.results.selection import SelectionError
-from service.results.sensitivity import sensitivity
-from service.results.unaffected import unaffected
-from service.storage.records import CaseColumns
+from sprag.service.http.api import models as m
+from sprag.service.results.curves import Fetch
+from sprag.service.results.selection import SelectionError
+from sprag.service.results.sensitivity import sensitivity
+from sprag.service.results.unaffected import unaffected
+from sprag.service.storage.records import CaseColumns
+from sprag.worker import models
+from sprag.worker.models import ChunkResult
+from sprag.worker.study import Study
 from tests.service.spec_sample import parsed
-from worker import models
-from worker.models import ChunkResult
-from worker.study import Study
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

@@ -11,10 +11,10 @@ import pytest
 from SALib.analyze import rbd_fast
 from scipy.stats import qmc
 
-from service.cli.pictures import _show_effects
-from service.results.pictures.sensitivity import draw_sensitivity
-from service.results.sensitivity import Sensitivity
-from service.results.sensitivity_design import is_sample
+from sprag.service.cli.pictures import _show_effects
+from sprag.service.results.pictures.sensitivity import draw_sensitivity
+from sprag.service.results.sensitivity import Sensitivity
+from sprag.service.results.sensitivity_design import is_sample
 from tests.service.results.test_sensitivity import API, SPEED, effects, ranges
 
 if TYPE_CHECKING:

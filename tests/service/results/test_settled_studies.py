@@ -12,15 +12,15 @@ import pyarrow.parquet as pq
 import pytest
 import xarray as xr
 
-from engine.run import SettledRun
-from engine.vibration_drive.regimes import Regime
-from engine.vibration_drive.settle import settle
-from service.spec.document import parse_spec
+from sprag.engine.run import SettledRun
+from sprag.engine.vibration_drive.regimes import Regime
+from sprag.engine.vibration_drive.settle import settle
+from sprag.service.spec.document import parse_spec
+from sprag.worker import models
+from sprag.worker.models import ChunkResult, regime_info
+from sprag.worker.study import Study
 from tests.service.conftest import API, Service, made_up
 from tests.service.spec_sample import changed
-from worker import models
-from worker.models import ChunkResult, regime_info
-from worker.study import Study
 
 #: A case at a load, the same without one, and one whose motion is irregular: 25 Hz, 2 mm.
 SPEC: dict[str, Any] = changed(
@@ -119,7 +119,7 @@ def test_transient_studies_have_no_regime(service: Service) -> None:
 
 
 def test_settled_and_transient_cases_do_not_share_rows() -> None:
-    from worker.reuse import kin_hash
+    from sprag.worker.reuse import kin_hash
 
     settled, timed = (parse_spec(changed({"/run": run})).study for run in ({"until": "settled"}, {"duration": 2}))
     longer = parse_spec(changed({"/run": {"at_most": "2000 periods"}})).study

@@ -10,23 +10,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from service.http.api import models as m
-from service.jobs.scheduler import Scheduler
-from service.results.curves import Curve, Line, Map
-from service.schedules.deadline import FinishError, check_run_finish, finish_at, run_finish_at
-from service.schedules.fields import read_fields
+from sprag.service.http.api import models as m
+from sprag.service.jobs.scheduler import Scheduler
+from sprag.service.results.curves import Curve, Line, Map
+from sprag.service.schedules.deadline import FinishError, check_run_finish, finish_at, run_finish_at
+from sprag.service.schedules.fields import read_fields
+from sprag.worker.chunking import Chunking
+from sprag.worker.dispatcher import POLL_SECONDS, Dispatcher
+from sprag.worker.executors.inline import InlineExecutor
+from sprag.worker.models import study_results
+from sprag.worker.states import StudyState
 from tests.service.timed_spec import SPEC
 from tests.worker import fakes
-from worker.chunking import Chunking
-from worker.dispatcher import POLL_SECONDS, Dispatcher
-from worker.executors.inline import InlineExecutor
-from worker.models import study_results
-from worker.states import StudyState
 
 if TYPE_CHECKING:
     from conftest import Service
 
-    from worker.models import ChunkResult, ChunkTask
+    from sprag.worker.models import ChunkResult, ChunkTask
 
 STUDIES = "/api/v1/studies"
 NOW = datetime(2026, 3, 1, 12, tzinfo=UTC)

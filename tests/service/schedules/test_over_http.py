@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from service.http.api.schedules import EXAMPLE
-from service.jobs.scheduler import Scheduler
+from sprag.service.http.api.schedules import EXAMPLE
+from sprag.service.jobs.scheduler import Scheduler
 from tests.service.conftest import Service
 from tests.service.schedules.conftest import Clock
 from tests.service.timed_spec import SPEC

@@ -8,16 +8,16 @@ from typing import Any
 
 import pytest
 
-from service.jobs.scheduler import Scheduler
-from service.schedules.fields import ScheduleFields, read_fields
-from service.settings import Settings
-from service.storage.schedules import RunState
-from service.storage.store import Store
+from sprag.service.jobs.scheduler import Scheduler
+from sprag.service.schedules.fields import ScheduleFields, read_fields
+from sprag.service.settings import Settings
+from sprag.service.storage.schedules import RunState
+from sprag.service.storage.store import Store
+from sprag.worker.dispatcher import Dispatcher
+from sprag.worker.executors.inline import InlineExecutor
+from sprag.worker.states import StudyState
 from tests.service.timed_spec import SPEC
 from tests.worker import fakes
-from worker.dispatcher import Dispatcher
-from worker.executors.inline import InlineExecutor
-from worker.states import StudyState
 
 NEW_YEAR = datetime(2026, 1, 1, tzinfo=UTC)  # where the clock of the tests begins
 
@@ -75,7 +75,7 @@ def test_what_was_refused_for_a_reason_that_passes_is_tried_again(
     kept = store.create_schedule(fields(at="2026-01-01T22:00", finish_by="06:00"))
     clock.set("2026-01-01T22:00")
     with monkeypatch.context() as patch:
-        patch.setattr("service.jobs.submission.MAX_WAITING_STUDIES", 0)
+        patch.setattr("sprag.service.jobs.submission.MAX_WAITING_STUDIES", 0)
         for _ in range(3):
             look()
         (run,) = store.schedule_runs(kept.id)
@@ -106,7 +106,7 @@ def test_what_was_refused_for_a_reason_that_passes_is_tried_again(
 def test_a_refusal_that_does_not_pass_within_the_grace_is_final(
     store: Store, clock: Clock, monkeypatch: pytest.MonkeyPatch, given: dict[str, Any], end: str
 ) -> None:
-    monkeypatch.setattr("service.jobs.submission.MAX_WAITING_STUDIES", 0)
+    monkeypatch.setattr("sprag.service.jobs.submission.MAX_WAITING_STUDIES", 0)
     look = Scheduler(store).look
     kept = store.create_schedule(fields(**given))
     clock.set(given.get("at", "2026-01-01T01:00"))

@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from service.http.app import chunking
-from service.jobs import scheduler as module
-from service.jobs.scheduler import Scheduler
-from service.schedules.fields import ScheduleFields, read_fields
-from service.storage.errors import DatabaseBusyError, ScheduleNotFound
-from service.storage.schedules import RunState
-from service.storage.store import Store
+from sprag.service.http.app import chunking
+from sprag.service.jobs import scheduler as module
+from sprag.service.jobs.scheduler import Scheduler
+from sprag.service.schedules.fields import ScheduleFields, read_fields
+from sprag.service.storage.errors import DatabaseBusyError, ScheduleNotFound
+from sprag.service.storage.schedules import RunState
+from sprag.service.storage.store import Store
+from sprag.worker.states import StudyState
 from tests.service.conftest import Service
 from tests.service.schedules.conftest import NEW_YEAR, Clock
 from tests.service.timed_spec import SPEC
-from worker.states import StudyState
 
 if TYPE_CHECKING:
-    from service.settings import Settings
+    from sprag.service.settings import Settings
 
 
 def fields(**given: Any) -> ScheduleFields:

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.spec.document import SpecError, format_of, load_spec, parse_spec
+from sprag.service.spec.document import SpecError, format_of, load_spec, parse_spec
+from sprag.worker.limits import MAX_PROBLEMS
+from sprag.worker.study import Study
 from tests.service.spec_sample import SPEC, changed, parsed, problems
-from worker.limits import MAX_PROBLEMS
-from worker.study import Study
 
 
 def test_the_documented_example() -> None:

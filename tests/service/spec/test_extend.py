@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from service.presets import preset_text
-from service.spec.document import SpecError, parse_spec
-from service.spec.extend import parse_extended
-from service.storage.part import SystemClock
+from sprag.service.presets import preset_text
+from sprag.service.spec.document import SpecError, parse_spec
+from sprag.service.spec.extend import parse_extended
+from sprag.service.storage.part import SystemClock
+from sprag.worker.dispatcher import Dispatcher
+from sprag.worker.executors.inline import InlineExecutor
+from sprag.worker.study import Study
 from tests.service.spec_sample import parsed
 from tests.service.storage.test_reuse import Engine
-from worker.dispatcher import Dispatcher
-from worker.executors.inline import InlineExecutor
-from worker.study import Study
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

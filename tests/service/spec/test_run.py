@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from service.spec.run import in_periods, time_text
+from sprag.service.spec.run import in_periods, time_text
+from sprag.worker.limits import MAX_PROBLEMS
 from tests.service.spec_sample import parsed, problems
-from worker.limits import MAX_PROBLEMS
 
 
 @pytest.mark.parametrize(

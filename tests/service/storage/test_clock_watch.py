@@ -9,16 +9,16 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.http.app import create_app
-from service.jobs.maintenance import Maintenance, MaintenancePlan, backups
-from service.jobs.scheduler import Scheduler
-from service.jobs.submission import accept
-from service.schedules.fields import read_fields
-from service.settings import Settings
-from service.spec.document import parse_spec
-from service.storage.clock_watch import ClockWatch
-from service.storage.errors import StudyNotFound
-from service.storage.store import Store
+from sprag.service.http.app import create_app
+from sprag.service.jobs.maintenance import Maintenance, MaintenancePlan, backups
+from sprag.service.jobs.scheduler import Scheduler
+from sprag.service.jobs.submission import accept
+from sprag.service.schedules.fields import read_fields
+from sprag.service.settings import Settings
+from sprag.service.spec.document import parse_spec
+from sprag.service.storage.clock_watch import ClockWatch
+from sprag.service.storage.errors import StudyNotFound
+from sprag.service.storage.store import Store
 from tests.service.conftest import InThread
 from tests.service.timed_spec import SPEC
 from tests.worker.fakes import HandClock

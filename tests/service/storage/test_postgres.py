@@ -20,24 +20,24 @@ import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
-from service.http.app import chunking, create_app
-from service.jobs import dispatching
-from service.jobs.dispatching import WorkerSettings, run_dispatcher
-from service.settings import Settings
-from service.storage import postgres as storage
-from service.storage import session as session_module
-from service.storage.errors import DatabaseBusyError, DatabaseError, SchemaError
-from service.storage.session import Session, lock_of
-from service.storage.store import Store
-from service.storage.tables import HEAD_REVISION, STUDIES, all_tables
+from sprag.service.http.app import chunking, create_app
+from sprag.service.jobs import dispatching
+from sprag.service.jobs.dispatching import WorkerSettings, run_dispatcher
+from sprag.service.settings import Settings
+from sprag.service.storage import postgres as storage
+from sprag.service.storage import session as session_module
+from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, SchemaError
+from sprag.service.storage.session import Session, lock_of
+from sprag.service.storage.store import Store
+from sprag.service.storage.tables import HEAD_REVISION, STUDIES, all_tables
+from sprag.worker import models
+from sprag.worker.chunking import Chunking
+from sprag.worker.executors.inline import InlineExecutor
+from sprag.worker.states import StudyState
 from tests import postgres
 from tests.conftest import ROOT, Finished
 from tests.service.conftest import API, InThread, Service
 from tests.worker import fakes
-from worker import models
-from worker.chunking import Chunking
-from worker.executors.inline import InlineExecutor
-from worker.states import StudyState
 
 DEADLINE = 120.0
 
@@ -85,8 +85,8 @@ def test_other_machines_are_spoken_to_in_secret(url: str, mode: str | None) -> N
 
 
 def test_without_the_driver_the_command_that_brings_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(sys.modules, "service.storage.postgres")
-    monkeypatch.delattr("service.storage.postgres")
+    monkeypatch.delitem(sys.modules, "sprag.service.storage.postgres")
+    monkeypatch.delattr("sprag.service.storage.postgres")
     monkeypatch.setitem(sys.modules, "psycopg", None)
     with pytest.raises(DatabaseError, match=r"pip install 'sprag\[postgres\]'"):
         Session("postgresql://localhost/sprag")
@@ -269,7 +269,7 @@ def test_commands_about_the_database(
 
 
 def worker(url: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "service.cli", "worker", "--db", url, "--processes", "1"]
+    command = [sys.executable, "-m", "sprag.service.cli", "worker", "--db", url, "--processes", "1"]
     return subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
 
 
@@ -326,7 +326,7 @@ def test_a_standby_takes_over_in_seconds_when_the_dispatcher_is_killed_or_loses_
 #: Takes the dispatcher's lock, begins to write, and stands still.
 STOPPED = """
 import os, signal, sys
-from service.storage.session import Session, lock_of
+from sprag.service.storage.session import Session, lock_of
 session = Session(sys.argv[1])
 lock = lock_of(session, "host:1")
 assert lock.take()

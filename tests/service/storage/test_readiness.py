@@ -15,27 +15,27 @@ import psutil
 import pytest
 import sqlalchemy as sa
 
-from service.http.app import create_app
-from service.jobs import dispatching
-from service.jobs.dispatching import WorkerSettings, run_dispatcher
-from service.settings import Settings
-from service.storage.errors import DatabaseError, DatabaseFullError
-from service.storage.lock import DispatcherLock
-from service.storage.readiness import Readiness
-from service.storage.session import sqlite_driver
-from service.storage.store import Store
+from sprag.service.http.app import create_app
+from sprag.service.jobs import dispatching
+from sprag.service.jobs.dispatching import WorkerSettings, run_dispatcher
+from sprag.service.settings import Settings
+from sprag.service.storage.errors import DatabaseError, DatabaseFullError
+from sprag.service.storage.lock import DispatcherLock
+from sprag.service.storage.readiness import Readiness
+from sprag.service.storage.session import sqlite_driver
+from sprag.service.storage.store import Store
+from sprag.worker.executors.inline import InlineExecutor
+from sprag.worker.pool.process_table import processor_seconds, start_time
 from tests.conftest import ROOT
 from tests.service.conftest import SPEC, InThread
 from tests.worker import fakes
-from worker.executors.inline import InlineExecutor
-from worker.pool.process_table import processor_seconds, start_time
 
 #: Takes the dispatcher's lock and the write lock of a database, and stands still.
 STOPPED = """
 import os, signal, sys
 from pathlib import Path
-from service.storage.lock import DispatcherLock
-from service.storage.session import Session
+from sprag.service.storage.lock import DispatcherLock
+from sprag.service.storage.session import Session
 session = Session(f"sqlite:///{sys.argv[1]}")
 lock = DispatcherLock(Path(sys.argv[1]))
 assert lock.take()

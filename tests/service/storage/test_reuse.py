@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from service.storage.part import SystemClock
-from service.storage.records import StudyRecord
-from service.storage.store import Store
+from sprag.service.storage.part import SystemClock
+from sprag.service.storage.records import StudyRecord
+from sprag.service.storage.store import Store
+from sprag.worker import fingerprint, models
+from sprag.worker.chunking import Chunking
+from sprag.worker.dispatcher import Dispatcher
+from sprag.worker.executors.inline import InlineExecutor
+from sprag.worker.models import ChunkResult, ChunkTask
+from sprag.worker.study import Axis, Study
 from tests.worker.fakes import BASE, RUN
-from worker import fingerprint, models
-from worker.chunking import Chunking
-from worker.dispatcher import Dispatcher
-from worker.executors.inline import InlineExecutor
-from worker.models import ChunkResult, ChunkTask
-from worker.study import Axis, Study
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from service.storage.errors import DatabaseFullError
-from service.storage.room import RESERVE_BYTES
-from service.storage.store import Store
+from sprag.service.storage.errors import DatabaseFullError
+from sprag.service.storage.room import RESERVE_BYTES
+from sprag.service.storage.store import Store
+from sprag.worker.chunking import Chunking
+from sprag.worker.ports import StoreFullError
 from tests.worker import fakes
-from worker.chunking import Chunking
-from worker.ports import StoreFullError
 
 PLENTY = 10**12
 

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from service.storage import session as session_module
-from service.storage.errors import DatabaseBusyError, DatabaseError
-from service.storage.lock import DispatcherLock
-from service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
-from service.storage.session import Session, file_system_of, sqlite_warning
-from service.storage.store import Store
-from service.storage.tables import STUDIES
+from sprag.service.storage import session as session_module
+from sprag.service.storage.errors import DatabaseBusyError, DatabaseError
+from sprag.service.storage.lock import DispatcherLock
+from sprag.service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
+from sprag.service.storage.session import Session, file_system_of, sqlite_warning
+from sprag.service.storage.store import Store
+from sprag.service.storage.tables import STUDIES
 from tests.worker import fakes
 
 
@@ -27,7 +27,7 @@ def url(tmp_path: Path) -> str:
 
 
 def test_the_studies_kept_in_memory_are_few_values(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("service.storage.studies.KEPT_VALUES", 5)
+    monkeypatch.setattr("sprag.service.storage.studies.KEPT_VALUES", 5)
     with Store.open(url) as store:
         made = [fakes.study(3, name=f"study {index}") for index in range(3)]
         ids = [store.create_study({}, study).id for study in made]

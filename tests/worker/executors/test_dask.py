@@ -16,23 +16,23 @@ import pytest
 from distributed import Client, Future
 from pydantic import ValidationError
 
-from service.jobs.dispatching import WorkerSettings, pool
-from service.settings import Settings
-from service.storage.part import SystemClock
-from service.storage.store import Store
+from sprag.service.jobs.dispatching import WorkerSettings, pool
+from sprag.service.settings import Settings
+from sprag.service.storage.part import SystemClock
+from sprag.service.storage.store import Store
+from sprag.worker import fingerprint, models
+from sprag.worker.chunking import Chunking
+from sprag.worker.dispatcher import Dispatcher
+from sprag.worker.executors.dask import DaskExecutor
+from sprag.worker.executors.dask_tasks import scheduler_address
+from sprag.worker.executors.inline import InlineExecutor
+from sprag.worker.executors.process_pool import SPARE_CHUNKS, ProcessPoolExecutor
+from sprag.worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
+from sprag.worker.states import StudyState
+from sprag.worker.study import Study
 from tests.conftest import ROOT
 from tests.worker import fakes
 from tests.worker.executors.clusters import DEADLINE, Cluster, clusters
-from worker import fingerprint, models
-from worker.chunking import Chunking
-from worker.dispatcher import Dispatcher
-from worker.executors.dask import DaskExecutor
-from worker.executors.dask_tasks import scheduler_address
-from worker.executors.inline import InlineExecutor
-from worker.executors.process_pool import SPARE_CHUNKS, ProcessPoolExecutor
-from worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
-from worker.states import StudyState
-from worker.study import Study
 
 
 def eventually(true: Callable[[], object]) -> None:
@@ -146,7 +146,7 @@ def test_a_fault_of_the_program_is_told_by_its_name(start: Callable[..., DaskExe
 def test_chunks_are_stopped_whether_they_run_or_not(
     start: Callable[..., DaskExecutor], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("worker.executors.dask.STOP_SECONDS", 0.2)
+    monkeypatch.setattr("sprag.worker.executors.dask.STOP_SECONDS", 0.2)
     executor = start(run=fakes.faulty(hang=frozenset(range(8))), chunk_timeout=10 * DEADLINE)
     study = fakes.study(12)
     ready(executor, study)
@@ -392,6 +392,6 @@ def test_the_setting_is_checked() -> None:
 
 
 def test_without_dask_the_command_that_brings_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "worker.executors.dask", None)
+    monkeypatch.setitem(sys.modules, "sprag.worker.executors.dask", None)
     with pytest.raises(ExecutorError, match=r"pip install 'sprag\[cluster\]'"):
         pool(WorkerSettings("", 1, 60.0, executor="dask"))

@@ -14,14 +14,14 @@ import numpy as np
 import psutil
 import pytest
 
+from sprag.worker import models
+from sprag.worker.executors.inline import InlineExecutor
+from sprag.worker.executors.process_pool import MAX_FAILED_STARTS, SPARE_CHUNKS, ProcessPoolExecutor
+from sprag.worker.fingerprint import prepare_as
+from sprag.worker.models import KernelShape
+from sprag.worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
+from sprag.worker.study import Study
 from tests.worker import fakes
-from worker import models
-from worker.executors.inline import InlineExecutor
-from worker.executors.process_pool import MAX_FAILED_STARTS, SPARE_CHUNKS, ProcessPoolExecutor
-from worker.fingerprint import prepare_as
-from worker.models import KernelShape
-from worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
-from worker.study import Study
 
 DEADLINE = 60.0
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine.endings import Ending
+from sprag.engine.endings import Ending
+from sprag.worker import models
+from sprag.worker.study import Axis, Study
 from tests.worker import fakes
-from worker import models
-from worker.study import Axis, Study
 
 
 def test_every_ending_has_a_sentence() -> None:
@@ -126,7 +126,7 @@ def test_a_trajectory_is_that_of_the_case() -> None:
 
 def test_a_kernel_counts_as_compiled_once_it_was_loaded(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(models, "cache_folder", lambda: tmp_path)
-    monkeypatch.setattr("engine.vibration_drive.simulate.warm_up", lambda *_: None)
+    monkeypatch.setattr("sprag.engine.vibration_drive.simulate.warm_up", lambda *_: None)
     study = fakes.study(3)
     shape = models.shape_of(study)
     assert not models.is_compiled(shape)

@@ -7,9 +7,9 @@ import signal
 from multiprocessing import get_context
 from typing import TYPE_CHECKING
 
+from sprag.worker.pool.child_process import ChildProcess
+from sprag.worker.pool.processes import NICENESS, interrupts_held_back
 from tests.worker import fakes
-from worker.pool.child_process import ChildProcess
-from worker.pool.processes import NICENESS, interrupts_held_back
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection

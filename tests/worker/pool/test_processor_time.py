@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 
+from sprag.worker.executors.process_pool import ProcessPoolExecutor
+from sprag.worker.models import ChunkResult, ChunkTask
+from sprag.worker.ports import Chunk, Fate, Outcome
 from tests.worker import fakes
-from worker.executors.process_pool import ProcessPoolExecutor
-from worker.models import ChunkResult, ChunkTask
-from worker.ports import Chunk, Fate, Outcome
 
 
 def waiting(task: ChunkTask) -> ChunkResult:

@@ -1,16 +1,16 @@
-"""Figures of a study as bytes that are ready to be sent; as for `service.jobs.answers`."""
+"""Figures of a study as bytes that are ready to be sent; as for `sprag.service.jobs.answers`."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from service.http.web.figures.curves import curves_figure, map_figure
-from service.jobs.answers import curves_of, map_of
-from service.json_text import to_bytes
+from sprag.service.http.web.figures.curves import curves_figure, map_figure
+from sprag.service.jobs.answers import curves_of, map_of
+from sprag.service.json_text import to_bytes
 
 if TYPE_CHECKING:
-    from service.jobs.checks import Library
-    from service.results.curves import CurveQuery
+    from sprag.service.jobs.checks import Library
+    from sprag.service.results.curves import CurveQuery
 
 
 def curves_json(library: Library, study_id: str, query: CurveQuery, columns: int) -> bytes:

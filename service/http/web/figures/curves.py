@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from service.http.web.figures.thinning import thin
-from service.results.curves import numbers
-from service.results.regimes import DOUBTFUL, MARKED, MARKS, regimes_of, stretches
-from service.results.wording import number, unit_text, words
-from worker.codes import PENDING
-from worker.models import WorkerEnding
+from sprag.service.http.web.figures.thinning import thin
+from sprag.service.results.curves import numbers
+from sprag.service.results.regimes import DOUBTFUL, MARKED, MARKS, regimes_of, stretches
+from sprag.service.results.wording import number, unit_text, words
+from sprag.worker.codes import PENDING
+from sprag.worker.models import WorkerEnding
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from service.results.curves import Curve, Curves, Map
-    from worker.models import ResultInfo
+    from sprag.service.results.curves import Curve, Curves, Map
+    from sprag.worker.models import ResultInfo
 
 Figure = dict[str, Any]
 

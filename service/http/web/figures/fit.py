@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from service.results.wording import number
-from service.spec.units import parse_quantity
+from sprag.service.results.wording import number
+from sprag.service.spec.units import parse_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from worker.models import ClutchFit
+    from sprag.worker.models import ClutchFit
 
 WIDTH: Final = 560
 _LEFT, _RIGHT, _TOP, _LAW, _GAP, _REST = 64.0, 12.0, 10.0, 190.0, 26.0, 80.0

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from service.http.web.figures.curves import DASHES, PALETTE, Figure, axis_title
-from service.http.web.figures.shaft import shaft_figure
-from service.http.web.figures.thinning import thin
-from service.results.curves import numbers
-from service.results.pictures.states import OTHER_LOOK, spans_of
-from service.results.wording import number, words
-from worker import models
+from sprag.service.http.web.figures.curves import DASHES, PALETTE, Figure, axis_title
+from sprag.service.http.web.figures.shaft import shaft_figure
+from sprag.service.http.web.figures.thinning import thin
+from sprag.service.results.curves import numbers
+from sprag.service.results.pictures.states import OTHER_LOOK, spans_of
+from sprag.service.results.wording import number, words
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from worker.models import Presentation, Trajectory
-    from worker.study import Study
+    from sprag.worker.models import Presentation, Trajectory
+    from sprag.worker.study import Study
 
 #: Times at which a motion is sampled for a picture, and points of a line that are drawn.
 SAMPLES: Final = 6000

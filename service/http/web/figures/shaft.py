@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-from service.http.web.figures.curves import DASHES, PALETTE, Figure
-from service.http.web.figures.thinning import thin
-from service.results.curves import numbers
-from service.results.wording import unit_text
+from sprag.service.http.web.figures.curves import DASHES, PALETTE, Figure
+from sprag.service.http.web.figures.thinning import thin
+from sprag.service.results.curves import numbers
+from sprag.service.results.wording import unit_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from worker.models import Presentation, Trajectory
-    from worker.study import Study
+    from sprag.worker.models import Presentation, Trajectory
+    from sprag.worker.study import Study
 
 #: Angles at which a machine is drawn.
 SAMPLES: Final = 1441
@@ -70,7 +70,7 @@ def shaft_figure(shown: Presentation, made: Trajectory) -> Figure:
 
 def machine_case(study: Study) -> dict[str, Any]:
     """Ending, results and figure of a machine's first case. For the computing process."""
-    from worker import models
+    from sprag.worker import models
 
     rows = models.run_chunk(study, 0, 1)
     infos = models.study_results(study)

@@ -7,24 +7,24 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
-from service.faults import ErrorItem
-from service.http.web.figures.fit import FitChart, fit_chart
-from service.http.web.form.spec import Faults, clutch_pointers, field_of, pendulums_of, spec_of
-from service.jobs.preview import preview_json
-from service.results.fits import fit_json
-from service.results.wording import unit_text
-from service.schedules.deadline import ALLOWED, FinishError, finish_at
-from service.spec.document import ParsedSpec, SpecError, load_spec, parse_spec
-from service.spec.machine.clutch import read_clutch
-from service.spec.measured import MeasuredDataError, parse_measured
-from service.spec.report import Report, spec_items
-from service.spec.units import QuantityError, parse_quantity
+from sprag.service.faults import ErrorItem
+from sprag.service.http.web.figures.fit import FitChart, fit_chart
+from sprag.service.http.web.form.spec import Faults, clutch_pointers, field_of, pendulums_of, spec_of
+from sprag.service.jobs.preview import preview_json
+from sprag.service.results.fits import fit_json
+from sprag.service.results.wording import unit_text
+from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
+from sprag.service.spec.document import ParsedSpec, SpecError, load_spec, parse_spec
+from sprag.service.spec.machine.clutch import read_clutch
+from sprag.service.spec.measured import MeasuredDataError, parse_measured
+from sprag.service.spec.report import Report, spec_items
+from sprag.service.spec.units import QuantityError, parse_quantity
 
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from worker.chunking import Chunking
-    from worker.study import Study
+    from sprag.worker.chunking import Chunking
+    from sprag.worker.study import Study
 
     Known = Callable[[Study], int]
 

@@ -10,11 +10,11 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from service.results.wording import number, words
-from service.spec.fields import placed
-from service.spec.units import example
-from worker import models
-from worker.models import Parameter
+from sprag.service.results.wording import number, words
+from sprag.service.spec.fields import placed
+from sprag.service.spec.units import example
+from sprag.worker import models
+from sprag.worker.models import Parameter
 
 #: The model that the form describes field by field; others are given as text.
 FORM_MODEL: Final = "vibration-drive"

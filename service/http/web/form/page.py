@@ -12,15 +12,15 @@ from fastapi import APIRouter, Query, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
-from service.faults import FaultError
-from service.http.context import Context, Ctx
-from service.http.problems import ApiError, api_error
-from service.http.respond import json_response
-from service.http.views import preset_of
-from service.http.web.form import study_check
-from service.http.web.form.check import Checked
-from service.http.web.form.fields import FORM_MODEL, path_choices, pendulum, sections
-from service.http.web.form.spec import (
+from sprag.service.faults import FaultError
+from sprag.service.http.context import Context, Ctx
+from sprag.service.http.problems import ApiError, api_error
+from sprag.service.http.respond import json_response
+from sprag.service.http.views import preset_of
+from sprag.service.http.web.form import study_check
+from sprag.service.http.web.form.check import Checked
+from sprag.service.http.web.form.fields import FORM_MODEL, path_choices, pendulum, sections
+from sprag.service.http.web.form.spec import (
     Values,
     axes_of,
     clutch_pointers,
@@ -29,14 +29,14 @@ from service.http.web.form.spec import (
     values_of,
     with_clutch_defaults,
 )
-from service.http.web.form.values import Form
-from service.http.web.templates import fragment, page, spec_text
-from service.http.work import Attended, Work
-from service.jobs.submission import Submission, take_in
-from service.presets import preset_names
-from worker import models
-from worker.limits import MAX_AXES
-from worker.models import MAX_PENDULUMS
+from sprag.service.http.web.form.values import Form
+from sprag.service.http.web.templates import fragment, page, spec_text
+from sprag.service.http.work import Attended, Work
+from sprag.service.jobs.submission import Submission, take_in
+from sprag.service.presets import preset_names
+from sprag.worker import models
+from sprag.worker.limits import MAX_AXES
+from sprag.worker.models import MAX_PENDULUMS
 
 router = APIRouter(include_in_schema=False)
 

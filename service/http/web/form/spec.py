@@ -6,13 +6,13 @@ import re
 from collections.abc import Mapping
 from typing import Any, Final
 
-from service.http.web.form.fields import FORM_MODEL, pendulum, sections
-from service.spec.measured import MeasuredDataError, parse_measured
-from service.spec.report import Problem
-from service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
-from service.spec.units import QuantityError, parse_quantity
-from worker.limits import MAX_AXES
-from worker.models import MAX_PENDULUMS, SETTLED
+from sprag.service.http.web.form.fields import FORM_MODEL, pendulum, sections
+from sprag.service.spec.measured import MeasuredDataError, parse_measured
+from sprag.service.spec.report import Problem
+from sprag.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
+from sprag.service.spec.units import QuantityError, parse_quantity
+from sprag.worker.limits import MAX_AXES
+from sprag.worker.models import MAX_PENDULUMS, SETTLED
 
 Values = dict[str, str]
 Faults = dict[str, list[str]]

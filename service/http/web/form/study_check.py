@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from service.http.web.form.check import Checked, look_over
-from service.jobs.checks import Library
-from service.jobs.submission import Submission, submission
+from sprag.service.http.web.form.check import Checked, look_over
+from sprag.service.jobs.checks import Library
+from sprag.service.jobs.submission import Submission, submission
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from service.http.api import models as m
-from service.results.curves import CurveQuery, select
-from service.results.selection import SelectionError
-from worker import models
+from sprag.service.http.api import models as m
+from sprag.service.results.curves import CurveQuery, select
+from sprag.service.results.selection import SelectionError
+from sprag.worker import models
 
 if TYPE_CHECKING:
     import httpx
     from conftest import Service
 
-    from worker.models import ChunkResult
-    from worker.study import Study
+    from sprag.worker.models import ChunkResult
+    from sprag.worker.study import Study
 
 API = "/api/v1"
 TIED = ["excitation.amplitude_x", "excitation.amplitude_y"]
@@ -230,7 +230,7 @@ def test_many_numbers_are_written_by_a_process_that_checks(
     here = service.http.get(address.format(study_id))
     assert here.status_code == 200
     assert service.checker.calls == []
-    monkeypatch.setattr("service.jobs.answers.FEW", 0)
+    monkeypatch.setattr("sprag.service.jobs.answers.FEW", 0)
     elsewhere = service.http.get(address.format(study_id))
     assert len(service.checker.calls) == 1
     pickle.dumps(service.checker.calls)

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from service.client import Client
-from service.http.api.engagement_models import EngagementTables
+from sprag.service.client import Client
+from sprag.service.http.api.engagement_models import EngagementTables
+from sprag.worker import models
 from tests.service.conftest import API, PortalTransport, Service
-from worker import models
 
 
 @pytest.fixture

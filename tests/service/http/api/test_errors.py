@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from service.http.problems import PROBLEM_TYPES, Problem
-from service.storage.errors import DatabaseBusyError, DatabaseFullError
+from sprag.service.http.problems import PROBLEM_TYPES, Problem
+from sprag.service.storage.errors import DatabaseBusyError, DatabaseFullError
+from sprag.worker.limits import MAX_BODY_BYTES
 from tests.service.timed_spec import SPEC
-from worker.limits import MAX_BODY_BYTES
 
 if TYPE_CHECKING:
     from collections.abc import Callable

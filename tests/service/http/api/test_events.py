@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from service.http.api import events
-from service.http.api.models import FullProgress
+from sprag.service.http.api import events
+from sprag.service.http.api.models import FullProgress
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

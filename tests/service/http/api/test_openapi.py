@@ -12,18 +12,18 @@ from fastapi.routing import iter_route_contexts
 from openapi_spec_validator import OpenAPIV31SpecValidator
 from pydantic import SecretStr
 
-from service.http.api.examples import SPEC
-from service.http.api.schedules import EXAMPLE
-from service.http.app import create_app
-from service.http.guard import OPEN_PATHS
-from service.http.problems import PROBLEM_TYPES
+from sprag.service.http.api.examples import SPEC
+from sprag.service.http.api.schedules import EXAMPLE
+from sprag.service.http.app import create_app
+from sprag.service.http.guard import OPEN_PATHS
+from sprag.service.http.problems import PROBLEM_TYPES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     import httpx
 
-    from service.settings import Settings
+    from sprag.service.settings import Settings
     from tests.service.conftest import Service
 
     Connect = Callable[..., httpx.Client]

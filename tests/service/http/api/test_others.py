@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from service.http.api import models as m
-from service.http.api.examples import CLUTCH_FIT
-from worker import models
+from sprag.service.http.api import models as m
+from sprag.service.http.api.examples import CLUTCH_FIT
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from service.http.api import models as m
-from service.results import exports
-from service.results.exports import Source, csv_pieces, escape, json_pieces
-from service.storage.records import RowBlock
-from worker import models
+from sprag.service.http.api import models as m
+from sprag.service.results import exports
+from sprag.service.results.exports import Source, csv_pieces, escape, json_pieces
+from sprag.service.storage.records import RowBlock
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from sprag.worker.models import ChunkResult
     from tests.service.conftest import Service
-    from worker.models import ChunkResult
 
 API = "/api/v1"
 

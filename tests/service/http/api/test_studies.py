@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from service.http.api import models as m
-from service.http.api.examples import SPEC_TOML
-from service.storage.room import RESERVE_BYTES
-from service.storage.store import Store
+from sprag.service.http.api import models as m
+from sprag.service.http.api.examples import SPEC_TOML
+from sprag.service.storage.room import RESERVE_BYTES
+from sprag.service.storage.store import Store
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:

@@ -12,19 +12,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from service.faults import ErrorItem
-from service.http.web.figures.motion import motion_figures
-from service.http.web.figures.thinning import thin
-from service.http.web.form.check import check_form, check_text, message
-from service.http.web.form.page import EMPTY_FORM, share_clutches
-from service.http.web.form.spec import field_of, plain, spec_of, values_of, with_clutch_defaults
-from service.http.web.templates import duration, fragment, time_left
-from service.presets import preset_names, preset_text
-from service.results.wording import number, symbol, unit_text
-from service.spec.document import format_of, load_spec, parse_spec
-from worker import models
-from worker.chunking import Chunking
-from worker.study import Study
+from sprag.service.faults import ErrorItem
+from sprag.service.http.web.figures.motion import motion_figures
+from sprag.service.http.web.figures.thinning import thin
+from sprag.service.http.web.form.check import check_form, check_text, message
+from sprag.service.http.web.form.page import EMPTY_FORM, share_clutches
+from sprag.service.http.web.form.spec import field_of, plain, spec_of, values_of, with_clutch_defaults
+from sprag.service.http.web.templates import duration, fragment, time_left
+from sprag.service.presets import preset_names, preset_text
+from sprag.service.results.wording import number, symbol, unit_text
+from sprag.service.spec.document import format_of, load_spec, parse_spec
+from sprag.worker import models
+from sprag.worker.chunking import Chunking
+from sprag.worker.study import Study
 
 EXAMPLES = Path(__file__).resolve().parents[4] / "examples"
 

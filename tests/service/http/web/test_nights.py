@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from service.http.app import chunking, create_app
-from service.jobs.scheduler import Scheduler
-from service.settings import Settings
-from service.storage.scopes import TokenScope
-from service.storage.store import Store
+from sprag.service.http.app import chunking, create_app
+from sprag.service.jobs.scheduler import Scheduler
+from sprag.service.settings import Settings
+from sprag.service.storage.scopes import TokenScope
+from sprag.service.storage.store import Store
+from sprag.worker.models import ChunkResult
 from tests.service.conftest import InThread, made_up
 from tests.service.timed_spec import SPEC
 from tests.serving import served
-from worker.models import ChunkResult
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -69,8 +69,8 @@ def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[House]:
 
 def finished_study(store: Store) -> str:
     """The example, submitted and ended with made-up rows; its id."""
-    from service.jobs.submission import accept
-    from service.spec.document import parse_spec
+    from sprag.service.jobs.submission import accept
+    from sprag.service.spec.document import parse_spec
 
     record = accept(store, parse_spec(SPEC))
     rows, epoch = made_up(store.study(record.id)), store.take_over("test")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from worker import models
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

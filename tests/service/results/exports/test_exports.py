@@ -18,18 +18,18 @@ import pyarrow.parquet as pq
 import pytest
 import xarray as xr
 
-from service.results import exports
-from service.results.exports import MEDIA_TYPES, SUFFIXES, Source, format_of, xlsx
-from service.storage.records import RowBlock
+from sprag.service.results import exports
+from sprag.service.results.exports import MEDIA_TYPES, SUFFIXES, Source, format_of, xlsx
+from sprag.service.storage.records import RowBlock
+from sprag.worker import models
+from sprag.worker.study import Study
 from tests.service.conftest import made_up
-from worker import models
-from worker.study import Study
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from sprag.worker.models import ChunkResult
     from tests.service.conftest import Service
-    from worker.models import ChunkResult
 
 API = "/api/v1"
 LOADS = [0.02, 0.1, 0.3]

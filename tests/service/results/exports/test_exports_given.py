@@ -14,9 +14,9 @@ import pyarrow.parquet as pq
 import pytest
 import xarray as xr
 
-from service.results.exports.source import given_texts
-from service.results.report.content import report_of
-from service.spec.document import load_spec
+from sprag.service.results.exports.source import given_texts
+from sprag.service.results.report.content import report_of
+from sprag.service.spec.document import load_spec
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from service.results.curves import CurveQuery, draw, draw_map, select
-from service.results.pictures import curves as pictures
-from service.spec.document import parse_spec
-from service.storage.records import CaseColumns
-from worker import models
+from sprag.service.results.curves import CurveQuery, draw, draw_map, select
+from sprag.service.results.pictures import curves as pictures
+from sprag.service.spec.document import parse_spec
+from sprag.service.storage.records import CaseColumns
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from service.results.report.content import ranges, report_of
-from service.results.report.pdf import pdf_report
-from worker import models
+from sprag.service.results.report.content import ranges, report_of
+from sprag.service.results.report.pdf import pdf_report
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

@@ -13,10 +13,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.spec.axes.values import _steps
-from service.spec.document import parse_spec
+from sprag.service.spec.axes.values import _steps
+from sprag.service.spec.document import parse_spec
+from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES
 from tests.service.spec_sample import SPEC, changed, parsed, problems
-from worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES
 
 PENDULUM = SPEC["base"]["pendulums"][0]
 

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from service.spec.axes.sample import unit_sample
-from service.spec.document import parse_spec
-from service.spec.measured import MeasuredDataError, parse_measured
-from service.spec.report import SpecError
-from service.spec.schema.document import spec_schema
-from service.spec.units import parse_quantity
+from sprag.service.spec.axes.sample import unit_sample
+from sprag.service.spec.document import parse_spec
+from sprag.service.spec.measured import MeasuredDataError, parse_measured
+from sprag.service.spec.report import SpecError
+from sprag.service.spec.schema.document import spec_schema
+from sprag.service.spec.units import parse_quantity
+from sprag.worker import models
+from sprag.worker.study import Study
 from tests.service.spec_sample import SPEC, changed, parsed, problems
-from worker import models
-from worker.study import Study
 
 LOAD = {"path": "shaft.load", "values": [0.1, 0.2, 0.3]}
 FREQUENCY = {"path": "excitation.frequency", "values": ["20 Hz", "30 Hz"]}
@@ -261,10 +261,10 @@ def test_points_may_have_a_column_for_every_parameter_of_eight_pendulums() -> No
 
 
 def test_more_columns_than_the_limit_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("service.spec.axes.points.MAX_COLUMNS", 20)
+    monkeypatch.setattr("sprag.service.spec.axes.points.MAX_COLUMNS", 20)
     with pytest.raises(SpecError, match="of 21 columns under its header"):
         parse_spec(eight(21))
-    monkeypatch.setattr("service.spec.axes.points.MAX_COLUMNS", 256)
-    monkeypatch.setattr("service.spec.axes.design.MAX_COLUMNS", 20)
+    monkeypatch.setattr("sprag.service.spec.axes.points.MAX_COLUMNS", 256)
+    monkeypatch.setattr("sprag.service.spec.axes.design.MAX_COLUMNS", 20)
     with pytest.raises(SpecError, match="21 parameters vary"):
         parse_spec(eight(21))

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
+from sprag.worker.limits import MAX_CLUTCH_ROWS
+from sprag.worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, parameter_catalogue
 from tests.service.spec_sample import SPEC, parsed, problems
-from worker.limits import MAX_CLUTCH_ROWS
-from worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, parameter_catalogue
 
 PENDULUM = SPEC["base"]["pendulums"][0]
 LAW = {"coefficients": [0, "300 N*m/rad"]}

@@ -1,6 +1,6 @@
 """The engine for notebooks: parameters as arrays or a frame in, characteristics as a frame with units out.
 
-from sprag.engine import simulate
+from sprag.frames import simulate
 
 results = simulate({"excitation.frequency": [20.0, 25.0], ...})
 results["shaft.speed.mean"], results.attrs["units"]["shaft.speed.mean"]  # rad/s
@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import pandas as pd
 
-from engine import ENGINE_VERSION, Ending, Run, Span
-from engine.catalogue import Parameter
-from engine.endings import ENDING_CODES
-from engine.vibration_drive import simulate as _vibration_drive
-from engine.vibration_drive.cases import pendulum_count
-from engine.vibration_drive.parameters import PARAMETERS
-from engine.vibration_drive.results import result_infos
+from sprag.engine import ENGINE_VERSION, Ending, Run, Span
+from sprag.engine.catalogue import Parameter
+from sprag.engine.endings import ENDING_CODES
+from sprag.engine.vibration_drive import simulate as _vibration_drive
+from sprag.engine.vibration_drive.cases import pendulum_count
+from sprag.engine.vibration_drive.parameters import PARAMETERS
+from sprag.engine.vibration_drive.results import result_infos
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
