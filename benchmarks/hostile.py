@@ -18,7 +18,6 @@ from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -212,10 +211,11 @@ def main() -> None:
         with running() as service:
             watch, answers, seconds = throw(service, made, patience, clients)
             report(name, watch, clients, seconds, answers)
-            crowd = [threading.Thread(target=_fire, args=(service, made)) for _ in range(clients)]
+            sent = threading.Barrier(clients + 1)
+            crowd = [threading.Thread(target=_fire, args=(service, made, sent)) for _ in range(clients)]
             for thread in crowd:
                 thread.start()
-            until(partial(crowded, service, clients), "every client is connected")
+            sent.wait()
             print(f"{name}: ended {service.stop():.1f} s after SIGTERM under fire", flush=True)
             for thread in crowd:
                 thread.join()
@@ -235,19 +235,14 @@ def running() -> Iterator[Service]:
         yield service
 
 
-def crowded(service: Service, clients: int) -> bool:
-    """Whether that many clients are connected to the service."""
-    try:
-        found = psutil.Process(service.process.pid).net_connections("tcp")
-    except psutil.Error:
-        return False
-    port = port_of(service)
-    return sum(item.status == psutil.CONN_ESTABLISHED and item.laddr.port == port for item in found) >= clients
-
-
-def _fire(service: Service, made: dict[str, Any]) -> None:
+def _fire(service: Service, made: dict[str, Any], sent: threading.Barrier) -> None:
+    """Send a preview, wait until everybody has, and take whatever comes back."""
+    connection = http.client.HTTPConnection("127.0.0.1", port_of(service), timeout=_STAY)
+    connection.request("POST", "/api/v1/studies:preview", json.dumps(made), {"Content-Type": "application/json"})
+    sent.wait()
     with suppress(OSError, http.client.HTTPException):
-        send(port_of(service), json.dumps(made).encode(), _STAY)
+        connection.getresponse().read()
+    connection.close()
 
 
 if __name__ == "__main__":

@@ -146,7 +146,9 @@ class ProcessComputer:
             loading = self._loads.get(shape)
             if loading is None or (loading.future.done() and loading.future.exception() is not None):
                 loading = self._loads[shape] = self._schedule(LOAD_SECONDS, self._load, shape)
-            await asyncio.shield(asyncio.wrap_future(loading.future))
+            future = asyncio.wrap_future(loading.future)
+            future.add_done_callback(_retrieve)  # of a request that is gone nobody else does
+            await asyncio.shield(future)
 
     @contextmanager
     def _turn(self, timeout: float) -> Iterator[None]:
@@ -190,6 +192,12 @@ class ProcessComputer:
             pool, self._pool, self._closed = self._pool, None, True
         if pool is not None:
             pool.close()
+
+
+def _retrieve(future: asyncio.Future[None]) -> None:
+    """Take note of how a future ended, so that asyncio does not log an exception that nobody waits for."""
+    if not future.cancelled():
+        future.exception()
 
 
 def _prepare(prepare: Callable[[], None], memory: int) -> None:

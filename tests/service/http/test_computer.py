@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import gc
 import math
 import os
 import time
@@ -66,6 +68,30 @@ def test_a_kernel_takes_longer_than_a_computation_may_and_outlives_its_request(
         portal.call(computer.load, SHAPE)  # compiling again would wait for ever
     finally:
         computer.close()
+
+
+def test_the_end_of_a_kernel_that_nobody_waits_for_is_not_logged(tmp_path: Path) -> None:
+    begun, told = tmp_path / "begun", tmp_path / "told"
+    os.mkfifo(begun)
+    os.mkfifo(told)
+    load = partial(fakes.load_between, begun=str(begun), told=str(told))
+    computers = [ProcessComputer(Limits(60.0, COMPUTATION_BYTES), load=load)]
+    logged: list[dict[str, object]] = []
+
+    async def leave_and_close() -> None:
+        loop = asyncio.get_running_loop()
+        loop.set_exception_handler(lambda _, context: logged.append(context))
+        request = asyncio.create_task(computers[0].load(SHAPE))
+        await asyncio.to_thread(begun.read_text)  # waits until it compiles
+        request.cancel()
+        await asyncio.wait([request])
+        await asyncio.to_thread(computers[0].close)
+        await asyncio.gather(asyncio.wrap_future(computers[0]._loads[SHAPE].future), return_exceptions=True)
+
+    asyncio.run(leave_and_close())
+    computers.clear()  # and with it the kernel's future, the last to know the request's
+    gc.collect()
+    assert logged == []
 
 
 def test_it_is_ready_when_its_processes_are(tmp_path: Path, portal: BlockingPortal) -> None:
