@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-_FOLDERS = ("engine", "worker", "service", "migrations", "tests", "benchmarks")
+_FOLDERS = ("sprag", "engine", "worker", "service", "migrations", "tests", "benchmarks")
 _FAULTS = "tests/acceptance/test_faults.py::"
 _SETTLED = "tests/engine/test_settled.py"
 
@@ -133,6 +133,14 @@ MUTANTS = (
 _PASSED, _FAILED, _ENDLESS = "passed", "failed", "came to no end"
 
 
+def copy_program(tree: Path) -> None:
+    """Copy the program and its tests; the links in ``sprag/`` stay links, so that the changed copy is imported."""
+    for name in _FOLDERS:
+        shutil.copytree(ROOT / name, tree / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "examples"):
+        (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(ROOT / name, tree / name)
+
+
 def outcome(tree: Path, tests: tuple[str, ...]) -> str:
     """How the tests end in that copy. What a mutant loses is waited for in vain: some tests come to no end."""
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests]
@@ -153,10 +161,7 @@ def main() -> None:
     alive = []
     with tempfile.TemporaryDirectory(prefix="sprag-mutant-") as folder:
         tree = Path(folder)
-        for name in _FOLDERS:
-            shutil.copytree(ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__"))
-        for name in ("pyproject.toml", "examples"):
-            (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(ROOT / name, tree / name)
+        copy_program(tree)
         for mutant in MUTANTS:
             if wanted and not any(word in mutant.name for word in wanted):
                 continue

@@ -1,7 +1,8 @@
 """How often the truth lay inside the interval of the time left, for studies of different structure of cost.
 
-The estimator is the service's own (`service.storage.progress`). Chunks of made-up cost are run on simulated processes,
-in the order of the service; at every so many commits the interval is taken and held against what was left in truth.
+The estimator is the service's own (`sprag.service.storage.progress`). Chunks of made-up cost are run on simulated
+processes, in the order of the service; at every so many commits the interval is taken and compared with what was left
+in truth.
 With ``--real`` studies of the engine are run here as well, and the intervals that ``sprag run`` tells are taken.
 
     python -m benchmarks.time_left [--studies 60] [--seed 1] [--real]

@@ -39,8 +39,7 @@ def configure(form: LogFormat, *, requests: bool) -> None:
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(JsonFormatter() if form == "json" else TextFormatter())
     logging.basicConfig(level=logging.WARNING, handlers=[handler])
-    for name in ("sprag", "service", "worker"):
-        logging.getLogger(name).setLevel(logging.INFO)
+    logging.getLogger("sprag").setLevel(logging.INFO)
     _REQUESTS.setLevel(logging.INFO if requests else logging.WARNING)
 
 

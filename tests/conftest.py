@@ -42,7 +42,7 @@ class Finished:
 @pytest.fixture(autouse=True)
 def _levels_of_before() -> Iterator[None]:
     """A test that sets up the program's log leaves the others' levels as they were."""
-    loggers = [logging.getLogger(name) for name in ("sprag", "sprag.requests", "service", "worker")]
+    loggers = [logging.getLogger(name) for name in ("sprag", "sprag.requests")]
     levels = [logger.level for logger in loggers]
     yield
     for logger, level in zip(loggers, levels, strict=True):

@@ -2,9 +2,26 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
-from benchmarks.mutants import MUTANTS, ROOT, Mutant
+from benchmarks.mutants import MUTANTS, ROOT, Mutant, copy_program
+
+
+def test_what_runs_in_the_copy_is_the_copy(tmp_path: Path) -> None:
+    copy_program(tmp_path)
+    where = (
+        "from importlib.util import find_spec; print(*(find_spec(f'sprag.{n}').origin for n in ('engine', 'worker')))"
+    )
+    environment = {"PYTHONPATH": str(tmp_path)}
+    told = subprocess.run(
+        [sys.executable, "-c", where], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+    )
+    for name, origin in zip(("engine", "worker"), told.stdout.split(), strict=True):
+        assert Path(origin).resolve() == (tmp_path / name / "__init__.py").resolve()
 
 
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)

@@ -1,4 +1,4 @@
-"""The same for programs that wait for many things at once: every method of `service.client.study`, to be awaited."""
+"""The asynchronous client: every method of `sprag.service.client.study`, as a coroutine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The service over HTTP with plain JSON data in and out; what the command line and `service.client.study` stand on."""
+"""The service over HTTP with plain JSON data in and out, for the command line and `sprag.service.client.study`."""
 
 from __future__ import annotations
 

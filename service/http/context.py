@@ -56,9 +56,9 @@ class Context:
     """Settings, store and computer of one service; ``ending`` is set when the service is about to end.
 
     ``checker`` runs what reads, expands, fits or draws what users wrote, and ``library`` is the store for it; requests
-    use it and the computer through `service.http.work`, which keeps to the shares of each token. ``unaffected`` tells
-    of parameters that change nothing; ``streams`` are the places for streams of events. ``ready`` is set when the
-    checker can take work.
+    use it and the computer through `sprag.service.http.work`, which keeps to the shares of each token. ``unaffected``
+    tells of parameters that change nothing; ``streams`` are the places for streams of events. ``ready`` is set when
+    the checker can take work.
     """
 
     settings: Settings

@@ -36,7 +36,7 @@ def run(*command: object, cwd: Path) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel, built of a copy without the network."""
+    """The wheel, built without the network of the sources of a release, which are built of a copy of the repository."""
     folder = tmp_path_factory.mktemp("wheel")
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     for name in filter(None, listed.split("\0")):
@@ -47,8 +47,12 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 target.symlink_to((ROOT / name).readlink())
             else:
                 target.write_bytes((ROOT / name).read_bytes())
+    pack = f"from setuptools.build_meta import build_sdist; build_sdist({str(folder)!r})"
+    done = run(sys.executable, "-c", pack, cwd=folder / "sources")
+    assert done.returncode == 0, done.stderr
+    (release,) = folder.glob("*.tar.gz")
     build = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-index", "--no-build-isolation", "-w", folder]
-    done = run(*build, folder / "sources", cwd=folder)
+    done = run(*build, release, cwd=folder)
     assert done.returncode == 0, done.stderr
     (built,) = folder.glob("*.whl")
     return built

@@ -86,7 +86,7 @@ def test_a_fault_is_told_with_its_trace_and_request(
 
 
 def test_the_form_of_the_log_is_a_setting(monkeypatch: pytest.MonkeyPatch) -> None:
-    root, names = logging.getLogger(), ("sprag", "service", "worker", "sprag.requests")
+    root, names = logging.getLogger(), ("sprag", "sprag.requests")
     before, levels = root.handlers[:], [logging.getLogger(name).level for name in names]
     stream = io.StringIO()
     monkeypatch.setattr(sys, "stderr", stream)

@@ -228,8 +228,9 @@ def test_a_worker_with_another_numpy_is_refused(
 
 def edited_engine(folder: Path) -> dict[str, str]:
     """A copy of the sources whose engine is a hundred times less accurate, under the same version."""
-    for package in ("engine", "worker"):
-        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))
+    for package in ("sprag", "engine", "worker"):
+        copied = {"symlinks": True, "ignore": shutil.ignore_patterns("__pycache__")}
+        shutil.copytree(ROOT / package, folder / package, **copied)
     cases = folder / "engine" / "vibration_drive" / "cases.py"
     cases.write_text(cases.read_text(encoding="utf-8") + "\nTOLERANCE_FACTOR = 100.0\n", encoding="utf-8")
     return {}
@@ -237,14 +238,13 @@ def edited_engine(folder: Path) -> dict[str, str]:
 
 def no_sprag(folder: Path) -> dict[str, str]:
     """No package of Sprag that could be imported."""
-    (folder / "engine.py").write_text("raise ImportError('there is no Sprag here')\n", encoding="utf-8")
+    (folder / "sprag.py").write_text("raise ImportError('there is no Sprag here')\n", encoding="utf-8")
     return {}
 
 
 def no_fma(folder: Path) -> dict[str, str]:
     """The same sources on a processor without fused multiplication and addition."""
-    for package in ("engine", "worker"):
-        (folder / package).symlink_to(ROOT / package)
+    (folder / "sprag").symlink_to(ROOT / "sprag")
     features = fingerprint.own()["processor features"].split()
     return {"NUMBA_CPU_FEATURES": ",".join(("-" if name == "fma" else "+") + name for name in features)}
 
