@@ -32,6 +32,7 @@ check: $(DEV)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python -m docs.reference --check
 
 # The first Python in PYTHONS that is new enough makes the environment; a broken environment is made anew.
 define MAKE_ENVIRONMENT

@@ -11,13 +11,11 @@ from sprag.engine.machine_shaft.results import MACHINE_RESULTS
 from sprag.engine.vibration_drive.regimes import settled_infos
 from sprag.service.cli.app import app
 from sprag.service.presets import ABOUT, preset_names, preset_text
-from sprag.service.settings import table
-from sprag.worker import limits, models
+from sprag.worker import models
 from sprag.worker.codes import ENDING_CODES, FLAG_MASKS
 from sprag.worker.states import StudyState
 
 ROOT = Path(__file__).resolve().parents[1]
-REFERENCE = (ROOT / "docs" / "reference.md").read_text()
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
@@ -81,30 +79,6 @@ def test_links_lead_somewhere(page: Path) -> None:
             assert anchor in {re.sub(r"[^\w-]", "", h.lower().replace(" ", "-")) for h in headings}, target
 
 
-def test_the_reference_lists_every_command() -> None:
-    for name in commands():
-        assert f"| `sprag {name}` | " in REFERENCE
-
-
-def test_the_reference_lists_every_setting_with_default_and_help() -> None:
-    for row in table():
-        default = f"`{row.default}`" if row.default else ""
-        assert f"| `{row.variable}` | {default} | {row.help} |" in REFERENCE
-
-
-@pytest.mark.parametrize("model", models.model_names())
-def test_the_reference_lists_every_parameter(model: str) -> None:
-    for entry in models.parameter_catalogue(model):
-        default = "" if entry.default is None else f"{entry.default:g}"
-        assert f"| `{entry.path}` | {entry.unit} | {entry.range_text()} | {default} | {entry.help} |" in REFERENCE
-
-
-@pytest.mark.parametrize("model", models.model_names())
-def test_the_reference_lists_every_result(model: str) -> None:
-    for info in models.result_catalogue(model):
-        assert f"| `{info.name}` | {info.unit} | {info.description} |" in REFERENCE
-
-
 def test_results_that_the_pages_name_exist() -> None:
     names = {info.name for info in (*settled_infos(8), *MACHINE_RESULTS)}
     names |= {re.sub(r"\d", "N", name) for name in names}
@@ -117,25 +91,10 @@ def test_results_that_the_pages_name_exist() -> None:
             assert name in names | paths or family, f"{page.name}: {name}"
 
 
-def test_the_reference_lists_every_ending_flag_and_state() -> None:
-    sentences = dict(models.ENDING_SENTENCES)
-    for model in models.model_names():
-        sentences |= models.flags_of(model)
-    sentences |= {state.value: state.sentence for state in StudyState}
-    for key, sentence in sentences.items():
-        assert f"| `{key}` | {sentence} |" in REFERENCE
-
-
 def test_the_page_of_exports_has_the_number_of_every_ending_and_flag() -> None:
     page = (ROOT / "docs" / "exports.md").read_text()
     told = {name: int(number) for name, number in re.findall(r"\| `(\w+)`(?: \(not run\))? \| (-?\d+) ", page)}
     assert told == {**ENDING_CODES, **FLAG_MASKS}
-
-
-def test_the_reference_tells_the_limits() -> None:
-    told = ("MAX_AXES", "MAX_COLUMNS", "MAX_CASES", "MAX_AXIS_VALUES", "MAX_BODY_BYTES", "MAX_DEPTH")
-    for limit in (getattr(limits, name) for name in told):
-        assert f" {limit:,} " in REFERENCE
 
 
 def test_the_studies_that_come_with_the_program_are_the_examples() -> None:

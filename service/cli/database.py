@@ -81,7 +81,7 @@ def prune(
     db: Database = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Delete every study that ended longer ago than that, with all its results."""
+    """Delete every study that ended longer ago than --older-than days, with all its results."""
     from datetime import timedelta
 
     from sprag.service.storage.store import Store

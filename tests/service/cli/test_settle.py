@@ -70,11 +70,3 @@ def test_a_case_that_ends_otherwise_is_told(sprag: Sprag, examples: Path, tmp_pa
     (row,) = sprag("settle", path, "--case", 178, "--json", "--at-most", 100).data
     assert row["ending"] != "ok"
     assert set(row["results"].values()) == {None}
-
-
-def test_every_regime_is_in_the_reference() -> None:
-    from sprag.engine.vibration_drive.regimes import Regime
-
-    page = (Path(__file__).resolve().parents[3] / "docs" / "reference.md").read_text(encoding="utf-8")
-    for regime in Regime:
-        assert f"| `{regime.name.lower()}` | {regime.sentence} |" in page

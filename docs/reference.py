@@ -1,0 +1,153 @@
+"""The tables of docs/reference.md, from what the program says of itself; the sentences between them are by hand.
+
+python -m docs.reference           write the tables anew
+python -m docs.reference --check   exit code 1 where a table is not what the program says
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import typer
+
+from sprag.engine.machine_shaft.expressions import MAX_LENGTH
+from sprag.engine.vibration_drive.engagements import MAX_PERIODS
+from sprag.service.cli.app import app
+from sprag.service.settings import table
+from sprag.worker import limits as limit
+from sprag.worker import models
+from sprag.worker.models import machine_shaft
+from sprag.worker.states import StudyState
+
+PAGE = Path(__file__).with_name("reference.md")
+Row = Iterable[str]
+
+
+def commands(command: object | None = None, name: str = "") -> Iterator[Row]:
+    """Every command with the first paragraph of its help."""
+    command = command or typer.main.get_command(app)
+    if name and (not hasattr(command, "commands") or getattr(command, "invoke_without_command", False)):
+        yield f"`sprag {name}`", _sentence(command.help)  # type: ignore[attr-defined]
+    for key, inner in getattr(command, "commands", {}).items():
+        yield from commands(inner, f"{name} {key}".strip())
+
+
+def _sentence(text: str) -> str:
+    """The first paragraph, its options as code."""
+    return re.sub(r"(--[a-z-]+)", r"`\1`", " ".join(text.partition("\n\n")[0].split()))
+
+
+def settings() -> Iterator[Row]:
+    """Every setting."""
+    return ((f"`{row.variable}`", f"`{row.default}`" if row.default else "", row.help) for row in table())
+
+
+def parameters(model: str) -> Iterator[Row]:
+    """Every parameter of a model."""
+    for entry in models.parameter_catalogue(model):
+        default = "" if entry.default is None else f"{entry.default:g}"
+        yield f"`{entry.path}`", entry.unit, entry.range_text(), default, entry.help
+
+
+def results(model: str, *, settled: bool = False) -> Iterator[Row]:
+    """Every result of a model that all cases have; or those that settled cases have besides."""
+    for info in models.result_catalogue(model):
+        if settled == (info.name in SETTLED_ONLY):
+            yield f"`{info.name}`", info.unit, info.description
+
+
+def meanings(sentences: dict[str, str]) -> Iterator[Row]:
+    """Names with their sentences."""
+    return ((f"`{name}`", sentence) for name, sentence in sentences.items())
+
+
+def limits() -> Iterator[Row]:
+    """What a study and a service are held to."""
+    yield "axes of a study", f"{limit.MAX_AXES:,}"
+    yield "columns of a table of cases", f"{limit.MAX_COLUMNS:,}"
+    yield "cases of a study", f"{limit.MAX_CASES:,}"
+    yield "values on all axes together", f"{limit.MAX_AXIS_VALUES:,}"
+    yield "size of a spec", f"{limit.MAX_BODY_BYTES:,} bytes"
+    yield "nesting of a spec", f"{limit.MAX_DEPTH} levels"
+    yield "pendulums of a drive", f"{models.MAX_PENDULUMS}"
+    yield "coefficients of a clutch law", f"{models.MAX_COEFFICIENTS}"
+    yield "rows of measured clutch data", f"{limit.MAX_CLUTCH_ROWS:,}"
+    yield "steps of an operation, constants of formulas", f"{machine_shaft.MAX_STEPS}"
+    yield "rows of a table of a machine", f"{machine_shaft.MAX_ROWS:,}"
+    yield "characters of a formula", f"{MAX_LENGTH:,}"
+    yield "excitation periods of a run", f"{limit.MAX_RUN_PERIODS:,.0f}"
+    searched = f"{limit.MIN_SETTLED_PERIODS:,} to {limit.MAX_SETTLED_PERIODS:,}"
+    yield "excitation periods of a search for the settled motion (`at_most`)", searched
+    yield "largest order of a periodic motion (`max_period`)", f"1 to {limit.MAX_ORBIT_PERIODS}"
+    yield "scaled distance that counts as settled (`settled`)", f"{limit.MIN_SETTLED:g} to {limit.MAX_SETTLED:g}"
+    yield "tolerance", f"{limit.MIN_TOLERANCE:g} to {limit.MAX_TOLERANCE:g}"
+    yield "times of a trajectory", f"{limit.MAX_TRAJECTORY_POINTS:,}"
+    told = "excitation periods in the tables of a case's engagements: the last of its run"
+    yield told, f"{MAX_PERIODS}"
+    yield "studies that have not ended", f"{limit.MAX_WAITING_STUDIES:,}"
+    yield "schedules", f"{limit.MAX_SCHEDULES:,}"
+    yield "streams of events", f"{limit.MAX_STREAMS:,}"
+    yield "checks, fits and pictures of one token, of all together", f"{limit.MAX_CHECKS_EACH}, {limit.MAX_CHECKS}"
+    together = f"{limit.MAX_COMPUTATIONS_EACH}, {limit.MAX_COMPUTATIONS}"
+    yield "instantaneous values asked for by one token, by all together", together
+    yield "memory for the instantaneous values of a case", f"{limit.COMPUTATION_BYTES / 2**30:g} GiB"
+    yield "connections", f"{limit.MAX_CONNECTIONS}"
+    yield "head, body of a request", f"{limit.HEAD_SECONDS:g} s, {limit.BODY_SECONDS:g} s"
+    yield "time in which a client takes something of an answer", f"{limit.WRITE_SECONDS:g} s"
+
+
+DRIVE, SHAFT = models.VIBRATION_DRIVE, models.MACHINE_SHAFT
+TIMED = {info.name.replace("pendulums.0.", "pendulums.N.") for info in models.result_infos(DRIVE, "1")}
+#: Results that cases of a given time have not.
+SETTLED_ONLY = {info.name for info in models.result_catalogue(DRIVE)} - TIMED
+#: Name of a table, as the page has it in a comment above -> heads of its columns, and its rows.
+TABLES: dict[str, tuple[str, Iterable[Row]]] = {
+    "commands": ("command | ", commands()),
+    "settings": ("variable | default | ", settings()),
+    "parameters of the vibration drive": ("path | unit | allowed | default | ", parameters(DRIVE)),
+    "parameters of the machine shaft": ("path | unit | allowed | default | ", parameters(SHAFT)),
+    "results of the vibration drive": ("result | unit | ", results(DRIVE)),
+    "results of the machine shaft": ("result | unit | ", results(SHAFT)),
+    "results of settled cases": ("result | unit | meaning ", results(DRIVE, settled=True)),
+    "regimes": ("regime | meaning ", meanings(models.REGIME_SENTENCES)),
+    "endings": ("ending | ", meanings(dict(models.ENDING_SENTENCES))),
+    "flags": ("flag | ", meanings({k: v for name in models.model_names() for k, v in models.flags_of(name).items()})),
+    "states": ("state | ", meanings({state.value: state.sentence for state in StudyState})),
+    "limits": (" | ", limits()),
+}
+
+
+def page(text: str) -> str:
+    """The page with its tables made anew."""
+    for name, (heads, rows) in TABLES.items():
+        lines = [f"| {heads}|".replace("|  |", "| |"), "|" + "---|" * (heads.count("|") + 1)]
+        lines += [f"| {' | '.join(cells)} |" for cells in rows]
+        pattern = rf"(<!-- table: {name} -->\n\n)(?:\|.*\n)*"
+        made = "\n".join(lines) + "\n"
+        text, found = re.subn(pattern, lambda match, made=made: match[1] + made, text)  # type: ignore[misc]
+        if found != 1:
+            raise ValueError(f"the page has {found} places for the table {name!r}")
+    return text
+
+
+def main() -> int:
+    """Write the page, or check it."""
+    text = PAGE.read_text(encoding="utf-8")
+    made = page(text)
+    if "--check" not in sys.argv:
+        PAGE.write_text(made, encoding="utf-8")
+        return 0
+    lines = set(text.splitlines())
+    for line in made.splitlines():
+        if line not in lines:
+            print(f"docs/reference.md lacks: {line}")
+    if made != text:
+        print("docs/reference.md is not what the program says: python -m docs.reference writes it anew.")
+    return int(made != text)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
