@@ -64,4 +64,4 @@ def words(name: str) -> str:
     """``shaft.speed.mean`` as ``Shaft speed mean``."""
     text = name.replace(".", " ").replace("_", " ").strip()
     text = re.sub(r"^pendulums (\d+)", r"pendulum \1", text)
-    return text[:1].upper() + text[1:]
+    return text[:1].upper() + text[1:] if text[:1].isascii() else text

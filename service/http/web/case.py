@@ -13,13 +13,13 @@ from sprag.service.faults import FaultError
 from sprag.service.http.context import CaseNumber, Context, Ctx, StudyId, study_with
 from sprag.service.http.drawing import picture
 from sprag.service.http.respond import entity_tag, json_response, not_modified, tagged
-from sprag.service.http.web.figures.motion import SAMPLES, motion_figures
+from sprag.service.http.web.figures.answers import SAMPLES, motion_figures
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.results import trajectories
 from sprag.service.results.defaults import main_results
-from sprag.service.results.pictures.motion import draw_motion
+from sprag.service.results.pictures.curves import draw_motion
 from sprag.service.results.selection import axis_name
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models

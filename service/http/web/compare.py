@@ -17,13 +17,14 @@ from sprag.service.http.context import Context, Ctx
 from sprag.service.http.drawing import Drawing, picture
 from sprag.service.http.respond import entity_tag, json_response, not_modified, tagged
 from sprag.service.http.web.choice import held, varying_axes
-from sprag.service.http.web.figures.curves import curves_figure
+from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.study import fixed_choices
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.results.curves import CurveQuery, Curves, draw, select
 from sprag.service.results.defaults import main_query
-from sprag.service.results.pictures.compare import draw_compare
+from sprag.service.results.figures.curves import curves_figure
+from sprag.service.results.pictures.curves import draw_compare
 from sprag.service.results.selection import SelectionError
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
@@ -172,7 +173,9 @@ def compare_figure(context: Ctx, request: Request) -> Response:
     tag = _tag(context, request)
     if unchanged := not_modified(request, tag):
         return unchanged
-    return tagged(json_response(curves_figure(drawn(context, comparison(context, request.query_params)))), tag)
+    return tagged(
+        json_response(plotly_figure(curves_figure(drawn(context, comparison(context, request.query_params))))), tag
+    )
 
 
 @router.get("/compare/picture.svg")

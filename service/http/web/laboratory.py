@@ -24,7 +24,7 @@ from sprag.service.http.web.form.spec import plain
 from sprag.service.http.web.templates import fragment, page, spec_text
 from sprag.service.http.work import Attended, Work
 from sprag.service.presets import preset_names
-from sprag.service.results.pictures.motion import draw_motion
+from sprag.service.results.pictures.curves import draw_motion
 from sprag.service.results.wording import number, words
 from sprag.service.spec.catalogue import parameter_of
 from sprag.service.spec.document import parse_spec

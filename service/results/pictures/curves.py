@@ -1,11 +1,10 @@
-"""Pictures of curves and maps: SVG, PNG and PDF through matplotlib, the same bytes for the same numbers."""
+"""Pictures of figures and maps: SVG, PNG and PDF through matplotlib, the same bytes for the same numbers."""
 
 from __future__ import annotations
 
 import io
-import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
@@ -13,16 +12,23 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 import numpy as np
 
 from sprag.service.faults import ErrorItem
-from sprag.service.results.regimes import DOUBTFUL, MARKED, MARKS, regimes_of, stretches
+from sprag.service.results.figures.curves import curves_figure, doubtful_marks, map_quantities
+from sprag.service.results.figures.figure import OTHER_LOOK, PALETTE, shortened
+from sprag.service.results.figures.motion import motion_figure
+from sprag.service.results.regimes import MARKS
 from sprag.service.results.selection import SelectionError
+from sprag.service.results.wording import words
 from sprag.worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from sprag.service.results.curves import Curves, Map
-    from sprag.worker.models import ResultInfo
+    from sprag.service.results.figures.figure import Figure as Described
+    from sprag.service.results.figures.figure import Line, Marks, Panel, Quantity
+    from sprag.worker.models import Presentation, Trajectory
 
 Picture = Literal["svg", "png", "pdf"]
 PICTURES: Final[tuple[Picture, ...]] = get_args(Picture)
@@ -31,16 +37,18 @@ MEDIA_TYPES: Final[dict[Picture, str]] = {"svg": "image/svg+xml", "png": "image/
 #: What one picture can show; more would take minutes to draw and nobody could read it.
 MAX_PICTURE_CURVES: Final = 200
 MAX_PICTURE_POINTS: Final = 100_000
-#: Curves that have an entry in the legend each; more have a block each of a colour bar, so many of them with a label.
-_LEGEND_CURVES: Final = 10
+#: Labels of a colour bar, which tells more curves apart than a legend can.
 _BAR_LABELS: Final = 24
-#: How results of one unit are told apart: style of the line, and marker where there is none.
+#: Style of the line, and marker where there is none.
 _STYLES: Final[tuple[tuple[Literal["-", "--", ":", "-."], str], ...]] = (
     ("-", "o"),
     ("--", "s"),
     (":", "^"),
     ("-.", "D"),
 )
+#: Columns of the legend of several studies, and characters for which one has room.
+_COLUMNS: Final = 2
+_MOST_LABEL: Final = 52
 #: Characters on a line of a title.
 _TITLE_WIDTH: Final = 100
 #: Points of a map that are marked each.
@@ -69,42 +77,59 @@ def draw_curves(curves: Curves, title: str, picture: Picture) -> bytes:
 
     Raises SelectionError when there are more curves or points than one picture can show.
     """
-    require_drawable(curves)
-    return render(partial(paint_curves, curves=curves, title=title), picture, (8.0, 1.2 + 3.6 * len(_groups(curves))))
+    require_drawable([curves])
+    return _draw(curves_figure([("", curves)], by_unit=True), title, picture)
 
 
-def require_drawable(curves: Curves) -> None:
+def draw_compare(drawn: Sequence[tuple[str, Curves]], picture: Picture) -> bytes:
+    """Curves of studies, each with its name, a plot for each result; raises SelectionError as `draw_curves` does."""
+    require_drawable([curves for _, curves in drawn])
+    return _draw(curves_figure(drawn), "", picture)
+
+
+def draw_motion(made: Trajectory, shown: Presentation, title: str, picture: Picture) -> bytes:
+    """The motion of one case: its variables above the states of the parts of the machine."""
+    return _draw(motion_figure(made, shown), title, picture)
+
+
+def require_drawable(drawn: Sequence[Curves]) -> None:
     """Raise SelectionError when there are more curves or points than one picture can show."""
-    points = sum(len(curve.endings) for curve in curves.curves) * len(curves.selection.results)
-    check_size("curves", len(curves.curves), MAX_PICTURE_CURVES)
+    lines = [curve for curves in drawn for curve in curves.curves]
+    check_size("curves", len(lines), MAX_PICTURE_CURVES)
+    points = sum(len(curve.endings) for curve in lines) * len(drawn[0].selection.results)
     check_size("points", points, MAX_PICTURE_POINTS)
 
 
-def _groups(curves: Curves) -> dict[str, list[ResultInfo]]:
-    """The results by their units, each group a plot."""
-    groups: dict[str, list[ResultInfo]] = {}
-    for info in curves.selection.results:
-        groups.setdefault(info.unit, []).append(info)
-    return groups
+def _draw(figure: Described, title: str, picture: Picture) -> bytes:
+    legend = 0.24 * len(figure.listed) / _COLUMNS if figure.studies > 1 else 0.5 * len(figure.spans)
+    size = (8.0, 1.2 + (2.1 if figure.motion else 3.6) * figure.rows + legend)
+    return render(partial(paint_figure, drawn=figure, title=title), picture, size)
 
 
-def paint_curves(figure: Figure, curves: Curves, title: str) -> None:
-    """Draw the curves into an empty figure; for use inside `painting`."""
-    groups = _groups(curves)
-    plots = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, (unit, infos) in zip(plots, groups.items(), strict=True):
-        _paint_curves(axes, curves, infos, unit)
-    chosen = curves.selection
-    plots[-1].set_xlabel(axis_label(chosen.names[chosen.x], chosen.units[chosen.x]))
-    _explain(figure, list(plots), curves)
-    _explain_regimes(figure, regimes_of(curve.regimes for curve in curves.curves))
-    head(figure, title, chosen.held)
+def paint_figure(figure: Figure, drawn: Described, title: str) -> None:
+    """Draw what is described into an empty figure; for use inside `painting`."""
+    heights = [3.0] * drawn.rows + ([0.45 * len(drawn.spans) + 0.3] if drawn.spans else [])
+    grid = figure.subplots(len(heights), drawn.columns, sharex=True, height_ratios=heights, squeeze=False)
+    plots: list[Axes] = list(grid.reshape(-1))
+    for axes, panel in zip(plots, drawn.panels, strict=False):
+        _paint_panel(axes, panel, motion=drawn.motion)
+    if drawn.spans:
+        _paint_states(plots[-1], drawn)
+    for axes in plots[len(drawn.panels) + bool(drawn.spans) :]:
+        axes.set_visible(False)
+    for axes in plots[-drawn.columns :]:
+        axes.set_xlabel(quantity_label(drawn.x))
+    if not drawn.motion:
+        (_explain if drawn.studies == 1 else _explain_studies)(figure, plots, drawn)
+        _explain_regimes(figure, drawn.regimes)
+    head(figure, title, drawn.held if drawn.studies == 1 else ())
 
 
 def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
     """A map as a picture: colours over two axes, cases without a result left blank; SelectionError when too large."""
     check_size("points", drawn.values.size, MAX_PICTURE_POINTS)
     drawn = drawn.run()
+    x, y, z = map_quantities(drawn)
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
@@ -119,31 +144,16 @@ def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
         for axis, values in ((axes.xaxis, drawn.x_values), (axes.yaxis, drawn.y_values)):
             if len(values) == 1:
                 axis.set_ticks(values)
-        axes.set_xlabel(axis_label(drawn.names[0], drawn.units[0]))
-        axes.set_ylabel(axis_label(drawn.names[1], drawn.units[1]))
-        figure.colorbar(mesh, label=axis_label(drawn.result.name, drawn.result.unit))
-        _mark_doubtful(axes, drawn)
-        _explain_regimes(figure, [name for name in regimes_of(drawn.regimes or ()) if name in DOUBTFUL])
+        axes.set_xlabel(quantity_label(x))
+        axes.set_ylabel(quantity_label(y))
+        figure.colorbar(mesh, label=quantity_label(z))
+        doubtful = list(doubtful_marks(drawn))
+        _paint_marks(axes, doubtful)
+        _explain_regimes(figure, [marks.regime for marks in doubtful])
         missing = int(np.isnan(drawn.values).sum())
         head(figure, title, (*drawn.held, f"grey: {missing} cases without a result") if missing else drawn.held)
 
     return render(paint, picture, (8.0, 6.0))
-
-
-def _mark_doubtful(axes: Axes, drawn: Map) -> None:
-    """The points of a map whose motion is not periodic."""
-    for name in DOUBTFUL:
-        places = [
-            (drawn.x_values[column], drawn.y_values[row])
-            for row, regimes in enumerate(drawn.regimes or ())
-            for column, own in enumerate(regimes)
-            if own == name
-        ]
-        if places:
-            mark = MARKS[name]
-            axes.plot(
-                *zip(*places, strict=True), color=mark.colour, linestyle="none", marker=mark.marker, clip_on=False
-            )
 
 
 def check_size(what: str, count: int, most: int) -> None:
@@ -187,88 +197,95 @@ def render(paint: Callable[[Figure], None], picture: Picture, size: tuple[float,
     return buffer.getvalue()
 
 
-def _paint_curves(axes: Axes, curves: Curves, infos: list[ResultInfo], unit: str) -> None:
-    """Colour tells the curves apart, the style of the line and the marker the results."""
+def _paint_panel(axes: Axes, panel: Panel, *, motion: bool) -> None:
     from matplotlib.lines import Line2D
 
-    colours = _colours(len(curves.curves))
-    for curve, colour in zip(curves.curves, colours, strict=True):
-        # A line tells how x leads to y; points of a zip that go to and fro are not on one.
-        run = curve.run()
-        x = np.asarray(curve.line.x)[run]
-        regimes = None if curve.regimes is None else [curve.regimes[place] for place in run.tolist()]
-        joined = bool(np.all(np.diff(x) > 0.0))
-        for info, (style, marker) in zip(infos, itertools.cycle(_STYLES), strict=False):
-            y = curve.y[info.name][run]
-            for stretch in stretches(regimes, len(x)):
-                axes.plot(
-                    x[stretch],
-                    y[stretch],
-                    color=colour,
-                    linestyle=style if joined else "none",
-                    marker=marker,
-                    markersize=3.0 if joined else 4.5,
-                    linewidth=1.4,
-                )
-            for name in MARKED:
-                places = [place for place, own in enumerate(regimes or ()) if own == name]
-                if places:
-                    mark = MARKS[name]
-                    axes.plot(
-                        x[places], y[places], color=mark.colour, linestyle="none", marker=mark.marker, markersize=5.0
-                    )
-    if len(infos) == 1:
-        axes.set_ylabel(axis_label(infos[0].name, unit))
-        return
-    axes.set_ylabel("dimensionless" if unit == "1" else unit)
-    handles = [
-        Line2D([], [], color="0.3", linestyle=style, marker=marker, markersize=3.0, label=info.name)
-        for info, (style, marker) in zip(infos, itertools.cycle(_STYLES), strict=False)
-    ]
-    # Above the plot, where it hides no point.
+    for line in panel.lines:
+        style, marker = _STYLES[line.style % len(_STYLES)]
+        for stretch in line.stretches or (slice(None),):
+            axes.plot(
+                line.x[stretch],
+                line.y[stretch],
+                color=line.colour,
+                linestyle=style if line.joined else "none",
+                marker="" if line.cases is None else marker,
+                markersize=3.0 if line.joined else 4.5,
+                linewidth=1.1 if motion else 1.4,
+                label=line.name,
+            )
+    _paint_marks(axes, panel.marks)
+    axes.set_ylabel(quantity_label(panel.y))
+    if motion and len(panel.lines) > 1:
+        axes.legend(fontsize=8, loc="upper right", framealpha=0.8)
+    if panel.styles:
+        handles = [
+            Line2D([], [], color="0.3", linestyle=style, marker=marker, markersize=3.0, label=name)
+            for name, (style, marker) in zip(panel.styles, _STYLES * len(panel.styles), strict=False)
+        ]
+        # Above the plot, where it hides no point.
+        axes.legend(
+            handles=handles,
+            fontsize=8,
+            ncols=min(len(handles), 3),
+            frameon=False,
+            loc="lower right",
+            bbox_to_anchor=(1.0, 1.0),
+            borderaxespad=0.2,
+        )
+
+
+def _paint_marks(axes: Axes, every: Sequence[Marks]) -> None:
+    for marks in every:
+        look = MARKS[marks.regime]
+        axes.plot(
+            marks.x, marks.y, color=look.colour, linestyle="none", marker=look.marker, markersize=5.0, clip_on=False
+        )
+
+
+def _paint_states(axes: Axes, drawn: Described) -> None:
+    """A strip of states over time: a row for each part of the machine."""
+    from matplotlib.patches import Patch
+
+    shown: dict[str, Patch] = {}
+    for row, spans in enumerate(drawn.spans.values()):
+        for state, begin, end in spans:
+            colour, _, hatch = drawn.looks.get(state, OTHER_LOOK)
+            style: dict[str, Any] = {"facecolor": colour, "hatch": hatch, "edgecolor": "#333333", "linewidth": 0.0}
+            axes.broken_barh([(begin, end - begin)], (row - 0.4, 0.8), **style)
+            shown.setdefault(state, Patch(label=words(state).lower(), **style))
+    axes.set_yticks(range(len(drawn.spans)), list(drawn.spans))
+    axes.grid(visible=False)
     axes.legend(
-        handles=handles,
-        fontsize=8,
-        ncols=min(len(handles), 3),
-        frameon=False,
-        loc="lower right",
-        bbox_to_anchor=(1.0, 1.0),
-        borderaxespad=0.2,
+        handles=list(shown.values()), fontsize=7, ncols=len(shown), loc="upper center", bbox_to_anchor=(0.5, -0.6)
     )
 
 
-def _colours(count: int) -> list[Any]:
-    """Colours that differ most for a few curves, and that follow the order of many."""
-    if count <= _LEGEND_CURVES:
-        return [f"C{number}" for number in range(count)]
-    from matplotlib import colormaps
+def _handle(line: Line) -> Artist:
+    """What a legend shows of a line."""
+    from matplotlib.lines import Line2D
 
-    return [colormaps["viridis"](number / (count - 1)) for number in range(count)]
+    style, marker = _STYLES[line.style % len(_STYLES)]
+    return Line2D([], [], color=line.colour, linestyle=style, marker=marker, markersize=3.0)
 
 
-def _explain(figure: Figure, plots: list[Axes], curves: Curves) -> None:
+def _explain(figure: Figure, plots: list[Axes], drawn: Described) -> None:
     """What the colours mean, beside the plots: every curve in a legend, or in a colour bar where there are many."""
-    chosen = curves.selection
-    paths = list(curves.curves[0].line.by)
-    if not paths:
+    if not drawn.family:
         return
-    meaning = ",\n".join(axis_label(chosen.names[path].replace(" = ", " =\n"), chosen.units[path]) for path in paths)
-    texts = [", ".join(f"{value:.6g}" for value in curve.line.by.values()) for curve in curves.curves]
-    colours = _colours(len(texts))
-    if len(texts) <= _LEGEND_CURVES:
-        from matplotlib.lines import Line2D
-
-        handles = [
-            Line2D([], [], color=colour, marker="o", markersize=3.0, label=text)
-            for colour, text in zip(colours, texts, strict=True)
-        ]
-        figure.legend(handles=handles, title=meaning, loc="outside right upper", fontsize=8, title_fontsize=8)
+    meaning = ",\n".join(quantity_label(quantity).replace(" = ", " =\n") for quantity in drawn.family)
+    lines = drawn.listed
+    texts = [line.name for line in lines]
+    if len(texts) <= len(PALETTE):
+        figure.legend(
+            [_handle(line) for line in lines], texts, title=meaning, loc="outside right upper",
+            fontsize=8, title_fontsize=8,
+        )  # fmt: skip
         return
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, Normalize
 
     # One block of colour for each curve, its number in the middle: values need not be evenly spaced, nor be numbers.
-    blocks = ScalarMappable(Normalize(-0.5, len(texts) - 0.5), ListedColormap(colours))
+    blocks = ScalarMappable(Normalize(-0.5, len(texts) - 0.5), ListedColormap([line.colour for line in lines]))
     bar = figure.colorbar(blocks, ax=plots, aspect=30 * len(plots))
     labelled = range(0, len(texts), math.ceil(len(texts) / _BAR_LABELS))
     bar.set_ticks(list(labelled), labels=[texts[number] for number in labelled])
@@ -276,19 +293,40 @@ def _explain(figure: Figure, plots: list[Axes], curves: Curves) -> None:
     bar.set_label(meaning.replace(" =\n", " = "), fontsize=8)
 
 
-def _explain_regimes(figure: Figure, regimes: list[str]) -> None:
+def _explain_studies(figure: Figure, _plots: list[Axes], drawn: Described) -> None:
+    """The legend of several studies: the name of each once, and under it the values that tell its curves apart."""
+    from matplotlib.patches import Patch
+
+    lines = [(line.heading, _handle(line), line.name) for line in drawn.listed]
+    columns = _COLUMNS
+    if drawn.family:
+        # A legend is filled column by column: blocks of one length, as many in each column, keep the studies apart.
+        empty = Patch(visible=False)
+        studies = {name: [line for line in lines if line[0] == name] for name, _, _ in lines}
+        length = max(map(len, studies.values()))
+        blocks: list[tuple[str, Artist, str]] = []
+        for name, own in studies.items():
+            blocks += [(name, empty, name), *own, *[("", empty, "")] * (length - len(own))]
+        lines = blocks + [("", empty, "")] * ((length + 1) * (-len(studies) % _COLUMNS))
+    labels = [_fitting(text) for _, _, text in lines]
+    title = ", ".join(quantity_label(quantity) for quantity in drawn.family)
+    figure.legend(
+        [handle for _, handle, _ in lines], labels, title=title or None, loc="outside lower center",
+        fontsize=8, title_fontsize=8, ncols=columns,
+    )  # fmt: skip
+
+
+def _explain_regimes(figure: Figure, regimes: Sequence[str]) -> None:
     """What the marks of points mean, below the plots; nothing where all motions are periodic."""
     from matplotlib.lines import Line2D
 
-    if not set(regimes) & set(MARKED):
-        return
-    handles = [
-        Line2D(
-            [], [], color=MARKS[name].colour, marker=MARKS[name].marker, markersize=5.0, linestyle="none", label=name
-        )
-        for name in regimes
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=8, frameon=False)
+    looks = [(name, MARKS[name]) for name in regimes]
+    if looks:
+        handles = [
+            Line2D([], [], color=look.colour, marker=look.marker, markersize=5.0, linestyle="none", label=name)
+            for name, look in looks
+        ]
+        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=8, frameon=False)
 
 
 def head(figure: Figure, title: str, held: tuple[str, ...]) -> None:
@@ -309,6 +347,18 @@ def head(figure: Figure, title: str, held: tuple[str, ...]) -> None:
 def axis_label(name: str, unit: str, brackets: str = "()") -> str:
     """What stands at an axis: the name, and its unit in ``brackets`` where it has one."""
     return f"{name} {brackets[:1]}{unit}{brackets[1:]}" if unit != "1" else name
+
+
+def quantity_label(quantity: Quantity) -> str:
+    """The same of a quantity; the unit alone where it has no name."""
+    if quantity.name:
+        return axis_label(quantity.name, quantity.unit)
+    return "dimensionless" if quantity.unit == "1" else quantity.unit
+
+
+def _fitting(label: str) -> str:
+    """A name as the font can write it, and not wider than a column of a legend."""
+    return shortened(writable(label), _MOST_LABEL)
 
 
 def _short(title: str) -> str:

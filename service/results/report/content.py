@@ -180,7 +180,7 @@ def _pictures(study: Study, infos: tuple[ResultInfo, ...], fetch: Fetch) -> tupl
     chosen = [info for group in groups for info in group]
     try:
         whole = draw(select(study, infos, replace(query, y=tuple(info.name for info in chosen))), fetch)
-        require_drawable(_part(whole, groups[0]))
+        require_drawable([_part(whole, groups[0])])
     except SelectionError as error:
         return (), f"There are no curves here: {error}."
     return tuple(_part(whole, group) for group in groups), ""

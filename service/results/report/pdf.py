@@ -7,7 +7,8 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.results.pictures.curves import load_matplotlib, paint_curves, painting, writable
+from sprag.service.results.figures.curves import curves_figure
+from sprag.service.results.pictures.curves import load_matplotlib, paint_figure, painting, writable
 from sprag.service.results.report.html import input_text, number_text
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def pdf_report(report: Report) -> bytes:
             _text_page(pages, report.title if start == 0 else "", lines[start : start + _LINES])
         for curves in report.pictures:
             figure = _figure()
-            paint_curves(figure, curves, "")
+            paint_figure(figure, curves_figure([("", curves)], by_unit=True), "")
             pages.savefig(figure)
     return buffer.getvalue()
 

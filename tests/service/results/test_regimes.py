@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sprag.service.http.web.figures.curves import curves_figure, map_figure
+from sprag.service.http.web.figures.plotly import map_figure, plotly_figure
 from sprag.service.results.curves import CurveQuery, Curves, draw, draw_map, select
+from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.pictures.curves import draw_curves
 from sprag.service.results.pictures.curves import draw_map as paint_map
 from sprag.service.results.regimes import MARKS, counted, regimes_of, stretches
@@ -63,7 +64,7 @@ def drawn() -> Curves:
 
 
 def test_a_figure_breaks_lines_and_marks_regimes() -> None:
-    figure = curves_figure([("", drawn())])
+    figure = plotly_figure(curves_figure([("", drawn())]))
     line, *marks = figure["data"]
     assert line["customdata"] == [0, 1, 2, None, 3, None, 4, None, 5, None, 6]
     assert line["connectgaps"] is False
@@ -72,7 +73,7 @@ def test_a_figure_breaks_lines_and_marks_regimes() -> None:
     }  # fmt: skip
     assert figure["layout"]["showlegend"]
     transient = replace(drawn(), curves=tuple(replace(curve, regimes=None) for curve in drawn().curves))
-    (line,) = curves_figure([("", transient)])["data"]
+    (line,) = plotly_figure(curves_figure([("", transient)]))["data"]
     assert line["customdata"] == list(range(8))
 
 

@@ -1,23 +1,53 @@
-"""Figures of a study as bytes that are ready to be sent; as for `sprag.service.jobs.answers`."""
+"""Figures as bytes that are ready to be sent, as for `sprag.service.jobs.answers`; and the motion of a case."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-from sprag.service.http.web.figures.curves import curves_figure, map_figure
+from sprag.service.http.web.figures.plotly import Data, map_figure, plotly_figure
 from sprag.service.jobs.answers import curves_of, map_of
 from sprag.service.json_text import to_bytes
+from sprag.service.results.figures.curves import curves_figure
+from sprag.service.results.figures.motion import motion_figure, phase_figure
+from sprag.service.results.wording import number
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from sprag.service.jobs.checks import Library
     from sprag.service.results.curves import CurveQuery
+    from sprag.worker.study import Study
+
+#: Times at which a motion is sampled for a picture.
+SAMPLES: Final = 6000
 
 
 def curves_json(library: Library, study_id: str, query: CurveQuery, columns: int) -> bytes:
     """The figure of curves, as JSON text."""
-    return to_bytes(curves_figure([("", curves_of(library, study_id, query))], columns))
+    return to_bytes(plotly_figure(curves_figure([("", curves_of(library, study_id, query))], columns)))
 
 
 def map_json(library: Library, study_id: str, query: CurveQuery, contours: bool) -> bytes:
     """The figure of a map, as JSON text."""
     return to_bytes(map_figure(map_of(library, study_id, query), contours))
+
+
+def motion_figures(study: Study, case: int, start: float, end: float) -> dict[str, Data]:
+    """The case run again and drawn. For the computing process."""
+    made = models.run_trajectory(study, case, start, end, SAMPLES)
+    shown = models.presentation_of(study)
+    if made.times.size == 0 or made.times[-1] == start < end:
+        told = {"data": [], "layout": {}, "note": _no_motion(study, case, made.ending)}
+        return {"motion": told, **({"phase": told} if shown.portrait else {})}
+    figures = {"motion": motion_figure(made, shown), **({"phase": phase_figure(made, shown)} if shown.portrait else {})}
+    return {name: plotly_figure(figure) for name, figure in figures.items()}
+
+
+def _no_motion(study: Study, case: int, ending: str) -> str:
+    """Why a part has no motion: the run stopped before."""
+    extent = models.extent(study, case)
+    if extent.along == "angle":
+        return f"There is no motion: the case ended with {ending}."
+    times = models.run_trajectory(study, case, 0.0, extent.end, SAMPLES).times
+    last = float(times[-1]) if times.size else 0.0
+    when = f"about t = {number(last, 3)} s" if last > 0.0 else "t = 0"
+    return f"There is no motion in this part: the run stopped at {when} with {ending}."

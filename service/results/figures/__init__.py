@@ -1,0 +1,1 @@
+"""What is drawn, described once: painters of pictures and of pages draw the same description."""

@@ -1,0 +1,139 @@
+"""Curves of one study or of several, and the marks of a map, as descriptions of figures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sprag.service.results.figures.figure import Figure, Line, Marks, Panel, Quantity, line_colours
+from sprag.service.results.regimes import DOUBTFUL, MARKED, regimes_of, stretches
+from sprag.service.results.wording import number, unit_text
+from sprag.worker.codes import PENDING
+from sprag.worker.models import WorkerEnding
+
+if TYPE_CHECKING:
+    from sprag.service.results.curves import Curve, Curves, Map
+    from sprag.worker.models import ResultInfo
+
+#: Points that all lines of a panel may have together, and one line at least and at most: the five that are kept of
+#: each column of pixels of a wide picture.
+_MOST_POINTS: Final = 24_000
+_LEAST_POINTS: Final = 400
+_LINE_POINTS: Final = 6_000
+
+
+def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1, *, by_unit: bool = False) -> Figure:
+    """Curves of one study, or of several that are overlaid: a panel for each result.
+
+    Parameters
+    ----------
+    drawn : pairs of label and curves
+        All with the same x and the same results; one study alone has the label "".
+    columns : int
+        Panels side by side.
+    by_unit : bool
+        A panel for each unit instead; the dashes of the lines tell its results apart.
+    """
+    chosen = drawn[0][1].selection
+    x = Quantity(chosen.names[chosen.x], chosen.units[chosen.x])
+    lines = [(study, curve) for study, (_, curves) in enumerate(drawn) for curve in curves.curves]
+    family = tuple(Quantity(chosen.names[path], chosen.units[path]) for path in chosen.lines[0].by)
+    occurring = tuple(regimes_of(curve.regimes for _, curve in lines))
+    regimes = occurring if len(occurring) > 1 or set(occurring) & set(MARKED) else ()
+    groups: dict[str, list[ResultInfo]] = {}
+    for info in chosen.results:
+        groups.setdefault(info.unit if by_unit else info.name, []).append(info)
+    labels = [label for label, _ in drawn]
+    panels = []
+    for index, infos in enumerate(groups.values()):
+        y = Quantity(infos[0].name if len(infos) == 1 else "", infos[0].unit)
+        parts = tuple(_lines(lines, labels, infos, listed=index == 0))
+        styles = tuple(info.name for info in infos) if len(infos) > 1 else ()
+        panels.append(Panel(y, parts, tuple(_marks(lines, infos, regimes)), styles))
+    most = min(max(_MOST_POINTS // len(lines), _LEAST_POINTS), _LINE_POINTS)
+    return Figure(x, tuple(panels), columns, family, len(drawn), regimes, chosen.held, most=most, note=_nothing(drawn))
+
+
+def _lines(
+    lines: Sequence[tuple[int, Curve]], labels: Sequence[str], infos: Sequence[ResultInfo], *, listed: bool
+) -> Iterator[Line]:
+    for index, ((study, curve), colour) in enumerate(zip(lines, line_colours(len(lines)), strict=True)):
+        run = curve.run()
+        x = np.asarray(curve.line.x)[run]
+        regimes = None if curve.regimes is None else [curve.regimes[place] for place in run.tolist()]
+        values = ", ".join(number(value) for value in curve.line.by.values())
+        for place, info in enumerate(infos):
+            yield Line(
+                values or labels[study],
+                x,
+                curve.y[info.name][run],
+                colour,
+                style=study if len(infos) == 1 else place,
+                key=str(index),
+                heading=labels[study] if values else "",
+                listed=listed and place == 0,
+                cases=curve.line.cases[run],
+                stretches=None if regimes is None else tuple(stretches(regimes, x.size)),
+                # A line tells how x leads to y; points of a zip that go to and fro are not on one.
+                joined=bool(np.all(np.diff(x) > 0.0)),
+            )
+
+
+def _marks(lines: Sequence[tuple[int, Curve]], infos: Sequence[ResultInfo], regimes: Sequence[str]) -> Iterator[Marks]:
+    """The points of each regime that occurs; none of the periodic ones, which have the colour of their curve."""
+    for name in regimes:
+        places = [
+            (curve, place, info.name)
+            for _, curve in lines
+            for place, own in enumerate(curve.regimes or ())
+            if own == name and name in MARKED
+            for info in infos
+        ]
+        yield Marks(
+            name,
+            np.array([curve.line.x[place] for curve, place, _ in places]),
+            np.array([curve.y[result][place] for curve, place, result in places]),
+            np.array([curve.line.cases[place] for curve, place, _ in places], dtype=np.int64),
+        )
+
+
+def _nothing(drawn: Sequence[tuple[str, Curves]]) -> str:
+    """Why there is nothing to draw, as a sentence; "" where there is anything: empty axes would be made-up scales."""
+    curves = [curve for _, found in drawn for curve in found.curves]
+    if any(not np.all(np.isnan(y)) for curve in curves for y in curve.y.values()):
+        return ""
+    chosen = drawn[0][1].selection
+    at = curves[0].line.at if curves else {}
+    held = [f"{axis_name} = {number(value)} {unit_text(chosen.units[axis_name])}" for axis_name, value in at.items()]
+    cases = (
+        f"case at {', '.join(text.strip() for text in held)}" if held and len(drawn) == 1 else "case that is drawn here"
+    )
+    endings = {ending for curve in curves for ending in curve.endings}
+    if endings <= {PENDING, WorkerEnding.CANCELLED}:
+        return f"No {cases} {'is done yet' if PENDING in endings else 'was run before the study was cancelled'}."
+    others = ", ".join(sorted(endings - {PENDING, WorkerEnding.CANCELLED}))
+    return f"No {cases} has a result; they ended with: {others}."
+
+
+def map_quantities(drawn: Map) -> tuple[Quantity, Quantity, Quantity]:
+    """What stands at the axes of a map, and what its colours are."""
+    (x, y), (x_unit, y_unit) = drawn.names, drawn.units
+    return Quantity(x, x_unit), Quantity(y, y_unit), Quantity(drawn.result.name, drawn.result.unit)
+
+
+def doubtful_marks(drawn: Map) -> Iterator[Marks]:
+    """The points of a map whose motion is not periodic."""
+    for name in DOUBTFUL:
+        places = [
+            (row, column)
+            for row, regimes in enumerate(drawn.regimes or ())
+            for column, own in enumerate(regimes)
+            if own == name
+        ]
+        if places:
+            rows, columns = np.array(places).T
+            yield Marks(
+                name, np.array(drawn.x_values)[columns], np.array(drawn.y_values)[rows], drawn.cases[rows, columns]
+            )
