@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+import math
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 def to_bytes(data: Any) -> bytes:
     """``data`` as JSON text in UTF-8. NaN and infinities are a fault (ValueError); a lone surrogate stays an escape."""
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.encode("utf-8", errors="backslashreplace")
+
+
+def timestamp(moment: datetime) -> str:
+    """A moment as RFC 3339 text in UTC."""
+    return moment.astimezone(UTC).isoformat().replace("+00:00", "Z")
+
+
+def numbers(values: NDArray[np.float64], count: bool = False) -> list[float | int | None]:
+    """Doubles as JSON numbers, NaN as null; counts as integers."""
+    return [None if math.isnan(value) else int(value) if count else value for value in values.tolist()]

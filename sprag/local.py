@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from datetime import datetime
     from os import PathLike
 
-    from sprag.service.client.types import Spec
+    from sprag.service.client.queries import Spec
     from sprag.service.storage.records import Progress
 
 

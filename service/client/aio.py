@@ -49,7 +49,8 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from sprag.service.client.types import Preview, Spec, StudyDetail, StudySummary
+    from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
+    from sprag.service.client.queries import Spec
 
 
 class AsyncClient:

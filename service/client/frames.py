@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from sprag.service.client.types import CurvesData
+    from sprag.service.answers.results import CurvesData
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,9 +14,10 @@ from sprag.service.client.errors import SpecFileError
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from sprag.service.client.types import Spec, StudyDetail
+    from sprag.service.answers.studies import StudyDetail
 
 Value = float | int | str
+Spec = Mapping[str, Any]
 
 
 class Progressing(Protocol):

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from sprag.service.client.types import Preview, Spec, StudyDetail, StudySummary
+    from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
+    from sprag.service.client.queries import Spec
 
 DEFAULT_SERVER = "http://127.0.0.1:8000"
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from datetime import UTC, datetime
 from typing import Any
 
 from starlette.concurrency import iterate_in_threadpool
@@ -103,8 +102,3 @@ def _quality(parameters: Iterable[str]) -> float | None:
             except ValueError:
                 return None
     return 1.0
-
-
-def timestamp(moment: datetime | None) -> str | None:
-    """A moment as RFC 3339 text in UTC."""
-    return None if moment is None else moment.astimezone(UTC).isoformat().replace("+00:00", "Z")

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
-from sprag.service.http.respond import timestamp
+from sprag.service.answers import filled
+from sprag.service.answers.schedules import ScheduleDetail, ScheduleRun, ScheduleSummary
 from sprag.service.http.views import API_PREFIX, study_address
-from sprag.service.storage.schedules import RunRecord, ScheduleRecord
+
+if TYPE_CHECKING:
+    from sprag.service.storage.schedules import RunRecord, ScheduleRecord
 
 
 def schedule_address(schedule_id: str) -> str:
@@ -14,34 +17,23 @@ def schedule_address(schedule_id: str) -> str:
     return f"{API_PREFIX}/schedules/{schedule_id}"
 
 
-def summary(record: ScheduleRecord) -> dict[str, Any]:
+def summary(record: ScheduleRecord) -> ScheduleSummary:
     """A schedule without its spec."""
-    fields = record.fields.to_json()
-    return {
-        "id": record.id,
-        **{name: fields.get(name) for name in ("name", "cron", "at", "zone", "window", "priority", "fresh")},
-        "finish_by": record.fields.finish_by,
-        "enabled": record.fields.enabled,
-        "created_at": timestamp(record.created_at),
-        "next_due": timestamp(record.next_due),
+    own = {
+        "cron": None,
+        "at": None,
+        **record.fields.to_json(),
         "last_run": None if record.last is None else run_json(record.last),
         "links": {"self": schedule_address(record.id), "page": f"/schedules#{record.id}"},
     }
+    return filled(ScheduleSummary, record, **own)
 
 
-def detail(record: ScheduleRecord, runs: tuple[RunRecord, ...]) -> dict[str, Any]:
+def detail(record: ScheduleRecord, runs: tuple[RunRecord, ...]) -> ScheduleDetail:
     """A schedule with everything."""
     return {**summary(record), "runs": [run_json(run) for run in runs], "spec": record.fields.spec}
 
 
-def run_json(run: RunRecord) -> dict[str, Any]:
+def run_json(run: RunRecord) -> ScheduleRun:
     """A due time and what became of it."""
-    return {
-        "due": timestamp(run.due),
-        "state": run.state.value,
-        "missed": run.missed,
-        "begun_at": timestamp(run.begun_at),
-        "study": run.study,
-        "address": None if run.study is None else study_address(run.study),
-        "problem": run.problem,
-    }
+    return filled(ScheduleRun, run, address=None if run.study is None else study_address(run.study))

@@ -6,7 +6,9 @@ from dataclasses import asdict
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.http.respond import timestamp
+from sprag.service.answers import filled
+from sprag.service.answers.catalogue import Preset
+from sprag.service.answers.studies import FullProgress, StudyDetail, StudySummary
 from sprag.service.presets import ABOUT, preset_text
 from sprag.service.spec.catalogue import axes_json
 from sprag.service.spec.document import format_of, load_spec, parse_spec
@@ -30,47 +32,31 @@ def study_links(study_id: str) -> dict[str, str]:
     return {"self": own, **parts, "cancel": f"{own}:cancel", "page": f"/studies/{study_id}"}
 
 
-def summary(record: StudyRecord) -> dict[str, Any]:
+def summary(record: StudyRecord) -> StudySummary:
     """A study without its spec."""
-    return {
-        "id": record.id,
-        "name": record.name,
-        "model": record.model,
-        "state": record.state.value,
-        "state_meaning": record.state.sentence,
-        "reason": record.reason,
-        "cases": record.cases,
-        "progress": {"total": record.cases, "done": record.done, "ok": record.ok},
-        "reused": record.reused,
-        "warnings": list(record.warnings),
-        "priority": record.priority,
-        "created_at": timestamp(record.created_at),
-        "started_at": timestamp(record.started_at),
-        "finished_at": timestamp(record.finished_at),
-        "finish_by": timestamp(record.finish_by),
-        "time_over": record.time_over,
-        "engine_version": record.engine_version,
-        "links": study_links(record.id),
-    }
+    return filled(
+        StudySummary,
+        record,
+        state_meaning=record.state.sentence,
+        progress={"total": record.cases, "done": record.done, "ok": record.ok},
+        links=study_links(record.id),
+    )
 
 
-def progress_json(progress: Progress) -> dict[str, Any]:
+def progress_json(progress: Progress) -> FullProgress:
     """How far a study is, how fast, and how long it will take."""
     left, covered = progress.seconds_left, progress.covered
-    return {
-        "total": progress.total,
-        "done": progress.done,
-        "ok": progress.ok,
-        "endings": progress.endings,
-        "rate": progress.rate,
-        "seconds_left": None if left is None else {"low": left[0], "high": left[1]},
-        "in_time": None if progress.in_time is None else progress.in_time.value,
-        "done_by_then": progress.done_by_then,
-        "passes": None if covered is None else asdict(covered),
-    }
+    return filled(
+        FullProgress,
+        progress,
+        seconds_left=None if left is None else {"low": left[0], "high": left[1]},
+        passes=None if covered is None else asdict(covered),
+    )
 
 
-def detail(record: StudyRecord, progress: Progress, study: Study, spec: dict[str, Any]) -> dict[str, Any]:
+def detail(
+    record: StudyRecord, progress: Progress, study: Study, spec: dict[str, Any], regimes: dict[str, int]
+) -> StudyDetail:
     """A study with everything; ``record`` and ``progress`` are of one moment (`Store.look`)."""
     return {
         **summary(record),
@@ -78,12 +64,13 @@ def detail(record: StudyRecord, progress: Progress, study: Study, spec: dict[str
         "combine": study.combine,
         "axes": axes_json(study),
         "physics_hash": record.physics_hash,
+        "regimes": regimes,
         "spec": spec,
     }
 
 
 @lru_cache
-def preset_of(name: str) -> dict[str, Any]:
+def preset_of(name: str) -> Preset:
     """A study that comes with the program, with its spec and what it shows; KeyError when there is none so named."""
     file, text = preset_text(name)
     spec = parse_spec(load_spec(text, format_of(file)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sprag.service.results.fits import fit_json
 from sprag.service.schedules.deadline import finish_warnings
@@ -11,6 +11,7 @@ from sprag.worker import models
 from sprag.worker.chunking import work_of
 
 if TYPE_CHECKING:
+    from sprag.service.answers.studies import Preview
     from sprag.service.spec.document import ParsedSpec
     from sprag.worker.chunking import Chunking
     from sprag.worker.study import Study
@@ -41,7 +42,7 @@ def preview_json(
     reusable: int = 0,
     seconds_left: float | None = None,
     start_seconds: float = 0.0,
-) -> dict[str, Any]:
+) -> Preview:
     """What ``parsed`` would be as a study that is cut and run so, as JSON data.
 
     ``reusable`` of its cases need not be run, because studies of the database have them. ``estimated_seconds`` (wall

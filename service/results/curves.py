@@ -10,12 +10,16 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.service.answers import filled
+from sprag.service.answers.results import Curve as CurveData
+from sprag.service.answers.results import CurvesData, MapData, MapResult, ResultMeaning
 from sprag.service.faults import ErrorItem
+from sprag.service.json_text import numbers
 from sprag.service.results.selection import (
     Fixed,
     SelectionError,
@@ -92,6 +96,18 @@ class Curve:
         """Places of the cases that were run, ascending: what a picture joins. Of a coarser study, its own points."""
         return np.flatnonzero(~_not_run(np.array(self.endings, dtype=object)))
 
+    def to_json(self, results: Sequence[ResultInfo]) -> CurveData:
+        """The curve as JSON data."""
+        data: CurveData = {
+            "by": self.line.by,
+            "at": self.line.at,
+            "x": list(self.line.x),
+            "cases": self.line.cases.tolist(),
+            "y": {info.name: numbers(self.y[info.name], info.kind == "count") for info in results},
+            "endings": self.endings,
+        }
+        return data if self.regimes is None else {**data, "regime": self.regimes}
+
 
 @dataclass(frozen=True, slots=True)
 class Curves:
@@ -100,25 +116,14 @@ class Curves:
     selection: Selection
     curves: tuple[Curve, ...]
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> CurvesData:
         """The document of docs/http.md: null for a missing number, with the ending that explains it."""
         chosen = self.selection
         return {
             "x": {"path": chosen.x, "unit": chosen.units[chosen.x], "values": list(chosen.x_values)},
             "units": chosen.units,
-            "results": {info.name: {"unit": info.unit, "description": info.description} for info in chosen.results},
-            "curves": [
-                {
-                    "by": curve.line.by,
-                    "at": curve.line.at,
-                    "x": list(curve.line.x),
-                    "cases": curve.line.cases.tolist(),
-                    "y": {info.name: numbers(curve.y[info.name], info.kind == "count") for info in chosen.results},
-                    "endings": curve.endings,
-                    **({} if curve.regimes is None else {"regime": curve.regimes}),
-                }
-                for curve in self.curves
-            ],
+            "results": {info.name: filled(ResultMeaning, info) for info in chosen.results},
+            "curves": [curve.to_json(chosen.results) for curve in self.curves],
         }
 
 
@@ -144,24 +149,20 @@ class Map:
     endings: list[list[str]]
     regimes: list[list[str | None]] | None = None
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> MapData:
         """The map as JSON data; ``z.values[j][i]`` belongs to ``y.values[j]`` and ``x.values[i]``."""
-        count = self.result.kind == "count"
-        return {
+        data: MapData = {
             "x": {"path": self.x, "unit": self.units[0], "values": list(self.x_values)},
             "y": {"path": self.y, "unit": self.units[1], "values": list(self.y_values)},
-            "z": {
-                "name": self.result.name,
-                "unit": self.result.unit,
-                "description": self.result.description,
-                "values": [numbers(row, count) for row in self.values],
-            },
+            "z": filled(
+                MapResult, self.result, values=[numbers(row, self.result.kind == "count") for row in self.values]
+            ),
             "units": {self.x: self.units[0], self.y: self.units[1], **self.at_units},
             "at": self.at,
             "cases": self.cases.tolist(),
             "endings": self.endings,
-            **({} if self.regimes is None else {"regime": self.regimes}),
         }
+        return data if self.regimes is None else {**data, "regime": self.regimes}
 
     def run(self) -> Map:
         """The part of the map all of whose cases were run; the map itself where none was.
@@ -201,11 +202,6 @@ def _complete(missing: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.
 def _not_run(endings: NDArray[np.object_]) -> NDArray[np.bool_]:
     """Which cases have no ending of their own, yet or for good; shape as ``endings``."""
     return np.asarray((endings == PENDING) | (endings == WorkerEnding.CANCELLED.value), dtype=np.bool_)
-
-
-def numbers(values: NDArray[np.float64], count: bool = False) -> list[float | int | None]:
-    """Doubles as JSON numbers, NaN as null; counts as integers."""
-    return [None if math.isnan(value) else int(value) if count else value for value in values.tolist()]
 
 
 def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Selection:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
+from sprag.service.answers import filled
+from sprag.service.answers.results import EngagementRow, EngagementTables, PeriodRow
 from sprag.service.faults import FaultError
 from sprag.service.json_text import to_bytes
 from sprag.service.results.exports import table_csv
@@ -42,7 +44,7 @@ def engagements_file(study: Study, case: int, table: Table, form: Format) -> byt
     return to_bytes(engagements_json(made, case, study.case_parameters(case)))
 
 
-def engagements_json(made: Engagements, case: int, parameters: dict[str, float]) -> dict[str, Any]:
+def engagements_json(made: Engagements, case: int, parameters: dict[str, float]) -> EngagementTables:
     """Both tables as JSON data; ``parameters`` are the axis parameters of the case, SI."""
     return {
         "case": case,
@@ -50,8 +52,8 @@ def engagements_json(made: Engagements, case: int, parameters: dict[str, float])
         "start": made.start,
         "end": made.end,
         "regime": made.regime or None,
-        "engagements": [asdict(row) for row in made.rows],
-        "periods": [asdict(row) for row in made.periods],
+        "engagements": [filled(EngagementRow, row) for row in made.rows],
+        "periods": [filled(PeriodRow, row) for row in made.periods],
         "ending": made.ending,
     }
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
+from sprag.service.answers import filled
+from sprag.service.answers.studies import ClutchFitReport, FitDegree
 from sprag.service.spec.fields import placed, read_number, read_object
 from sprag.service.spec.machine.clutch import read_clutch
 from sprag.service.spec.report import Report
@@ -17,44 +18,9 @@ if TYPE_CHECKING:
 REQUEST_FIELDS: Final = ("data", "accuracy", "max_degree", "through_origin", "angles_include_backlash", "backlash")
 
 
-def fit_json(fit: ClutchFit) -> dict[str, Any]:
+def fit_json(fit: ClutchFit) -> ClutchFitReport:
     """The whole report of ``fit``, SI units; an infinite condition number is null."""
-    return {
-        "coefficients": list(fit.coefficients),
-        "windup_limit": fit.windup_limit,
-        "degree": fit.degree,
-        "accuracy": fit.accuracy,
-        "rms": fit.rms,
-        "max_residual": fit.max_residual,
-        "rank": fit.rank,
-        "condition_number": _finite(fit.condition_number),
-        "eigenvalues": list(fit.eigenvalues),
-        "monotone": fit.monotone,
-        "negative": fit.negative,
-        "residuals": list(fit.residuals),
-        "rows_in_backlash": list(fit.rows_in_backlash),
-        "degrees_tried": degrees_json(fit.degrees_tried),
-        "warnings": list(fit.warnings),
-    }
-
-
-def degrees_json(degrees: Any) -> list[dict[str, Any]]:
-    """The reports of the degrees that a fit tried."""
-    return [
-        {
-            "degree": report.degree,
-            "rms": report.rms,
-            "max_residual": report.max_residual,
-            "rank": report.rank,
-            "condition_number": _finite(report.condition_number),
-            "eigenvalues": list(report.eigenvalues),
-        }
-        for report in degrees
-    ]
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    return filled(ClutchFitReport, fit, degrees_tried=[filled(FitDegree, report) for report in fit.degrees_tried])
 
 
 def read_fit(data: object) -> ClutchFit:

@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 
 from sprag.service.faults import ErrorItem
-from sprag.service.results.curves import Fetch, numbers
+from sprag.service.json_text import numbers
+from sprag.service.results.curves import Fetch
 from sprag.service.results.selection import SelectionError, axis_name, listed
 from sprag.service.results.sensitivity_design import (
     factorial_table,
@@ -33,6 +34,7 @@ from sprag.worker import models
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from sprag.service.answers.results import ResultSensitivity
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Axis, Study
 
@@ -86,7 +88,7 @@ class Sensitivity:
     effects: tuple[Effect, ...]
     notes: tuple[str, ...]
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> ResultSensitivity:
         """The same as JSON data."""
         return {
             "result": self.info.name,

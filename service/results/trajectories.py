@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sprag.service.faults import parameter_error, shown
-from sprag.service.json_text import to_bytes
-from sprag.service.results.curves import numbers
+from sprag.service.json_text import numbers, to_bytes
 from sprag.service.results.exports import table_csv
 from sprag.service.spec.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
 
 if TYPE_CHECKING:
+    from sprag.service.answers.results import AngleTable
+    from sprag.service.answers.results import Trajectory as TrajectoryData
     from sprag.service.results.exports import Format
     from sprag.worker.models import Extent, Trajectory
     from sprag.worker.study import Study
@@ -60,7 +61,7 @@ def trajectory_file(study: Study, case: int, start: float, end: float, points: i
     return to_bytes(trajectory_json(made, case, study.case_parameters(case)))
 
 
-def trajectory_json(made: Trajectory, case: int, parameters: dict[str, float]) -> dict[str, Any]:
+def trajectory_json(made: Trajectory, case: int, parameters: dict[str, float]) -> AngleTable | TrajectoryData:
     """The values as JSON data; ``parameters`` are the axis parameters of the case, SI."""
     variables = {name: {"unit": unit} for name, unit in zip(made.names, made.units, strict=True)}
     values = {name: numbers(made.values[:, column]) for column, name in enumerate(made.names)}

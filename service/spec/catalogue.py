@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sprag.service.spec.fields import placed
 from sprag.service.spec.report import did_you_mean
@@ -12,6 +12,7 @@ from sprag.worker import models
 from sprag.worker.models import Parameter, ResultInfo
 
 if TYPE_CHECKING:
+    from sprag.service.answers.studies import AxisInfo
     from sprag.worker.study import Study
 
 _INDEX = re.compile(r"\.(\d+)(?=\.|$)")
@@ -52,7 +53,7 @@ def unknown_result(infos: Iterable[ResultInfo], name: str) -> str:
     return f"unknown result{did_you_mean(name, [info.name for info in infos])}"
 
 
-def axes_json(study: Study) -> list[dict[str, Any]]:
+def axes_json(study: Study) -> list[AxisInfo]:
     """The axes of a study as JSON data, without all their values."""
     return [
         {

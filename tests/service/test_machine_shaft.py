@@ -16,12 +16,13 @@ import pytest
 from sprag.engine.machine_shaft.simulate import simulate
 from sprag.engine.machine_shaft.spec import MachineSpec
 from sprag.engine.machine_shaft.trajectory import trajectory
-from sprag.service.http.api import models as m
+from sprag.service.answers import results, studies
 from sprag.service.jobs.local import run_here
 from sprag.service.spec.document import format_of, load_spec, parse_spec
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.executors.inline import InlineExecutor
+from tests.service.shapes import fits
 from tests.service.spec.machine.test_shaft import PRESS, changed
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def test_rows_are_the_engines(filled: tuple[Service, str]) -> None:
     block = service.store.case_rows(study_id)
     np.testing.assert_array_equal(block.values, engine_rows(service.store.study(study_id)))
     page = service.get(f"/studies/{study_id}/cases", page_size=52)
-    m.CasePage.model_validate(page)
+    fits(results.CasePage, page)
     row = page["cases"][30]
     assert row["ending"] == "ok"
     assert isinstance(row["results"]["phi_c.count"], int)
@@ -90,7 +91,7 @@ def test_curves_and_maps(filled: tuple[Service, str]) -> None:
     curves = service.get(
         f"/studies/{study_id}/curves", x="drive.inertia", y=["irregularity", "omega.min"], at="mean_speed=120 rpm"
     )
-    m.Curves.model_validate(curves)
+    fits(results.Curves, curves)
     assert curves["x"]["unit"] == "kg*m^2"
     assert curves["curves"][0]["y"]["irregularity"] == rows[2, :, RESULTS.index("irregularity")].tolist()
     assert curves["curves"][0]["endings"] == ["ok"] * 13
@@ -112,7 +113,7 @@ def test_trajectories_are_tables_over_the_angle(filled: tuple[Service, str]) -> 
     case = study.case_number((2, 6))
     own = NUMBERS | study.case_parameters(case)
     table = service.get(f"/studies/{study_id}/cases/{case}/trajectory", points=73)
-    m.AngleTable.model_validate(table)
+    fits(results.AngleTable, table)
     assert table["axis"] == {"name": "angles", "unit": "rad"}
     assert table["angles"] == np.linspace(0.0, 2.0 * math.pi, 73).tolist()
     expected = trajectory(STRUCTURE, own, table["angles"])
@@ -178,7 +179,7 @@ def test_run_and_preview(service: Service, examples: Path) -> None:
         np.testing.assert_array_equal(done.store.case_rows(done.record.id).values, engine_rows(parsed.study))
         assert (done.record.ok, done.record.cases) == (49, 52)
     preview = service.http.post("/api/v1/studies:preview", json=PRESS).json()
-    m.Preview.model_validate(preview)
+    fits(studies.Preview, preview)
     assert (preview["cases"], preview["shape"], preview["results"]) == (52, [4, 13], len(RESULTS))
     assert 0.0 < preview["estimated_seconds"] < 5.0 + models.estimate_compile_seconds(parsed.study)
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Path, Request
 
-from sprag.service.http.api import models as m
+from sprag.service.answers import catalogue as m
+from sprag.service.answers import filled
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.api.document import problems
 from sprag.service.http.problems import ApiError
@@ -55,45 +55,22 @@ def get_preset(request: Request, name: PresetName) -> Any:
     return _answer(request, preset_of(name))
 
 
-def _answer(request: Request, data: dict[str, Any]) -> Any:
+def _answer(request: Request, data: object) -> Any:
     response = json_response(data)
     tag = entity_tag(bytes(response.body).hex())
     return not_modified(request, tag) or tagged(response, tag)
 
 
-def _model(name: str) -> dict[str, Any]:
+def _model(name: str) -> m.Model:
+    parameters = models.parameter_catalogue(name)
     return {
         "name": name,
         "engine_version": models.ENGINE_VERSION,
-        "parameters": [_parameter(entry) for entry in models.parameter_catalogue(name)],
-        "results": [
-            {
-                "name": info.name,
-                "unit": info.unit,
-                "kind": info.kind,
-                "description": info.description,
-            }
-            for info in models.result_catalogue(name)
+        "parameters": [
+            filled(m.ParameterInfo, entry, required=entry.default is None, range=entry.range_text())
+            for entry in parameters
         ],
+        "results": [filled(m.ResultInfo, info) for info in models.result_catalogue(name)],
         "endings": models.endings_of(name),
         "flags": models.flags_of(name),
     }
-
-
-def _parameter(entry: models.Parameter) -> dict[str, Any]:
-    return {
-        "path": entry.path,
-        "symbol": entry.symbol,
-        "unit": entry.unit,
-        "low": _finite(entry.low),
-        "low_open": entry.low_open,
-        "high": _finite(entry.high),
-        "required": entry.default is None,
-        "default": _finite(entry.default),
-        "range": entry.range_text(),
-        "help": entry.help,
-    }
-
-
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Final
 from fastapi import APIRouter, Depends
 from starlette.responses import Response
 
+from sprag.service.answers import studies as m
 from sprag.service.http.api import examples
-from sprag.service.http.api import models as m
 from sprag.service.http.api.document import body, problems
 from sprag.service.http.problems import ApiError
 from sprag.service.http.requests import Body, read_body, strict_query

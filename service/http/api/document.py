@@ -8,7 +8,9 @@ from typing import Any, Final
 
 from fastapi import FastAPI, Header, Query
 from fastapi.openapi.utils import get_openapi
+from typing_extensions import is_typeddict
 
+from sprag.service.answers import catalogue, results, schedules, studies
 from sprag.service.faults import ErrorItem
 from sprag.service.http.api.links import add_links
 from sprag.service.http.problems import PROBLEM_MEDIA_TYPE, PROBLEM_TYPES, Problem, ProblemType, problem_json
@@ -24,6 +26,10 @@ _TEXT: Final = {"type": "string"}
 _TAG: Final = {"ETag": {"description": "entity tag of the version", "required": True, "schema": _TEXT}}
 
 Responses = dict[int | str, dict[str, Any]]
+
+for _module in (catalogue, results, schedules, studies):
+    for _shape in filter(is_typeddict, vars(_module).values()):
+        _shape.__pydantic_config__ = {"extra": "forbid"}  # an answer has these fields and no others
 
 
 def problems(*slugs: str) -> Responses:

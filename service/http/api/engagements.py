@@ -8,9 +8,9 @@ from fastapi import APIRouter, Depends, Query, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
+from sprag.service.answers.results import EngagementTables
 from sprag.service.faults import parameter_error, shown
 from sprag.service.http.api.document import files, format_query, one_of, problems
-from sprag.service.http.api.engagement_models import EngagementTables
 from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
 from sprag.service.http.requests import strict_query
 from sprag.service.http.respond import choose_format

@@ -7,8 +7,8 @@ from typing import Any, cast
 from fastapi import APIRouter, Depends, Request
 from starlette.responses import Response
 
+from sprag.service.answers.catalogue import Health
 from sprag.service.http.api.document import files, problems
-from sprag.service.http.api.models import Health
 from sprag.service.http.context import Context
 from sprag.service.http.metrics import CONTENT_TYPE, Metrics
 from sprag.service.http.problems import ApiError

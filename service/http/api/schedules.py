@@ -11,8 +11,8 @@ from starlette.concurrency import run_in_threadpool
 from starlette.convertors import register_url_convertor
 from starlette.responses import Response
 
+from sprag.service.answers import schedules as m
 from sprag.service.http.api import examples
-from sprag.service.http.api import schedule_models as m
 from sprag.service.http.api.document import body, key_header, located, problems
 from sprag.service.http.context import ID_PATTERN, Context, Ctx, StudyIdConvertor
 from sprag.service.http.problems import ApiError
@@ -176,7 +176,7 @@ async def change_schedule(context: Ctx, work: Attended, schedule_id: ScheduleId,
     record = await run_in_threadpool(context.store.get_schedule, schedule_id)
     fields = await _fields(context, work, received, record.fields)
 
-    def change() -> dict[str, Any]:
+    def change() -> m.ScheduleDetail:
         changed = context.store.change_schedule(schedule_id, fields)
         return detail(changed, context.store.schedule_runs(schedule_id))
 

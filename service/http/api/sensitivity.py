@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from fastapi import APIRouter, Depends, Query, Request
 from starlette.responses import Response
 
-from sprag.service.http.api import models as m
+from sprag.service.answers import results as m
 from sprag.service.http.api.document import files, format_query, problems
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.context import Ctx, StudyId

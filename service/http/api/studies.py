@@ -10,10 +10,10 @@ from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
+from sprag.service.answers import studies as m
 from sprag.service.faults import parameter_error
 from sprag.service.http import views
 from sprag.service.http.api import examples
-from sprag.service.http.api import models as m
 from sprag.service.http.api.document import body, key_header, located, one_of, problems
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.context import Context, Ctx, StudyId
@@ -149,9 +149,8 @@ def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
     if record.state.terminal and (unchanged := not_modified(request, tag)):
         return unchanged
     study = context.store.study(study_id)
-    data = views.detail(record, progress, study, context.store.spec(study_id))
+    data = views.detail(record, progress, study, context.store.spec(study_id), context.store.regimes(study_id))
     data["warnings"] += context.unaffected.of(context.store, record)
-    data["regimes"] = context.store.regimes(study_id)
     response = json_response(data)
     # While it runs, the time left changes with no change of the study.
     return tagged(response, tag) if record.state.terminal else response

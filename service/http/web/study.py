@@ -15,13 +15,13 @@ from starlette.responses import RedirectResponse, Response
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.problems import ApiError
-from sprag.service.http.respond import timestamp
 from sprag.service.http.web.choice import characteristic, map_query, pairs_of
 from sprag.service.http.web.form.check import fits_of, has_measured_clutch
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
+from sprag.service.json_text import timestamp
 from sprag.service.results import exports
 from sprag.service.results.curves import select
 from sprag.service.results.defaults import caption, drawn_numbers
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
     from starlette.datastructures import QueryParams
 
+    from sprag.service.answers.studies import ClutchFitReport
     from sprag.service.http.web.figures.fit import FitChart
     from sprag.service.results.curves import CurveQuery
     from sprag.worker.study import Study
@@ -59,7 +60,8 @@ _EVENTS: Final = {
 def study_frame(context: Context, study_id: str) -> dict[str, Any]:
     """What every page about a study shows: the study as the interface tells it, its verbs, the pages beside it."""
     (record, progress), study = context.store.look(study_id), context.store.study(study_id)
-    shown = views.detail(record, progress, study, context.store.spec(study_id))
+    # Counting regimes takes as long as there are rows: the one page that tells them does it by itself.
+    shown = views.detail(record, progress, study, context.store.spec(study_id), regimes={})
     varies = any(len(axis) > 1 for axis in study.axes)
     mapped = study.combine == "grid" and sum(len(axis) > 1 for axis in study.axes) > 1
     tabs = [("", "Overview"), *([("/curves", "Curves")] if varies else []), *([("/map", "Map")] if mapped else [])]
@@ -87,7 +89,7 @@ async def study_page(context: Ctx, work: Attended, study_id: StudyId) -> Respons
     return await run_in_threadpool(_study_page, context, study_id, fits)
 
 
-def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[dict[str, Any], FitChart]]) -> Response:
+def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[ClutchFitReport, FitChart]]) -> Response:
     study = context.store.study(study_id)
     frame = study_frame(context, study_id)
     query = _with_rows(context, study, study_id, characteristic(study, models.study_results(study)))

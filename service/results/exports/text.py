@@ -12,6 +12,7 @@ from sprag.service.results.exports.source import machine
 from sprag.service.spec.catalogue import unit_of
 
 if TYPE_CHECKING:
+    from sprag.service.answers.results import Case
     from sprag.service.results.exports.source import Source
     from sprag.service.storage.records import CaseRow, RowBlock
     from sprag.worker.study import Study
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 _FORMULA_STARTS: Final = ("=", "+", "-", "@", "\t", "\r")
 
 
-def row_json(row: CaseRow, parameters: dict[str, float]) -> dict[str, Any]:
+def row_json(row: CaseRow, parameters: dict[str, float]) -> Case:
     """One case as every interface shows it; ``parameters`` are its axis parameters, SI."""
     return {
         "case": row.case,
@@ -31,7 +32,7 @@ def row_json(row: CaseRow, parameters: dict[str, float]) -> dict[str, Any]:
     }
 
 
-def rows_json(study: Study, block: RowBlock) -> Iterator[dict[str, Any]]:
+def rows_json(study: Study, block: RowBlock) -> Iterator[Case]:
     """The cases of a block as `row_json` gives them."""
     columns = {path: column.tolist() for path, column in study.columns(block.cases).items()}
     for index, row in enumerate(block.rows()):

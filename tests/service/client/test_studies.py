@@ -16,6 +16,7 @@ import pandas as pd
 import pytest
 from anyio.from_thread import BlockingPortal
 
+from sprag.service.answers.studies import StudyDetail
 from sprag.service.client import (
     AsyncClient,
     AsyncStudy,
@@ -27,7 +28,6 @@ from sprag.service.client import (
     StudyTimeoutError,
     UnreachableError,
 )
-from sprag.service.client.types import StudyDetail
 from tests.service.conftest import PortalTransport, Service
 
 if TYPE_CHECKING:

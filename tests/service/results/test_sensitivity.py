@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from sprag.service.http.api import models as m
+from sprag.service.answers import results
 from sprag.service.results.curves import Fetch
 from sprag.service.results.selection import SelectionError
 from sprag.service.results.sensitivity import sensitivity
@@ -19,6 +19,7 @@ from sprag.service.storage.records import CaseColumns
 from sprag.worker import models
 from sprag.worker.models import ChunkResult
 from sprag.worker.study import Study
+from tests.service.shapes import fits
 from tests.service.spec_sample import parsed
 
 if TYPE_CHECKING:
@@ -142,7 +143,7 @@ def test_the_interface_tells_effects_and_axes_without_any(service: Service, spec
     assert service.get(f"/studies/{study_id}")["warnings"] == []
     fill(service, study_id, lambda p: p["shaft.load"])
     found = service.get(f"/studies/{study_id}/sensitivity", y=[SPEED, "torque.max"])
-    m.SensitivityReport.model_validate(found)
+    fits(results.SensitivityReport, found)
     assert [item["result"] for item in found["results"]] == [SPEED, "torque.max"]
     effect = {effect["paths"][0]: effect for effect in found["results"][0]["effects"]}
     assert effect["shaft.load"]["first_order"] == pytest.approx(1.0)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from sprag.service.http.api import models as m
+from sprag.service.answers import studies
 from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.results.curves import Curve, Line, Map
 from sprag.service.schedules.deadline import FinishError, check_run_finish, finish_at, run_finish_at
@@ -20,6 +20,7 @@ from sprag.worker.dispatcher import POLL_SECONDS, Dispatcher
 from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.models import study_results
 from sprag.worker.states import StudyState
+from tests.service.shapes import fits
 from tests.service.timed_spec import SPEC
 from tests.worker import fakes
 
@@ -140,12 +141,12 @@ def test_a_study_with_a_deadline_is_run_coarse_to_fine_and_held_then(service: Se
     made = service.http.post(STUDIES, json=nine_loads(), params={"finish_by": "1 h"})
     assert made.status_code == 202
     body = made.json()
-    m.StudySummary.model_validate(body)
+    fits(studies.StudySummary, body)
     deadline = clock.now() + timedelta(hours=1)
     assert (datetime.fromisoformat(body["finish_by"]), body["time_over"]) == (deadline, False)
     dispatch(service, clock, chunks=3)
     held = service.get(f"/studies/{body['id']}")
-    m.StudyDetail.model_validate(held)
+    fits(studies.StudyDetail, held)
     assert (held["state"], held["time_over"], held["progress"]["done"]) == ("paused", True, 6)
     assert held["progress"]["passes"] == {"complete": 3, "total": 4, "cases": 5, "values": [5]}
     assert "6 of 9 cases are done; pass 3 of 4 is complete, a grid of 5 values" in held["reason"]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.service.http.web.figures.thinning import thin
-from sprag.service.results.curves import numbers
+from sprag.service.json_text import numbers
 from sprag.service.results.figures.curves import doubtful_marks, map_quantities
 from sprag.service.results.figures.figure import OTHER_LOOK, PALETTE, shortened
 from sprag.service.results.regimes import MARKS

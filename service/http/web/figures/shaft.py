@@ -6,7 +6,7 @@ from copy import deepcopy
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.http.web.figures.plotly import plotly_figure
-from sprag.service.results.curves import numbers
+from sprag.service.json_text import numbers
 from sprag.service.results.figures.motion import motion_figure
 from sprag.worker import models
 

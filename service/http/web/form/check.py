@@ -23,6 +23,7 @@ from sprag.service.spec.units import QuantityError, parse_quantity
 if TYPE_CHECKING:
     from datetime import datetime
 
+    from sprag.service.answers.studies import ClutchFitReport, Preview
     from sprag.worker.chunking import Chunking
     from sprag.worker.study import Study
 
@@ -41,8 +42,8 @@ class Checked:
     spec: dict[str, Any]
     parsed: ParsedSpec | None = None
     faults: Faults = field(default_factory=dict)
-    preview: dict[str, Any] | None = None
-    fits: dict[str, tuple[dict[str, Any], FitChart]] = field(default_factory=dict)
+    preview: Preview | None = None
+    fits: dict[str, tuple[ClutchFitReport, FitChart]] = field(default_factory=dict)
     finish: datetime | None = None
     finish_text: str = ""
     notes: list[str] = field(default_factory=list)
@@ -200,7 +201,7 @@ def has_measured_clutch(spec: Mapping[str, Any]) -> bool:
     return any(isinstance(clutch, dict) and "data" in clutch for clutch in clutches)
 
 
-def fits_of(spec: dict[str, Any]) -> dict[str, tuple[dict[str, Any], FitChart]]:
+def fits_of(spec: dict[str, Any]) -> dict[str, tuple[ClutchFitReport, FitChart]]:
     """Report and picture of each clutch law that the spec gives as measured data, by their JSON Pointers."""
     # The fit is not stored: it follows from the spec, to the last bit.
     found = {}

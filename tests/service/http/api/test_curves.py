@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from sprag.service.http.api import models as m
+from sprag.service.answers import results
 from sprag.service.results.curves import CurveQuery, select
 from sprag.service.results.selection import SelectionError
 from sprag.worker import models
+from tests.service.shapes import fits
 
 if TYPE_CHECKING:
     import httpx
@@ -65,7 +66,7 @@ def test_curves_are_the_rows_bit_for_bit(service: Service, grid: dict[str, Any])
         "x=shaft.load&y=shaft.speed.mean&y=torque.max&by=excitation.frequency&at=excitation.amplitude_y=2%20mm",
     )
     body = response.json()
-    m.Curves.model_validate(body)
+    fits(results.Curves, body)
     assert body["x"] == {"path": "shaft.load", "unit": "N*m", "values": [0.02, 0.1, 0.3]}
     assert body["results"]["torque.max"]["unit"] == "N*m"
     assert body["units"]["excitation.frequency"] == "Hz"
@@ -196,7 +197,7 @@ def test_a_map_has_rows_of_y(service: Service, grid: dict[str, Any]) -> None:
     body = ask(
         service, study_id, "x=shaft.load&y=excitation.frequency&z=torque.max&at=excitation.amplitude_x=1%20mm", "map"
     ).json()
-    m.Map.model_validate(body)
+    fits(results.Map, body)
     assert body["y"]["values"] == [16.0, 25.0, 35.0]
     assert body["at"] == {"excitation.amplitude_x": 0.001, "pendulums.0.mass": 0.5}
     for frequency, values in zip(body["y"]["values"], body["z"]["values"], strict=True):

@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
+from sprag.service.answers import results
 from sprag.service.client import Client
-from sprag.service.http.api.engagement_models import EngagementTables
 from sprag.worker import models
 from tests.service.conftest import API, PortalTransport, Service
+from tests.service.shapes import fits
 
 
 @pytest.fixture
@@ -29,7 +30,7 @@ def test_both_tables_as_json(service: Service, one_case: str) -> None:
     response = asked(service, one_case)
     assert response.status_code == 200, response.text
     body = response.json()
-    EngagementTables.model_validate(body)
+    fits(results.EngagementTables, body)
     assert (body["case"], body["regime"], body["ending"]) == (4, None, "ok")
     assert body["parameters"] == {"excitation.frequency": 25.5, "shaft.load": 0.1}
     assert (body["start"], body["end"]) == pytest.approx((6 / 25.5, 12 / 25.5))
@@ -63,7 +64,7 @@ def test_each_table_as_csv(service: Service, one_case: str, table: str) -> None:
 def test_of_a_settled_study_one_turn(service: Service, spec: dict[str, Any]) -> None:
     spec["run"] = {"until": "settled"}
     body = asked(service, service.submit(spec)).json()
-    EngagementTables.model_validate(body)
+    fits(results.EngagementTables, body)
     assert body["regime"] in models.REGIME_SENTENCES
     assert body["start"] == 0.0
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from sprag.service.answers import studies
 from sprag.service.http.api import events
-from sprag.service.http.api.models import FullProgress
+from tests.service.shapes import fits
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
@@ -35,7 +36,7 @@ def test_an_ended_study_is_told_once(service: Service) -> None:
     assert answer.text.startswith("retry: ")
     ((number, kind, data),) = parse(answer.text)
     assert (kind, data["state"], data["progress"]["done"]) == ("end", "finished", 9)
-    FullProgress.model_validate(data["progress"])
+    fits(studies.FullProgress, data["progress"])
     again = service.http.get(f"{STUDIES}/{study_id}/events", headers={"Last-Event-ID": number})
     assert (again.status_code, again.content) == (204, b"")
     old = service.http.get(f"{STUDIES}/{study_id}/events", headers={"Last-Event-ID": "1"})

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service.http.api import models as m
+from sprag.service.answers import catalogue, studies
 from sprag.service.http.api.examples import CLUTCH_FIT
 from sprag.worker import models
+from tests.service.shapes import fits
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
@@ -24,7 +25,7 @@ def test_a_clutch_fit_reports_on_itself(service: Service) -> None:
     response = service.http.post(FITS, json=CLUTCH_FIT)
     assert response.status_code == 200, response.text
     body = response.json()
-    m.ClutchFitReport.model_validate(body)
+    fits(studies.ClutchFitReport, body)
     assert body["max_residual"] <= 0.05
     assert body["coefficients"][0] == 0.0
     assert body["windup_limit"] == 0.05
@@ -72,7 +73,7 @@ def test_a_fit_that_cannot_be_made_says_why(service: Service, change: dict[str, 
 
 def test_models_describe_parameters_results_and_endings(service: Service) -> None:
     body = service.get("/models")
-    m.ModelList.model_validate(body)
+    fits(catalogue.ModelList, body)
     model, shaft = body["models"]
     assert model == service.get("/models/vibration-drive")
     assert shaft == service.get("/models/machine-shaft")
@@ -99,7 +100,7 @@ def test_models_describe_parameters_results_and_endings(service: Service) -> Non
 
 def test_presets_can_be_submitted(service: Service) -> None:
     body = service.get("/presets")
-    m.PresetList.model_validate(body)
+    fits(catalogue.PresetList, body)
     assert len(body["presets"]) >= 2
     for preset in body["presets"]:
         assert service.get(f"/presets/{preset['name']}") == preset

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from sprag.service.http.api import models as m
+from sprag.service.answers import results
 from sprag.service.results import exports
 from sprag.service.results.exports import Source, csv_pieces, escape, json_pieces
 from sprag.service.storage.records import RowBlock
 from sprag.worker import models
+from tests.service.shapes import fits
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -40,7 +41,7 @@ def test_cases_that_a_cancelled_study_never_ran_are_told_as_cancelled(service: S
     record = service.store.get_study(study_id)
     service.store.settle(service.store.take_over("test"), record.number)
     page = service.get(f"/studies/{study_id}/cases", ending="cancelled")
-    m.CasePage.model_validate(page)
+    fits(results.CasePage, page)
     assert [case["case"] for case in page["cases"]] == list(range(6, record.cases))
     case = service.get(f"/studies/{study_id}/cases/6")
     assert (case["ending"], set(case["results"].values())) == ("cancelled", {None})
@@ -55,7 +56,7 @@ def test_cases_come_in_pages(service: Service) -> None:
     query: dict[str, Any] = {"page_size": 4}
     while True:
         page = service.get(f"/studies/{study_id}/cases", **query)
-        m.CasePage.model_validate(page)
+        fits(results.CasePage, page)
         seen += page["cases"]
         if page["next_page_token"] is None:
             break
@@ -88,7 +89,7 @@ def test_a_token_of_nothing_is_refused(service: Service, token: str) -> None:
 def test_one_case_tells_what_its_ending_means(service: Service) -> None:
     study_id = service.submit()
     waiting = service.get(f"/studies/{study_id}/cases/3")
-    m.CaseDetail.model_validate(waiting)
+    fits(results.CaseDetail, waiting)
     assert waiting["ending"] == "pending"
     assert set(waiting["results"].values()) == {None}
     rows = service.fill(study_id)
@@ -123,7 +124,7 @@ def test_results_as_json_are_the_rows(service: Service) -> None:
     assert body["axes"][0] == {"paths": ["excitation.frequency"], "unit": "Hz", "values": 3}
     assert [row["case"] for row in body["rows"]] == list(range(9))
     for row in body["rows"]:
-        m.Case.model_validate(row)
+        fits(results.Case, row)
         assert row["results"] == results_of(rows, row["case"])
     assert [result["name"] for result in body["results"]] == list(body["rows"][0]["results"])
     assert f'filename="{study_id}.json"' in response.headers["content-disposition"]
@@ -243,7 +244,7 @@ def test_instantaneous_values_of_a_case(service: Service, one_case: str) -> None
     response = trajectory(service, one_case, "?points=50&from=0.01&to=20%20ms")
     assert response.status_code == 200, response.text
     body = response.json()
-    m.Trajectory.model_validate(body)
+    fits(results.Trajectory, body)
     assert body["axis"] == {"name": "times", "unit": "s"}
     assert (body["times"][0], body["times"][-1], len(body["times"])) == (0.01, 0.02, 50)
     assert body["parameters"] == {"excitation.frequency": 25.5, "shaft.load": 0.1}

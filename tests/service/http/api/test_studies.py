@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service.http.api import models as m
+from sprag.service.answers import studies
 from sprag.service.http.api.examples import SPEC_TOML
 from sprag.service.storage.room import RESERVE_BYTES
 from sprag.service.storage.store import Store
+from tests.service.shapes import fits
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
@@ -26,11 +27,11 @@ def test_a_study_is_accepted_and_found_where_it_says(service: Service) -> None:
     response = service.http.post(STUDIES, json=SPEC)
     assert response.status_code == 202
     body = response.json()
-    m.StudySummary.model_validate(body)
+    fits(studies.StudySummary, body)
     assert (body["state"], body["cases"], body["progress"]) == ("queued", 9, {"total": 9, "done": 0, "ok": 0})
     assert response.headers["location"] == f"{STUDIES}/{body['id']}" == body["links"]["self"]
     shown = service.get(f"/studies/{body['id']}")
-    m.StudyDetail.model_validate(shown)
+    fits(studies.StudyDetail, shown)
     assert shown["spec"] == SPEC
     assert shown["axes"][1] == {"paths": ["shaft.load"], "unit": "N*m", "values": 3, "first": 0.02, "last": 0.3}
     assert datetime.fromisoformat(shown["created_at"]).tzinfo is not None
@@ -97,7 +98,7 @@ def test_studies_are_listed_in_pages_newest_first(service: Service, spec: dict[s
     token: str | None = None
     while True:
         page = service.get("/studies", page_size=2, **({"page_token": token} if token else {}))
-        m.StudyPage.model_validate(page)
+        fits(studies.StudyPage, page)
         seen += [study["id"] for study in page["studies"]]
         token = page["next_page_token"]
         if token is None:
@@ -148,7 +149,7 @@ def test_a_preview_submits_nothing(service: Service, spec: dict[str, Any]) -> No
     response = service.http.post(f"{STUDIES}:preview", json=spec)
     assert response.status_code == 200, response.text
     body = response.json()
-    m.Preview.model_validate(body)
+    fits(studies.Preview, body)
     assert (body["cases"], body["shape"]) == (9, [3, 3])
     assert body["first_cases"][1] == {"case": 1, "parameters": {"excitation.frequency": 16.0, "shaft.load": 0.1}}
     assert body["fits"]["/base/clutch"]["coefficients"][1] == pytest.approx(200.0)
@@ -210,7 +211,7 @@ def test_failed_cases_are_run_again(service: Service) -> None:
     assert (none.status_code, none.json()["type"]) == (409, "/problems/wrong-state")
     assert "ended as crashed or timed_out" in none.json()["detail"]
     again = service.http.post(address, params={"ending": ["chatter"]})
-    m.StudySummary.model_validate(again.json())
+    fits(studies.StudySummary, again.json())
     assert (again.status_code, again.json()["state"]) == (202, "queued")
     assert again.json()["progress"] == {"total": 9, "done": 8, "ok": 8}
     assert [row["case"] for row in service.get(f"/studies/{study_id}/cases")["cases"]] == [0, 1, 2, 3, 5, 6, 7, 8]

@@ -1,0 +1,55 @@
+"""Shapes of the answers of the service, each written once: the service fills them, OpenAPI documents them, and they are
+the client's types. They are typed dictionaries, so that whoever reads them needs none of the server's libraries.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from datetime import datetime
+from enum import Enum
+from typing import Annotated, Any, TypeVar
+
+from sprag.service.json_text import timestamp
+
+A = TypeVar("A")
+
+
+class Doc(str):
+    """What a field means; OpenAPI's description of it."""
+
+    __slots__ = ()
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        """The field's schema with its description."""
+        return {**handler(schema), "description": str(self)}
+
+
+class _DateTime:
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        return {**handler(schema), "format": "date-time"}
+
+
+#: A time as RFC 3339 text in UTC.
+Moment = Annotated[str, _DateTime()]
+Number = float | int | None
+
+
+def filled(shape: Callable[..., A], source: object, **given: Any) -> A:
+    """An answer of that shape: each field as ``given``, else the attribute of ``source`` of the same name.
+
+    Attributes become JSON data: times as texts, numbers that are not finite as None. Raises AttributeError where there
+    is none.
+    """
+    names = shape.__annotations__
+    return shape(**{name: given[name] if name in given else _plain(getattr(source, name)) for name in names})
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, datetime):
+        return timestamp(value)
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return [_plain(item) for item in value] if isinstance(value, tuple) else value

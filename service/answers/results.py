@@ -1,0 +1,213 @@
+"""Answers about results: cases, motions, curves, maps, what results depend on."""
+
+from __future__ import annotations
+
+from typing import Annotated, NotRequired
+
+from typing_extensions import TypedDict
+
+from sprag.service.answers import Doc, Number
+
+
+class Case(TypedDict):
+    """One case: a row of results."""
+
+    case: int
+    parameters: Annotated[dict[str, float], Doc("values of the axes, SI, every tied path")]
+    ending: Annotated[str, Doc("ok, or why not; pending when it has not been run yet")]
+    flags: list[str]
+    results: Annotated[
+        dict[str, Number | str],
+        Doc("SI numbers by name, categories by their names; null where it could not be computed"),
+    ]
+
+
+class CaseDetail(Case):
+    """One case with what its ending means."""
+
+    ending_meaning: str
+    flag_meanings: dict[str, str]
+    links: dict[str, str]
+
+
+class CasePage(TypedDict):
+    """A page of finished cases, in order of their numbers."""
+
+    cases: list[Case]
+    next_page_token: Annotated[str | None, Doc("token of the next page; null on the last")]
+
+
+class ValueAxis(TypedDict):
+    """What instantaneous values stand over."""
+
+    name: Annotated[str, Doc("field of the document with its values: times or angles")]
+    unit: str
+
+
+class Trajectory(TypedDict):
+    """Instantaneous values of one case."""
+
+    case: int
+    parameters: dict[str, float]
+    axis: Annotated[ValueAxis, Doc("what the values stand over")]
+    times: Annotated[list[float], Doc("s, from the start of the run")]
+    variables: Annotated[dict[str, dict[str, str]], Doc("unit of each variable")]
+    values: Annotated[dict[str, list[Number]], Doc("values at the times, by variable")]
+    states: Annotated[dict[str, list[str]], Doc("states of shaft and clutches at the times")]
+    ending: str
+
+
+class AngleTable(TypedDict):
+    """Tables of one case of a machine shaft over the angle of the shaft."""
+
+    case: int
+    parameters: dict[str, float]
+    axis: Annotated[ValueAxis, Doc("what the values stand over")]
+    angles: Annotated[list[float], Doc("rad, from the start of the cycle; none where the case has no motion")]
+    variables: Annotated[dict[str, dict[str, str]], Doc("unit of each variable")]
+    values: Annotated[dict[str, list[Number]], Doc("values at the angles, by variable")]
+    phi_c: Annotated[list[float], Doc("all angles in rad at which the energy is its mean")]
+    ending: str
+
+
+class CurveAxis(TypedDict):
+    """The axis of a curve."""
+
+    path: str
+    unit: str
+    values: Annotated[list[float], Doc("ascending; of a zip, in order of the cases")]
+
+
+class ResultMeaning(TypedDict):
+    """Unit and meaning of a result."""
+
+    unit: str
+    description: str
+
+
+class Curve(TypedDict):
+    """One curve; all its lists are aligned."""
+
+    by: dict[str, float]
+    at: dict[str, float]
+    x: list[float]
+    cases: list[int]
+    y: dict[str, list[Number]]
+    endings: list[str]
+    regime: NotRequired[Annotated[list[str | None], Doc("regime of each case of a settled study; null: none")]]
+
+
+class CurvesData(TypedDict):
+    """Curves of results over one axis, whoever has drawn them."""
+
+    x: CurveAxis
+    units: Annotated[dict[str, str], Doc("SI unit of every parameter in x, by and at")]
+    results: dict[str, ResultMeaning]
+    curves: list[Curve]
+
+
+class Curves(CurvesData):
+    """Curves of results over one axis."""
+
+    study: str
+
+
+class MapResult(TypedDict):
+    """The result of a map."""
+
+    name: str
+    unit: str
+    description: str
+    values: Annotated[list[list[Number]], Doc("values[j][i] belongs to y.values[j] and x.values[i]")]
+
+
+class MapData(TypedDict):
+    """One result over two axes, whoever has drawn it."""
+
+    x: CurveAxis
+    y: CurveAxis
+    z: MapResult
+    units: Annotated[dict[str, str], Doc("SI unit of every parameter in x, y and at")]
+    at: dict[str, float]
+    cases: list[list[int]]
+    endings: list[list[str]]
+    regime: NotRequired[Annotated[list[list[str | None]], Doc("regime of each case of a settled study; null: none")]]
+
+
+class Map(MapData):
+    """One result over two axes."""
+
+    study: str
+
+
+class AxisEffect(TypedDict):
+    """What one axis does to one result."""
+
+    paths: list[str]
+    unit: str
+    values: Annotated[list[Number], Doc("values of the axis, or middles of groups of them, SI")]
+    means: Annotated[list[Number], Doc("mean of the result at each of these values")]
+    first_order: Annotated[float | None, Doc("share of the variance that knowing this axis would take away")]
+    first_order_error: Annotated[float | None, Doc("half width of its 95 % interval; null where it is exact")]
+    total: Annotated[float | None, Doc("share that would stay if everything but this axis were known")]
+    total_error: Annotated[float | None, Doc("half width of its 95 % interval; null where it is exact")]
+
+
+class ResultSensitivity(TypedDict):
+    """What one result depends on."""
+
+    result: str
+    unit: str
+    description: str
+    method: Annotated[
+        str, Doc("grid: exact; saltelli: by the design for it; rbd-fast: from a sample; none: a note says why")
+    ]
+    cases: Annotated[int, Doc("cases that have the result")]
+    missing: Annotated[int, Doc("cases that have not")]
+    mean: float | None
+    variance: float | None
+    effects: list[AxisEffect]
+    notes: list[str]
+
+
+class SensitivityReport(TypedDict):
+    """What results depend on."""
+
+    study: str
+    results: list[ResultSensitivity]
+    warnings: Annotated[list[str], Doc("axes that change no result; told once the study has ended")]
+
+
+class EngagementRow(TypedDict):
+    """One stretch in which a clutch transmits torque."""
+
+    clutch: Annotated[int, Doc("number of its pendulum, from 0")]
+    start: Annotated[float, Doc("s")]
+    end: Annotated[float, Doc("s")]
+    order: Annotated[int, Doc("1: no other clutch transmits torque when it begins; 2: it joins another; and so on")]
+    torque_max: Annotated[float, Doc("largest torque, N*m")]
+    work_shaft: Annotated[float, Doc("work that the clutch does on the shaft, J")]
+    work_pendulum: Annotated[float, Doc("work that the pendulum does on the clutch, J")]
+    complete: Annotated[bool, Doc("false where it begins before or goes on after the part that is told")]
+
+
+class PeriodRow(TypedDict):
+    """One excitation period of a run."""
+
+    start: Annotated[float, Doc("s")]
+    speed_mean: Annotated[float, Doc("mean speed of the shaft, rad/s")]
+    speed_max: Annotated[float, Doc("largest speed of the shaft, rad/s")]
+    torque_mean: Annotated[float, Doc("mean torque of all clutches on the shaft, N*m")]
+
+
+class EngagementTables(TypedDict):
+    """The engagements of one case, and the means of its excitation periods."""
+
+    case: int
+    parameters: dict[str, float]
+    start: Annotated[float, Doc("start of the part that the engagements are from, s")]
+    end: Annotated[float, Doc("its end, s: after one turn of a periodic motion, or at the end of the window")]
+    regime: Annotated[str | None, Doc("regime of the settled motion; null for a run of a given time")]
+    engagements: list[EngagementRow]
+    periods: Annotated[list[PeriodRow], Doc("whole excitation periods")]
+    ending: str

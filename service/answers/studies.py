@@ -1,0 +1,150 @@
+"""Answers about studies: summaries, details, previews, clutch fits."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from typing_extensions import TypedDict
+
+from sprag.service.answers import Doc, Moment, Number
+
+
+class Interval(TypedDict):
+    """An interval, ends included."""
+
+    low: float
+    high: float
+
+
+class Progress(TypedDict):
+    """How far a study is."""
+
+    total: Annotated[int, Doc("cases of the study")]
+    done: Annotated[int, Doc("cases with an ending")]
+    ok: Annotated[int, Doc("cases that ended ok")]
+
+
+class Passes(TypedDict):
+    """What of a study is complete that is run coarse to fine."""
+
+    complete: Annotated[int, Doc("passes that are complete")]
+    total: Annotated[int, Doc("passes of the study; the last is the whole study")]
+    cases: Annotated[int, Doc("cases of the complete passes")]
+    values: Annotated[list[int], Doc("values of each axis in the complete grid; empty where cases are written out")]
+
+
+class FullProgress(Progress):
+    """How far a study is, how fast, and how long it will take."""
+
+    endings: Annotated[dict[str, int], Doc("number of cases for each ending")]
+    rate: Annotated[float | None, Doc("cases per second over the recent chunks; null when nothing runs")]
+    seconds_left: Annotated[Interval | None, Doc("estimated time left in s; null when nothing runs")]
+    in_time: Annotated[
+        Literal["yes", "no", "unsure"] | None,
+        Doc("whether it will be finished by `finish_by`, from `seconds_left`; null when nothing is known"),
+    ]
+    done_by_then: Annotated[int | None, Doc("cases that will be done at `finish_by`, about")]
+    passes: Annotated[Passes | None, Doc("of a study that is run coarse to fine: what is complete")]
+
+
+class _Study(TypedDict):
+    id: str
+    name: str
+    model: str
+    state: str
+    state_meaning: Annotated[str, Doc("the state as a sentence")]
+    reason: Annotated[str | None, Doc("why the study is held, waits or failed")]
+    cases: Annotated[int, Doc("number of cases")]
+    reused: Annotated[int, Doc("cases whose rows were taken from other studies instead of being run")]
+    warnings: Annotated[list[str], Doc("what is allowed but probably not meant")]
+    priority: Annotated[int, Doc("of the studies that wait, those of the highest priority go first")]
+    created_at: Moment
+    started_at: Moment | None
+    finished_at: Moment | None
+    finish_by: Annotated[Moment | None, Doc("when the study is held, whatever is done then")]
+    time_over: Annotated[bool, Doc("it is held because `finish_by` came before its end")]
+    engine_version: str
+    links: Annotated[dict[str, str], Doc("addresses of what belongs to the study")]
+
+
+class StudySummary(_Study):
+    """A study."""
+
+    progress: Progress
+
+
+class AxisInfo(TypedDict):
+    """An axis of a study."""
+
+    paths: Annotated[list[str], Doc("the parameters that vary together")]
+    unit: str
+    values: Annotated[int, Doc("number of values")]
+    first: Annotated[float, Doc("the first value, SI")]
+    last: Annotated[float, Doc("the last value, SI")]
+
+
+class StudyDetail(_Study):
+    """A study with its spec and its progress."""
+
+    progress: FullProgress
+    combine: Annotated[str, Doc("grid: every combination, the first axis slowest; zip: the axes go together")]
+    axes: list[AxisInfo]
+    physics_hash: Annotated[str, Doc("SHA-256 of what decides the numbers: equal for equal studies")]
+    regimes: Annotated[dict[str, int], Doc("number of cases of each regime; empty where cases have none")]
+    spec: Annotated[dict[str, Any], Doc("the spec as it was submitted")]
+
+
+class StudyPage(TypedDict):
+    """A page of studies, newest first."""
+
+    studies: list[StudySummary]
+    next_page_token: Annotated[str | None, Doc("token of the next page; null on the last")]
+
+
+class FitDegree(TypedDict):
+    """One degree that a clutch fit tried."""
+
+    degree: int
+    rms: float
+    max_residual: float
+    rank: int
+    condition_number: Number
+    eigenvalues: list[float]
+
+
+class ClutchFitReport(TypedDict):
+    """A fitted clutch law and how well it fits."""
+
+    coefficients: Annotated[list[float], Doc("c_1 first, N*m/rad^(k-1)")]
+    windup_limit: Annotated[float, Doc("end of the measured data, rad")]
+    degree: int
+    accuracy: Annotated[float, Doc("largest residual that was allowed, N*m")]
+    rms: Annotated[float, Doc("root mean square of the residuals, N*m")]
+    max_residual: Annotated[float, Doc("largest residual, N*m")]
+    residuals: Annotated[list[float], Doc("residual of each row, N*m")]
+    rows_in_backlash: Annotated[list[int], Doc("rows within the lost motion, left out of the fit")]
+    condition_number: Annotated[Number, Doc("of the normal matrix")]
+    eigenvalues: Annotated[list[float], Doc("of the normal matrix")]
+    rank: int
+    monotone: bool
+    negative: bool
+    degrees_tried: Annotated[list[FitDegree], Doc("every degree that was tried")]
+    warnings: list[str]
+
+
+class Preview(TypedDict):
+    """What a study would be, without submitting it."""
+
+    model: str
+    name: str
+    cases: int
+    shape: Annotated[list[int], Doc("number of values of each axis; of a zip, the common number")]
+    combine: str
+    axes: list[AxisInfo]
+    results: Annotated[int, Doc("number of results of each case")]
+    reusable: Annotated[int, Doc("cases that need not be run, because other studies of the database have them")]
+    estimated_seconds: Annotated[float, Doc("rough time on the processes of this service, s")]
+    estimated_bytes: Annotated[int, Doc("rough size in the database")]
+    warnings: list[str]
+    fits: Annotated[dict[str, ClutchFitReport], Doc("fitted clutch laws, by JSON Pointer into the spec")]
+    first_cases: Annotated[list[dict[str, Any]], Doc("parameters of the first cases, SI")]
