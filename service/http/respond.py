@@ -10,6 +10,8 @@ from typing import Any
 from starlette.concurrency import iterate_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
+from werkzeug.datastructures import MIMEAccept
+from werkzeug.http import parse_accept_header, parse_etags
 
 from sprag.service.faults import parameter_error, shown
 from sprag.service.http.problems import ApiError
@@ -30,8 +32,7 @@ def entity_tag(*parts: object) -> str:
 
 def not_modified(request: Request, tag: str) -> Response | None:
     """The answer 304 when the client has the version of ``tag`` already (If-None-Match), else None."""
-    held = [item.strip() for value in request.headers.getlist("if-none-match") for item in value.split(",")]
-    if "*" in held or any(item.removeprefix("W/") == tag for item in held):
+    if parse_etags(",".join(request.headers.getlist("if-none-match"))).contains_weak(tag.strip('"')):
         return Response(status_code=304, headers={"ETag": tag, "Vary": "Accept"})
     return None
 
@@ -65,40 +66,14 @@ def choose_format(request: Request, wanted: str | None, media_types: Mapping[str
         if wanted not in media_types:
             raise parameter_error("format", "there is no such format", wanted, ", ".join(formats))
         return wanted
+    header = ",".join(request.headers.getlist("accept"))
+    accept = parse_accept_header(header, MIMEAccept)
     by_type = {media.partition(";")[0]: name for name, media in reversed(list(media_types.items()))}
-    accept = ",".join(request.headers.getlist("accept"))
-    liked = _liked(accept)
-    named = {by_type[media]: quality for media, quality in liked.items() if media in by_type}
-    best = max(named, key=lambda name: named[name], default=None)
-    if best is not None and named[best] > 0:
-        return best
-    ranges = {media for media, quality in liked.items() if quality > 0}
-    for name, media in media_types.items():
-        if name not in named and ranges & {"*/*", media.partition("/")[0] + "/*"}:
-            return name
-    if liked:
-        detail = f"Accept is {shown(accept)}; the answer can be {', '.join(by_type)}."
-        raise ApiError("not-acceptable", detail)
-    return formats[0]
-
-
-def _liked(accept: str) -> dict[str, float]:
-    """Media types and ranges of an Accept header with their quality; what cannot be read is left out."""
-    found: dict[str, float] = {}
-    for item in accept.split(","):
-        media, *parameters = (part.strip().lower() for part in item.split(";"))
-        quality = _quality(parameters)
-        if "/" in media and quality is not None:
-            found.setdefault(media, quality)
-    return found
-
-
-def _quality(parameters: Iterable[str]) -> float | None:
-    for parameter in parameters:
-        name, _, value = parameter.partition("=")
-        if name.strip() == "q":
-            try:
-                return float(value)
-            except ValueError:
-                return None
-    return 1.0
+    if not any("/" in media for media, _ in accept):
+        return formats[0]
+    named = {media.lower() for media, quality in accept if quality > 0}
+    best = max(reversed(by_type), key=lambda media: (media in named, accept.quality(media)))
+    if accept.quality(best) > 0:
+        return by_type[best]
+    detail = f"Accept is {shown(header)}; the answer can be {', '.join(by_type)}."
+    raise ApiError("not-acceptable", detail)

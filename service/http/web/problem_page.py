@@ -15,9 +15,14 @@ if TYPE_CHECKING:
 _API = "/api/"
 
 
+def wants_page(request: Request) -> bool:
+    """Whether somebody in a browser asks, and for a page."""
+    return not request.url.path.startswith(_API) and "text/html" in request.headers.get("accept", "")
+
+
 def problem_page(request: Request, error: ApiError) -> Response | None:
     """The page that tells ``error``; None for programs, which get the problem document."""
-    if request.url.path.startswith(_API) or "text/html" not in request.headers.get("accept", ""):
+    if not wants_page(request):
         return None
     response = page(
         "error.html", status=error.type.status, problem=error.type, detail=error.detail, faults=error.errors

@@ -14,6 +14,7 @@ from starlette.responses import RedirectResponse
 
 from sprag.service.http.access import COOKIE, Access, Grant
 from sprag.service.http.web.form.values import read_form
+from sprag.service.http.web.problem_page import wants_page
 from sprag.service.http.web.templates import page
 
 if TYPE_CHECKING:
@@ -27,7 +28,6 @@ LOGIN_PATH: Final = "/login"
 #: Field of the login that says that a form is to be sent afterwards, and what the names of its fields begin with.
 KEPT: Final = "kept"
 KEPT_PREFIX: Final = "kept "
-_API: Final = "/api/"
 #: Longest address that the answer to the login repeats.
 _LONGEST: Final = 4000
 #: What can be mended by logging in, and what the login says of it where a form was sent.
@@ -44,9 +44,7 @@ async def way_in(request: Request, error: ApiError, access: Access) -> Response 
 
     Raises ApiError when the form that was sent cannot be read.
     """
-    if error.code not in _MENDED or request.url.path.startswith(_API):
-        return None
-    if "text/html" not in request.headers.get("accept", ""):
+    if error.code not in _MENDED or not wants_page(request):
         return None
     query = request.url.query
     wanted = request.url.path + (f"?{query}" if query else "")
