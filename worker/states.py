@@ -25,6 +25,14 @@ class StudyState(StrEnum):
         return _SENTENCES[self]
 
 
+class ChunkState(StrEnum):
+    """State of a chunk. The member's value is what is stored."""
+
+    WAITING = "waiting"
+    CLAIMED = "claimed"
+    DONE = "done"
+
+
 _SENTENCES = {
     StudyState.QUEUED: "Accepted; waits for a worker.",
     StudyState.RUNNING: "Cases are being run.",

@@ -15,7 +15,7 @@ from sprag.service.storage.records import CaseColumns, CaseRow, RowBlock
 from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
 from sprag.worker import models
 from sprag.worker.models import WorkerEnding, regime_info
-from sprag.worker.states import StudyState
+from sprag.worker.states import ChunkState, StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -156,7 +156,11 @@ class Cases(Orders):
     def _never_run(self, connection: sa.Connection, rows: _Rows, after_case: int) -> Iterator[int]:
         """Cases above ``after_case`` that are in no chunk that is done, in order."""
         c = CHUNKS.c
-        done = sa.select(c["first"], c["count"]).where(c.study == rows.number, c.state == "done").order_by(c["first"])
+        done = (
+            sa.select(c["first"], c["count"])
+            .where(c.study == rows.number, c.state == ChunkState.DONE)
+            .order_by(c["first"])
+        )
         order = self._order(rows.number, connection)
         if order is not None:
             never = np.ones(rows.cases, dtype=np.bool_)

@@ -10,7 +10,7 @@ import sqlalchemy as sa
 
 from sprag.service.storage.part import EPOCH, Part, moment
 from sprag.service.storage.tables import CHUNKS, DISPATCHER, ENDINGS, HELD_AT_DEADLINE, STUDIES
-from sprag.worker.states import TERMINAL
+from sprag.worker.states import TERMINAL, ChunkState
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -74,7 +74,11 @@ class Totals(Part):
         lately = STUDIES.c.finished_at.is_(None) | (STUDIES.c.finished_at >= micros)
         query = (
             sa.select(c.claimed_at, c.finished_at, c["count"])
-            .where(c.study.in_(sa.select(STUDIES.c.number).where(lately)), c.state == "done", c.finished_at > micros)
+            .where(
+                c.study.in_(sa.select(STUDIES.c.number).where(lately)),
+                c.state == ChunkState.DONE,
+                c.finished_at > micros,
+            )
             .order_by(c.finished_at)
         )
         with self.session.read() as connection:

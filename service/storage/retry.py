@@ -15,7 +15,7 @@ from sprag.service.storage.records import StudyRecord, record_of
 from sprag.service.storage.tables import CHUNKS, ENDINGS, RECORD_COLUMNS, STUDIES, results_table
 from sprag.worker import models
 from sprag.worker.chunking import MAX_CHUNKS
-from sprag.worker.states import StudyEvent, StudyState, follow
+from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -164,9 +164,9 @@ def _pieces(number: int, chunk: _Done, inside: Sequence[Run]) -> list[dict[str, 
     for first, end in pairwise(borders):
         piece: dict[str, Any] = {"study": number, "first": first, "count": end - first, "failures": 0}
         if first in waiting:
-            piece |= {"state": "waiting", "claimed_at": None, "finished_at": None, "detail": None}
+            piece |= {"state": ChunkState.WAITING, "claimed_at": None, "finished_at": None, "detail": None}
         else:
             begin, finish = (chunk.claimed_at + round(pace * (border - chunk.first)) for border in (first, end))
-            piece |= {"state": "done", "claimed_at": begin, "finished_at": finish, "detail": chunk.detail}
+            piece |= {"state": ChunkState.DONE, "claimed_at": begin, "finished_at": finish, "detail": chunk.detail}
         pieces.append(piece)
     return pieces

@@ -5,6 +5,7 @@ from functools import cache
 import sqlalchemy as sa
 
 from sprag.worker import models
+from sprag.worker.states import ChunkState
 
 #: Revision of the schema below; the last file in migrations/versions.
 HEAD_REVISION = "0015"
@@ -80,6 +81,8 @@ RECORD_COLUMNS = tuple(
     if column.name not in {"spec", "study", "deleted_at", "kin_hash", "fresh", "fingerprint"}
 )
 
+_CHUNK_STATE = sa.Enum(ChunkState, native_enum=False, length=8, values_callable=lambda states: list(map(str, states)))
+
 CHUNKS = sa.Table(
     "chunks",
     METADATA,
@@ -87,7 +90,7 @@ CHUNKS = sa.Table(
     # Of case numbers, or of positions in the study's order where it is coarse to fine.
     sa.Column("first", sa.Integer, primary_key=True),
     sa.Column("count", sa.Integer, nullable=False),
-    sa.Column("state", sa.String(8), nullable=False),
+    sa.Column("state", _CHUNK_STATE, nullable=False),
     sa.Column("epoch", sa.Integer),
     sa.Column("failures", sa.Integer, nullable=False),
     sa.Column("detail", sa.Text),

@@ -25,7 +25,7 @@ from sprag.service.storage.tables import (
 from sprag.worker import models
 from sprag.worker.models import ChunkResult
 from sprag.worker.ports import ActiveStudy, Chunk
-from sprag.worker.states import TERMINAL, StudyEvent, StudyState
+from sprag.worker.states import TERMINAL, ChunkState, StudyEvent, StudyState
 from sprag.worker.study import Study
 
 if TYPE_CHECKING:
@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 
     from sprag.worker.ports import Known
 
-_WAITING = {"state": "waiting", "epoch": None, "claimed_at": None}
+_WAITING = {"state": ChunkState.WAITING, "epoch": None, "claimed_at": None}
 _TERMINAL = [state.value for state in TERMINAL]
 #: Only studies that have not ended have claims; by study the chunks have an index.
-CLAIMED = (CHUNKS.c.state == "claimed") & CHUNKS.c.study.in_(
+CLAIMED = (CHUNKS.c.state == ChunkState.CLAIMED) & CHUNKS.c.study.in_(
     sa.select(STUDIES.c.number).where(STUDIES.c.state.not_in(_TERMINAL))
 )
 
@@ -153,7 +153,7 @@ class Work(Reuse):
         with self.session.read() as connection:
             rows = connection.execute(
                 sa.select(c["first"], c["count"], c.failures)
-                .where(c.study == number, c.state != "done")
+                .where(c.study == number, c.state != ChunkState.DONE)
                 .order_by(c["first"])
             ).all()
         return [Chunk(number, first, count, failures) for first, count, failures in rows]
@@ -180,8 +180,8 @@ class Work(Reuse):
                     continue
                 claimed = connection.execute(
                     sa.update(CHUNKS)
-                    .where(_is(chunk), CHUNKS.c.state == "waiting")
-                    .values(state="claimed", epoch=epoch, claimed_at=self._now())
+                    .where(_is(chunk), CHUNKS.c.state == ChunkState.WAITING)
+                    .values(state=ChunkState.CLAIMED, epoch=epoch, claimed_at=self._now())
                 )
                 if claimed.rowcount:
                     got.append(chunk)
@@ -191,7 +191,9 @@ class Work(Reuse):
         """Whether the chunk is claimed in this epoch; raises EpochLostError when the epoch is not ours any more."""
         self._own(connection, epoch)
         found = connection.execute(
-            sa.select(CHUNKS.c["first"]).where(_is(chunk), CHUNKS.c.state == "claimed", CHUNKS.c.epoch == epoch)
+            sa.select(CHUNKS.c["first"]).where(
+                _is(chunk), CHUNKS.c.state == ChunkState.CLAIMED, CHUNKS.c.epoch == epoch
+            )
         ).one_or_none()
         return found is not None
 
@@ -240,7 +242,7 @@ class Work(Reuse):
         connection.execute(
             sa.update(CHUNKS)
             .where(_is(chunk))
-            .values(state="done", finished_at=self._now(), detail=detail, failures=chunk.failures)
+            .values(state=ChunkState.DONE, finished_at=self._now(), detail=detail, failures=chunk.failures)
         )
         for ending, cases in endings.items():
             this = (ENDINGS.c.study == chunk.study) & (ENDINGS.c.ending == ending)
@@ -279,7 +281,7 @@ class Work(Reuse):
                         "study": part.study,
                         "first": part.first,
                         "count": part.count,
-                        "state": "waiting",
+                        "state": ChunkState.WAITING,
                         "failures": part.failures,
                         "detail": detail,
                     }
@@ -317,7 +319,7 @@ class Work(Reuse):
             self._own(connection, epoch)
             connection.execute(
                 sa.update(CHUNKS)
-                .where(CHUNKS.c.study == number, CHUNKS.c.state != "done")
+                .where(CHUNKS.c.study == number, CHUNKS.c.state != ChunkState.DONE)
                 .values(failures=0, **_WAITING)
             )
             state = connection.execute(sa.select(STUDIES.c.state).where(STUDIES.c.number == number)).scalar_one()
@@ -361,13 +363,13 @@ class Work(Reuse):
             self._own(connection, epoch)
             return_claims(connection)
             connection.execute(
-                sa.update(CHUNKS).where(CHUNKS.c.study == number, CHUNKS.c.state != "done").values(failures=0)
+                sa.update(CHUNKS).where(CHUNKS.c.study == number, CHUNKS.c.state != ChunkState.DONE).values(failures=0)
             )
 
     def settle(self, epoch: int, number: int) -> StudyState:
         """Bring a study without open claims to its end: cancelled when that was asked for, else finished or failed."""
         self._forget_reuse(number)
-        open_chunks = (CHUNKS.c.study == number) & (CHUNKS.c.state != "done")
+        open_chunks = (CHUNKS.c.study == number) & (CHUNKS.c.state != ChunkState.DONE)
         with self.session.write() as connection:
             self._own(connection, epoch)
             state, cases, ok = connection.execute(

@@ -1,0 +1,61 @@
+"""Pictures and pages draw the same description: the same points, colours and marks."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+
+from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.results.curves import CurveQuery, draw, select
+from sprag.service.results.figures.curves import curves_figure
+from sprag.service.results.figures.figure import PALETTE
+from sprag.service.results.figures.motion import motion_figure, phase_figure
+from sprag.service.results.pictures.curves import paint_figure, painting
+from sprag.service.spec.document import parse_spec
+from sprag.service.storage.records import CaseColumns
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+SPEED, TORQUE = "shaft.speed.mean", "torque.mean"
+
+
+def fetch(cases: NDArray[np.int64], names: Any) -> CaseColumns:
+    return CaseColumns(cases, ["ok"] * cases.size, {name: cases.astype(float) for name in names})
+
+
+def test_both_painters_draw_the_described_lines(spec: dict[str, Any]) -> None:
+    spec["axes"] = [{"path": "excitation.frequency", "values": [20, 25]}, {"path": "shaft.load", "values": [0, 0.1, 1]}]
+    study = parse_spec(spec).study
+    query = CurveQuery("shaft.load", (SPEED, TORQUE), ("excitation.frequency",))
+    described = curves_figure([("", draw(select(study, models.study_results(study), query), fetch))])
+    page, picture = plotly_figure(described), Figure()
+    with painting():
+        paint_figure(picture, described, "")
+    drawn = [line for axes in picture.axes for line in axes.lines]
+    assert [trace["x"] for trace in page["data"]] == [list(line.get_xdata()) for line in drawn]
+    assert [trace["y"] for trace in page["data"]] == [list(line.get_ydata()) for line in drawn]
+    assert [trace["line"]["color"] for trace in page["data"]] == [to_hex(str(line.get_color())) for line in drawn]
+    assert [trace["name"] for trace in page["data"]] == [str(line.get_label()) for line in drawn]
+
+
+def test_a_motion_is_drawn_over_its_states_and_as_a_portrait() -> None:
+    times, angle = np.array([0.0, 0.1, 0.2]), "pendulums.0.angle"
+    names = (angle, "pendulums.0.speed", "shaft.speed", "pendulums.0.torque", "power.input", "power.useful",
+             "power.loss", "power.clutch")  # fmt: skip
+    units = ("rad", "rad/s", "rad/s", "N*m", "W", "W", "W", "W")
+    values = np.arange(24.0).reshape(3, 8)
+    made = models.Trajectory(times, names, units, values, {"shaft": ("held", "held", "rotating")}, "ok")
+    shown = models.model_of("vibration-drive").presentation
+    described = motion_figure(made, shown)
+    assert described.spans == {"Shaft": (("held", 0.0, 0.2), ("rotating", 0.2, 0.2))}
+    page = plotly_figure(described)
+    assert page["zoom"] is True
+    assert [trace["name"] for trace in page["data"] if trace["type"] == "bar"] == ["held", "rotating"]
+    assert {trace["xaxis"] for trace in page["data"] if trace["type"] == "scatter"} == {"x"}
+    (orbit,) = phase_figure(made, shown).panels[0].lines
+    assert (orbit.x.tolist(), orbit.y.tolist(), orbit.colour) == ([0.0, 8.0, 16.0], [1.0, 9.0, 17.0], PALETTE[0])
