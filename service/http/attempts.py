@@ -9,13 +9,13 @@ from __future__ import annotations
 import ipaddress
 import logging
 import time
-from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final
 
 import anyio
+from cachetools import TTLCache
 from starlette.datastructures import Headers
 from starlette.types import Scope
 
@@ -44,7 +44,6 @@ Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 @dataclass(slots=True)
 class _History:
     failures: int = 0
-    latest: float = 0.0
     waiting: int = 0
 
 
@@ -66,8 +65,7 @@ class Attempts:
     ) -> None:
         self._trusted = tuple(trusted)
         self._sleep = sleep
-        self._clock = clock
-        self._histories: OrderedDict[str, _History] = OrderedDict()
+        self._histories: TTLCache[str, _History] = TTLCache(_MOST_ADDRESSES, FORGET_SECONDS, timer=clock)
         self._waiting = 0
 
     def address_of(self, scope: Scope) -> str:
@@ -100,20 +98,14 @@ class Attempts:
         address = self.address_of(scope)
         # The words and their order are those of the filter for fail2ban in the documentation.
         _LOG.warning("Failed login from %s: %s", address, place)
-        history, now = self._history(_network(address)), self._clock()
-        history.failures = 1 if now - history.latest > FORGET_SECONDS else history.failures + 1
-        history.latest = now
+        network = _network(address)
+        # Kept anew, so that an address is remembered from its latest failure on.
+        history = self._histories[network] = self._histories.get(network) or _History()
+        history.failures += 1
         if self._waiting >= MOST_WAITING_IN_ALL:
             raise _too_many()
         with self._in_line(history):
             await self._sleep(min(FIRST_SECONDS * 2.0 ** min(history.failures - 1, 30), LONGEST_SECONDS))
-
-    def _history(self, network: str) -> _History:
-        history = self._histories.setdefault(network, _History())
-        self._histories.move_to_end(network)
-        while len(self._histories) > _MOST_ADDRESSES:
-            self._histories.popitem(last=False)
-        return history
 
     @contextmanager
     def _in_line(self, history: _History) -> Iterator[None]:

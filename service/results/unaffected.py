@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from functools import partial
+from operator import attrgetter
 from threading import Lock
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from cachetools import LRUCache, cachedmethod
 
 from sprag.service.results.curves import Fetch
 from sprag.worker import models
@@ -109,21 +110,17 @@ class Unaffected:
     """`unaffected` of ended studies, kept in memory: their rows do not change."""
 
     def __init__(self) -> None:
-        self._found: OrderedDict[tuple[str, int], tuple[str, ...]] = OrderedDict()
+        self._found: LRUCache[tuple[str, int], tuple[str, ...]] = LRUCache(_KEPT)
         self._lock = Lock()
 
     def of(self, store: Store, record: StudyRecord) -> tuple[str, ...]:
         """The sentences about a study; none before its end."""
         if not record.state.terminal or not record.done:
             return ()
-        key = (record.id, record.revision)
-        with self._lock:
-            if key in self._found:
-                self._found.move_to_end(key)
-                return self._found[key]
-        found = unaffected(store.study(record.id), partial(store.rows_for_cases, record.id))
-        with self._lock:
-            self._found[key] = found
-            while len(self._found) > _KEPT:
-                self._found.popitem(last=False)
-        return found
+        return self._of(store, record)
+
+    @cachedmethod(
+        attrgetter("_found"), key=lambda _self, _store, record: (record.id, record.revision), lock=attrgetter("_lock")
+    )
+    def _of(self, store: Store, record: StudyRecord) -> tuple[str, ...]:
+        return unaffected(store.study(record.id), partial(store.rows_for_cases, record.id))

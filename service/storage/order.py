@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from threading import Lock
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import sqlalchemy as sa
+from cachetools import LRUCache
 
 from sprag.service.storage.part import Part
 from sprag.service.storage.tables import CHUNKS, STUDIES
 from sprag.worker.order import coverage, order_of
+from sprag.worker.states import ChunkState
 from sprag.worker.study import Study
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ class Orders(Part):
 
     def __init__(self, session: Session, clock: Clock) -> None:
         super().__init__(session, clock)
-        self._orders: OrderedDict[int, Order | None] = OrderedDict()
+        self._orders: LRUCache[int, Order | None] = LRUCache(_KEPT)
         self._orders_lock = Lock()
 
     def _order(self, number: int, connection: sa.Connection | None = None) -> Order | None:
@@ -40,7 +41,6 @@ class Orders(Part):
         """
         with self._orders_lock:
             if number in self._orders:
-                self._orders.move_to_end(number)
                 return self._orders[number]
         if connection is None:
             with self.session.read() as own:
@@ -53,8 +53,6 @@ class Orders(Part):
         found = order_of(Study.from_text(text)) if coarse else None
         with self._orders_lock:
             self._orders[number] = found
-            while len(self._orders) > _KEPT:
-                self._orders.popitem(last=False)
         return found
 
     def _cases(self, chunk: Chunk, connection: sa.Connection | None = None) -> NDArray[np.int64]:
@@ -71,8 +69,8 @@ class Orders(Part):
         c = CHUNKS.c
         first_open, done = connection.execute(
             sa.select(
-                sa.func.min(sa.case((c.state != "done", c["first"]))),
-                sa.func.coalesce(sa.func.sum(sa.case((c.state == "done", c["count"]), else_=0)), 0),
+                sa.func.min(sa.case((c.state != ChunkState.DONE, c["first"]))),
+                sa.func.coalesce(sa.func.sum(sa.case((c.state == ChunkState.DONE, c["count"]), else_=0)), 0),
             ).where(c.study == number)
         ).one()
         if first_open is not None:

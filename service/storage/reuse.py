@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections import Counter, OrderedDict
+from collections import Counter
 from dataclasses import dataclass
 from threading import Lock
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import sqlalchemy as sa
+from cachetools import LRUCache
 
 from sprag.service.storage.cases import conditions
 from sprag.service.storage.order import Orders
@@ -19,7 +20,7 @@ from sprag.worker.models import WorkerEnding
 from sprag.worker.order import order_of
 from sprag.worker.ports import Known
 from sprag.worker.reuse import Wanted, kin_hash, shared_cases, span
-from sprag.worker.states import StudyState
+from sprag.worker.states import ChunkState, StudyState
 from sprag.worker.study import Study
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ class Reuse(Orders):
 
     def __init__(self, session: Session, clock: Clock) -> None:
         super().__init__(session, clock)
-        self._found: OrderedDict[int, _Found | None] = OrderedDict()
+        self._found: LRUCache[int, _Found | None] = LRUCache(_KEPT)
         self._spans = _Spans()
 
     def reusable(self, study: Study) -> int:
@@ -100,9 +101,6 @@ class Reuse(Orders):
                     sa.select(STUDIES.c.kin_hash, STUDIES.c.fresh).where(STUDIES.c.number == number)
                 ).one()
                 self._found[number] = None if fresh else _find(connection, self._spans, study, kin, number)
-            while len(self._found) > _KEPT:
-                self._found.popitem(last=False)
-        self._found.move_to_end(number)
         return self._found[number]
 
     def _forget_reuse(self, number: int) -> None:
@@ -114,7 +112,7 @@ class _Spans:
     """The `span` of every study that was looked at: it never changes, and most studies can be ruled out by it alone."""
 
     def __init__(self) -> None:
-        self._of: OrderedDict[int, NDArray[np.float64]] = OrderedDict()
+        self._of: LRUCache[int, NDArray[np.float64]] = LRUCache(_KEPT_SPANS)
         self._lock = Lock()
 
     def candidates(self, connection: sa.Connection, wanted: Wanted, kin: str, number: int) -> list[int]:
@@ -146,8 +144,6 @@ class _Spans:
                 spans[number] = span(Study.from_text(text))
         with self._lock:
             self._of.update(spans)
-            while len(self._of) > _KEPT_SPANS:
-                self._of.popitem(last=False)
         return spans
 
 
@@ -199,7 +195,9 @@ def _has_rows(connection: sa.Connection, source: sa.Row[Any], study: Study, case
     c = CHUNKS.c
     if source.state not in {StudyState.FINISHED.value, StudyState.FAILED.value}:
         done = connection.execute(
-            sa.select(c["first"], c["count"]).where(c.study == source.number, c.state == "done").order_by(c["first"])
+            sa.select(c["first"], c["count"])
+            .where(c.study == source.number, c.state == ChunkState.DONE)
+            .order_by(c["first"])
         ).all()
         if not done:
             return ~stored

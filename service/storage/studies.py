@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import secrets
-from collections import OrderedDict
 from contextlib import suppress
 from dataclasses import replace
 from datetime import timedelta
@@ -12,6 +11,7 @@ from threading import Event, Lock, RLock
 from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
+from cachetools import LRUCache
 
 from sprag.service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyEnded, StudyNotFound
 from sprag.service.storage.order import Orders
@@ -33,7 +33,7 @@ from sprag.worker import models
 from sprag.worker.chunking import Chunking, spans
 from sprag.worker.limits import MAX_AXIS_VALUES
 from sprag.worker.reuse import kin_hash
-from sprag.worker.states import TERMINAL, StudyEvent, StudyState
+from sprag.worker.states import TERMINAL, ChunkState, StudyEvent, StudyState
 from sprag.worker.study import Study
 
 if TYPE_CHECKING:
@@ -55,7 +55,10 @@ class Studies(Orders):
     def __init__(self, session: Session, clock: Clock, chunking: Chunking) -> None:
         super().__init__(session, clock)
         self.chunking = chunking
-        self._studies: OrderedDict[str, Study] = OrderedDict()
+        # Each counts as its share of the number of studies at least.
+        self._studies: LRUCache[str, Study] = LRUCache(
+            KEPT_VALUES, lambda study: max(_values(study), KEPT_VALUES // KEPT_STUDIES)
+        )
         self._lock = Lock()
         self._reading = RLock()
         #: Set when a study is deleted, for `sprag.service.jobs.housekeeping`.
@@ -121,7 +124,7 @@ class Studies(Orders):
             connection.execute(
                 sa.insert(CHUNKS),
                 [
-                    {"study": number, "first": first, "count": count, "state": "waiting", "failures": 0}
+                    {"study": number, "first": first, "count": count, "state": ChunkState.WAITING, "failures": 0}
                     for first, count in spans(row["cases"], row["chunk_cases"])
                 ],
             )
@@ -163,7 +166,6 @@ class Studies(Orders):
         """The study in SI numbers; raises StudyNotFound. Studies never change, so some are kept in memory."""
         with self._lock:
             if study_id in self._studies:
-                self._studies.move_to_end(study_id)
                 return self._studies[study_id]
         with self._reading:  # one long study at a time, and once for all who wait for it
             return self._read_study(study_id)
@@ -175,10 +177,8 @@ class Studies(Orders):
         with self.session.read() as connection:
             text = self._row(connection, study_id, STUDIES.c.study).study
         study = Study.from_text(text)
-        with self._lock:
+        with self._lock, suppress(ValueError):  # too large to be kept
             self._studies[study_id] = study
-            while len(self._studies) > KEPT_STUDIES or sum(map(_values, self._studies.values())) > KEPT_VALUES:
-                self._studies.popitem(last=False)
         return study
 
     def list_studies(
@@ -220,13 +220,13 @@ class Studies(Orders):
             ).all()
             recent = connection.execute(
                 sa.select(CHUNKS.c.claimed_at, CHUNKS.c.finished_at, CHUNKS.c["count"])
-                .where(CHUNKS.c.study == row.number, CHUNKS.c.state == "done")
+                .where(CHUNKS.c.study == row.number, CHUNKS.c.state == ChunkState.DONE)
                 .order_by(CHUNKS.c.finished_at.desc())
                 .limit(RECENT_CHUNKS)
             ).all()
             claimed = connection.execute(
                 sa.select(CHUNKS.c.claimed_at, CHUNKS.c["count"]).where(
-                    CHUNKS.c.study == row.number, CHUNKS.c.state == "claimed"
+                    CHUNKS.c.study == row.number, CHUNKS.c.state == ChunkState.CLAIMED
                 )
             ).all()
             covered = self._coverage(connection, row.number, row.cases)
