@@ -84,11 +84,14 @@ def prune(
     """Delete every study that ended longer ago than --older-than days, with all its results."""
     from datetime import timedelta
 
+    from sprag.service.storage.clock_watch import distrust
     from sprag.service.storage.store import Store
 
     with _opened(db) as session:
         location = session.url.render_as_string(hide_password=False)
     with Store.open(location) as store:
+        if not dry_run and (problem := distrust(store)):
+            raise TroubleError(f"{problem}.")
         found = store.prune(store.clock.now() - timedelta(days=older_than), dry=dry_run)
         store.purge()
     if as_json:

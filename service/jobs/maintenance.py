@@ -9,6 +9,7 @@ import logging
 import re
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import partial
@@ -60,21 +61,24 @@ def backups(folder: Path) -> list[tuple[datetime, Path]]:
     """The backups in ``folder`` with the times at which they were made, oldest first."""
     if not folder.is_dir():
         return []
-    found = ((_NAME.fullmatch(path.name), path) for path in folder.iterdir())
-    return sorted(
-        (datetime.strptime(match[1], _STAMP).replace(tzinfo=UTC), path) for match, path in found if match is not None
-    )
+    found = []
+    for path in folder.iterdir():
+        if match := _NAME.fullmatch(path.name):
+            with suppress(ValueError):  # a name like that of a backup, with a date that does not exist
+                found.append((datetime.strptime(match[1], _STAMP).replace(tzinfo=UTC), path))
+    return sorted(found)
 
 
 @dataclass(slots=True)
 class _Task:
-    """Something to be done each night; `do` is told the time and whether the clock is believed, and says if it did it.
+    """Something to be done each night; `do` is told the time, when it was due and whether the clock is believed, and
+    says if it did it.
 
     ``done`` is the due time that is done with, ``wait_until`` the time before which it is not tried again.
     """
 
     name: str
-    do: Callable[[datetime, bool], bool]
+    do: Callable[[datetime, datetime, bool], bool]
     done: datetime | None = None
     wait_until: datetime | None = None
 
@@ -95,8 +99,8 @@ class Maintenance(threading.Thread):
             self._tasks.append(_Task("deletion of old studies", self._prune))
 
     def run(self) -> None:
-        """Look, and again; at the clock even where nothing else is wanted."""
-        self.begin()
+        """Look, and again; at the clock even where nothing else is wanted. What was missed is made up for at once."""
+        self.look()
         while not self._ending.wait(LOOK_SECONDS):
             self.look()
 
@@ -106,21 +110,11 @@ class Maintenance(threading.Thread):
         if self.is_alive():
             self.join()
 
-    def begin(self) -> None:
-        """Make up for what was due while nothing was running; a backup that was made since is enough."""
-        now = self._store.clock.now()
-        due = self._plan.timing.latest_until(now)
-        for task in self._tasks:
-            if task.name == "backup" and self._plan.folder is not None:
-                made = [when for when, _ in backups(self._plan.folder) if when <= now]
-                if made and (due is None or made[-1] >= due):
-                    task.done = due
-        self.look()
-
     def look(self) -> None:
         """Do what is due, each task for itself; what fails is said, and tried again later."""
         now = self._store.clock.now()
         due = self._plan.timing.latest_until(now)
+        assert due is not None, "a time of day comes every day"
         try:
             believed = self._watch.believable()
         except StoreError as error:
@@ -130,19 +124,26 @@ class Maintenance(threading.Thread):
             if task.done == due or (task.wait_until is not None and task.wait_until - AGAIN <= now < task.wait_until):
                 continue
             try:
-                if not task.do(now, believed):
+                if not task.do(now, due, believed):
                     continue
-            except (StoreError, OSError) as error:
-                _LOG.error("The nightly %s failed and is tried again in 10 minutes: %s", task.name, error)
+            except Exception as error:  # whatever it is, it must end neither the other tasks nor the nights to come
+                known = isinstance(error, StoreError | OSError)
+                _LOG.error(
+                    "The nightly %s failed and is tried again in 10 minutes: %s",
+                    task.name,
+                    error,
+                    exc_info=None if known else error,
+                )
                 task.wait_until = now + AGAIN
                 continue
             task.done, task.wait_until = due, None
 
-    def _back_up(self, folder: Path, now: datetime, believed: bool) -> bool:
+    def _back_up(self, folder: Path, now: datetime, due: datetime, believed: bool) -> bool:
+        """Write a backup unless there is one since ``due``; then remove the oldest."""
         folder.mkdir(PRIVATE_FOLDER_MODE, parents=True, exist_ok=True)
         sweep(folder.glob(f".sprag-*.sqlite3.*{PART_SUFFIX}"))
-        target = folder / f"sprag-{now.astimezone(UTC):{_STAMP}}.sqlite3"
-        if not target.exists():
+        if not any(due <= when <= now for when, _ in backups(folder)):
+            target = folder / f"sprag-{now.astimezone(UTC):{_STAMP}}.sqlite3"
             self._store.backup(target)
             _LOG.info("Backup: %s (%.3g MB).", target, target.stat().st_size / 1e6)
         if believed:
@@ -151,7 +152,7 @@ class Maintenance(threading.Thread):
                 path.unlink()
         return True
 
-    def _prune(self, now: datetime, believed: bool) -> bool:
+    def _prune(self, now: datetime, _due: datetime, believed: bool) -> bool:
         if not believed:
             return False
         gone = self._store.prune(now - timedelta(days=self._plan.study_days))

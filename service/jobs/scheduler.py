@@ -17,6 +17,7 @@ from sprag.worker.states import StudyState
 if TYPE_CHECKING:
     from datetime import datetime
 
+    from sprag.service.storage.records import StudyRecord
     from sprag.service.storage.schedules import OpenRun, ScheduleRecord
     from sprag.service.storage.store import Store
 
@@ -75,14 +76,19 @@ class Scheduler(threading.Thread):
         for record in self._store.due_schedules(now):
             self._take(record)
         for run in self._store.open_runs():
-            if self._store.clock.monotonic() >= self._next_try.get((run.schedule, run.due), 0.0):
+            if _is_over(run, now):
+                self._give_up(run)
+            elif self._store.clock.monotonic() >= self._next_try.get((run.schedule, run.due), 0.0):
                 self._submit(run)
         for study in self._store.bound_studies():
-            inside = study.window.open_at(now)
-            if inside and study.held:
-                self._store.let_in(study.number)
-            elif not inside and study.state in {StudyState.QUEUED, StudyState.RUNNING}:
-                self._store.hold_for_window(study.number, f"outside its window, {study.window}; it goes on by itself")
+            if study.window is None or study.window.open_at(now):
+                if study.held:
+                    self._store.let_in(study.number)
+                continue
+            reason = f"outside its window, {study.window}; it goes on by itself"
+            going = study.state in {StudyState.QUEUED, StudyState.RUNNING}
+            if going or (study.held and study.reason != reason):
+                self._store.hold_for_window(study.number, reason)
 
     def _take(self, record: ScheduleRecord) -> None:
         """Take up the latest due time; the ones before it that nobody was there for are only counted."""
@@ -108,12 +114,16 @@ class Scheduler(threading.Thread):
         from sprag.service.spec.document import parse_spec
         from sprag.service.spec.report import SpecError
 
+        # No client can send a key with a blank in it.
+        key = f"schedule {run.id} {run.due}"
+        known = self._store.study_of_key(key, None)
+        if known is not None:  # whoever submitted it died before this was noted; the schedule may have changed since
+            self._close(run, known)
+            return
         try:
             parsed = parse_spec(run.fields.spec)
             if run.fields.name:
                 parsed = replace(parsed, study=replace(parsed.study, name=run.fields.name))
-            # No client can send a key with a blank in it.
-            key = f"schedule {run.id} {run.due}"
             fields = run.fields
             # Of the beginning that was meant: a run that is put off must not slip to the deadline of the next day.
             finish = _finish_of(run)
@@ -121,11 +131,23 @@ class Scheduler(threading.Thread):
         except (SpecError, FaultError) as error:
             now, end = self._store.clock.now(), _grace_end(run)
             if isinstance(error, FaultError) and error.code in _TRANSIENT and now < end:
-                self._put_off(run, f"{error} It is tried again until {end.isoformat(timespec='seconds')}.")
+                self._put_off(run, f"{error}{_again_until(end)}")
                 return
-            _LOG.error("The schedule %s was due, and no study came of it: %s", run.id, error)
-            self._store.close_run(run, problem=str(error))
+            self._refuse(run, str(error))
             return
+        self._close(run, study)
+
+    def _give_up(self, run: OpenRun) -> None:
+        """Refuse a run whose time was over before it could be tried again: nothing was running, or nothing changed."""
+        why = (run.problem or "").removesuffix(_again_until(_grace_end(run)))
+        self._refuse(run, why or "Its deadline passed before it could be submitted.")
+
+    def _refuse(self, run: OpenRun, problem: str) -> None:
+        _LOG.error("The schedule %s was due, and no study came of it: %s", run.id, problem)
+        self._next_try.pop((run.schedule, run.due), None)
+        self._store.close_run(run, problem=problem)
+
+    def _close(self, run: OpenRun, study: StudyRecord) -> None:
         self._next_try.pop((run.schedule, run.due), None)
         self._store.close_run(run, study=study.number)
         _LOG.info("The schedule %s was due: study %s.", run.id, study.id)
@@ -137,6 +159,16 @@ def _finish_of(run: OpenRun) -> datetime | None:
 
     text = run.fields.finish_by
     return None if text is None else run_finish_at(text, run.fields.timing.zone, run.begun_at)
+
+
+def _is_over(run: OpenRun, now: datetime) -> bool:
+    """Whether a run may be submitted no longer: its deadline is over, or the grace for what was refused once."""
+    finish = _finish_of(run)
+    return (finish is not None and finish <= now) or (run.problem is not None and _grace_end(run) <= now)
+
+
+def _again_until(end: datetime) -> str:
+    return f" It is tried again until {end.isoformat(timespec='seconds')}."
 
 
 def _grace_end(run: OpenRun) -> datetime:

@@ -19,6 +19,8 @@ _LOG = logging.getLogger("sprag.clock")
 #: A clock that is ahead of itself by more than this has jumped, while the worker runs and between two of its runs.
 JUMP: Final = timedelta(hours=1)
 LONGEST_PAUSE: Final = timedelta(days=60)
+#: A clock that was put back is followed after this time: one that the network sets after the start is right by then.
+FOLLOWED_AFTER: Final = timedelta(hours=1)
 #: The believed moment is written down after this time.
 NOTE_AFTER: Final = timedelta(minutes=10)
 MESSAGE: Final = (
@@ -36,6 +38,8 @@ class ClockWatch:
         #: The latest believed moment, and how much time had passed then.
         self._believed: tuple[datetime, float] | None = None
         self._noted: datetime | None = None
+        #: How much time had passed when the clock was first seen behind what was believed.
+        self._behind_since: float | None = None
         self._told = False
 
     def believable(self) -> bool:
@@ -54,17 +58,40 @@ class ClockWatch:
             if self._told:
                 _LOG.warning("The clock is believed again: it is %s.", now.isoformat(timespec="seconds"))
                 self._told = False
-            self._believed = max(expected, now), elapsed
-            if noted is None or now - noted > NOTE_AFTER:
+            back = self._put_back(now, expected, elapsed)
+            self._believed = now if back else max(expected, now), elapsed
+            if back or noted is None or now - noted > NOTE_AFTER:
                 self._store.note_clock(now)
                 noted = now
             self._noted = noted
             return True
 
+    def _put_back(self, now: datetime, expected: datetime, elapsed: float) -> bool:
+        """Whether the clock has been behind what was believed for so long that it is followed: else its next jump to
+        that time, which was a wrong one, would pass for the truth.
+        """
+        if expected - now <= JUMP:
+            self._behind_since = None
+            return False
+        if self._behind_since is None:
+            self._behind_since = elapsed
+        if elapsed - self._behind_since < FOLLOWED_AFTER.total_seconds():
+            return False
+        self._behind_since = None
+        return True
+
 
 def jump_message(before: datetime, now: datetime) -> str:
     """What is said of a jump."""
     return MESSAGE.format(*(moment.isoformat(timespec="seconds") for moment in (before, now)))
+
+
+def distrust(store: Store) -> str | None:
+    """Why nothing may be deleted by age now, for somebody who looks at the clock once; None where nothing is known."""
+    noted, now = store.believed_clock(), store.clock.now()
+    if noted is not None and now - noted > LONGEST_PAUSE:
+        return jump_message(noted, now)
+    return clock_problem(store)
 
 
 def clock_problem(store: Store) -> str | None:

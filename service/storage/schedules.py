@@ -74,12 +74,16 @@ class OpenRun:
 
 @dataclass(frozen=True, slots=True)
 class BoundStudy:
-    """A study with a window that has not ended. ``held`` tells whether the window is what it waits for."""
+    """A study with a window that has not ended. ``held`` tells whether the window is what it waits for.
+
+    ``window`` is None where the schedule has none any more.
+    """
 
     number: int
     state: StudyState
     held: bool
-    window: Window
+    reason: str | None
+    window: Window | None
 
 
 class Schedules(Part):
@@ -139,10 +143,20 @@ class Schedules(Part):
             return self._runs(connection, number, SHOWN_RUNS)
 
     def change_schedule(self, schedule_id: str, fields: ScheduleFields) -> ScheduleRecord:
-        """Put ``fields`` in the place of those that the schedule has; what was missed before is forgotten."""
+        """Put ``fields`` in the place of those that the schedule has; what was missed before is forgotten.
+
+        A run of which no study came yet is tried no longer where the schedule is disabled.
+        """
         with self.session.write() as connection:
             number = self._schedule_row(connection, schedule_id).number
             connection.execute(sa.update(SCHEDULES).where(_S.number == number).values(self._values(fields)))
+            if not fields.enabled:
+                problem = "The schedule was disabled before a study came of it."
+                connection.execute(
+                    sa.update(SCHEDULE_RUNS)
+                    .where(_R.schedule == number, _R.state == RunState.TAKEN.value)
+                    .values(state=RunState.REFUSED.value, problem=problem)
+                )
             return self._schedule(connection, schedule_id)
 
     def delete_schedule(self, schedule_id: str) -> None:
@@ -237,7 +251,7 @@ class Schedules(Part):
         """Studies that have not ended and are bound to a window."""
         c = STUDIES.c
         query = (
-            sa.select(c.number, c.state, c.waits_for, _S.window_begin, _S.window_end, _S.zone)
+            sa.select(c.number, c.state, c.waits_for, c.reason, _S.window_begin, _S.window_end, _S.zone)
             .join_from(SCHEDULE_RUNS, SCHEDULES)
             .join(STUDIES, c.number == _R.study)
             .where(
@@ -248,20 +262,21 @@ class Schedules(Part):
         with self.session.read() as connection:
             rows = connection.execute(query).all()
         return [
-            BoundStudy(row.number, StudyState(row.state), row.waits_for == WAITS_FOR_WINDOW, window)
+            BoundStudy(row.number, StudyState(row.state), row.waits_for == WAITS_FOR_WINDOW, row.reason, _window(row))
             for row in rows
-            if (window := _window(row)) is not None
         ]
 
     def hold_for_window(self, number: int, reason: str) -> None:
-        """Pause a queued or running study until `let_in`."""
+        """Pause a queued or running study until `let_in`; one that is held by its window has a new reason."""
+        c = STUDIES.c
         with self.session.write() as connection:
-            state = connection.execute(sa.select(STUDIES.c.state).where(STUDIES.c.number == number)).scalar_one()
+            state = connection.execute(sa.select(c.state).where(c.number == number)).scalar_one()
             if StudyState(state) in {StudyState.QUEUED, StudyState.RUNNING}:
                 self._move(connection, number, StudyEvent.FAULT, reason)
-                connection.execute(
-                    sa.update(STUDIES).where(STUDIES.c.number == number).values(waits_for=WAITS_FOR_WINDOW)
-                )
+                connection.execute(sa.update(STUDIES).where(c.number == number).values(waits_for=WAITS_FOR_WINDOW))
+            else:
+                held = (c.number == number) & (c.waits_for == WAITS_FOR_WINDOW)
+                connection.execute(sa.update(STUDIES).where(held).values(reason=reason, revision=c.revision + 1))
 
     def let_in(self, number: int) -> None:
         """Queue a study again that `hold_for_window` paused and nobody has touched since."""

@@ -294,8 +294,11 @@ class Studies(Orders):
             announce(connection)
             return record_of(self._row(connection, study_id, *RECORD_COLUMNS))
 
-    def study_of_key(self, idempotency_key: str, body_hash: str) -> StudyRecord | None:
-        """The study that was submitted with that key; raises IdempotencyConflict when its body was another."""
+    def study_of_key(self, idempotency_key: str, body_hash: str | None) -> StudyRecord | None:
+        """The study that was submitted with that key, with any body where ``body_hash`` is None.
+
+        Raises IdempotencyConflict when its body was another.
+        """
         with self.session.read() as connection:
             return _study_of_key(connection, idempotency_key, body_hash)
 
@@ -357,7 +360,7 @@ def _values(study: Study) -> int:
     return sum(map(len, study.axes))
 
 
-def _study_of_key(connection: sa.Connection, key: str, body_hash: str) -> StudyRecord | None:
+def _study_of_key(connection: sa.Connection, key: str, body_hash: str | None) -> StudyRecord | None:
     row = connection.execute(
         sa.select(IDEMPOTENCY_KEYS.c.body_hash, *RECORD_COLUMNS)
         .join_from(IDEMPOTENCY_KEYS, STUDIES)
@@ -365,7 +368,7 @@ def _study_of_key(connection: sa.Connection, key: str, body_hash: str) -> StudyR
     ).one_or_none()
     if row is None:
         return None
-    if row.body_hash != body_hash:
+    if body_hash is not None and row.body_hash != body_hash:
         raise IdempotencyConflict(f"the idempotency key {key!r} was already used with another body or other parameters")
     return record_of(row)
 

@@ -48,7 +48,7 @@ def test_a_backup_is_written_every_night_and_some_are_kept(store: Store, clock: 
     folder = tmp_path / "safe" / "backups"
     study = accept(store, parse_spec(SPEC))
     maintenance = Maintenance(store, MaintenancePlan(folder, keep=2, time="02:30", zone="Europe/Berlin"))
-    maintenance.begin()
+    maintenance.look()
     assert made(folder) == ["01 00:00"]  # there was none
     (folder / "of somebody else.sqlite3").write_text("stays")
     for hour in range(1, 3 * 24):
@@ -67,12 +67,12 @@ def test_a_missed_backup_is_made_up_for_and_a_fresh_one_is_enough(
 ) -> None:
     plan = MaintenancePlan(tmp_path / "b", time="02:30")
     clock.seconds = 3 * 3600.0
-    Maintenance(store, plan).begin()
+    Maintenance(store, plan).look()
     clock.seconds = 5 * 3600.0
-    Maintenance(store, plan).begin()  # the service was started again
+    Maintenance(store, plan).look()  # the service was started again
     assert made(tmp_path / "b") == ["01 03:00"]
     clock.seconds = DAY + 9 * 3600.0
-    Maintenance(store, plan).begin()
+    Maintenance(store, plan).look()
     assert made(tmp_path / "b") == ["01 03:00", "02 09:00"]
 
 
@@ -82,7 +82,7 @@ def test_a_backup_that_fails_is_said_and_tried_again(
     folder = tmp_path / "b"
     folder.write_text("a file where the folder is to be")
     maintenance = Maintenance(store, MaintenancePlan(folder))
-    maintenance.begin()
+    maintenance.look()
     maintenance.look()
     assert len([text for text in caplog.messages if "failed and is tried again" in text]) == 1
     folder.unlink()
@@ -91,12 +91,44 @@ def test_a_backup_that_fails_is_said_and_tried_again(
     assert len(made(folder)) == 1
 
 
+def test_what_else_lies_in_the_folder_and_cannot_be_removed_multiplies_no_backups(
+    store: Store, clock: HandClock, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "sprag-20250101T000000Z.sqlite3").mkdir()
+    (tmp_path / "sprag-20251399T000000Z.sqlite3").touch()  # no such date
+    maintenance = Maintenance(store, MaintenancePlan(tmp_path, keep=1))
+    for minute in range(0, 60, 11):
+        clock.seconds = minute * 60.0
+        maintenance.look()
+    assert made(tmp_path) == ["01 00:00", "01 00:00"]
+    assert "The nightly backup failed and is tried again in 10 minutes: [Errno 21] Is a directory" in caplog.text
+
+
+def test_a_fault_of_one_task_leaves_the_others_and_the_nights_to_come(
+    store: Store, clock: HandClock, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = accept(store, parse_spec(SPEC))
+    store.cancel_study(study.id)
+    store.settle(store.take_over("test"), study.number)
+    maintenance = Maintenance(store, MaintenancePlan(tmp_path, study_days=30))
+    maintenance.look()
+    clock.seconds = 31 * DAY
+    with monkeypatch.context() as patch:
+        patch.setattr(store, "backup", lambda _: 1 / 0)
+        maintenance.look()
+    with pytest.raises(StudyNotFound):
+        store.get_study(study.id)
+    clock.seconds += 601.0
+    maintenance.look()
+    assert made(tmp_path) == ["01 00:00", "01 00:10"]
+
+
 def test_parts_of_killed_backups_are_removed(store: Store, tmp_path: Path) -> None:
     left, other = tmp_path / ".sprag-20250101T000000Z.sqlite3.1f.part", tmp_path / ".else.part"
     for path in (left, other):
         path.touch()
         os.utime(path, (0, 0))
-    Maintenance(store, MaintenancePlan(tmp_path)).begin()
+    Maintenance(store, MaintenancePlan(tmp_path)).look()
     assert (left.exists(), other.exists()) == (False, True)
 
 
@@ -106,7 +138,7 @@ def test_studies_that_ended_long_ago_are_deleted_and_no_others(store: Store, clo
     store.cancel_study(old.id)
     store.settle(epoch, old.number)
     maintenance = Maintenance(store, MaintenancePlan(study_days=30))
-    maintenance.begin()
+    maintenance.look()
     clock.seconds = 20 * DAY
     store.cancel_study(young.id)
     store.settle(epoch, young.number)

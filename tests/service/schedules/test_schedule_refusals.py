@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
 from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.schedules.fields import ScheduleFields, read_fields
+from sprag.service.schedules.fields import ScheduleFields, change_fields, read_fields
 from sprag.service.settings import Settings
+from sprag.service.storage.errors import StoreError
 from sprag.service.storage.schedules import RunState
 from sprag.service.storage.store import Store
 from sprag.worker.dispatcher import Dispatcher
@@ -93,6 +95,81 @@ def test_what_was_refused_for_a_reason_that_passes_is_tried_again(
     assert study.finish_by == datetime(2026, 1, 2, 6, tzinfo=UTC)
     (run,) = store.schedule_runs(kept.id)
     assert (run.state, run.problem) == (RunState.SUBMITTED, None)
+
+
+def put_off(store: Store, clock: Clock, monkeypatch: pytest.MonkeyPatch, **given: Any) -> str:
+    """The id of a schedule that was due at 22:00 and was refused for a reason that passes at once."""
+    kept = store.create_schedule(fields(**given))
+    clock.set("2026-01-01T22:00")
+    with monkeypatch.context() as patch:
+        patch.setattr("sprag.service.jobs.submission.MAX_WAITING_STUDIES", 0)
+        Scheduler(store).look()
+    return kept.id
+
+
+@pytest.mark.parametrize(
+    ("given", "studies"),
+    [
+        ({"at": "2026-01-01T22:00"}, 0),
+        ({"at": "2026-01-01T22:00", "finish_by": "06:00"}, 0),
+        ({"cron": "0 22 * * *"}, 1),  # that of the day before, which was missed
+    ],
+)
+def test_a_worker_that_starts_after_the_grace_submits_it_no_more(
+    store: Store, clock: Clock, monkeypatch: pytest.MonkeyPatch, given: dict[str, Any], studies: int
+) -> None:
+    kept = put_off(store, clock, monkeypatch, **given)
+    clock.set("2026-01-04T09:00")
+    Scheduler(store).look()
+    assert len(store.list_studies().studies) == studies
+    run = store.schedule_runs(kept)[-1]
+    assert (run.state, run.problem) == (RunState.REFUSED, "0 studies have not ended yet.")
+
+
+def test_a_disabled_schedule_is_tried_no_more(store: Store, clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+    kept = put_off(store, clock, monkeypatch, cron="0 22 * * *")
+    changed = change_fields(store.get_schedule(kept).fields, {"enabled": False}, clock.now())
+    store.change_schedule(kept, changed)
+    Scheduler(store).look()
+    assert store.list_studies().studies == ()
+    (run,) = store.schedule_runs(kept)
+    assert (run.state, run.problem) == (RunState.REFUSED, "The schedule was disabled before a study came of it.")
+
+
+def test_a_schedule_that_changed_after_its_study_was_submitted_finds_it(
+    store: Store, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = store.create_schedule(fields(at="2026-01-01T22:00"))
+    clock.set("2026-01-01T22:00")
+    with monkeypatch.context() as patch:
+        patch.setattr(store, "close_run", Mock(side_effect=StoreError("the worker dies here")))
+        with pytest.raises(StoreError):
+            Scheduler(store).look()
+    (study,) = store.list_studies().studies
+    changed = change_fields(store.get_schedule(kept.id).fields, {"spec": {**SPEC, "name": "other"}}, clock.now())
+    store.change_schedule(kept.id, changed)
+    Scheduler(store).look()
+    (run,) = store.schedule_runs(kept.id)
+    assert (run.state, run.study) == (RunState.SUBMITTED, study.id)
+
+
+def test_a_held_study_follows_the_window_of_its_schedule(store: Store, clock: Clock) -> None:
+    look = Scheduler(store).look
+    kept = store.create_schedule(fields(at="2026-01-01T12:00", window=["22:00", "06:00"]))
+    clock.set("2026-01-01T12:00")
+    look()
+    look()
+    (study,) = store.list_studies().studies
+    assert study.reason == "outside its window, 22:00 to 06:00 (UTC); it goes on by itself"
+    for window, reason in (
+        (["20:00", "06:00"], "outside its window, 20:00 to 06:00 (UTC); it goes on by itself"),
+        (None, None),
+    ):
+        changed = change_fields(store.get_schedule(kept.id).fields, {"window": window}, clock.now())
+        store.change_schedule(kept.id, changed)
+        look()
+        assert store.get_study(study.id).reason == reason
+    assert store.get_study(study.id).state is StudyState.QUEUED
 
 
 @pytest.mark.parametrize(

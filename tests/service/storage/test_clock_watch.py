@@ -9,6 +9,8 @@ from pathlib import Path
 import httpx
 import pytest
 
+from sprag.service.cli.app import execute
+from sprag.service.cli.console import ExitCode
 from sprag.service.http.app import create_app
 from sprag.service.jobs.maintenance import Maintenance, MaintenancePlan, backups
 from sprag.service.jobs.scheduler import Scheduler
@@ -64,13 +66,12 @@ def test_a_jump_deletes_nothing_and_is_told_and_survives_a_restart(
     http = connect(create_app(settings, store=store, checker=InThread()))
     study, plan = ended(store), MaintenancePlan(tmp_path / "b", keep=1, study_days=30)
     maintenance = Maintenance(store, plan)
-    maintenance.begin()
+    maintenance.look()
     clock.seconds = DAY / 2
     maintenance.look()
     clock.ahead = timedelta(days=3650)
     clock.seconds += 20.0
     for looker in (maintenance, Maintenance(store, plan)):  # as it runs on, and when it is started again
-        looker.begin()
         looker.look()
         clock.seconds += DAY
         looker.look()
@@ -111,13 +112,40 @@ def test_a_pause_of_weeks_and_a_clock_that_is_put_back_are_no_jump(store: Store,
     assert watch.believable()
 
 
+def test_a_first_start_under_a_wrong_clock_does_not_cover_its_next_jump(store: Store, clock: Wrong) -> None:
+    clock.ahead = timedelta(days=3650)
+    assert ClockWatch(store).believable(), "nothing is known to compare it with"
+    clock.ahead = timedelta()
+    watch = ClockWatch(store)
+    for clock.seconds in (0.0, 1800.0, 3700.0):
+        assert watch.believable()
+    clock.ahead = timedelta(days=3650)
+    assert not watch.believable()
+    assert not ClockWatch(store).believable()
+
+
+def test_the_command_deletes_nothing_on_the_word_of_a_clock_that_jumped(
+    settings: Settings, store: Store, clock: Wrong, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = ended(store)
+    store.note_clock(clock.now())  # in January 2026: the clock of the command is months ahead
+    command = ["db", "prune", "--older-than", "1", "--db", settings.database]
+    assert execute(command) == ExitCode.TROUBLE
+    assert "nothing is deleted by age until it is set right" in capsys.readouterr().err
+    assert store.get_study(study).id == study
+    assert execute(["db", "clock", "--db", settings.database]) == 0
+    assert execute(command) == 0
+    with pytest.raises(StudyNotFound):
+        store.get_study(study)
+
+
 def test_what_was_missed_is_deleted_at_the_start_and_while_backups_fail(
     store: Store, clock: Wrong, tmp_path: Path
 ) -> None:
     study, folder = ended(store), tmp_path / "b"
     folder.write_text("a file where the folder is to be")
     clock.seconds = 31.4 * DAY  # the machine is off at 02:30, always
-    Maintenance(store, MaintenancePlan(folder, study_days=30)).begin()
+    Maintenance(store, MaintenancePlan(folder, study_days=30)).look()
     with pytest.raises(StudyNotFound):
         store.get_study(study)
 
