@@ -8,6 +8,9 @@ DEV := $(VENV)/.sprag-dev
 SOURCES := pyproject.toml constraints.txt
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input --quiet --quiet
 
+# The tests start many processes: compiling all modules anew in each would be a third of their time.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help demo test check serve clean
 
 help:

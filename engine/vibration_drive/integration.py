@@ -84,6 +84,6 @@ def integrate(
         np.zeros(MAX_DEGREE + 1), work_stack(),
         blocks_for(listed, lay.order), np.zeros((listed, 3), dtype=np.int64),
         np.zeros((lay.lanes, int(np.max(end, initial=0.0)) + 3)), sums, asked, samples, states,
-        since, steps,
+        float(since), steps,
     )  # fmt: skip
     return Integration(sums, recorded, samples, states, done, steps)

@@ -6,10 +6,12 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import cache
 from importlib.metadata import version
 from typing import Any
 
 from fastapi import APIRouter, FastAPI
+from fastapi.routing import APIRoute
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp
 
@@ -166,7 +168,7 @@ def create_app(
         redoc_url=None,
         redirect_slashes=False,
         lifespan=lifespan,
-        generate_unique_id_function=lambda route: route.name,
+        generate_unique_id_function=_operation_id,
     )
     app.state.access = access
     app.state.metrics = metrics
@@ -181,11 +183,20 @@ def create_app(
     )
     if checker is not None:
         context.ready.set()
+    app.router.routes.extend(_routes().routes)
+    handlers.install(app)
+    return app
+
+
+@cache
+def _routes() -> APIRouter:
+    """All routes, which know no application: what they take is worked out once in a process, by the first request."""
+    routes = APIRouter(generate_unique_id_function=_operation_id)
     api = APIRouter(prefix=API_PREFIX)
     for module in (studies, events, curves, sensitivity, cases, engagements, clutch_fits, schedules, catalogues):
         api.include_router(module.router)
-    app.include_router(api)
-    app.include_router(health.router)
+    routes.include_router(api)
+    routes.include_router(health.router)
     for page in (
         pages,
         form,
@@ -199,9 +210,12 @@ def create_app(
         schedule_pages,
         login,
     ):
-        app.include_router(page.router)
-    handlers.install(app)
-    return app
+        routes.include_router(page.router)
+    return routes
+
+
+def _operation_id(route: APIRoute) -> str:
+    return route.name
 
 
 async def _make_ready(checker: ProcessComputer, context: Context) -> None:

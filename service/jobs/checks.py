@@ -13,6 +13,7 @@ from sprag.service.jobs.submission import Submission, hash_of, submission
 from sprag.service.json_text import to_bytes
 from sprag.service.results.fits import fit_json, read_fit
 from sprag.service.schedules.fields import ScheduleFields, change_fields, read_fields
+from sprag.service.spec import units
 from sprag.service.spec.document import load_spec, parse_spec
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.longer import longer_spec
@@ -30,11 +31,12 @@ if TYPE_CHECKING:
 
 
 def prepare() -> None:
-    """First thing in a process that checks: this module is loaded, and what is not compiled is left to others.
+    """First thing in a process that checks: this module and units are loaded, what is not compiled is left to others.
 
     matplotlib and the machine shaft's kernels are loaded for the first who needs them, in time that does not count
     against his limit: a process that takes the place of one that was ended is there sooner without them.
     """
+    units.load()
     compile_elsewhere()
 
 

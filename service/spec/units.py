@@ -16,11 +16,12 @@ import re
 from collections import Counter
 from fractions import Fraction
 from functools import lru_cache
-from typing import Final
-
-import pint
+from typing import TYPE_CHECKING, Final
 
 from sprag.worker.limits import MAX_QUANTITY_LENGTH
+
+if TYPE_CHECKING:
+    import pint
 
 #: Words that mean the period of the excitation, for times of a run.
 PERIOD_NAMES: Final = frozenset({"period", "periods", "cycle", "cycles"})
@@ -180,8 +181,15 @@ def to_float(number: Fraction) -> float:
     return value
 
 
+def load() -> None:
+    """Load pint now, which takes half a second; otherwise the first quantity with a unit does."""
+    _registry()
+
+
 @lru_cache(maxsize=1)
 def _registry() -> pint.UnitRegistry[Fraction]:
+    import pint
+
     registry: pint.UnitRegistry[Fraction] = pint.UnitRegistry(None, non_int_type=Fraction, cache_folder=None)
     for line in _DEFINITIONS:
         registry.define(line)
@@ -288,6 +296,8 @@ def _operand(tokens: list[str], text: str) -> tuple[Fraction, Counter[str]]:
 @lru_cache(maxsize=1024)
 def _named(name: str) -> tuple[Fraction, tuple[tuple[str, int], ...]]:
     """Factor and powers of the root units of one unit's name, from pint."""
+    import pint
+
     registry = _registry()
     try:
         factor, root = registry.get_root_units(registry.parse_units(name))
