@@ -75,6 +75,25 @@ def examples() -> Path:
 
 
 @pytest.fixture(scope="session")
+def empty_database(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """A database without studies, made once."""
+    from sprag.service.storage.store import Store
+
+    path = tmp_path_factory.mktemp("empty") / "sprag.sqlite3"
+    with Store.open(f"sqlite:///{path}") as store:
+        store.backup(path.with_suffix(".copy"))
+    return path.with_suffix(".copy").read_bytes()
+
+
+@pytest.fixture
+def sqlite_url(tmp_path: Path, empty_database: bytes) -> str:
+    """URL of a database of this test with the tables and nothing in them; ``sprag.sqlite3`` in its folder."""
+    file = tmp_path / "sprag.sqlite3"
+    file.write_bytes(empty_database)
+    return f"sqlite:///{file}"
+
+
+@pytest.fixture(scope="session")
 def postgres_server() -> Iterator[postgres.Server]:
     """A PostgreSQL server that tests leave running; skipped where there is none, and a failure in the gate."""
     with postgres.running() as server:

@@ -29,14 +29,17 @@ ROOT = Path(__file__).resolve().parents[2]
 COMMAND = (sys.executable, "-m", "sprag.service.cli")
 #: Generous: the machine may be busy.
 PATIENCE = 600.0
-_LOOK = 0.005
+_LOOK = 0.02
 _ORPHANED = "EOFError: Ran out of input"
 
 
 def environment(**more: str) -> dict[str, str]:
-    """The environment without the user's settings of the program, except where compiled kernels lie."""
+    """The environment without the user's settings of the program, except where compiled kernels lie.
+
+    One process checks specs: each loads the engine when a service starts, and drills start many services.
+    """
     kept = {k: v for k, v in os.environ.items() if not k.startswith("SPRAG_") or k == "SPRAG_KERNEL_CACHE"}
-    return {**kept, "PYTHONPATH": str(ROOT), **more}
+    return {**kept, "PYTHONPATH": str(ROOT), "SPRAG_CHECK_PROCESSES": "1", **more}
 
 
 def until(condition: Callable[[], object], what: str, patience: float = PATIENCE) -> None:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[2]
+from benchmarks.faults.harness import COMMAND, ROOT, environment
+
+__all__ = ["COMMAND", "EXAMPLES", "ROOT", "SECONDS", "Ended", "Service", "environment", "service", "sprag"]
+
 EXAMPLES = ROOT / "examples"
-COMMAND = [sys.executable, "-m", "sprag.service.cli"]
 #: Generous: the machine may be busy with other tests.
 SECONDS = 240
 
@@ -32,15 +32,6 @@ class Ended:
     def data(self) -> Any:
         """Standard output as JSON."""
         return json.loads(self.out)
-
-
-def environment(**more: str) -> dict[str, str]:
-    """The environment without the user's settings of the program, except where compiled kernels lie.
-
-    One process checks specs: each loads the engine when a service starts, and tests start many services.
-    """
-    kept = {k: v for k, v in os.environ.items() if not k.startswith("SPRAG_") or k == "SPRAG_KERNEL_CACHE"}
-    return {**kept, "PYTHONPATH": str(ROOT), "SPRAG_CHECK_PROCESSES": "1", **more}
 
 
 def sprag(*arguments: object, cwd: Path | None = None, stdin: bytes | None = None, **more: str) -> Ended:

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import httpx
 import pytest
 
-from tests.acceptance.processes import EXAMPLES, Service, service, sprag
+from tests.acceptance.processes import EXAMPLES, Service
+from tests.conftest import Finished
 from tests.wrong_specs import BASE, WRONG, changed
 
 JSON = {"Content-Type": "application/json"}
-
-
-@pytest.fixture(scope="module")
-def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
-    with service(tmp_path_factory.mktemp("served"), "--processes", 1) as started:
-        yield started
 
 
 @pytest.mark.parametrize("address", ["studies", "studies:preview"])
@@ -34,13 +29,15 @@ def test_wrong_specs_are_problem_documents(running: Service, name: str, address:
 
 
 @pytest.mark.parametrize("name", [name for name, (text, _) in WRONG.items() if text.startswith("{")])
-def test_wrong_specs_through_submit(running: Service, tmp_path: Path, name: str) -> None:
+def test_wrong_specs_through_submit(
+    running: Service, tmp_path: Path, name: str, sprag: Callable[..., Finished]
+) -> None:
     text, named = WRONG[name]
     path = tmp_path / "spec.json"
     path.write_text(text)
     done = sprag("submit", path, "--server", running.address)
     assert done.code == 2
-    assert done.out == b""
+    assert done.out == ""
     assert named in done.err
 
 
@@ -57,7 +54,7 @@ def test_the_base_of_these_specs_is_itself_right(running: Service) -> None:
     assert answer.json()["cases"] == 2
 
 
-def test_wrong_questions_through_the_commands(running: Service, tmp_path: Path) -> None:
+def test_wrong_questions_through_the_commands(running: Service, tmp_path: Path, sprag: Callable[..., Finished]) -> None:
     at = ("--server", running.address)
     study = sprag("submit", EXAMPLES / "measured_clutch.json", "--wait", "--json", *at).data["id"]
     wrong = [
@@ -75,7 +72,7 @@ def test_wrong_questions_through_the_commands(running: Service, tmp_path: Path) 
     for arguments, named in wrong:
         done = sprag(*arguments, *at)
         assert done.code == 2, (arguments, done)
-        assert done.out == b""
+        assert done.out == ""
         assert named in done.err, (arguments, done.err)
         machine = sprag(*arguments, *at, "--json")
         assert json.loads(machine.err)["exit_code"] == 2

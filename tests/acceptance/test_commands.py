@@ -1,22 +1,23 @@
-"""Commands as processes of their own: a service followed and stopped, pipes, signals, the demonstration."""
+"""Commands and a real service: followed and stopped; pipes and signals, where a command is a process of its own."""
 
 from __future__ import annotations
 
 import json
 import os
-import re
 import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
-import httpx
 import pytest
 
-from tests.acceptance.processes import COMMAND, EXAMPLES, SECONDS, Service, environment, service, sprag
+from tests.acceptance import processes
+from tests.acceptance.processes import COMMAND, EXAMPLES, SECONDS, Service, environment, service
 from tests.conftest import Finished
+
+Sprag = Callable[..., Finished]
 
 SPEC = EXAMPLES / "one_pendulum.json"
 SMALL = EXAMPLES / "measured_clutch.json"
@@ -29,31 +30,25 @@ INTERRUPTIBLE = [
 ]
 
 
-@pytest.fixture(scope="module")
-def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
-    with service(tmp_path_factory.mktemp("served"), "--processes", 1) as started:
-        yield started
-
-
-def test_a_study_from_submission_to_picture(running: Service, tmp_path: Path) -> None:
+def test_a_study_from_submission_to_picture(running: Service, tmp_path: Path, sprag: Sprag) -> None:
     at = ("--server", running.address)
     submitted = sprag("submit", SMALL, *at)
     assert submitted.code == 0
-    study = submitted.out.decode().strip()
+    study = submitted.out.strip()
     watched = sprag("watch", study, *at)
     assert watched.code == 0
     assert "17 of 17 cases done, 17 ok" in watched.err
-    assert watched.out.decode().strip() == study
+    assert watched.out.strip() == study
     assert study in [item["id"] for item in sprag("list", "--json", *at).data["studies"]]
-    assert study in sprag("list", "--state", "finished", *at).out.decode()
-    assert study not in sprag("list", "--state", "running", *at).out.decode()
+    assert study in sprag("list", "--state", "finished", *at).out
+    assert study not in sprag("list", "--state", "running", *at).out
 
     picture = tmp_path / "curve.svg"
     curve = ("curve", study, "--x", "shaft.load", "--y", "shaft.speed.mean", "--y", "efficiency", *at)
     shown = sprag(*curve, "-o", picture)
     assert shown.code == 0
-    assert "shaft.speed.mean [rad/s]" in shown.out.decode()
-    assert len([line for line in shown.out.decode().splitlines() if line.strip()[:1].isdigit()]) == 17
+    assert "shaft.speed.mean [rad/s]" in shown.out
+    assert len([line for line in shown.out.splitlines() if line.strip()[:1].isdigit()]) == 17
     assert "<svg" in picture.read_text()
     data = sprag(*curve, "--json").data
     assert data["x"]["values"][0] == 0.0
@@ -62,13 +57,11 @@ def test_a_study_from_submission_to_picture(running: Service, tmp_path: Path) ->
     for name in ("rows.csv", "rows.json"):
         file = tmp_path / name
         assert sprag("export", study, "-o", file, *at).code == 0
-        assert sprag("export", study, "--format", name[5:], *at).out == file.read_bytes()
+        assert sprag("export", study, "--format", name[5:], *at).out.encode() == file.read_bytes()
     assert json.loads((tmp_path / "rows.json").read_text())["rows"][3]["case"] == 3
 
 
-def test_points_of_a_file_are_run_here_and_by_the_service(
-    running: Service, tmp_path: Path, sprag: Callable[..., Finished]
-) -> None:
+def test_points_of_a_file_are_run_here_and_by_the_service(running: Service, tmp_path: Path, sprag: Sprag) -> None:
     at = ("--server", running.address)
     points = tmp_path / "points.csv"
     points.write_text("shaft.load;excitation.frequency [rpm]\n250 N*mm;1500\n0;1560\n")
@@ -85,14 +78,14 @@ def test_points_of_a_file_are_run_here_and_by_the_service(
     assert f"{points}: line 3, column shaft.load: is out of range (got '-1'; allowed: >= 0 N*m" in refused.err
 
 
-def test_the_same_key_submits_once(running: Service) -> None:
+def test_the_same_key_submits_once(running: Service, sprag: Sprag) -> None:
     arguments = ("submit", SMALL, "--key", "once", "--json", "--server", running.address)
     assert sprag(*arguments).data["id"] == sprag(*arguments).data["id"]
     other = sprag("submit", EXAMPLES / "two_pendulums.toml", "--key", "once", "--server", running.address)
     assert other.code == 2
 
 
-def test_a_study_is_held_and_cancelled(running: Service, tmp_path: Path) -> None:
+def test_a_study_is_held_and_cancelled(running: Service, tmp_path: Path, sprag: Sprag) -> None:
     at = ("--server", running.address, "--json")
     spec = json.loads(SPEC.read_text())
     spec["run"] = {"duration": "20000 periods", "window": ["40 periods", "60 periods"]}
@@ -107,12 +100,12 @@ def test_a_study_is_held_and_cancelled(running: Service, tmp_path: Path) -> None
     assert watched.data["state"] == "cancelled"
 
 
-def test_nobody_at_the_address_is_said_in_one_sentence() -> None:
+def test_nobody_at_the_address_is_said_in_one_sentence(sprag: Sprag) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))  # bound but not listening: nobody answers, and nobody else can begin to
         address = f"http://127.0.0.1:{taken.getsockname()[1]}"
         for arguments in (("list",), ("watch", "st_1"), ("submit", SMALL)):
-            done = sprag(*arguments, SPRAG_SERVER=address)
+            done = sprag(*arguments, "--server", address)
             assert done.code == 3
             assert done.err.count("\n") == 1
             assert address in done.err
@@ -120,22 +113,11 @@ def test_nobody_at_the_address_is_said_in_one_sentence() -> None:
 
 
 @pytest.mark.parametrize("address", ["nonsense", "ftp://127.0.0.1", "http://", "http://[", "http://127.0.0.1:99999999"])
-def test_no_address(address: str) -> None:
+def test_no_address(address: str, sprag: Sprag) -> None:
     assert sprag("list", "--server", address).code in (2, 3)
 
 
-def test_a_token_is_asked_for_and_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    token = sprag("token").out.decode().strip()
-    folder = tmp_path / "served"
-    folder.mkdir()
-    with service(folder, "--processes", 1, SPRAG_TOKEN=token) as running:
-        refused = sprag("list", "--server", running.address)
-        assert refused.code == 3
-        assert "token" in refused.err.lower()
-        assert sprag("list", "--server", running.address, SPRAG_TOKEN=token).code == 0
-
-
-def test_a_service_that_others_could_reach_needs_a_token(tmp_path: Path) -> None:
+def test_a_service_that_others_could_reach_needs_a_token(tmp_path: Path, sprag: Sprag) -> None:
     done = sprag("serve", "--host", "0.0.0.0", "--port", "0", "--db", tmp_path / "x.sqlite3")
     assert done.code == 2
     assert "SPRAG_TOKEN" in done.err
@@ -143,19 +125,21 @@ def test_a_service_that_others_could_reach_needs_a_token(tmp_path: Path) -> None
 
 def test_a_port_that_is_taken(running: Service, tmp_path: Path) -> None:
     port = running.address.rpartition(":")[2]
-    done = sprag("serve", "--port", port, "--db", tmp_path / "x.sqlite3")
+    done = processes.sprag("serve", "--port", port, "--db", tmp_path / "x.sqlite3")
     assert done.code == 3
     assert port in done.err
 
 
-def test_wrong_settings_are_told_together(tmp_path: Path) -> None:
-    done = sprag("serve", SPRAG_PORT="x", SPRAG_PROCESSES="-1")
+def test_wrong_settings_are_told_together(sprag: Sprag, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SPRAG_PORT", "x")
+    monkeypatch.setenv("SPRAG_PROCESSES", "-1")
+    done = sprag("serve")
     assert done.code == 2
     assert "SPRAG_PORT" in done.err
     assert "SPRAG_PROCESSES" in done.err
 
 
-def test_a_database_that_is_none(tmp_path: Path) -> None:
+def test_a_database_that_is_none(tmp_path: Path, sprag: Sprag) -> None:
     file = tmp_path / "notes.txt"
     file.write_text("not a database, but long enough to be looked at as one" * 100)
     for arguments in (("run", SMALL, "--db", file), ("db", "upgrade", "--db", file), ("db", "check", "--db", file)):
@@ -165,7 +149,9 @@ def test_a_database_that_is_none(tmp_path: Path) -> None:
     assert sprag("run", SMALL, "--db", "postgresql://localhost/x").code == 3
 
 
-def test_a_run_kept_in_a_database_is_found_there(tmp_path: Path) -> None:
+def test_a_run_kept_in_a_database_is_found_there_by_whoever_has_the_token(
+    tmp_path: Path, sprag: Sprag, monkeypatch: pytest.MonkeyPatch
+) -> None:
     database = tmp_path / "study.sqlite3"
     done = sprag("run", SMALL, "--db", database, "--json")
     assert done.code == 0
@@ -176,15 +162,17 @@ def test_a_run_kept_in_a_database_is_found_there(tmp_path: Path) -> None:
     assert sprag("db", "upgrade", "--db", copy, "--json").data["before"] is not None
     (folder := tmp_path / "served").mkdir()
     copy.rename(folder / "sprag.sqlite3")
-    with service(folder, "--processes", 1) as running:
-        study = done.data["study"]
-        rows = httpx.get(
-            f"{running.address}/api/v1/studies/{study}/results", params={"format": "json"}, timeout=60
-        ).json()["rows"]
-    assert rows == done.data["rows"]
+    token = sprag("token").out.strip()
+    with service(folder, "--processes", 1, SPRAG_TOKEN=token) as running:
+        refused = sprag("list", "--server", running.address)
+        assert refused.code == 3
+        assert "token" in refused.err.lower()
+        monkeypatch.setenv("SPRAG_TOKEN", token)
+        rows = sprag("export", done.data["study"], "--json", "--server", running.address)
+    assert rows.data["rows"] == done.data["rows"]
 
 
-def test_a_worker_alone_runs_what_a_service_was_given(tmp_path: Path) -> None:
+def test_a_worker_alone_runs_what_a_service_was_given(tmp_path: Path, sprag: Sprag) -> None:
     database = tmp_path / "study.sqlite3"
     assert sprag("db", "upgrade", "--db", database).code == 0
     worker = subprocess.Popen(
@@ -201,9 +189,11 @@ def test_a_worker_alone_runs_what_a_service_was_given(tmp_path: Path) -> None:
     assert len(done.data["rows"]) == 17
 
 
-def test_a_reader_that_goes_away_is_no_failure_to_talk_about() -> None:
+def test_a_reader_that_goes_away_is_no_failure_to_talk_about(tmp_path: Path) -> None:
+    short = tmp_path / "short.json"  # but with more rows than a pipe holds
+    short.write_text(json.dumps(json.loads(SPEC.read_text()) | {"run": {"duration": "12 periods"}}))
     with subprocess.Popen(
-        [*COMMAND, "run", str(SPEC)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment()
+        [*COMMAND, "run", str(short)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment()
     ) as process:
         assert process.stdout is not None
         assert process.stderr is not None
@@ -247,23 +237,22 @@ def test_a_full_disk_is_storage_trouble() -> None:
         )
     assert done.returncode == 3
     assert b"no space left" in done.stderr
-    assert sprag("run", SMALL, "-o", "/dev/full").code == 3
+    assert processes.sprag("run", SMALL, "-o", "/dev/full").code == 3
 
 
 def test_specs_and_data_come_through_standard_input() -> None:
-    assert sprag("validate", "-", stdin=SPEC.read_bytes()).code == 0
-    assert sprag("validate", "-", stdin=(EXAMPLES / "two_pendulums.toml").read_bytes()).code == 0
-    fitted = sprag("fit", "-", "--accuracy", "0.05", "--json", stdin=(EXAMPLES / "clutch_measured.csv").read_bytes())
+    assert processes.sprag("validate", "-", stdin=(EXAMPLES / "two_pendulums.toml").read_bytes()).code == 0
+    measured = (EXAMPLES / "clutch_measured.csv").read_bytes()
+    fitted = processes.sprag("fit", "-", "--accuracy", "0.05", "--json", stdin=measured)
     assert fitted.data["degree"] == 3
 
 
 def test_output_for_a_terminal_of_another_character_set() -> None:
-    done = sprag("validate", SPEC, PYTHONIOENCODING="ascii")
-    assert done.code == 0
-    assert sprag("--help", PYTHONIOENCODING="ascii").code == 0
+    assert processes.sprag("validate", SPEC, PYTHONIOENCODING="ascii").code == 0
+    assert processes.sprag("--help", PYTHONIOENCODING="ascii").code == 0
 
 
-def test_doctor_finds_the_installation_sound(tmp_path: Path) -> None:
+def test_doctor_finds_the_installation_sound(tmp_path: Path, sprag: Sprag) -> None:
     done = sprag("doctor", "--json", "--db", tmp_path / "x.sqlite3")
     assert done.code == 0, done.data
     assert done.data["sound"] is True
@@ -272,33 +261,18 @@ def test_doctor_finds_the_installation_sound(tmp_path: Path) -> None:
     }
 
 
-def test_doctor_names_files_that_others_may_read(tmp_path: Path) -> None:
+def test_doctor_names_files_that_others_may_read(tmp_path: Path, sprag: Sprag) -> None:
     file = tmp_path / "x.sqlite3"
     assert sprag("db", "upgrade", "--db", file).code == 0
     file.chmod(0o640)
     done = sprag("doctor", "--db", file)
     assert done.code == 3
-    assert f"others may read {file}: `chmod 600`" in done.out.decode()
+    assert f"others may read {file}: `chmod 600`" in done.out
 
 
-def test_doctor_finds_a_database_of_another_program(tmp_path: Path) -> None:
+def test_doctor_finds_a_database_of_another_program(tmp_path: Path, sprag: Sprag) -> None:
     file = tmp_path / "x.sqlite3"
     file.write_text("no database at all" * 1000)
     done = sprag("doctor", "--db", file)
     assert done.code == 3
-    assert "WRONG" in done.out.decode()
-
-
-def test_the_demonstration(tmp_path: Path) -> None:
-    done = sprag("demo", "--exit", cwd=tmp_path)
-    assert done.code == 0, done.err
-    text = done.out.decode()
-    assert "Mechanical characteristic at excitation.frequency 25 Hz" in text
-    assert "mean speed" in text
-    assert max(map(len, text.splitlines())) <= 80
-    assert "512 cases" in done.err
-    assert (tmp_path / "demo" / "curve.png").read_bytes().startswith(b"\x89PNG")
-    address = re.search(r"http://127\.0\.0\.1:\d+", done.err)
-    assert address is not None
-    with pytest.raises(httpx.ConnectError):
-        httpx.get(address[0], timeout=60)
+    assert "WRONG" in done.out

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import signal
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import httpx
@@ -16,7 +18,7 @@ from benchmarks.faults.kills import kills
 from benchmarks.faults.powercut import powercut
 from benchmarks.faults.stopped import stopped
 from sprag.service.storage.session import sqlite_driver
-from tests.acceptance.processes import sprag
+from tests.conftest import Finished
 
 
 def test_killed_processes_lose_nothing(tmp_path: Path) -> None:
@@ -47,7 +49,7 @@ def test_clients_do_not_hear_of_locks(tmp_path: Path) -> None:
     assert figures["read a curve: answers"] > 0
 
 
-def test_the_service_ends_soon_and_hands_running_chunks_back(tmp_path: Path) -> None:
+def test_the_service_ends_soon_with_open_streams_and_hands_running_chunks_back(tmp_path: Path) -> None:
     made = harness.spec(4_000, 2_000.0)
     service = harness.Service(tmp_path, "--processes", 1, "--chunk", 500)
     service.start()
@@ -56,14 +58,16 @@ def test_the_service_ends_soon_and_hands_running_chunks_back(tmp_path: Path) -> 
     harness.until(lambda: harness.asked(service.database, claimed), "chunks are claimed")
     http = httpx.Client(base_url=service.http.base_url, timeout=60, trust_env=False)
     with http, http.stream("GET", f"/studies/{study}/events") as events:
-        assert any(line == "event: progress" for line in events.iter_lines())
-        assert service.stop() < 10.0
+        lines = events.iter_lines()
+        assert any(line == "event: progress" for line in lines)
+        service.stop()
+        assert "event: end" not in list(lines)
     assert harness.asked(service.database, claimed) == 0
     assert harness.asked(service.database, "SELECT count(*) FROM chunks WHERE failures > 0") == 0
     assert harness.asked(service.database, "SELECT state FROM studies") == "running"
 
 
-def test_a_copy_made_during_a_run_goes_on_where_it_was_made(tmp_path: Path) -> None:
+def test_a_copy_made_during_a_run_goes_on_where_it_was_made(tmp_path: Path, sprag: Callable[..., Finished]) -> None:
     made = harness.spec(300, 2_000.0)
     with harness.running(tmp_path, "--processes", 1, "--chunk", 10) as service:
         study = service.submit(made)
@@ -106,6 +110,15 @@ def of_a_newer_version(database: Path) -> None:
     connection.close()
 
 
+@pytest.fixture
+def signals() -> Iterator[None]:
+    """What a worker does on signals ends with the test."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
 @pytest.mark.parametrize("command", ["serve", "worker"])
 @pytest.mark.parametrize(
     ("spoil", "message", "remedy"),
@@ -117,8 +130,9 @@ def of_a_newer_version(database: Path) -> None:
     ],
 )
 def test_a_database_that_cannot_be_trusted_is_refused_at_the_start(
-    tmp_path: Path, command: str, spoil: object, message: str, remedy: str
-) -> None:
+    tmp_path: Path, command: str, spoil: object, message: str, remedy: str,
+    sprag: Callable[..., Finished], signals: None,
+) -> None:  # fmt: skip
     database = tmp_path / "sprag.sqlite3"
     assert sprag("db", "upgrade", "--db", database).code == 0
     spoil(database)  # type: ignore[operator]

@@ -11,7 +11,7 @@ import pytest
 from jupyter_client.manager import AsyncKernelManager
 from nbclient import NotebookClient
 
-from tests.acceptance.processes import EXAMPLES, ROOT, service
+from tests.acceptance.processes import EXAMPLES, ROOT, Service
 
 
 class ThisPython(AsyncKernelManager):
@@ -28,21 +28,20 @@ def outputs(cell: Any) -> str:
     return "".join(parts)
 
 
-def test_the_example_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_example_notebook_runs(running: Service, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     notebook = nbformat.read(EXAMPLES / "feeder_motor.ipynb", as_version=4)
     assert [cell.outputs for cell in notebook.cells if cell.cell_type == "code" and cell.outputs] == []
-    with service(tmp_path, "--processes", 1) as running:
-        monkeypatch.setenv("SPRAG_SERVER", running.address)
-        monkeypatch.setenv("PYTHONPATH", str(ROOT))
-        monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
-        monkeypatch.setenv("JUPYTER_RUNTIME_DIR", str(tmp_path / "runtime"))
-        monkeypatch.delenv("SPRAG_TOKEN", raising=False)
-        NotebookClient(
-            notebook,
-            timeout=240,
-            kernel_manager_class=ThisPython,
-            resources={"metadata": {"path": str(EXAMPLES)}},
-        ).execute()
+    monkeypatch.setenv("SPRAG_SERVER", running.address)
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
+    monkeypatch.setenv("JUPYTER_RUNTIME_DIR", str(tmp_path / "runtime"))
+    monkeypatch.delenv("SPRAG_TOKEN", raising=False)
+    NotebookClient(
+        notebook,
+        timeout=240,
+        kernel_manager_class=ThisPython,
+        resources={"metadata": {"path": str(EXAMPLES)}},
+    ).execute()
     said = [outputs(cell) for cell in notebook.cells if cell.cell_type == "code"]
     assert "'done': 27" in said[1]
     assert "(27, 73)" in said[5]

@@ -1,4 +1,4 @@
-"""Every command of the README's walk, run as it stands there against a real service."""
+"""The demonstration, and every command of the README's walk, run as it stands there against a real service."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.acceptance.processes import EXAMPLES, ROOT, SECONDS, environment, service
+import httpx
+import pytest
+
+from tests.acceptance.processes import EXAMPLES, ROOT, SECONDS, Ended, environment, service, sprag
 
 README = (ROOT / "README.md").read_text()
 PRINTED = "http://127.0.0.1:8000"
@@ -35,13 +38,36 @@ def tools(folder: Path) -> str:
     return f"{binaries}{os.pathsep}{os.environ['PATH']}"
 
 
-def test_every_command_of_the_readme_does_what_it_says(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def demonstration(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended]:
+    """What the demonstration left, and what it said."""
+    folder = tmp_path_factory.mktemp("demonstration")
+    return folder / "demo", sprag("demo", "--exit", cwd=folder)
+
+
+def test_the_demonstration(demonstration: tuple[Path, Ended]) -> None:
+    folder, done = demonstration
+    assert done.code == 0, done.err
+    text = done.out.decode()
+    assert "Mechanical characteristic at excitation.frequency 25 Hz" in text
+    assert "mean speed" in text
+    assert max(map(len, text.splitlines())) <= 80
+    assert "512 cases" in done.err
+    assert (folder / "curve.png").read_bytes().startswith(b"\x89PNG")
+    address = re.search(r"http://127\.0\.0\.1:\d+", done.err)
+    assert address is not None
+    with pytest.raises(httpx.ConnectError):
+        httpx.get(address[0], timeout=60)
+
+
+def test_every_command_of_the_readme_does_what_it_says(tmp_path: Path, demonstration: tuple[Path, Ended]) -> None:
+    """The demonstration has run the example study already, and its rows are taken from its database."""
     shutil.copytree(EXAMPLES, tmp_path / "examples")
     path = tools(tmp_path)
     script = "".join(blocks())
     assert PRINTED in script
     assert "$ .venv/bin/sprag serve\n" in README
-    with service(tmp_path) as running:
+    with service(demonstration[0]) as running:
         done = subprocess.run(
             ["/bin/sh", "-eu", "-c", script.replace(PRINTED, running.address)],
             cwd=tmp_path,

@@ -31,51 +31,32 @@ def worker_of(running: Service) -> psutil.Process:
     return next(child for child in psutil.Process(running.process.pid).children() if child.children())
 
 
-def submit_and_finish(running: Service) -> None:
-    """A small study goes through."""
+def submit_and_finish(running: Service, duration: str) -> None:
+    """A study of that time, which no other study has, goes through."""
     spec = json.loads((EXAMPLES / "one_pendulum.json").read_text())
-    spec["run"] = {"duration": "4 periods"}
+    spec["run"] = {"duration": duration}
     answer = httpx.post(f"{running.address}/api/v1/studies", content=json.dumps(spec), headers=JSON, timeout=60)
     address = running.address + answer.headers["location"]
     until(lambda: httpx.get(address, timeout=60).json()["state"] == "finished")
 
 
-def test_a_killed_worker_is_replaced_and_all_end_with_the_service(tmp_path: Path) -> None:
-    with service(tmp_path, "--processes", 1) as running:
-        first = worker_of(running)
-        family = [first, *first.children(recursive=True)]
-        first.kill()
-        assert psutil.wait_procs(family, timeout=SECONDS)[1] == []
-        submit_and_finish(running)
-        assert worker_of(running) != first
-        family = psutil.Process(running.process.pid).children(recursive=True)
-    assert psutil.wait_procs(family, timeout=SECONDS)[1] == []
-
-
-def test_nothing_outlives_a_killed_service(tmp_path: Path) -> None:
+def test_a_killed_worker_is_replaced_and_nothing_outlives_a_killed_service(tmp_path: Path) -> None:
     folder = tmp_path / "killed"
     folder.mkdir()
     alive: list[psutil.Process] = []
     with pytest.raises(AssertionError), service(folder, "--processes", 1) as running:  # noqa: PT012 - it fails at its end
-        worker_of(running)
+        first = worker_of(running)
+        family = [first, *first.children(recursive=True)]
+        first.kill()
+        assert psutil.wait_procs(family, timeout=SECONDS)[1] == []
+        submit_and_finish(running, "4 periods")
+        assert worker_of(running) != first
         family = psutil.Process(running.process.pid).children(recursive=True)
         running.process.send_signal(signal.SIGKILL)
         alive = psutil.wait_procs(family, timeout=SECONDS)[1]
         running.process.wait(SECONDS)
     assert (alive, running.process.returncode) == ([], -signal.SIGKILL)
     with service(folder, "--processes", 1) as again:
-        submit_and_finish(again)
-
-
-def test_an_open_stream_does_not_hold_up_the_end(tmp_path: Path) -> None:
-    with service(tmp_path, "--processes", 1) as running:
-        spec = (EXAMPLES / "one_pendulum.json").read_bytes()
-        address = httpx.post(f"{running.address}/api/v1/studies", content=spec, headers=JSON, timeout=60).headers[
-            "location"
-        ]
-        assert httpx.post(f"{running.address}{address}:pause", timeout=60).json()["state"] == "paused"
-        with httpx.stream("GET", f"{running.address}{address}/events") as stream:
-            lines = stream.iter_lines()
-            assert any(line == "event: progress" for line in lines)
-            running.process.send_signal(signal.SIGTERM)
-            assert "event: end" not in list(lines)
+        submit_and_finish(again, "5 periods")
+        family = psutil.Process(again.process.pid).children(recursive=True)
+    assert psutil.wait_procs(family, timeout=SECONDS)[1] == []

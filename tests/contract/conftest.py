@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -15,13 +14,14 @@ from tests.worker import fakes
 
 
 @pytest.fixture(params=["pysqlite3", "sqlite3", "postgresql"])
-def url(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def url(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     if request.param == "postgresql":
         url: str = request.getfixturevalue("postgres_url")
         return url
     if request.param == "sqlite3":
         monkeypatch.setattr(session, "sqlite_driver", lambda: sqlite3)
-    return f"sqlite:///{tmp_path / 'store.sqlite3'}"
+    ready: str = request.getfixturevalue("sqlite_url")
+    return ready
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -23,12 +22,12 @@ from tests.worker import fakes
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])
-def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Store]:
+def store(request: pytest.FixtureRequest) -> Iterator[Store]:
     if request.param == "postgresql":
         server: postgres.Server = request.getfixturevalue("postgres_server")
         url = server.url(server.new_database())
     else:
-        url = f"sqlite:///{tmp_path / 'store.sqlite3'}"
+        url = request.getfixturevalue("sqlite_url")
     with Store.open(url, chunking=Chunking(cases=10)) as store:
         yield store
 

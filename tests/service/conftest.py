@@ -127,15 +127,6 @@ def portal() -> Iterator[BlockingPortal]:
         yield opened
 
 
-@pytest.fixture(scope="session")
-def empty_database(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """A database without studies, made once."""
-    path = tmp_path_factory.mktemp("empty") / "sprag.sqlite3"
-    with Store.open(f"sqlite:///{path}") as store:
-        store.backup(path.with_suffix(".copy"))
-    return path.with_suffix(".copy").read_bytes()
-
-
 @pytest.fixture
 def chunk_cases() -> int:
     """Cases to a chunk; few, so that small studies have several."""

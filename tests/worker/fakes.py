@@ -33,6 +33,8 @@ BASE = {
     "shaft.load": 0.1,
     "clutch.coefficients.0": 0.0,
     "clutch.coefficients.1": 200.0,
+    "clutch.coefficients.2": 0.0,
+    "clutch.coefficients.3": 20000.0,
 }
 RUN = {"duration": [3.0, "periods"], "window": None, "tolerance": 1e-9, "reset": "contact"}
 RESULTS = len(models.result_infos("vibration-drive", "1"))

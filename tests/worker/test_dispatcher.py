@@ -28,8 +28,8 @@ from tests.worker.dispatching import Prompt, after, endings, submit, work
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    with Store.open(f"sqlite:///{tmp_path / 'sprag.sqlite3'}", chunking=Chunking(cases=4)) as store:
+def store(sqlite_url: str) -> Iterator[Store]:
+    with Store.open(sqlite_url, chunking=Chunking(cases=4)) as store:
         yield store
 
 
@@ -71,7 +71,7 @@ def test_a_crash_and_a_hang_are_found_among_their_neighbours(store: Store) -> No
 
 def test_the_log_tells_when_a_study_is_taken_up_and_how_it_ends(store: Store, caplog: pytest.LogCaptureFixture) -> None:
     record = submit(store, 10)
-    with caplog.at_level("INFO", logger="worker"):
+    with caplog.at_level("INFO", logger="sprag.worker"):
         work(store, InlineExecutor(fakes.run))
     assert caplog.messages == [
         f"The study {record.id} is taken up: 10 cases in 3 chunks to be run.",

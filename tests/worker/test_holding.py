@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partialmethod
-from pathlib import Path
 
 import pytest
 
@@ -25,8 +24,8 @@ from tests.worker.dispatching import Prompt, endings, submit, work
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    with Store.open(f"sqlite:///{tmp_path / 'sprag.sqlite3'}", chunking=Chunking(cases=4)) as store:
+def store(sqlite_url: str) -> Iterator[Store]:
+    with Store.open(sqlite_url, chunking=Chunking(cases=4)) as store:
         yield store
 
 

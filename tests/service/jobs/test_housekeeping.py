@@ -21,8 +21,8 @@ SECONDS = 120.0
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    with Store.open(f"sqlite:///{tmp_path / 'sprag.sqlite3'}", chunking=Chunking(cases=2)) as opened:
+def store(sqlite_url: str) -> Iterator[Store]:
+    with Store.open(sqlite_url, chunking=Chunking(cases=2)) as opened:
         yield opened
 
 

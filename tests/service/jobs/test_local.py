@@ -43,8 +43,8 @@ def eventually(condition: Callable[[], bool]) -> None:
 
 
 @pytest.fixture
-def url(tmp_path: Path) -> str:
-    return f"sqlite:///{tmp_path / 'sprag.sqlite3'}"
+def url(sqlite_url: str) -> str:
+    return sqlite_url
 
 
 def test_a_study_is_run_in_a_passing_database() -> None:

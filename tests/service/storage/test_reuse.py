@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,8 +61,8 @@ class Engine:
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    with Store.open(f"sqlite:///{tmp_path / 'sprag.sqlite3'}", chunking=Chunking(cases=4)) as store:
+def store(sqlite_url: str) -> Iterator[Store]:
+    with Store.open(sqlite_url, chunking=Chunking(cases=4)) as store:
         yield store
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import resource
 import shutil
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
@@ -21,8 +20,8 @@ PLENTY = 10**12
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    with Store.open(f"sqlite:///{tmp_path / 'sprag.sqlite3'}", chunking=Chunking(cases=500)) as store:
+def store(sqlite_url: str) -> Iterator[Store]:
+    with Store.open(sqlite_url, chunking=Chunking(cases=500)) as store:
         yield store
 
 

@@ -45,13 +45,13 @@ def test_the_catalogues_are_complete() -> None:
 
 def test_the_shape_of_a_machine_comes_from_its_paths() -> None:
     study = fakes.study(3)
-    assert models.shape_of(study) == models.KernelShape("vibration-drive", (1, 2, 1e-9))
+    assert models.shape_of(study) == models.KernelShape("vibration-drive", (1, 4, 1e-9))
     own_clutch = {"pendulums.2.clutch.coefficients.4": 1.0}
     assert models.variant_of(replace(study, base=study.base | own_clutch)) == "3"
     assert models.coefficients(replace(study, base=study.base | own_clutch)) == 5
-    on_axis = Axis(("pendulums.1.mass", "clutch.coefficients.2"), (0.5,))
+    on_axis = Axis(("pendulums.1.mass", "clutch.coefficients.5"), (0.5,))
     assert models.variant_of(replace(study, axes=(on_axis,))) == "2"
-    assert models.coefficients(replace(study, axes=(on_axis,))) == 3
+    assert models.coefficients(replace(study, axes=(on_axis,))) == 6
     assert len(models.study_results(study)) == fakes.RESULTS
 
 

@@ -21,8 +21,6 @@ from tests.service.timed_spec import SPEC
 from tests.serving import served
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from playwright.sync_api import BrowserContext
 
 expect.set_options(timeout=90_000)
@@ -55,11 +53,11 @@ class House:
 
 
 @pytest.fixture
-def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[House]:
+def house(sqlite_url: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[House]:
     """A service with one finished study of made-up rows, and no worker."""
     for name in Settings.model_fields:
         monkeypatch.delenv(f"SPRAG_{name.upper()}", raising=False)
-    settings = Settings(database=str(tmp_path / "sprag.sqlite3"), processes=1)
+    settings = Settings(database=sqlite_url, processes=1)
     clock = NewYear()
     with Store.open(settings.database_url, chunking=chunking(settings), clock=clock) as store:
         app = create_app(settings, store=store, computer=InThread(), checker=InThread())
