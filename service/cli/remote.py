@@ -153,7 +153,7 @@ def watch(
 ) -> None:
     """Follow a study until it has ended, also over a restart of the service."""
     with connection(server, token) as client:
-        client.study(study_id)  # a wrong address or id is told at once, not waited for
+        client.study(study_id, timeout)  # a wrong address or id is told at once, not waited for
         study = follow(client, study_id, timeout)
     show_study(study, as_json)
     exit_as(study)

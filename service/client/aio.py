@@ -40,6 +40,7 @@ from sprag.service.client.wire import (
     refusal,
     require_finite,
     study_path,
+    within,
 )
 
 if TYPE_CHECKING:
@@ -182,17 +183,20 @@ class AsyncStudy:
                     waiting.failed(error)
                 await asyncio.sleep(waiting.pause())
 
-    async def _looks(self, waiting: Waiting) -> AsyncIterator[StudyDetail]:
-        yield await self.detail()
+    async def _looks(self, waiting: Waiting) -> AsyncIterator[dict[str, Any]]:
+        yield await self._look(waiting)
         if not waiting.listens():
             return
         waiting.listening()
         async for _ in self._client.events(self.id):
             waiting.heard()
-            yield await self.detail()
+            yield await self._look(waiting)
             if not waiting.listens():
                 return
         waiting.listened()
+
+    async def _look(self, waiting: Waiting) -> dict[str, Any]:
+        return await self._client.request("GET", self._path, timeout=within(waiting.left()))
 
     async def curves(
         self,

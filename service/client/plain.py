@@ -24,6 +24,7 @@ from sprag.service.client.wire import (
     require_finite,
     schedule_path,
     study_path,
+    within,
 )
 
 
@@ -94,9 +95,9 @@ class ServiceClient:
         """Number of cases, estimated time and size of a study that is not submitted."""
         return self._json("POST", "/studies:preview", json=spec)
 
-    def study(self, study_id: str) -> dict[str, Any]:
-        """One study with its state, progress and time left."""
-        return self._json("GET", study_path(study_id))
+    def study(self, study_id: str, timeout: float | None = None) -> dict[str, Any]:
+        """One study with its state, progress and time left, asked for within ``timeout`` s."""
+        return self._json("GET", study_path(study_id), timeout=within(timeout))
 
     def studies(self, query: Query = ()) -> dict[str, Any]:
         """A page of studies, newest first."""

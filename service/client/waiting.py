@@ -84,7 +84,7 @@ class Waiting:
 
     def pause(self) -> float:
         """Seconds to sleep before the next look; raises StudyTimeoutError when the time is up."""
-        left = self._left()
+        left = self.left()
         if left is not None and left <= 0:
             if self._study is None:
                 assert self._failure is not None
@@ -97,7 +97,7 @@ class Waiting:
 
     def listens(self) -> bool:
         """Whether to listen to the stream of events: it brings something, and its silence cannot outlast the time."""
-        left = self._left()
+        left = self.left()
         return self._streams and (left is None or left > SILENCE)
 
     def listening(self) -> None:
@@ -112,7 +112,8 @@ class Waiting:
         """Take note that the stream has ended; one that brought nothing is not asked for again."""
         self._streams = self._heard
 
-    def _left(self) -> float | None:
+    def left(self) -> float | None:
+        """Seconds until the time is up, None without a limit; a look that hangs must not outlast them."""
         return None if self._end is None else self._end - time.monotonic()
 
 
@@ -130,13 +131,13 @@ def wait_for(client: ServiceClient, study_id: str, waiting: Waiting) -> dict[str
 
 def _looks(client: ServiceClient, study_id: str, waiting: Waiting) -> Iterator[dict[str, Any]]:
     """The study now, and after each of its events while they come."""
-    yield client.study(study_id)
+    yield client.study(study_id, waiting.left())
     if not waiting.listens():
         return
     waiting.listening()
     for _ in client.events(study_id):
         waiting.heard()
-        yield client.study(study_id)
+        yield client.study(study_id, waiting.left())
         if not waiting.listens():
             return
     waiting.listened()

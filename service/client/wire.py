@@ -38,6 +38,14 @@ def connection_options(server: str, token: str | None) -> dict[str, Any]:
     return {"base_url": server, "headers": headers, "timeout": TIMEOUT, "trust_env": not is_loopback(url.host)}
 
 
+def within(seconds: float | None) -> httpx.Timeout:
+    """`TIMEOUT` for a request that is to be answered within ``seconds``, where they are given, or a second."""
+    if seconds is None:
+        return TIMEOUT
+    seconds = max(seconds, 1.0)
+    return httpx.Timeout(min(seconds, TIMEOUT.read or seconds), connect=min(seconds, TIMEOUT.connect or seconds))
+
+
 def document(server: str, response: httpx.Response) -> dict[str, Any]:
     """The JSON object that was answered; RefusedError for a problem, UnreachableError for an answer that is none."""
     if response.is_error:

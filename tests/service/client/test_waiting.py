@@ -38,11 +38,14 @@ class Scripted:
     def __init__(self, looks: list[Any], streams: list[list[bytes] | int]) -> None:
         self.looks, self.streams = looks, streams
         self.asked: list[str] = []
+        #: The longest time (s) that the client gives the service for each answer.
+        self.patience: list[float] = []
 
     def __call__(self, request: httpx.Request) -> httpx.Response:
         """Answer the next request."""
         kind = "stream" if request.url.path.endswith("/events") else "look"
         self.asked.append(kind)
+        self.patience.append(max(request.extensions["timeout"][part] for part in ("connect", "read")))
         answer = (self.streams if kind == "stream" else self.looks).pop(0)
         if answer == DOWN:
             raise httpx.ConnectError("refused")
@@ -138,6 +141,16 @@ def test_the_time_ends_waiting_for_a_lost_service_too(wait: Waits, sleeps: list[
     with pytest.raises(UnreachableError):
         wait(Scripted([study("running"), DOWN], []), timeout=0.0)
     assert sleeps == []
+
+
+def test_a_service_that_hangs_does_not_outlast_the_time(wait: Waits, sleeps: list[float]) -> None:
+    looks = [study("running"), study("running"), study("running"), study("finished")]
+    scripted = Scripted(looks, [])
+    wait(scripted, timeout=20.0)
+    assert max(scripted.patience[1:]) <= 20.0
+    scripted = Scripted([study("running"), study("finished")], [])
+    wait(scripted, timeout=0.0)
+    assert scripted.patience[1] == 1.0, "enough for a look"
 
 
 @pytest.fixture
