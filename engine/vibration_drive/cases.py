@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from enum import IntEnum, auto
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,11 +12,40 @@ from sprag.engine.vibration_drive.parameters import MAX_COEFFICIENTS, MAX_PENDUL
 
 Floats = NDArray[np.float64]
 
-#: Columns of a case: excitation and shaft; then stops as pairs (whole periods, fraction); then each pendulum's columns,
-#: followed by its clutch coefficients.
-SHAFT_COLUMNS = 10
+
+class Column(IntEnum):
+    """Columns of a case that its excitation and its shaft have; after them come the stops, then the pendulums."""
+
+    NU = 0
+    PERIOD = auto()
+    ACC_X = auto()
+    ACC_Y = auto()
+    CHI = auto()
+    GRAVITY = auto()
+    LOAD = auto()
+    INERTIA = auto()
+    INVERSE_RATE = auto()
+    SPEED = auto()
+
+
+class PendulumColumn(IntEnum):
+    """Columns that each pendulum has, before its clutch coefficients; those up to LIMIT as the layout has them."""
+
+    ML = 0
+    SPRING = auto()
+    DAMPING = auto()
+    INVERSE_INERTIA = auto()
+    INERTIA = auto()
+    BACKLASH = auto()
+    LIMIT = auto()
+    ANGLE = auto()
+    SPEED = auto()
+
+
+SHAFT_COLUMNS = len(Column)
+#: Stops, each a pair of columns: whole periods, fraction.
 STOPS = 4
-PENDULUM_COLUMNS = 9
+PENDULUM_COLUMNS = len(PendulumColumn)
 #: Fewest clutch coefficients of a kernel: the straight line beyond the data needs two.
 MIN_COEFFICIENTS = 2
 #: A stop this near a whole period is meant to be one.
@@ -68,8 +98,9 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     Returns
     -------
     array, shape (cases, columns)
-        nu, period, d nu^2, b nu^2, chi, g, M_c, J_e, 1/rate, initial speed; four stops; per pendulum M l/J, c a^2/J,
-        lambda/J, 1/J, J, delta, u_end, initial angle, initial speed, clutch coefficients.
+        `Column`: nu, period, d nu^2, b nu^2, chi, g, M_c, J_e, 1/rate, initial speed; four stops; per pendulum
+        `PendulumColumn`: M l/J, c a^2/J, lambda/J, 1/J, J, delta, u_end, initial angle, initial speed; its clutch
+        coefficients.
     """
     n, count = pendulum_count(columns), coefficient_count(columns)
 
@@ -103,10 +134,14 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
         law = _law_prefix(columns, i)
         stiffness = np.maximum(column(f"{law}coefficients.1", 0.0), 0.0)
         rate = np.maximum(rate, np.sqrt(stiffness * (1.0 / inertia + 1.0 / shaft_inertia)))
-        pendulums += [
-            own["mass"] * own["arm"] / inertia, spring, own["damping"] / inertia, 1.0 / inertia, inertia,
-            own["backlash"], column(f"{law}windup_limit", math.inf), own["initial_angle"], own["initial_speed"],
-        ]  # fmt: skip
+        P = PendulumColumn
+        values = {
+            P.ML: own["mass"] * own["arm"] / inertia, P.SPRING: spring, P.DAMPING: own["damping"] / inertia,
+            P.INVERSE_INERTIA: 1.0 / inertia, P.INERTIA: inertia, P.BACKLASH: own["backlash"],
+            P.LIMIT: column(f"{law}windup_limit", math.inf), P.ANGLE: own["initial_angle"],
+            P.SPEED: own["initial_speed"],
+        }  # fmt: skip
+        pendulums += [values[place] for place in P]
         pendulums += [column(f"{law}coefficients.{k}", 0.0) for k in range(count)]
     end_of_run = np.array([run.duration.in_periods(f) for f in frequency])
     # Seconds times frequency may round past the end of the run.
@@ -115,13 +150,25 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     whole = np.floor(end - start + 1e-9)
     # Without a whole period in the window its "start of whole periods" is its end, and there is no efficiency.
     times = (start, np.where(whole > 0, np.maximum(start, end - whole), end), end, end_of_run)
-    shaft = [
-        nu, 1.0 / frequency, parameter("excitation.amplitude_x") * nu**2, parameter("excitation.amplitude_y") * nu**2,
-        parameter("excitation.phase"), parameter("gravity"), parameter("shaft.load"), shaft_inertia,
-        1.0 / rate, parameter("shaft.initial_speed"),
-    ]  # fmt: skip
+    C = Column
+    shaft = {
+        C.NU: nu, C.PERIOD: 1.0 / frequency, C.ACC_X: parameter("excitation.amplitude_x") * nu**2,
+        C.ACC_Y: parameter("excitation.amplitude_y") * nu**2, C.CHI: parameter("excitation.phase"),
+        C.GRAVITY: parameter("gravity"), C.LOAD: parameter("shaft.load"), C.INERTIA: shaft_inertia,
+        C.INVERSE_RATE: 1.0 / rate, C.SPEED: parameter("shaft.initial_speed"),
+    }  # fmt: skip
     stops = [part for time in times for part in _stop(time)]
-    return np.ascontiguousarray(np.column_stack([*shaft, *stops, *pendulums]))
+    return np.ascontiguousarray(np.column_stack([*(shaft[place] for place in C), *stops, *pendulums]))
+
+
+def stop_column(stop: int) -> int:
+    """The column of the whole periods of a stop; the next one has its fraction."""
+    return SHAFT_COLUMNS + 2 * stop
+
+
+def pendulum_column(coefficients: int, pendulum: int, column: int) -> int:
+    """A column of a pendulum in a matrix whose clutches have that many coefficients."""
+    return stop_column(STOPS) + pendulum * (PENDULUM_COLUMNS + coefficients) + column
 
 
 def with_lengths(matrix: Floats, begin: Floats, periods: Floats, *, windowed: bool | NDArray[np.bool_]) -> Floats:
@@ -143,6 +190,6 @@ def with_lengths(matrix: Floats, begin: Floats, periods: Floats, *, windowed: bo
     start = np.where(windowed, begin, end)
     for k, time in enumerate((start, start, end, end)):
         whole, fraction = _stop(time)
-        changed[:, SHAFT_COLUMNS + 2 * k] = whole
-        changed[:, SHAFT_COLUMNS + 2 * k + 1] = fraction
+        changed[:, stop_column(k)] = whole
+        changed[:, stop_column(k) + 1] = fraction
     return changed

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS
+from sprag.engine.vibration_drive.cases import Column, PendulumColumn, pendulum_column, stop_column
 from sprag.engine.vibration_drive.lanes import OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS
 from sprag.engine.vibration_drive.layout import Layout
 from sprag.engine.vibration_drive.results import result_infos
@@ -36,9 +36,9 @@ class _Cases:
 
     def __init__(self, lay: Layout, matrix: Floats, sums: Floats) -> None:
         self.lay, self.matrix, self.sums = lay, matrix, sums
-        self.period, self.load, self.inertia = matrix[:, 1], matrix[:, 6], matrix[:, 7]
-        stops = matrix[:, SHAFT_COLUMNS : SHAFT_COLUMNS + 2 * STOPS]
-        start, whole, end = (stops[:, 2 * k] + stops[:, 2 * k + 1] for k in range(3))
+        self.period, self.load = matrix[:, Column.PERIOD], matrix[:, Column.LOAD]
+        self.inertia = matrix[:, Column.INERTIA]
+        start, whole, end = (matrix[:, stop_column(k)] + matrix[:, stop_column(k) + 1] for k in range(3))
         self.periods = end - start
         self.whole_periods = end - whole
         self.length = self.periods * self.period
@@ -56,9 +56,8 @@ class _Cases:
         column: Floats = self.sums[:, first + row - self.lay.p_sum_phi]
         return column
 
-    def parameter(self, i: int, column: int) -> Floats:
-        first = SHAFT_COLUMNS + 2 * STOPS + i * (PENDULUM_COLUMNS + self.lay.coefficients)
-        values: Floats = self.matrix[:, first + column]
+    def parameter(self, i: int, column: PendulumColumn) -> Floats:
+        values: Floats = self.matrix[:, pendulum_column(self.lay.coefficients, i, column)]
         return values
 
 
@@ -135,7 +134,7 @@ def _pendulum(cases: _Cases, i: int, out: dict[str, Floats]) -> None:
     def put(name: str, values: Floats) -> None:
         out[f"pendulums.{i}.{name}"] = values
 
-    inertia = cases.parameter(i, 4)
+    inertia = cases.parameter(i, PendulumColumn.INERTIA)
     mean = cases.pendulum(i, "sum_phi") / cases.length
     put("angle.mean", np.clip(mean, cases.pendulum(i, "phi_min"), cases.pendulum(i, "phi_max")))
     put("angle.max", cases.pendulum(i, "phi_max"))
@@ -151,8 +150,11 @@ def _pendulum(cases: _Cases, i: int, out: dict[str, Floats]) -> None:
     put("fraction.engaged", cases.pendulum(i, "time_engaged") / cases.time)
     put("fraction.beyond_data", cases.pendulum(i, "time_beyond") / cases.time)
     put("engagements", cases.pendulum(i, "engagements"))
-    put("power.input", cases.parameter(i, 0) * inertia * cases.pendulum(i, "work_input") / cases.length)
-    put("power.loss", cases.parameter(i, 2) * inertia * cases.pendulum(i, "work_loss") / cases.length)
+    put("power.input", cases.parameter(i, PendulumColumn.ML) * inertia * cases.pendulum(i, "work_input") / cases.length)
+    put(
+        "power.loss",
+        cases.parameter(i, PendulumColumn.DAMPING) * inertia * cases.pendulum(i, "work_loss") / cases.length,
+    )
 
 
 def _over_pendulums(cases: _Cases, out: dict[str, Floats], name: str) -> Floats:
@@ -212,11 +214,11 @@ def _balances(cases: _Cases, out: dict[str, Floats]) -> None:
     kinetic = 0.5 * cases.inertia * cases.shaft("speed_max") ** 2
     for i in range(cases.lay.n):
         fastest = np.maximum(cases.pendulum(i, "speed_max"), -cases.pendulum(i, "speed_min"))
-        kinetic = kinetic + 0.5 * cases.parameter(i, 4) * fastest**2
+        kinetic = kinetic + 0.5 * cases.parameter(i, PendulumColumn.INERTIA) * fastest**2
     # Of a motion that has died away nothing but rounding is left: it is judged against a swing of 3e-5 rad.
     least = np.zeros_like(cases.period)
     for i in range(cases.lay.n):
-        least = least + 1e-9 * cases.parameter(i, 4) * (2.0 * np.pi / cases.period) ** 2
+        least = least + 1e-9 * cases.parameter(i, PendulumColumn.INERTIA) * (2.0 * np.pi / cases.period) ** 2
     size = np.max(np.abs([supplied, stored, lost, useful, kinetic, least]), axis=0)
     residual = supplied - stored - lost - useful - cases.shaft("energy_lost")
     out["balance.energy"] = np.where(size > 0.0, _ratio(np.abs(residual), size), np.where(np.isnan(size), np.nan, 0.0))

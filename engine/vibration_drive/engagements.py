@@ -14,7 +14,7 @@ from sprag.engine.endings import ENDING_CODES, Ending
 from sprag.engine.outcome import Engagement, Engagements, PeriodMeans
 from sprag.engine.run import Run, SettledRun
 from sprag.engine.vibration_drive.automaton import Clutch
-from sprag.engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count, with_lengths
+from sprag.engine.vibration_drive.cases import Column, case_matrix, coefficient_count, pendulum_count, with_lengths
 from sprag.engine.vibration_drive.integration import integrate
 from sprag.engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
 from sprag.engine.vibration_drive.lanes import OUT_ENDING
@@ -136,7 +136,7 @@ def _pieces(
         done = integrate(module, matrix, run, starts=starts, pieces=room, since=since)
         if np.isnan(done.pieces[-1, 0]):
             ending = ENDING_CODES[int(done.sums[0, OUT_ENDING])]
-            return ending, Pieces.read(module.LAYOUT, done.pieces, float(matrix[0, 1]))
+            return ending, Pieces.read(module.LAYOUT, done.pieces, float(matrix[0, Column.PERIOD]))
         room *= 2
 
 

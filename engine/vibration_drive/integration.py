@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from sprag.engine.run import Run
 from sprag.engine.taylor.batch import aligned_zeros, blocks_for
 from sprag.engine.taylor.roots import MAX_DEGREE, work_stack
-from sprag.engine.vibration_drive.cases import SHAFT_COLUMNS, STOPS
+from sprag.engine.vibration_drive.cases import STOPS, stop_column
 from sprag.engine.vibration_drive.characteristics import sum_columns
 from sprag.engine.vibration_drive.kernel import Kernel
 from sprag.engine.vibration_drive.pieces import piece_width
@@ -70,7 +70,7 @@ def integrate(
     asked = np.empty(0) if times is None else times
     sums = np.full((cases, sum_columns(lay)), np.nan)
     recorded = np.full((cases, strobes, width(n)), np.nan)
-    end = matrix[:, SHAFT_COLUMNS + 2 * (STOPS - 1)]
+    end = matrix[:, stop_column(STOPS - 1)]
     samples = np.empty((len(asked), SHAFT_SAMPLES + n * PENDULUM_SAMPLES))
     states = np.zeros((len(asked), 1 + n), dtype=np.int64)
     steps = np.full((pieces, piece_width(lay)), np.nan)

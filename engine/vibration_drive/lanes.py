@@ -13,7 +13,7 @@ from sprag.engine.vibration_drive import states as ev
 from sprag.engine.vibration_drive.advance import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR
 from sprag.engine.vibration_drive.automaton import Clutch, Shaft
 from sprag.engine.vibration_drive.bounds import TOO_LONG
-from sprag.engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS
+from sprag.engine.vibration_drive.cases import PENDULUM_COLUMNS, STOPS, Column, PendulumColumn, stop_column
 from sprag.engine.vibration_drive.events import collect_guards, transit
 from sprag.engine.vibration_drive.layout import Layout
 from sprag.engine.vibration_drive.states import count_event, law, set_clutch, set_shaft
@@ -39,10 +39,12 @@ _STEP_BUDGET = ENDING_CODES.index(Ending.STEP_BUDGET)
 _DIVERGED = ENDING_CODES.index(Ending.DIVERGED)
 _RUNNING = -1
 
-(_NU, _PERIOD, _ACC_X, _ACC_Y, _CHI, _GRAVITY, _LOAD, _INERTIA, _INVERSE_RATE, _SPEED) = range(10)
-_STOPS = SHAFT_COLUMNS
-_FIRST_PENDULUM = SHAFT_COLUMNS + 2 * STOPS
-_P_COPIED = PENDULUM_COLUMNS - 2
+_NU, _PERIOD, _ACC_X, _ACC_Y = int(Column.NU), int(Column.PERIOD), int(Column.ACC_X), int(Column.ACC_Y)
+_CHI, _GRAVITY, _LOAD, _INERTIA = int(Column.CHI), int(Column.GRAVITY), int(Column.LOAD), int(Column.INERTIA)
+_INVERSE_RATE, _SPEED = int(Column.INVERSE_RATE), int(Column.SPEED)
+_STOPS, _FIRST_PENDULUM = stop_column(0), stop_column(STOPS)
+_P_COPIED = int(PendulumColumn.LIMIT) + 1
+_P_ANGLE, _P_SPEED = int(PendulumColumn.ANGLE), int(PendulumColumn.SPEED)
 
 # Whole-run values of a case, in the first columns of its row of sums.
 OUT_ENDING, OUT_STEPS, OUT_EVENTS, OUT_RUNUP, OUT_SUMS = 0, 1, 2, 3, 4
@@ -81,8 +83,8 @@ def load_case(
         column = _FIRST_PENDULUM + i * (PENDULUM_COLUMNS + lay.coefficients)
         for k in range(_P_COPIED):
             W[(base + lay.p_ml + k) * lanes + lane] = row[column + k]
-        W[(base + lay.p_phi) * lanes + lane] = row[column + _P_COPIED]
-        W[(base + lay.p_speed) * lanes + lane] = row[column + _P_COPIED + 1]
+        W[(base + lay.p_phi) * lanes + lane] = row[column + _P_ANGLE]
+        W[(base + lay.p_speed) * lanes + lane] = row[column + _P_SPEED]
         for k in range(lay.coefficients):
             W[(base + lay.p_law + k) * lanes + lane] = row[column + PENDULUM_COLUMNS + k]
         W[(base + lay.p_u) * lanes + lane] = -W[(base + lay.p_backlash) * lanes + lane]

@@ -150,6 +150,40 @@ class Layout(NamedTuple):
     p_drive: int
 
 
+def _beside(*groups: str) -> None:
+    """Raise ValueError where the fields of a group do not follow one another: code goes from one to the next."""
+    for group in groups:
+        names = group.split()
+        first = Layout._fields.index(names[0])
+        if Layout._fields[first : first + len(names)] != tuple(names):
+            raise ValueError(f"rows of the layout that belong side by side are not: {group}")
+
+
+_BANDS = "w_low {0}w_high {0}u_low {0}u_high {0}t_low {0}t_high"
+_EXTREMA = "phi_max {0}phi_min {0}speed_max {0}speed_min {0}acc_max {0}acc_min {0}torque_max {0}u_max"
+_SHAFT_EXTREMA = "speed_max {0}speed_min {0}acc_max {0}sum_max {0}power_max"
+_beside(
+    # As the columns of a case (`PendulumColumn`) are copied.
+    "p_ml p_spring p_damping p_inverse_inertia p_inertia p_backlash p_limit",
+    # Sums that begin at 0, those of the shaft and those of a pendulum.
+    "sum_held time_held time_rotating time_driven work_clutch",
+    "p_sum_phi p_sum_torque p_work_input p_work_loss p_time_engaged p_time_beyond p_engagements",
+    # What is handed out at the end of a window, as far as characteristics reads it.
+    "work_clutch speed_max speed_min acc_max sum_max power_max turn_0 turn_1 turn_2 speed_0 speed_2 energy_0 energy_2 "
+    "input_1 driving_max energy_lost",
+    "p_engagements p_phi_max p_phi_min p_speed_max p_speed_min p_acc_max p_acc_min p_torque_max p_u_max",
+    # Guards in the order of `Band`, and what lies as far from its bounds or extrema as any other.
+    f"p_{_BANDS.format('p_')}",
+    f"p_m_{_BANDS.format('p_m_')}",
+    f"p_{_EXTREMA.format('p_')}",
+    f"p_x_{_EXTREMA.format('p_x_')}",
+    _SHAFT_EXTREMA.format(""),
+    f"x_{_SHAFT_EXTREMA.format('x_')}",
+    "sum_high speed_low",
+    "m_sum_high m_speed_low",
+)
+
+
 def make_layout(n: int, coefficients: int, order: int, lanes: int) -> Layout:
     """Lay out the rows for ``n`` pendulums, that many clutch coefficients, series of that order, and that many
     lanes.

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from sprag.engine.vibration_drive.cases import PENDULUM_COLUMNS, SHAFT_COLUMNS, STOPS, with_lengths
+from sprag.engine.vibration_drive.cases import Column, PendulumColumn, pendulum_column, with_lengths
 from sprag.engine.vibration_drive.integration import PENDULUM_SAMPLES, SHAFT_SAMPLES, integrate
 from sprag.engine.vibration_drive.layout import Layout
 from sprag.engine.vibration_drive.search import Search
@@ -25,8 +25,6 @@ Floats = NDArray[np.float64]
 
 #: Samples of a period; cubics between them are good to 1e-11 of the speed.
 _SAMPLES = 4096
-#: Place of the backlash among a pendulum's columns of the case matrix.
-_BACKLASH = 5
 
 
 def limit_speed(times: Floats, angle: Floats, speed: Floats, acceleration: Floats, backlash: float) -> float:
@@ -118,7 +116,7 @@ def limit_of(search: Search, case: int, point: Floats, order: int) -> float:
     matrix = with_lengths(search.matrix[case : case + 1], np.array([begin]), np.array([float(order)]), windowed=False)
     places = begin + np.linspace(0.0, order, _SAMPLES * order + 1)
     done = integrate(search.kernel, matrix, search.run, starts=point[None, :], times=places)
-    times = places[: done.recorded] * search.matrix[case, 1]
+    times = places[: done.recorded] * search.matrix[case, Column.PERIOD]
     best = math.nan
     for i in range(search.kernel.LAYOUT.n):
         column = SHAFT_SAMPLES + PENDULUM_SAMPLES * i
@@ -130,5 +128,4 @@ def limit_of(search: Search, case: int, point: Floats, order: int) -> float:
 
 def backlash(layout: Layout, matrix: Floats, pendulum: int) -> float:
     """Backlash of the clutch of a pendulum of the only case of a matrix, in rad."""
-    first = SHAFT_COLUMNS + 2 * STOPS + pendulum * (PENDULUM_COLUMNS + layout.coefficients)
-    return float(matrix[0, first + _BACKLASH])
+    return float(matrix[0, pendulum_column(layout.coefficients, pendulum, PendulumColumn.BACKLASH)])
