@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.service.answers import filled
 from sprag.service.answers.studies import ClutchFitReport, FitDegree
+from sprag.service.spec.described import FIT
 from sprag.service.spec.fields import placed, read_number, read_object
 from sprag.service.spec.machine.clutch import read_clutch
 from sprag.service.spec.report import Report
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from sprag.worker.models import ClutchFit
 
 #: Fields of a request for a fit.
-REQUEST_FIELDS: Final = ("data", "accuracy", "max_degree", "through_origin", "angles_include_backlash", "backlash")
+REQUEST_FIELDS: Final = ("data", "accuracy", *FIT, "backlash")
 
 
 def fit_json(fit: ClutchFit) -> ClutchFitReport:

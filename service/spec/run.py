@@ -5,19 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.service.spec.described import ANY_RUN, SETTLED_RUN, Described
 from sprag.service.spec.fields import read_object, read_whole
 from sprag.service.spec.report import Report, did_you_mean, join
 from sprag.service.spec.units import PERIOD_NAMES, QuantityError, exact_number, parse_exact, split_quantity, to_float
-from sprag.worker.limits import (
-    MAX_ORBIT_PERIODS,
-    MAX_RUN_PERIODS,
-    MAX_SETTLED,
-    MAX_SETTLED_PERIODS,
-    MAX_TOLERANCE,
-    MIN_SETTLED,
-    MIN_SETTLED_PERIODS,
-    MIN_TOLERANCE,
-)
+from sprag.worker.limits import MAX_ORBIT_PERIODS, MAX_RUN_PERIODS, MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
 from sprag.worker.models import MEANS_FROM_PERIODS, SETTLED
 
 if TYPE_CHECKING:
@@ -25,20 +17,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 #: Fields of a run until it is settled alone, and of a run for a time alone.
-SETTLED_FIELDS: Final = ("until", "at_most", "settled", "max_period")
+SETTLED_FIELDS: Final = tuple(SETTLED_RUN)
 TIMED_FIELDS: Final = ("duration", "window")
-FIELDS: Final = (*SETTLED_FIELDS, *TIMED_FIELDS, "tolerance", "reset")
-RESETS: Final = ("contact", "literal")
+FIELDS: Final = (*SETTLED_FIELDS, *TIMED_FIELDS, *ANY_RUN)
+RESETS: Final = tuple(value for value, _ in ANY_RUN["reset"].choices)
+_ANY_DEFAULTS: Final[dict[str, Any]] = {name: field.default for name, field in ANY_RUN.items()}
 #: What stands for the fields that are not given. A run without a field of `TIMED_FIELDS` lasts until it is settled.
-SETTLED_DEFAULTS: Final[dict[str, Any]] = {
-    "until": SETTLED, "at_most": 1000, "settled": 1e-8, "max_period": 32, "tolerance": 1e-9, "reset": "contact",
-}  # fmt: skip
-TIMED_DEFAULTS: Final[dict[str, Any]] = {
-    "duration": [60.0, "periods"],
-    "window": None,
-    "tolerance": 1e-9,
-    "reset": "contact",
-}
+SETTLED_DEFAULTS: Final[dict[str, Any]] = {name: field.default for name, field in SETTLED_RUN.items()} | _ANY_DEFAULTS
+TIMED_DEFAULTS: Final[dict[str, Any]] = {"duration": [60.0, "periods"], "window": None, **_ANY_DEFAULTS}
 _TIME: Final = 'seconds (2.0 or "2 s") or excitation periods ("60 periods")'
 _MAX_SECONDS: Final = 1e9
 #: Ends that are equal but for the rounding of a conversion between seconds and periods count as equal.
@@ -61,7 +47,7 @@ def read_run(report: Report, data: object, frequencies: NDArray[np.float64]) -> 
     run = dict(SETTLED_DEFAULTS if settled else TIMED_DEFAULTS)
     before = report.found
     if "tolerance" in found:
-        run["tolerance"] = _read_plain(report, "/run/tolerance", found["tolerance"], MIN_TOLERANCE, MAX_TOLERANCE)
+        run["tolerance"] = _read_plain(report, ANY_RUN["tolerance"], found["tolerance"])
     if "reset" in found:
         run["reset"] = _read_reset(report, found["reset"])
     if settled:
@@ -94,7 +80,7 @@ def _read_settled(report: Report, found: Mapping[str, Any], run: dict[str, Any])
     if "at_most" in found:
         run["at_most"] = _read_periods(report, found["at_most"])
     if "settled" in found:
-        run["settled"] = _read_plain(report, "/run/settled", found["settled"], MIN_SETTLED, MAX_SETTLED)
+        run["settled"] = _read_plain(report, SETTLED_RUN["settled"], found["settled"])
     if "max_period" in found:
         run["max_period"] = read_whole(report, "/run/max_period", found["max_period"], 1, MAX_ORBIT_PERIODS)
     if run["at_most"] is not None and run["at_most"] < MEANS_FROM_PERIODS:
@@ -173,7 +159,8 @@ def _read_window(report: Report, data: object) -> list[Time] | None:
     return None if None in times else [time for time in times if time is not None]
 
 
-def _read_plain(report: Report, pointer: str, value: object, low: float, high: float) -> float | None:
+def _read_plain(report: Report, field: Described, value: object) -> float | None:
+    pointer, low, high = join("/run", field.name), field.low, field.high
     allowed = f"{low:g} to {high:g}, a plain number"
     if isinstance(value, bool) or not isinstance(value, int | float):
         report.problem(pointer, "must be a plain number", value, allowed=allowed)

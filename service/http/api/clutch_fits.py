@@ -15,8 +15,8 @@ from sprag.service.http.requests import Body, read_body, strict_query
 from sprag.service.http.respond import JSON
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks
+from sprag.service.spec.described import FIT, schemas
 from sprag.service.spec.report import SpecError, spec_items
-from sprag.worker import models
 
 router = APIRouter(tags=["clutch"], dependencies=[Depends(strict_query)])
 
@@ -34,9 +34,7 @@ SCHEMA: Final[dict[str, Any]] = {
             "items": {"type": "array", "minItems": 2, "maxItems": 2, "items": _QUANTITY},
         },
         "accuracy": {**_QUANTITY, "description": "largest residual accepted (N*m)"},
-        "max_degree": {"type": "integer", "minimum": 1, "maximum": models.MAX_COEFFICIENTS - 1, "default": 7},
-        "through_origin": {"type": "boolean", "default": True, "description": "no torque at zero windup (c_1 = 0)"},
-        "angles_include_backlash": {"type": "boolean", "default": False},
+        **schemas(FIT),
         "backlash": {**_QUANTITY, "description": "lost motion to be taken off the angles (rad)", "default": 0},
     },
 }

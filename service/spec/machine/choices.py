@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from inspect import signature
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from sprag.worker import models
+from sprag.service.spec.described import FIT
 
 if TYPE_CHECKING:
     from sprag.worker.study import Study
 
-#: Options of the fit of a clutch law, and what they mean.
-_FIT_OPTIONS: Final = {
-    "max_degree": "largest degree that the fit may have",
-    "through_origin": "whether the fitted torque begins at 0",
-    "angles_include_backlash": "whether the measured angles begin before the backlash is taken up",
-}
 #: The choices of a machine shaft.
 _MEANINGS: Final = {
     "cycle": "revolutions of a cycle",
@@ -55,10 +48,8 @@ def drive_choices(study: Study, spec: Mapping[str, Any]) -> Iterator[Choice]:
     for place, owner in places:
         clutch = owner.get("clutch") or {}
         if "data" in clutch:
-            usual = signature(models.fit_clutch).parameters
-            for name in _FIT_OPTIONS:
-                value = clutch.get(name, usual[name].default)
-                yield Choice(f"{place}.{name}", str(value).lower(), _FIT_OPTIONS[name])
+            for name, field in FIT.items():
+                yield Choice(f"{place}.{name}", str(clutch.get(name, field.default)).lower(), field.help)
         elif clutch and f"{place}.windup_limit" not in (*study.base, *study.axis_paths):
             yield Choice(f"{place}.windup_limit", "none", "largest windup; none: the law holds for any")
 

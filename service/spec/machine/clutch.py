@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sprag.service.spec.described import FIT
 from sprag.service.spec.fields import missing, placed, read_flag, read_number, read_object, read_whole
 from sprag.service.spec.report import Report, join, quantity_text
 from sprag.worker import models
@@ -20,12 +21,12 @@ if TYPE_CHECKING:
     from sprag.worker.study import Axis, Combine
 
 _BY_LAW = ("coefficients", "windup_limit")
-_BY_DATA = ("data", "accuracy", "max_degree", "through_origin", "angles_include_backlash")
+_BY_DATA = ("data", "accuracy", *FIT)
 FIELDS = (*_BY_LAW, *_BY_DATA)
 
 _ANGLE = Parameter("angle", "xi", "rad", 0.0, 1e3, False, None, "measured angle")
 _TORQUE = Parameter("torque", "M", "N*m", -1e9, 1e9, False, None, "measured torque")
-_ACCURACY = Parameter("accuracy", "", "N*m", 0.0, 1e9, True, None, "largest residual of the fit that is accepted")
+ACCURACY = Parameter("accuracy", "", "N*m", 0.0, 1e9, True, None, "largest residual of the fit that is accepted")
 
 
 @dataclass(frozen=True)
@@ -121,9 +122,9 @@ def _measured(
     rows = _rows(report, join(pointer, "data"), data.get("data"))
     accuracy = None
     if "accuracy" in data:
-        accuracy = read_number(report, join(pointer, "accuracy"), data["accuracy"], _ACCURACY)
+        accuracy = read_number(report, join(pointer, "accuracy"), data["accuracy"], ACCURACY)
     else:
-        missing(report, join(pointer, "accuracy"), _ACCURACY)
+        missing(report, join(pointer, "accuracy"), ACCURACY)
     options: dict[str, Any] = {}
     if "max_degree" in data:
         where = join(pointer, "max_degree")

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN, schemas
 from sprag.service.spec.fields import placed
-from sprag.service.spec.run import RESETS, SETTLED_DEFAULTS, SETTLED_FIELDS, TIMED_FIELDS
+from sprag.service.spec.machine.clutch import ACCURACY
+from sprag.service.spec.run import SETTLED_FIELDS, TIMED_FIELDS
 from sprag.service.spec.schema.axes import Schema, object_schema
 from sprag.service.spec.schema.quantity import quantity_schema
 from sprag.worker import models
-from sprag.worker.limits import (
-    MAX_CLUTCH_ROWS,
-    MAX_ORBIT_PERIODS,
-    MAX_SETTLED,
-    MAX_SETTLED_PERIODS,
-    MAX_TOLERANCE,
-    MIN_SETTLED,
-    MIN_SETTLED_PERIODS,
-    MIN_TOLERANCE,
-)
-from sprag.worker.models import CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, MAX_PENDULUMS, SETTLED, Parameter
+from sprag.worker.limits import MAX_CLUTCH_ROWS
+from sprag.worker.models import CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, MAX_PENDULUMS, Parameter
 
 
 def drive_schema() -> Schema:
@@ -63,22 +58,8 @@ def clutch_schema() -> Schema:
             "items": {**pair, "items": {"type": ["number", "string"]}},
             "description": "measured rows [angle, torque]",
         },
-        "accuracy": quantity_schema(
-            Parameter("accuracy", "", "N*m", 0.0, 1e9, True, None, "largest residual of the fit that is accepted")
-        ),
-        "max_degree": {
-            "type": "integer",
-            "minimum": 1,
-            "maximum": MAX_COEFFICIENTS - 1,
-            "default": 7,
-            "description": "highest degree of the polynomial that is tried",
-        },
-        "through_origin": {"type": "boolean", "default": True, "description": "no torque at zero windup (c_1 = 0)"},
-        "angles_include_backlash": {
-            "type": "boolean",
-            "default": False,
-            "description": "the angles count from the first contact, so that the backlash is taken off them",
-        },
+        "accuracy": quantity_schema(ACCURACY),
+        **schemas(FIT),
     }
     return {
         "description": "torque of the freewheel clutch over its windup",
@@ -91,60 +72,15 @@ def clutch_schema() -> Schema:
 
 def run_schema() -> Schema:
     """Schema of `run`."""
-    time = {"type": ["number", "string"], "examples": ["60 periods", "2 s", 2.0], "minimum": 0}
+    window = {
+        "type": "array",
+        "minItems": 2,
+        "maxItems": 2,
+        "items": replace(DURATION, help="a time of the run").schema(),
+        "description": "part of the run that is evaluated, [start, end]; by default the last third",
+    }
     schema = object_schema(
-        {
-            "until": {
-                "const": SETTLED,
-                "description": "run each case until its motion is settled; the default where there is neither "
-                "`duration` nor `window`",
-            },
-            "at_most": {
-                "type": "string",
-                "default": f"{SETTLED_DEFAULTS['at_most']} periods",
-                "examples": ["1000 periods"],
-                "description": "excitation periods after which the search for the settled motion ends: "
-                f"{MIN_SETTLED_PERIODS} to {MAX_SETTLED_PERIODS:,}",
-            },
-            "settled": {
-                "type": "number",
-                "minimum": MIN_SETTLED,
-                "maximum": MAX_SETTLED,
-                "default": SETTLED_DEFAULTS["settled"],
-                "description": "scaled distance from its orbit below which a run counts as settled",
-            },
-            "max_period": {
-                "type": "integer",
-                "minimum": 1,
-                "maximum": MAX_ORBIT_PERIODS,
-                "default": SETTLED_DEFAULTS["max_period"],
-                "description": "largest number of excitation periods after which a motion may repeat itself",
-            },
-            "duration": {
-                **time,
-                "description": "end of the run, which then lasts for a given time: a number is seconds, a text says "
-                "periods or a unit of time; 60 periods where there is a window alone",
-            },
-            "window": {
-                "type": "array",
-                "minItems": 2,
-                "maxItems": 2,
-                "items": time,
-                "description": "part of the run that is evaluated, [start, end]; by default the last third",
-            },
-            "tolerance": {
-                "type": "number",
-                "minimum": MIN_TOLERANCE,
-                "maximum": MAX_TOLERANCE,
-                "default": SETTLED_DEFAULTS["tolerance"],
-                "description": "local relative error of the integration",
-            },
-            "reset": {
-                "enum": list(RESETS),
-                "default": SETTLED_DEFAULTS["reset"],
-                "description": "whether an upward crossing while torque is transmitted restarts the windup (literal)",
-            },
-        },
+        {**schemas(SETTLED_RUN), "duration": DURATION.schema(), "window": window, **schemas(ANY_RUN)},
         description="how long each case runs, what is evaluated, how accurately",
     )
     # A run lasts until it is settled or for a given time.

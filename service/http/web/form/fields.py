@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from sprag.service.results.wording import number, words
+from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN, Described
 from sprag.service.spec.fields import placed
 from sprag.service.spec.units import example
 from sprag.worker import models
@@ -35,6 +36,7 @@ class Field:
     required: bool
     default: str
     example: str
+    choices: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +79,25 @@ def _field(entry: Parameter, path: str) -> Field:
         default="" if entry.default is None else number(entry.default, 8),
         example=text[1] if len(text) > 1 else "",
     )
+
+
+def run_fields() -> dict[str, Field]:
+    """The fields of the run that take one text each, by name."""
+    entries = [*SETTLED_RUN.values(), DURATION, *ANY_RUN.values()]
+    return {entry.name: _described(entry, "/run") for entry in entries}
+
+
+def degree_field(pointer: str) -> Field:
+    """The highest degree of the fit of a clutch at ``pointer``."""
+    return _described(FIT["max_degree"], pointer)
+
+
+def _described(entry: Described, pointer: str) -> Field:
+    ends = [number(int(end)) if entry.kind in ("whole", "periods") else f"{end:g}" for end in (entry.low, entry.high)]
+    unit = " periods" if entry.kind == "periods" else ""
+    limits = f"{ends[0]} to {ends[1]}{unit}" if entry.high else ""
+    name = f"{pointer}/{entry.name}"
+    return Field(name, entry.label, "", "", "", entry.help, limits, False, entry.default_text, "", entry.choices)
 
 
 def range_words(entry: Parameter) -> str:

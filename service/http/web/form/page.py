@@ -19,7 +19,7 @@ from sprag.service.http.respond import json_response
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form import study_check
 from sprag.service.http.web.form.check import Checked
-from sprag.service.http.web.form.fields import FORM_MODEL, path_choices, pendulum, sections
+from sprag.service.http.web.form.fields import FORM_MODEL, degree_field, path_choices, pendulum, run_fields, sections
 from sprag.service.http.web.form.spec import (
     Values,
     axes_of,
@@ -45,10 +45,7 @@ EMPTY_FORM: Final[Values] = {
     "pendulums": "1",
     "axes": "1",
     "/combine": "grid",
-    "/run/until": "settled",
-    "/run/at_most": "1000 periods",
-    "/run/tolerance": "1e-9",
-    "/run/reset": "contact",
+    **{f"/run/{name}": run_fields()[name].default for name in ("until", "at_most", "tolerance", "reset")},
     "/base/clutch/kind": "law",
     "/axes/0/way": "linspace",
 }
@@ -212,6 +209,8 @@ def form_page(request: Request, values: Values, checked: Checked | None, status:
         choices=[] if text_mode else path_choices(pendulums_of(values), prefixes),
         presets=[preset for preset in map(preset_of, preset_names()) if text_mode or _fits_form(preset)],
         most_coefficients=models.MAX_COEFFICIENTS,
+        run=run_fields(),
+        degree_field=degree_field,
     )
 
 
