@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from asyncio import Semaphore
 from dataclasses import dataclass, field
 from threading import Event
 from typing import TYPE_CHECKING, Annotated, Final, cast
@@ -32,25 +33,6 @@ CaseNumber = Annotated[
 ]
 
 
-class Places:
-    """A number of places; who finds none is sent away. For one event loop."""
-
-    def __init__(self, most: int) -> None:
-        self.most = most
-        self.taken = 0
-
-    def take(self) -> bool:
-        """Take a place; False when there is none."""
-        if self.taken >= self.most:
-            return False
-        self.taken += 1
-        return True
-
-    def leave(self) -> None:
-        """Give the place back."""
-        self.taken -= 1
-
-
 @dataclass(frozen=True, slots=True)
 class Context:
     """Settings, store and computer of one service; ``ending`` is set when the service is about to end.
@@ -68,7 +50,7 @@ class Context:
     library: Library
     ending: Event = field(default_factory=Event)
     ready: Event = field(default_factory=Event)
-    streams: Places = field(default_factory=lambda: Places(MAX_STREAMS))
+    streams: Semaphore = field(default_factory=lambda: Semaphore(MAX_STREAMS))
     unaffected: Unaffected = field(default_factory=Unaffected)
     compute_shares: Shares = field(default_factory=lambda: Shares(1, MAX_COMPUTATIONS_EACH))
     check_shares: Shares = field(default_factory=lambda: Shares(1, MAX_CHECKS_EACH))

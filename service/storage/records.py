@@ -222,28 +222,13 @@ def split_flags(flags: str) -> tuple[str, ...]:
 
 def record_of(row: sa.Row[Any]) -> StudyRecord:
     """The record in a row of `RECORD_COLUMNS`."""
-    return StudyRecord(
-        number=row.number,
-        id=row.id,
-        name=row.name,
-        model=row.model,
-        variant=row.variant,
-        state=StudyState(row.state),
-        reason=row.reason,
-        cases=row.cases,
-        done=row.done,
-        ok=row.ok,
-        chunk_cases=row.chunk_cases,
-        engine_version=row.engine_version,
-        physics_hash=row.physics_hash,
-        warnings=tuple(json.loads(row.warnings)),
-        priority=row.priority,
-        reused=row.reused,
-        revision=row.revision,
-        created_at=moment(row.created_at),
-        started_at=optional_moment(row.started_at),
-        finished_at=optional_moment(row.finished_at),
-        finish_by=optional_moment(row.finish_by),
-        coarse=bool(row.coarse),
-        time_over=row.waits_for == HELD_AT_DEADLINE,
-    )
+    times = {name: optional_moment(getattr(row, name)) for name in ("started_at", "finished_at", "finish_by")}
+    own = {
+        "state": StudyState(row.state),
+        "warnings": tuple(json.loads(row.warnings)),
+        "created_at": moment(row.created_at),
+        "coarse": bool(row.coarse),
+        "time_over": row.waits_for == HELD_AT_DEADLINE,
+        **times,
+    }
+    return StudyRecord(**{name: own[name] if name in own else getattr(row, name) for name in StudyRecord.__slots__})

@@ -20,6 +20,7 @@ from sprag.service.http.requests import strict_query
 from sprag.service.json_text import to_bytes
 from sprag.service.storage.errors import StoreError
 from sprag.service.storage.records import Progress, StudyRecord
+from sprag.worker.limits import MAX_STREAMS
 
 router = APIRouter(tags=["studies"], dependencies=[Depends(strict_query)])
 
@@ -49,10 +50,10 @@ async def get_events(context: Ctx, study_id: StudyId, last_event_id: LastEventId
     record = await run_in_threadpool(context.store.get_study, study_id)
     if record.state.terminal and last_event_id == str(record.revision):
         return Response(status_code=204)
-    if not context.streams.take():
-        raise ApiError(
-            "unavailable", f"{context.streams.most} streams of events are open already.", headers={"Retry-After": "10"}
-        )
+    if context.streams.locked():
+        detail = f"{MAX_STREAMS} streams of events are open already."
+        raise ApiError("unavailable", detail, headers={"Retry-After": "10"})
+    await context.streams.acquire()
     return _Stream(context, study_id, last_event_id)
 
 
@@ -68,7 +69,7 @@ class _Stream(StreamingResponse):
         try:
             await super().__call__(scope, receive, send)
         finally:
-            self._places.leave()
+            self._places.release()
 
 
 async def _events(context: Context, study_id: str, last: str | None) -> AsyncIterator[bytes]:

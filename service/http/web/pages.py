@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import gzip
-from functools import lru_cache
-from importlib.metadata import version
+import os
 from importlib.resources import files
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from fastapi import APIRouter, Query, Request
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import Response
+from starlette.staticfiles import StaticFiles
 
 from sprag.service.http import views
 from sprag.service.http.context import Ctx
 from sprag.service.http.problems import PROBLEM_TYPES, ApiError
-from sprag.service.http.respond import entity_tag, json_response, not_modified, tagged
+from sprag.service.http.respond import json_response
 from sprag.service.http.views import preset_of
 from sprag.service.http.web import apidoc
 from sprag.service.http.web.apidoc import with_token_needed
@@ -22,15 +22,14 @@ from sprag.service.http.web.templates import page
 from sprag.service.presets import preset_names
 from sprag.worker.states import StudyState
 
+if TYPE_CHECKING:
+    from starlette.types import Receive, Scope, Send
+
 router = APIRouter(include_in_schema=False)
 
 _LISTED: Final = 50
-_TYPES: Final = {"css": "text/css", "svg": "image/svg+xml", "js": "text/javascript"}
 #: The script that draws the pictures, as it lies in the package of that name.
 PLOTLY: Final = "plotly.min.js"
-_OWN: Final = frozenset(
-    {"sprag.css", "sprag.svg", "link.js", "list.js", "plots.js", "study.js", "form.js", "laboratory.js", "case.js"}
-)
 
 
 @router.get("/")
@@ -73,32 +72,36 @@ async def problem(slug: str) -> Response:
     return page("problem.html", problem=PROBLEM_TYPES[slug])
 
 
+class _Files(StaticFiles):
+    """Style sheet, sign and scripts of all pages, and the script of plotly as it lies in the package of that name."""
+
+    def get_path(self, scope: Scope) -> str:
+        """The name in the address."""
+        return str(scope["path_params"]["name"])
+
+    def lookup_path(self, path: str) -> tuple[str, os.stat_result | None]:
+        """The file of that name, and what is known of it; None where there is none."""
+        if path != PLOTLY:
+            return super().lookup_path(path)
+        file = str(files("plotly") / "package_data" / PLOTLY)
+        return file, os.stat(file)
+
+    def file_response(self, *args: Any, **options: Any) -> Response:
+        """The file; it changes with the program only."""
+        response = super().file_response(*args, **options)
+        response.headers["Cache-Control"] = "max-age=3600"
+        return response
+
+
+_FILES: Final = GZipMiddleware(_Files(packages=[("sprag.service.http.web", "static")]), compresslevel=6)
+
+
+class _FileAnswer(Response):
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        await _FILES(scope, receive, send)
+
+
 @router.get("/static/{name}")
-def static(request: Request, name: str) -> Response:
+async def static(name: str) -> Response:  # noqa: ARG001 - the files take it from the address
     """Style sheet, sign and scripts of all pages."""
-    if name not in _OWN and name != PLOTLY:
-        raise ApiError("not-found", "There is no such file.")
-    content, tag = _file(name)
-    if unchanged := not_modified(request, tag):
-        return unchanged
-    headers = {"Cache-Control": "max-age=3600"}
-    if name == PLOTLY and "gzip" in request.headers.get("accept-encoding", ""):
-        content, headers["Content-Encoding"] = _packed_plotly(), "gzip"
-    response = tagged(Response(content, media_type=_TYPES[name.rpartition(".")[2]], headers=headers), tag)
-    response.headers["Vary"] = "Accept-Encoding"
-    return response
-
-
-@lru_cache(maxsize=16)
-def _file(name: str) -> tuple[bytes, str]:
-    """A file and its entity tag; they change with the program only."""
-    if name == PLOTLY:
-        content = files("plotly").joinpath("package_data", PLOTLY).read_bytes()
-        return content, entity_tag(PLOTLY, version("plotly"))
-    content = files("sprag.service.http.web").joinpath("static", name).read_bytes()
-    return content, entity_tag(name, content.hex())
-
-
-@lru_cache(maxsize=1)
-def _packed_plotly() -> bytes:
-    return gzip.compress(_file(PLOTLY)[0], compresslevel=6)
+    return _FileAnswer()
