@@ -121,7 +121,7 @@ def paint_figure(figure: Figure, drawn: Described, title: str) -> None:
         axes.set_xlabel(quantity_label(drawn.x))
     if not drawn.motion:
         (_explain if drawn.studies == 1 else _explain_studies)(figure, plots, drawn)
-        _explain_regimes(figure, drawn.regimes)
+        _explain_regimes(figure, drawn.regimes, "lower" if drawn.studies == 1 else "upper")
     head(figure, title, drawn.held if drawn.studies == 1 else ())
 
 
@@ -148,7 +148,7 @@ def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
         axes.set_ylabel(quantity_label(y))
         figure.colorbar(mesh, label=quantity_label(z))
         doubtful = list(doubtful_marks(drawn))
-        _paint_marks(axes, doubtful)
+        _paint_marks(axes, doubtful, clipped=False)
         _explain_regimes(figure, [marks.regime for marks in doubtful])
         missing = int(np.isnan(drawn.values).sum())
         head(figure, title, (*drawn.held, f"grey: {missing} cases without a result") if missing else drawn.held)
@@ -234,12 +234,14 @@ def _paint_panel(axes: Axes, panel: Panel, *, motion: bool) -> None:
         )
 
 
-def _paint_marks(axes: Axes, every: Sequence[Marks]) -> None:
+def _paint_marks(axes: Axes, every: Sequence[Marks], *, clipped: bool = True) -> None:
     for marks in every:
         look = MARKS[marks.regime]
-        axes.plot(
-            marks.x, marks.y, color=look.colour, linestyle="none", marker=look.marker, markersize=5.0, clip_on=False
-        )
+        if marks.x.size:
+            axes.plot(
+                marks.x, marks.y, color=look.colour, linestyle="none", marker=look.marker, markersize=5.0,
+                clip_on=clipped,
+            )  # fmt: skip
 
 
 def _paint_states(axes: Axes, drawn: Described) -> None:
@@ -316,8 +318,8 @@ def _explain_studies(figure: Figure, _plots: list[Axes], drawn: Described) -> No
     )  # fmt: skip
 
 
-def _explain_regimes(figure: Figure, regimes: Sequence[str]) -> None:
-    """What the marks of points mean, below the plots; nothing where all motions are periodic."""
+def _explain_regimes(figure: Figure, regimes: Sequence[str], edge: Literal["upper", "lower"] = "lower") -> None:
+    """What the marks of points mean, at an edge of the picture; nothing where all motions are periodic."""
     from matplotlib.lines import Line2D
 
     looks = [(name, MARKS[name]) for name in regimes]
@@ -326,7 +328,13 @@ def _explain_regimes(figure: Figure, regimes: Sequence[str]) -> None:
             Line2D([], [], color=look.colour, marker=look.marker, markersize=5.0, linestyle="none", label=name)
             for name, look in looks
         ]
-        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=8, frameon=False)
+        figure.legend(
+            handles=handles,
+            loc="outside upper center" if edge == "upper" else "outside lower center",
+            ncols=len(handles),
+            fontsize=8,
+            frameon=False,
+        )
 
 
 def head(figure: Figure, title: str, held: tuple[str, ...]) -> None:

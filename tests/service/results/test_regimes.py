@@ -10,7 +10,7 @@ import pytest
 from sprag.service.http.web.figures.plotly import map_figure, plotly_figure
 from sprag.service.results.curves import CurveQuery, Curves, draw, draw_map, select
 from sprag.service.results.figures.curves import curves_figure
-from sprag.service.results.pictures.curves import draw_curves
+from sprag.service.results.pictures.curves import draw_compare, draw_curves
 from sprag.service.results.pictures.curves import draw_map as paint_map
 from sprag.service.results.regimes import MARKS, counted, regimes_of, stretches
 from sprag.service.spec.document import parse_spec
@@ -82,6 +82,15 @@ def test_a_picture_names_the_regimes_that_occur() -> None:
     periodic = replace(drawn(), curves=tuple(replace(curve, regimes=["periodic"] * 8) for curve in drawn().curves))
     assert with_marks.count(MARKS["unsettled"].colour.encode()) > 0
     assert MARKS["unsettled"].colour.encode() not in draw_curves(periodic, "", "svg")
+
+
+def test_pictures_of_several_plots_have_room_for_plots_and_marks() -> None:
+    one = study(8, 2)
+    query = CurveQuery("shaft.load", ("shaft.speed.mean", "torque.mean"), ("excitation.frequency",))
+    curves = draw(select(one, models.study_results(one), query), fetched)
+    # A layout without room for its plots is a warning of matplotlib, and so an error here.
+    for picture in (draw_curves(curves, "A study", "svg"), draw_compare([("a", curves), ("b", curves)], "svg")):
+        assert picture.count(b"<!-- unsettled -->") == 1
 
 
 @pytest.mark.parametrize("name", ["irregular", "unsettled"])
