@@ -47,13 +47,7 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
         where = _pointer(study, "excitation.frequency")
         report.warn(f"{where}: below 0.1 Hz, which is slow for a vibration drive")
     pendulums = sum(path.startswith("pendulums.") and path.endswith(".mass") for path in study.base)
-    across, along = (_values(study, f"excitation.amplitude_{axis}").any() for axis in "xy")
-    starts = [f"pendulums.{index}.initial_{name}" for index in range(pendulums) for name in ("angle", "speed")]
-    if along and not across and not any(_values(study, path).any() for path in starts):
-        report.warn(
-            "/base/pendulums: with vibration along y alone a pendulum that starts upright without speed stays upright, "
-            "even at parametric resonance: nothing would move; give an initial_angle (say 0.01 rad) or an amplitude_x"
-        )
+    _upright(report, study, pendulums)
     for index in range(pendulums):
         _stability(report, study, index)
         _inertia(report, study, index)
@@ -167,6 +161,20 @@ def _pointer(study: Study, path: str) -> str:
         if path in axis.paths:
             return f"/axes/{position} ({path})"
     return "/base/" + path.replace(".", "/")
+
+
+def _upright(report: Report, study: Study, pendulums: int) -> None:
+    """Vibration along y alone has no torque on a pendulum at rest in the upright position."""
+    starts = [f"pendulums.{index}.initial_{name}" for index in range(pendulums) for name in ("angle", "speed")]
+    across, along, *starts_at, weight = _columns(study, ["excitation.amplitude_x", "excitation.amplitude_y", *starts])
+    across, along, *starts_at = np.broadcast_arrays(across, along, *starts_at)
+    still = (along != 0.0) & (across == 0.0) & ~np.any(starts_at, axis=0)
+    if still.any():
+        report.warn(
+            "/base/pendulums: with vibration along y alone a pendulum that starts upright without speed stays upright, "
+            "even at parametric resonance: nothing would move; give an initial_angle (say 0.01 rad) or an amplitude_x"
+            + _share(still, weight)
+        )
 
 
 def _stability(report: Report, study: Study, index: int) -> None:

@@ -103,7 +103,11 @@ def test_a_start_that_vibration_along_y_never_leaves() -> None:
     assert "stays upright" in warning
     assert "initial_angle" in warning
     assert warnings(upright | {"/base/pendulums/0/initial_angle": 0.01}) == []
-    assert warnings(upright | {"/axes": [{"path": "pendulums.0.initial_angle", "values": [0, 0.01]}]}) == []
+    for path in ("pendulums.0.initial_angle", "excitation.amplitude_x"):
+        (warning,) = warnings(upright | {"/axes": [{"path": path, "values": [0, 0.001, 0.002]}]})
+        assert warning.endswith("or an amplitude_x (in 1 of 3 cases)")
+    together = [{"path": ["excitation.amplitude_x", "excitation.amplitude_y"], "values": [0, 0.001]}]
+    assert warnings({"/axes": together}) == []
 
 
 def test_a_base_that_does_not_move() -> None:
