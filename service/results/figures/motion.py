@@ -30,7 +30,7 @@ def motion_figure(made: Trajectory, shown: Presentation) -> Figure:
                 made.values[:, made.names.index(name)],
                 PALETTE[place % len(PALETTE)],
                 place,
-                key=panel.title,
+                key=f"{panel.title} {label}" if angle else panel.title,
                 heading="" if angle else words(panel.title),
                 listed=len(panel.lines) > 1 or not angle,
             )
