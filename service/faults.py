@@ -1,31 +1,243 @@
-"""Faults that a caller is told of, whoever it is: where, what was given, what is allowed."""
+"""Faults as whoever caused them is told of them: where, what was given, what is allowed, and a code that stays.
+
+Wording is free; codes are what programs and tests rely on. ``docs/faults.md`` lists them.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
 _SHOWN_LENGTH = 200
 
+#: What one place of the input has wrong.
+Code = Literal[
+    "cannot-assemble",
+    "conflict",
+    "empty",
+    "exactly-one",
+    "inertia-insufficient",
+    "invalid-choice",
+    "invalid-formula",
+    "invalid-machine",
+    "invalid-path",
+    "invalid-range",
+    "invalid-table",
+    "invalid-text",
+    "invalid-time",
+    "missing-unit",
+    "motor-overrun",
+    "motor-stalled",
+    "near-singular",
+    "negative-inertia",
+    "no-clutch-law",
+    "not-a-grid",
+    "not-a-number",
+    "not-an-axis",
+    "not-finite",
+    "not-fixed",
+    "not-numeric",
+    "not-used",
+    "nothing-varies",
+    "out-of-range",
+    "quadrature-not-reached",
+    "repeated",
+    "required",
+    "too-long",
+    "too-many",
+    "too-many-faults",
+    "unbalanced-work",
+    "unequal-lengths",
+    "unknown-field",
+    "unknown-name",
+    "unknown-value",
+    "unreadable",
+    "unsupported-version",
+    "wrong-type",
+    "wrong-unit",
+]
+CODES: Final[dict[Code, str]] = {
+    "cannot-assemble": "The mechanism cannot be assembled at some angle.",
+    "conflict": "Fields contradict each other.",
+    "empty": "Nothing is left, or nothing was given, where there must be something.",
+    "exactly-one": "Exactly one of several fields must be given.",
+    "inertia-insufficient": "The shaft would stop, or nearly stop, within the cycle.",
+    "invalid-choice": "The value is not one of the choices.",
+    "invalid-formula": "The formula cannot be read, or it gives no number.",
+    "invalid-machine": "The parts named do not make a machine, or a name of its formulas cannot be used.",
+    "invalid-path": "The path names no number that can vary.",
+    "invalid-range": "The ends, the step or the count of a range do not go together.",
+    "invalid-table": "A table is too short, not ascending, or not closed over the cycle.",
+    "invalid-text": "The text does not have the required form.",
+    "invalid-time": "The text is not a time, or not a time that comes.",
+    "missing-unit": "A text needs a unit.",
+    "motor-overrun": "The load drives the shaft harder than the motor can brake it.",
+    "motor-stalled": "The load stalls the motor.",
+    "near-singular": "The mechanism passes too near to a singular position.",
+    "negative-inertia": "The reduced inertia is not positive at every angle.",
+    "no-clutch-law": "The coefficients are not a clutch law, or no law fits the measured data.",
+    "not-a-grid": "The axes vary together, and a grid is required.",
+    "not-a-number": "The text does not begin with a number.",
+    "not-an-axis": "The path is not an axis of the study.",
+    "not-finite": "The number is not finite.",
+    "not-fixed": "An axis needs one value and has none.",
+    "not-numeric": "The result is a category, and a number is required.",
+    "not-used": "The field has no effect here, so that it is refused.",
+    "nothing-varies": "The study has one case only, or no axis.",
+    "out-of-range": "The value is outside the allowed range.",
+    "quadrature-not-reached": "Torque or inertia is too rough to be integrated to the required accuracy.",
+    "repeated": "The same field, value or case is given more than once.",
+    "required": "A required field is missing.",
+    "too-long": "The text is too long.",
+    "too-many": "There are more values, cases or parameters than allowed.",
+    "too-many-faults": "There are more faults than are listed.",
+    "unbalanced-work": "Drive and resistance do not do opposite work over the cycle.",
+    "unequal-lengths": "Lists that go together have different lengths.",
+    "unknown-field": "There is no field or parameter of this name.",
+    "unknown-name": "There is no item of this name or number.",
+    "unknown-value": "The axis does not have this value.",
+    "unreadable": "The document cannot be read: its size, encoding or syntax.",
+    "unsupported-version": "This version of the spec is not supported.",
+    "wrong-type": "The value has the wrong type: an object, a list, a text, a number or true or false is required.",
+    "wrong-unit": "The unit cannot be read, or it is a unit of another quantity.",
+}
+
+#: What went wrong as a whole; over HTTP the last part of a problem's type.
+Kind = Literal[
+    "bad-request",
+    "body-too-large",
+    "case-not-found",
+    "cross-site",
+    "idempotency-conflict",
+    "internal",
+    "invalid-body",
+    "invalid-parameter",
+    "invalid-selection",
+    "invalid-spec",
+    "method-not-allowed",
+    "not-acceptable",
+    "not-computed",
+    "not-found",
+    "queue-full",
+    "read-only",
+    "schedule-not-found",
+    "storage-full",
+    "study-not-found",
+    "timed-out",
+    "too-costly",
+    "too-many-attempts",
+    "too-many-requests",
+    "too-slow",
+    "unauthorized",
+    "unavailable",
+    "unsupported-media-type",
+    "wrong-host",
+    "wrong-state",
+    # Of commands, the client and the database; over HTTP, those of the database are `unavailable`.
+    "database-busy",
+    "database-damaged",
+    "database-forbidden",
+    "database-read-only",
+    "database-replaced",
+    "database-unreachable",
+    "file-exists",
+    "invalid-data",
+    "invalid-database-url",
+    "invalid-file",
+    "invalid-settings",
+    "missing-extra",
+    "not-a-database",
+    "not-done",
+    "token-not-found",
+    "unreachable",
+    "unsupported-database",
+    "write-failed",
+    "wrong-revision",
+]
+#: Kinds that only commands and the Python client tell of; `sprag.service.http.problems` explains the others.
+LOCAL_KINDS: Final[dict[Kind, str]] = {
+    "database-busy": "Another process kept the database busy for too long.",
+    "database-damaged": "The database is damaged.",
+    "database-forbidden": "The user lacks the rights for this in the database.",
+    "database-read-only": "The database, or its folder, is read-only.",
+    "database-replaced": "The file of the database was deleted, moved or replaced while it was in use.",
+    "database-unreachable": "The database cannot be reached or opened.",
+    "file-exists": "The file exists already and is not replaced.",
+    "invalid-data": "The measured data cannot be read, or no clutch law fits them.",
+    "invalid-database-url": "The URL does not name a database.",
+    "invalid-file": "The file cannot be read.",
+    "invalid-settings": "A setting is not valid.",
+    "missing-extra": "A package is not installed; the message names the extra that brings it.",
+    "not-a-database": "The file or database is not one of Sprag.",
+    "not-done": "The study was not finished.",
+    "token-not-found": "There is no such token.",
+    "unreachable": "No service answered at this address.",
+    "unsupported-database": "This kind, version or place of a database is not supported.",
+    "write-failed": "The output cannot be written.",
+    "wrong-revision": "The database has another revision than this program; the message names the command to run.",
+}
+
 
 @dataclass(frozen=True, slots=True)
-class ErrorItem:
-    """One fault: where it is (JSON Pointer into the body, or name of a parameter), what was given, what is allowed."""
+class Fault:
+    """One thing wrong with the input.
 
+    Attributes
+    ----------
+    where : str or None
+        JSON Pointer (RFC 6901) to the field, "" for the whole document; of a file a line, of a command an option.
+    code : str
+        One of `CODES`.
+    message : str
+        What is wrong, for people, without the value.
+    value : object
+        The value received, shortened, always plain JSON data.
+    allowed : str or None
+        The allowed range or choices.
+    unit : str or None
+        The SI unit of the field.
+    """
+
+    place: ClassVar[str] = "pointer"
+
+    where: str | None
+    code: Code
     message: str
-    pointer: str | None = None
-    parameter: str | None = None
     value: Any = None
     allowed: str | None = None
     unit: str | None = None
 
+    def __str__(self) -> str:
+        details = []
+        if self.value is not None:
+            details.append(f"got {self.value!r}" if isinstance(self.value, str) else f"got {self.value}")
+        if self.allowed is not None:
+            details.append(f"allowed: {self.allowed}")
+        if self.unit is not None and (self.allowed is None or self.unit not in self.allowed):
+            details.append(f"unit {self.unit}")
+        where = self.where or "(the whole spec)"
+        return f"{where}: {self.message}" + (f" ({'; '.join(details)})" if details else "")
+
     def to_json(self) -> dict[str, Any]:
-        """The fault as JSON data; where a fault is not told by a name, the name is left out."""
-        where = {"pointer": self.pointer} if self.parameter is None else {"parameter": self.parameter}
-        return {**where, "message": self.message, "value": self.value, "allowed": self.allowed, "unit": self.unit}
+        """The fault as JSON data."""
+        return {
+            self.place: self.where,
+            "code": self.code,
+            "message": self.message,
+            "value": self.value,
+            "allowed": self.allowed,
+            "unit": self.unit,
+        }
+
+
+class ParameterFault(Fault):
+    """One thing wrong with a parameter of a request; ``where`` is its name."""
+
+    __slots__ = ()
+    place = "parameter"
 
 
 class FaultError(Exception):
@@ -34,29 +246,39 @@ class FaultError(Exception):
     Attributes
     ----------
     code : str
-        Kind of the fault, stable: the last part of a problem's type.
+        Kind of the fault, stable: one of `Kind`.
     detail : str
         What went wrong this time, as a sentence.
-    errors : tuple of ErrorItem
+    faults : tuple of Fault
         Every faulty place, where there can be several.
     retry_after : int or None
         Seconds after which another attempt makes sense.
     """
 
-    def __init__(
-        self, code: str, detail: str, errors: Iterable[ErrorItem] = (), retry_after: int | None = None
-    ) -> None:
+    code: str
+
+    def __init__(self, code: Kind, detail: str, faults: Iterable[Fault] = (), retry_after: int | None = None) -> None:
         super().__init__(detail)
         self.code = code
         self.detail = detail
-        self.errors = tuple(errors)
+        self.faults = tuple(faults)
         self.retry_after = retry_after
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (type(self), self.args, self.__dict__)
 
-def parameter_error(name: str, message: str, value: Any = None, allowed: str | None = None) -> FaultError:
+
+def _restored(kind: type[FaultError], args: tuple[Any, ...], state: dict[str, Any]) -> FaultError:
+    """The fault as another process raised it."""
+    fault = kind.__new__(kind, *args)
+    fault.__dict__.update(state)
+    return fault
+
+
+def parameter_error(name: str, code: Code, message: str, value: Any = None, allowed: str | None = None) -> FaultError:
     """A `FaultError` about one parameter of the request."""
-    item = ErrorItem(message, parameter=name, value=shown(value), allowed=allowed)
-    return FaultError("invalid-parameter", f"{name}: {message}", (item,))
+    fault = ParameterFault(name, code, message, shown(value), allowed)
+    return FaultError("invalid-parameter", f"{name}: {message}", (fault,))
 
 
 def shown(value: Any) -> Any:

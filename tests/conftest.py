@@ -38,6 +38,11 @@ class Finished:
         """Standard output as JSON."""
         return json.loads(self.out)
 
+    @property
+    def failure(self) -> Any:
+        """Why a command with ``--json`` failed: the object on standard error (of `validate`, on standard output)."""
+        return json.loads((self.err or self.out).splitlines()[-1])
+
 
 @pytest.fixture(autouse=True)
 def _levels_of_before() -> Iterator[None]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 class Chunk:
     """Consecutive cases of one study, the unit of claim and commit.
 
-    They are consecutive in the order in which the study is run: by their numbers, or coarse to fine (`worker.order`).
+    They are consecutive in the order in which the study is run: by their numbers, or coarse to fine
+    (`sprag.worker.order`).
     ``study`` is the study's number in order of submission. ``failures`` counts how often these cases, as one chunk,
     took their process down or ran out of time.
     """
@@ -74,7 +75,9 @@ class ActiveStudy:
 
 
 class StoreError(Exception):
-    """The store refuses; the message is one plain sentence for a user."""
+    """The store refuses; the message is one plain sentence for a user, ``code`` says the kind and is stable."""
+
+    code: str = "unavailable"
 
 
 class StoreFullError(StoreError):
@@ -87,6 +90,8 @@ class EpochLostError(StoreError):
 
 class ExecutorError(Exception):
     """The executor cannot run anything any more; the message is one plain sentence for a user."""
+
+    code: ClassVar[str] = "unavailable"
 
 
 class KernelError(Exception):

@@ -1,6 +1,7 @@
 """The states of a study and the one table of what may follow what."""
 
 from enum import StrEnum
+from typing import ClassVar
 
 
 class StudyState(StrEnum):
@@ -102,6 +103,8 @@ ALREADY: frozenset[tuple[StudyState, StudyEvent]] = frozenset(
 
 class TransitionError(Exception):
     """The state of a study does not allow what was asked for."""
+
+    code: ClassVar[str] = "wrong-state"
 
     def __init__(self, state: StudyState, event: StudyEvent) -> None:
         super().__init__(f"a study that is {state.value} cannot take {event.value.replace('_', ' ')!r}")

@@ -8,7 +8,7 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Annotated
+from typing import Annotated, cast
 
 import typer
 
@@ -27,8 +27,9 @@ from sprag.service.cli import (
     settle,
     token,
 )
-from sprag.service.cli.console import CommandFailureError, ExitCode, TroubleError, say, write_text
+from sprag.service.cli.console import CommandFailureError, ExitCode, TroubleError, WrongInputError, say, write_text
 from sprag.service.extras import command_for
+from sprag.service.faults import Kind
 
 #: Set to anything to see where a fault of the program lies.
 DEBUG_VARIABLE = "SPRAG_DEBUG"
@@ -116,7 +117,9 @@ def execute(arguments: Sequence[str]) -> int:
         code = ExitCode.PIPE_CLOSED
     except OSError as error:  # a full disk, or no right to write where temporary files go
         _drop_output()
-        failure = TroubleError(f"{error.filename or 'standard output'}: {(error.strerror or str(error)).lower()}")
+        failure = TroubleError(
+            "write-failed", f"{error.filename or 'standard output'}: {(error.strerror or str(error)).lower()}"
+        )
         code = _report(failure, "--json" in arguments)
     return int(code)
 
@@ -137,7 +140,7 @@ def _invoke(arguments: Sequence[str]) -> int:
     except CommandFailureError as failure:
         return _report(failure, as_json)
     except (StoreError, ExecutorError) as error:
-        return _report(TroubleError(str(error)), as_json)
+        return _report(TroubleError(cast("Kind", error.code), str(error)), as_json)
     except typer.TyperException as error:
         return _usage(error, as_json)
     except typer.Abort:
@@ -150,11 +153,13 @@ def _invoke(arguments: Sequence[str]) -> int:
     except Exception as error:
         command = command_for(error) if isinstance(error, ModuleNotFoundError) else None
         if command is not None:
-            return _report(TroubleError(f"this command needs a package that is not installed: {command}"), as_json)
+            return _report(
+                TroubleError("missing-extra", f"this command needs a package that is not installed: {command}"), as_json
+            )
         if os.environ.get(DEBUG_VARIABLE):
             traceback.print_exc()
         sentence = f"This is a fault of Sprag: {type(error).__name__}: {error}. {DEBUG_VARIABLE}=1 shows where it lies."
-        return _report(TroubleError(sentence), as_json)
+        return _report(TroubleError("internal", sentence), as_json)
 
 
 def _usage(error: typer.TyperException, as_json: bool) -> int:
@@ -162,7 +167,7 @@ def _usage(error: typer.TyperException, as_json: bool) -> int:
     context = getattr(error, "ctx", None)
     message = error.format_message().replace(": Value error, ", ": ")
     if as_json:
-        say(json.dumps({"error": message, "exit_code": int(ExitCode.WRONG_INPUT)}, ensure_ascii=False))
+        say(json.dumps(WrongInputError("invalid-parameter", message).document(), ensure_ascii=False))
     elif message:
         say(f"sprag: {message}")
         if context is not None:
@@ -175,7 +180,7 @@ def _report(failure: CommandFailureError, as_json: bool) -> int:
         say(json.dumps(failure.document(), ensure_ascii=False))
     else:
         say(*(f"sprag: {line}" if index == 0 else line for index, line in enumerate(failure.lines())))
-    return failure.code
+    return failure.exit_code
 
 
 def _drop_output() -> None:

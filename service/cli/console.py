@@ -11,11 +11,10 @@ import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.spec.report import Problem
+from sprag.service.faults import FaultError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -39,40 +38,33 @@ class ExitCode(IntEnum):
     PIPE_CLOSED = 141
 
 
-class CommandFailureError(Exception):
+class CommandFailureError(FaultError):
     """A command cannot do what it was asked to; carries the exit code and everything that is to be said about it."""
 
-    code = ExitCode.TROUBLE
-
-    def __init__(self, message: str, *, problems: Iterable[Problem] = ()) -> None:
-        super().__init__(message)
-        self.message = message
-        self.problems = tuple(problems)
+    exit_code = ExitCode.TROUBLE
 
     def lines(self) -> Iterator[str]:
-        """The message and every problem, one a line, for people."""
-        yield self.message
-        for problem in self.problems:
-            yield f"  {problem}"
+        """The message and every fault, one a line, for people."""
+        yield self.detail
+        for fault in self.faults:
+            yield f"  {fault}"
 
     def document(self) -> dict[str, object]:
         """The same as plain JSON data."""
-        document: dict[str, object] = {"error": self.message, "exit_code": int(self.code)}
-        if self.problems:
-            document["problems"] = [asdict(problem) for problem in self.problems]
+        document: dict[str, object] = {"error": self.detail, "code": self.code, "exit_code": int(self.exit_code)}
+        if self.faults:
+            document["problems"] = [fault.to_json() for fault in self.faults]
         return document
 
 
 class WrongInputError(CommandFailureError):
     """The input is wrong: exit code 2."""
 
-    code = ExitCode.WRONG_INPUT
+    exit_code = ExitCode.WRONG_INPUT
 
 
 class TroubleError(CommandFailureError):
     """The service or the storage is in trouble: exit code 3."""
-
-    code = ExitCode.TROUBLE
 
 
 def write_json(data: object) -> None:

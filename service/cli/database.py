@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sprag.service.cli.console import TroubleError, WrongInputError, say, write_json
+from sprag.service.cli.console import ExitCode, TroubleError, WrongInputError, say, write_json
 from sprag.service.cli.options import Database, JsonFlag
 from sprag.service.cli.settings import read_settings
 
@@ -48,7 +48,7 @@ def check(db: Database = None, as_json: JsonFlag = False) -> None:
         print(f"{report.location}: {report.backend} {report.backend_version}, revision {report.revision or 'none'}")
         print("\n".join(f"  {problem}" for problem in report.problems) or "  sound")
     if report.problems:
-        raise typer.Exit(TroubleError.code)
+        raise typer.Exit(ExitCode.TROUBLE)
 
 
 @app.command()
@@ -62,7 +62,7 @@ def backup(
 
     target = Path(file)
     if target.exists():
-        raise WrongInputError(f"{file}: exists already; a backup never replaces a file")
+        raise WrongInputError("file-exists", f"{file}: exists already; a backup never replaces a file")
     with _opened(db) as session:
         write_copy(session, target)
     size = target.stat().st_size
@@ -91,7 +91,7 @@ def prune(
         location = session.url.render_as_string(hide_password=False)
     with Store.open(location) as store:
         if not dry_run and (problem := distrust(store)):
-            raise TroubleError(f"{problem}.")
+            raise TroubleError("unavailable", f"{problem}.")
         found = store.prune(store.clock.now() - timedelta(days=older_than), dry=dry_run)
         store.purge()
     if as_json:
@@ -114,7 +114,7 @@ def _opened(db: str | None, *, existing: bool = True) -> Iterator[Session]:
         url = make_url(location)
         path = url.database if url.get_backend_name() == "sqlite" else None
         if existing and path and not Path(path).exists():
-            raise WrongInputError(f"{path}: there is no such database")
+            raise WrongInputError("invalid-file", f"{path}: there is no such database")
     session = Session(location)
     try:
         yield session

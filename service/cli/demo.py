@@ -79,7 +79,7 @@ def _address(process: subprocess.Popen[bytes]) -> str:
     with process.stdout as output:
         line = output.readline()
     if not line:
-        raise TroubleError("The service did not start; what it said stands above.")
+        raise TroubleError("unavailable", "The service did not start; what it said stands above.")
     return str(json.loads(line)["address"])
 
 

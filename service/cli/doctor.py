@@ -16,10 +16,10 @@ from typing import Annotated, Any
 
 import typer
 
-from sprag.service.cli.console import TroubleError, WrongInputError, console, write_json, write_text
+from sprag.service.cli.console import ExitCode, WrongInputError, console, write_json, write_text
 from sprag.service.cli.options import Database, JsonFlag
 from sprag.service.cli.settings import read_settings
-from sprag.service.spec.report import Problem
+from sprag.service.faults import Fault
 from sprag.worker.limits import MAX_TOLERANCE, MIN_TOLERANCE
 
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sqlalchemy", "fastapi", "uvicorn")
@@ -61,9 +61,10 @@ def doctor(
         return
     if given:
         problems = [
-            Problem(f"--{name}", "belongs to --kernel, which is not given", value) for name, value in given.items()
+            Fault(f"--{name}", "not-used", "belongs to --kernel, which is not given", value)
+            for name, value in given.items()
         ]
-        raise WrongInputError("an option is wrong", problems=problems)
+        raise WrongInputError("invalid-parameter", "an option is wrong", problems)
     findings = list(examine(db))
     sound = all(finding.ok for finding in findings)
     if as_json:
@@ -75,7 +76,7 @@ def doctor(
             screen.print(f"{mark:>5}", style=style, end="  ")
             screen.print(f"{finding.subject}: {finding.detail}", markup=False, soft_wrap=True)
     if not sound:
-        raise typer.Exit(TroubleError.code)
+        raise typer.Exit(ExitCode.TROUBLE)
 
 
 def _show_kernel(shape: dict[str, Any], as_json: bool) -> None:
@@ -83,8 +84,8 @@ def _show_kernel(shape: dict[str, Any], as_json: bool) -> None:
 
     for name, most in (("pendulums", MAX_PENDULUMS), ("coefficients", MAX_COEFFICIENTS)):
         if shape[name] > most:
-            problem = Problem(f"--{name}", "there is no such kernel", shape[name], allowed=f"1 .. {most}")
-            raise WrongInputError("an option is wrong", problems=[problem])
+            problem = Fault(f"--{name}", "unknown-name", "there is no such kernel", shape[name], allowed=f"1 .. {most}")
+            raise WrongInputError("invalid-parameter", "an option is wrong", [problem])
     text = kernel_source(**shape)
     if as_json:
         write_json({**shape, "source": text})

@@ -10,8 +10,8 @@ import typer
 from sprag.service.cli.console import ExitCode, WrongInputError, say, write_json
 from sprag.service.cli.files import output, read_study, to_file
 from sprag.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
+from sprag.service.faults import Fault
 from sprag.service.json_text import to_bytes
-from sprag.service.spec.report import Problem
 
 if TYPE_CHECKING:
     from sprag.worker.study import Study
@@ -60,8 +60,10 @@ def _require(study: Study, case: int) -> None:
     from sprag.worker.models import VIBRATION_DRIVE, has_clutches
 
     if not has_clutches(study):
-        problem = Problem("/model", "has no clutches, so that nothing engages", study.model, allowed=VIBRATION_DRIVE)
-        raise WrongInputError("this study has no engagements", problems=[problem])
+        problem = Fault(
+            "/model", "wrong-type", "has no clutches, so that nothing engages", study.model, allowed=VIBRATION_DRIVE
+        )
+        raise WrongInputError("invalid-parameter", "this study has no engagements", [problem])
     if case >= study.cases:
-        problem = Problem("--case", "there is no such case", case, allowed=f"0 .. {study.cases - 1}")
-        raise WrongInputError("an option is wrong", problems=[problem])
+        problem = Fault("--case", "unknown-name", "there is no such case", case, allowed=f"0 .. {study.cases - 1}")
+        raise WrongInputError("invalid-parameter", "an option is wrong", [problem])

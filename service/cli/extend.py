@@ -11,8 +11,8 @@ from sprag.service.cli.console import WrongInputError, say
 from sprag.service.cli.files import decode, read_bytes
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, WaitTimeout
 from sprag.service.cli.remote import connection, exit_as, follow, show_study
+from sprag.service.faults import Fault
 from sprag.service.spec.numbers import parse_number
-from sprag.service.spec.report import Problem
 from sprag.worker.limits import MAX_BODY_BYTES, MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
 
 
@@ -84,16 +84,18 @@ def _what_is_new(old: Mapping[str, Any], study: Mapping[str, Any]) -> str:
 
 def _addition(axes: list[str], points: str | None) -> dict[str, Any]:
     if bool(axes) == (points is not None):
-        problem = Problem("--axis", "or --points is needed, and not both", allowed="--axis shaft.load=0.5,0.7")
-        raise WrongInputError("an option is missing", problems=[problem])
+        problem = Fault(
+            "--axis", "exactly-one", "or --points is needed, and not both", allowed="--axis shaft.load=0.5,0.7"
+        )
+        raise WrongInputError("invalid-parameter", "an option is missing", [problem])
     if points is not None:
         return {"cases": [{"points": decode(points, read_bytes(points, MAX_BODY_BYTES))}]}
     made = []
     for text in axes:
         path, sign, values = text.partition("=")
         if not sign or not path.strip() or not values.strip():
-            problem = Problem("--axis", "must be PATH=VALUES", text, allowed="such as shaft.load=0.5,0.7")
-            raise WrongInputError("an option is wrong", problems=[problem])
+            problem = Fault("--axis", "invalid-text", "must be PATH=VALUES", text, allowed="such as shaft.load=0.5,0.7")
+            raise WrongInputError("invalid-parameter", "an option is wrong", [problem])
         made.append({"path": path.strip(), "values": [_value(item.strip()) for item in values.split(",")]})
     return {"axes": made}
 

@@ -12,10 +12,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Literal
+from typing import IO, TYPE_CHECKING, Literal, cast
 
 from sprag.service.cli.console import CommandFailureError, TroubleError, WrongInputError
-from sprag.service.spec.report import Problem, SpecError
+from sprag.service.faults import Fault, Kind
+from sprag.service.spec.report import SpecError
 from sprag.service.stale_files import mark, sweep
 from sprag.worker.limits import MAX_BODY_BYTES
 
@@ -33,8 +34,9 @@ _STORAGE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS}
 def file_failure(path: Path | str, error: OSError) -> CommandFailureError:
     """The failure that an operating system's error on ``path`` means."""
     reason = (error.strerror or str(error)).lower()
-    kind = TroubleError if error.errno in _STORAGE_ERRORS else WrongInputError
-    return kind(f"{path}: {reason}")
+    if error.errno in _STORAGE_ERRORS:
+        return TroubleError("write-failed", f"{path}: {reason}")
+    return WrongInputError("invalid-file", f"{path}: {reason}")
 
 
 def read_bytes(path: str, limit: int) -> bytes:
@@ -49,7 +51,7 @@ def read_bytes(path: str, limit: int) -> bytes:
             with Path(path).open("rb") as file:
                 data = file.read(limit + 1)
     if len(data) > limit:
-        raise WrongInputError(f"{path}: larger than the allowed {limit} bytes")
+        raise WrongInputError("invalid-file", f"{path}: larger than the allowed {limit} bytes")
     return data
 
 
@@ -59,13 +61,15 @@ def decode(path: str, data: bytes) -> str:
     Raises WrongInputError when it is no text.
     """
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        raise WrongInputError(f"{path}: UTF-16 text; save it as UTF-8 (spreadsheets call it CSV UTF-8)")
+        raise WrongInputError("invalid-file", f"{path}: UTF-16 text; save it as UTF-8 (spreadsheets call it CSV UTF-8)")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise WrongInputError(f"{path}: no UTF-8 text (byte {error.start} is {data[error.start]:#04x})") from error
+        raise WrongInputError(
+            "invalid-file", f"{path}: no UTF-8 text (byte {error.start} is {data[error.start]:#04x})"
+        ) from error
     if "\0" in text:
-        raise WrongInputError(f"{path}: a binary file, no text")
+        raise WrongInputError("invalid-file", f"{path}: a binary file, no text")
     return text
 
 
@@ -87,8 +91,8 @@ def read_spec(path: str, points: str | None = None, limit: int = MAX_DATA_BYTES)
     from sprag.service.spec.text import load_spec
 
     if path == points == "-":
-        problem = Problem("--points", "standard input is the spec already", allowed="a file")
-        raise WrongInputError("an option is wrong", problems=[problem])
+        problem = Fault("--points", "conflict", "standard input is the spec already", allowed="a file")
+        raise WrongInputError("invalid-parameter", "an option is wrong", [problem])
     data = read_bytes(path, MAX_BODY_BYTES)
     try:
         spec = load_spec(data, _format(path, data))
@@ -124,15 +128,15 @@ def naming_points(points: str | None) -> Iterator[None]:
         if points is None:
             raise
         told = [
-            replace(problem, pointer=points) if problem.pointer.startswith("/axes") else problem
-            for problem in failure.problems
+            replace(fault, where=points) if (fault.where or "").startswith("/axes") else fault
+            for fault in failure.faults
         ]
-        raise WrongInputError(failure.message, problems=told) from failure
+        raise WrongInputError(cast("Kind", failure.code), failure.detail, told) from failure
 
 
 def spec_failure(path: str, error: SpecError) -> WrongInputError:
     """The failure a SpecError means: its problems, one a line."""
-    return WrongInputError(f"{path}: the spec is not valid", problems=error.problems)
+    return WrongInputError("invalid-spec", f"{path}: the spec is not valid", error.faults)
 
 
 Write = Callable[[bytes], None]
@@ -154,7 +158,7 @@ def output(path: str | None) -> Iterator[Write]:
     target = Path(path)
     with _told(target):
         if target.is_dir():
-            raise WrongInputError(f"{path}: is a directory")
+            raise WrongInputError("invalid-file", f"{path}: is a directory")
         through = target.exists() and not target.is_file()  # a device or a pipe is written to, never replaced
     if through:
         with _told(target):
@@ -198,7 +202,7 @@ def _told(path: Path | str) -> Iterator[None]:
     except OSError as error:
         raise file_failure(path, error) from error
     except ValueError as error:  # a zero byte in the name
-        raise WrongInputError(f"{path!r} is no file name") from error
+        raise WrongInputError("invalid-file", f"{path!r} is no file name") from error
 
 
 @contextmanager

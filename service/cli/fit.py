@@ -11,8 +11,9 @@ import typer
 from sprag.service.cli.console import WrongInputError, say, show_table, write_json, write_text
 from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes
 from sprag.service.cli.options import JsonFlag
+from sprag.service.faults import Fault
 from sprag.service.spec.numbers import parse_number
-from sprag.service.spec.report import Problem, shorten
+from sprag.service.spec.report import shorten
 
 if TYPE_CHECKING:
     from sprag.service.spec.measured import MeasuredData
@@ -48,8 +49,10 @@ def fit(
     """
     lost_motion = _quantity("--backlash", backlash, "rad")
     if lost_motion and not angles_include_backlash:
-        problem = Problem("--backlash", "is taken off the angles only with --angles-include-backlash", backlash)
-        raise WrongInputError("an option is wrong", problems=[problem])
+        problem = Fault(
+            "--backlash", "not-used", "is taken off the angles only with --angles-include-backlash", backlash
+        )
+        raise WrongInputError("invalid-parameter", "an option is wrong", [problem])
     measured = _measured(data)
     made = _fitted(
         measured,
@@ -76,7 +79,9 @@ def _quantity(option: str, text: str, unit: str) -> float:
     try:
         return parse_quantity(text if number is None else number, unit)
     except QuantityError as error:
-        raise WrongInputError("an option is wrong", problems=[Problem(option, str(error), text, unit=unit)]) from error
+        raise WrongInputError(
+            "invalid-parameter", "an option is wrong", [Fault(option, error.code, str(error), text, unit=unit)]
+        ) from error
 
 
 def _measured(path: str) -> MeasuredData:
@@ -86,7 +91,7 @@ def _measured(path: str) -> MeasuredData:
     try:
         return parse_measured(decode(path, read_bytes(path, MAX_DATA_BYTES)), parse_quantity)
     except MeasuredDataError as error:
-        raise WrongInputError(f"{path}: no measured clutch data", problems=error.problems) from error
+        raise WrongInputError("invalid-data", f"{path}: no measured clutch data", error.faults) from error
 
 
 def _fitted(measured: MeasuredData, *, accuracy: float, **options: Any) -> ClutchFit:
@@ -96,10 +101,10 @@ def _fitted(measured: MeasuredData, *, accuracy: float, **options: Any) -> Clutc
         return fit_clutch(measured.rows, accuracy, **options)
     except ClutchFitError as error:
         if error.degrees:
-            raise WrongInputError(error.summary, problems=_tried(error.degrees, accuracy)) from error
+            raise WrongInputError("invalid-data", error.summary, _tried(error.degrees, accuracy)) from error
         where = _place(error.name, measured)
-        problem = Problem(where, error.message, shorten(error.value), allowed=error.allowed)
-        raise WrongInputError("no law can be fitted", problems=[problem]) from error
+        problem = Fault(where, "no-clutch-law", error.message, shorten(error.value), allowed=error.allowed)
+        raise WrongInputError("invalid-data", "no law can be fitted", [problem]) from error
 
 
 def _place(name: str, measured: MeasuredData) -> str:
@@ -110,11 +115,12 @@ def _place(name: str, measured: MeasuredData) -> str:
     return name if name in ("", "data") else "--" + name.replace("_", "-")
 
 
-def _tried(degrees: Iterable[DegreeReport], accuracy: float) -> list[Problem]:
+def _tried(degrees: Iterable[DegreeReport], accuracy: float) -> list[Fault]:
     """Best residual of each degree that was tried, as problems."""
     return [
-        Problem(
+        Fault(
             f"degree {report.degree}",
+            "out-of-range",
             "largest residual in N*m",
             float(f"{report.max_residual:.6g}"),
             allowed=f"<= {accuracy:g}",

@@ -27,7 +27,7 @@ from sprag.service.cli.files import output, read_study, to_file
 from sprag.service.cli.options import ChunkCases, FinishBy, Fresh, JsonFlag, OutputFile, PointsFile, Processes, SpecFile
 from sprag.service.cli.remote import TableFormat, table_format
 from sprag.service.cli.settings import read_settings
-from sprag.service.spec.report import Problem
+from sprag.service.faults import Fault
 from sprag.worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def validate(spec: SpecFile, points: PointsFile = None, as_json: JsonFlag = Fals
     try:
         parsed = read_study(spec, points)
     except WrongInputError as failure:
-        if not as_json or not failure.problems:
+        if not as_json or not failure.faults:
             raise
         write_json({"valid": False, **failure.document()})
         raise typer.Exit(ExitCode.WRONG_INPUT) from failure
@@ -181,15 +181,15 @@ def _trajectory(study: Study, case: int, start: str | None, end: str | None, poi
     from sprag.worker.models import run_trajectory
 
     if case >= study.cases:
-        problem = Problem("--case", "there is no such case", case, allowed=f"0 .. {study.cases - 1}")
-        raise WrongInputError("an option is wrong", problems=[problem])
+        problem = Fault("--case", "unknown-name", "there is no such case", case, allowed=f"0 .. {study.cases - 1}")
+        raise WrongInputError("invalid-parameter", "an option is wrong", [problem])
     try:
         first, last = span(study, case, start, end)
     except FaultError as error:
         problems = [
-            Problem(f"--{item.parameter}", item.message, item.value, allowed=item.allowed) for item in error.errors
+            Fault(f"--{item.where}", item.code, item.message, item.value, item.allowed) for item in error.faults
         ]
-        raise WrongInputError("an option is wrong", problems=problems) from error
+        raise WrongInputError("invalid-parameter", "an option is wrong", problems) from error
     return run_trajectory(study, case, first, last, points)
 
 
@@ -221,8 +221,14 @@ def presets(
             write_text("".join(f"{item:{width}}{ABOUT[item].shows}\n" for item in names))
         return
     if name not in names:
-        problem = Problem("NAME", f"there is no such preset{did_you_mean(name, names)}", name, allowed=", ".join(names))
-        raise WrongInputError("an argument is wrong", problems=[problem])
+        problem = Fault(
+            "NAME",
+            "unknown-name",
+            f"there is no such preset{did_you_mean(name, names)}",
+            name,
+            allowed=", ".join(names),
+        )
+        raise WrongInputError("invalid-parameter", "an argument is wrong", [problem])
     file, text = preset_text(name)
     if as_json:
         write_json({"name": name, "file": file, "text": text})
@@ -315,8 +321,8 @@ def _finish(text: str | None) -> datetime | None:
     try:
         return None if text is None else finish_at(text, datetime.now(UTC))
     except FinishError as error:
-        problem = Problem("--finish-by", str(error), text, allowed=ALLOWED)
-        raise WrongInputError("an option is wrong", problems=[problem]) from None
+        problem = Fault("--finish-by", error.code, str(error), text, allowed=ALLOWED)
+        raise WrongInputError("invalid-parameter", "an option is wrong", [problem]) from None
 
 
 def _rows(done: LocalRun, study: Study, form: Format | ReportFormat) -> Iterator[bytes]:

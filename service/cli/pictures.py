@@ -11,7 +11,7 @@ from sprag.service.cli.console import OK, WrongInputError, cell_text, say, show_
 from sprag.service.cli.files import write_pieces
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
 from sprag.service.cli.remote import connection
-from sprag.service.spec.report import Problem
+from sprag.service.faults import Fault
 
 HeldAt = Annotated[
     list[str] | None, typer.Option("--at", metavar="PATH=VALUE", help="Value at which another axis is held.")
@@ -29,8 +29,9 @@ def file_format(file: str, allowed: tuple[str, ...], what: str) -> str:
     if form not in allowed:
         names = ", ".join(f".{name}" for name in allowed[:-1]) + f" or .{allowed[-1]}"
         raise WrongInputError(
+            "invalid-parameter",
             "an option is wrong",
-            problems=[Problem("--output", f"no kind of {what}", file, allowed=f"a name that ends in {names}")],
+            [Fault("--output", "invalid-choice", f"no kind of {what}", file, allowed=f"a name that ends in {names}")],
         )
     return form
 

@@ -39,9 +39,9 @@ def serve(
     try:
         run_service(settings, announce=announce if as_json else None)
     except UnsafeSettingsError as error:
-        raise WrongInputError(str(error)) from error
+        raise WrongInputError("invalid-settings", str(error)) from error
     except AddressError as error:
-        raise TroubleError(str(error)) from error
+        raise TroubleError("unavailable", str(error)) from error
 
 
 def worker(

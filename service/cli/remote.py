@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
 import typer
 
@@ -36,8 +36,8 @@ from sprag.service.cli.options import (
     Token,
     WaitTimeout,
 )
+from sprag.service.faults import Fault, Kind
 from sprag.service.formats import FORMATS, REPORT_FORMATS, Format, ReportFormat, format_of
-from sprag.service.spec.report import Problem
 from sprag.worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
 from sprag.worker.states import TERMINAL, StudyState
 
@@ -54,7 +54,7 @@ PriorityOption = Annotated[
 
 
 class TableFormat(StrEnum):
-    """Formats of a whole study: case rows (`service.results.exports`) and documents (`service.results.report`)."""
+    """Formats of a whole study: case rows (`sprag.service.results.exports`) and documents (`...results.report`)."""
 
     CSV = "csv"
     JSON = "json"
@@ -75,41 +75,42 @@ def connection(server: str, token: str | None) -> Iterator[ServiceClient]:
     try:
         client = ServiceClient(server, token)
     except ValueError as error:
-        raise WrongInputError(str(error)) from error
+        raise WrongInputError("invalid-parameter", str(error)) from error
     with client:
         try:
             yield client
         except UnreachableError as error:
             raise TroubleError(
+                "unreachable",
                 f"No Sprag service at {error.address} ({error.reason}); start one with `sprag serve` or name another "
-                "with --server."
+                "with --server.",
             ) from error
         except RefusedError as error:
             raise refusal(error) from error
         except StudyTimeoutError as error:
-            raise TroubleError(f"{error}; it goes on.") from error
+            raise TroubleError("not-done", f"{error}; it goes on.") from error
 
 
 def refusal(error: RefusedError) -> CommandFailureError:
     """The failure of the command that the service's refusal means."""
+    kind = cast("Kind", error.code)
     if error.status == 401:
-        return TroubleError(f"{error} Give the service's token with --token or in SPRAG_TOKEN.")
+        return TroubleError(kind, f"{error} Give the service's token with --token or in SPRAG_TOKEN.")
     if error.status in (403, 421) or error.status >= 500:
-        return TroubleError(str(error))
-    problems = [
-        Problem(
-            _option(item["parameter"]) if item.get("parameter") else str(item.get("pointer") or ""),
-            _PARAMETER_IN_TEXT.sub(
-                lambda found: f"{_option(found[1])}{found[2] and ' '}", str(item.get("message", "is wrong"))
-            ),
-            item.get("value"),
-            allowed=item.get("allowed"),
-            unit=item.get("unit"),
+        return TroubleError(kind, str(error))
+    faults = [
+        Fault(
+            _option(fault.where) if fault.place == "parameter" else fault.where,
+            fault.code,
+            _PARAMETER_IN_TEXT.sub(lambda found: f"{_option(found[1])}{found[2] and ' '}", fault.message),
+            fault.value,
+            fault.allowed,
+            fault.unit,
         )
-        for item in error.errors
+        for fault in error.faults
     ]
     title = error.problem.get("title")
-    return WrongInputError(str(title) if problems and title else str(error), problems=problems)
+    return WrongInputError(kind, str(title) if faults and title else str(error), faults)
 
 
 def _option(parameter: object) -> str:

@@ -10,7 +10,7 @@ from sprag.service.cli.console import WrongInputError, say, show_table, write_js
 from sprag.service.cli.files import read_spec
 from sprag.service.cli.options import DEFAULT_SERVER, Fresh, JsonFlag, Server, SpecFile, Token
 from sprag.service.cli.remote import PriorityOption, connection
-from sprag.service.spec.report import Problem
+from sprag.service.faults import Fault
 from sprag.worker.limits import MAX_PRIORITY
 
 if TYPE_CHECKING:
@@ -150,7 +150,9 @@ def change(
     if spec is not None:
         fields["spec"] = read_spec(spec)
     if not fields:
-        raise WrongInputError("nothing is given to change; `sprag schedule change --help` lists what can be")
+        raise WrongInputError(
+            "invalid-parameter", "nothing is given to change; `sprag schedule change --help` lists what can be"
+        )
     _change(schedule_id, fields, server, token, as_json)
 
 
@@ -200,8 +202,8 @@ def _window(text: str | None) -> dict[str, Any]:
         return {"window": []}
     begin, dash, end = text.partition("-")
     if not dash:
-        problem = Problem("--window", "is no window", text, allowed="as 22:00-06:00")
-        raise WrongInputError("an option is wrong", problems=[problem])
+        problem = Fault("--window", "invalid-text", "is no window", text, allowed="as 22:00-06:00")
+        raise WrongInputError("invalid-parameter", "an option is wrong", [problem])
     return {"window": [begin.strip(), end.strip()]}
 
 

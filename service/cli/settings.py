@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sprag.service.cli.console import WrongInputError
-from sprag.service.spec.report import Problem, shorten
+from sprag.service.faults import Fault
+from sprag.service.spec.report import shorten
 
 if TYPE_CHECKING:
     from sprag.service.settings import Settings
@@ -24,11 +25,18 @@ def read_settings(**options: object) -> Settings:
     try:
         return Settings(**given)  # type: ignore[arg-type]
     except SettingsFileError as error:
-        raise WrongInputError(str(error)) from error
+        raise WrongInputError("invalid-settings", str(error)) from error
     except ValidationError as error:
         problems = []
         for item in error.errors(include_url=False):
             name = str(item["loc"][0]) if item["loc"] else ""
             value = None if name == "token" else shorten(item.get("input"))
-            problems.append(Problem(ENV_PREFIX + name.upper(), item["msg"].removeprefix("Value error, "), value))
-        raise WrongInputError("a setting is wrong", problems=problems) from error
+            problems.append(
+                Fault(
+                    ENV_PREFIX + name.upper(),
+                    "wrong-type" if item["type"] == "missing" else "invalid-text",
+                    item["msg"].removeprefix("Value error, "),
+                    value,
+                )
+            )
+        raise WrongInputError("invalid-settings", "a setting is wrong", problems) from error

@@ -11,8 +11,8 @@ import typer
 from sprag.service.cli.console import ExitCode, WrongInputError, progress_bar, say, show_table, write_json
 from sprag.service.cli.files import output, read_study, to_file
 from sprag.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
+from sprag.service.faults import Fault
 from sprag.service.json_text import to_bytes
-from sprag.service.spec.report import Problem
 from sprag.worker.limits import MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
 
 if TYPE_CHECKING:
@@ -70,8 +70,8 @@ def _settled(study: Study, at_most: int | None) -> Study:
     from sprag.worker.models import VIBRATION_DRIVE, settled_study
 
     if study.model != VIBRATION_DRIVE:
-        problem = Problem("/model", "has no motion that settles", study.model, allowed=VIBRATION_DRIVE)
-        raise WrongInputError("this study cannot be settled", problems=[problem])
+        problem = Fault("/model", "wrong-type", "has no motion that settles", study.model, allowed=VIBRATION_DRIVE)
+        raise WrongInputError("invalid-parameter", "this study cannot be settled", [problem])
     return settled_study(study, at_most)
 
 
@@ -80,12 +80,12 @@ def _chosen(study: Study, asked: list[int] | None) -> list[int]:
     if asked is None:
         return list(range(study.cases))
     problems = [
-        Problem("--case", "there is no such case", case, allowed=f"0 .. {study.cases - 1}")
+        Fault("--case", "unknown-name", "there is no such case", case, allowed=f"0 .. {study.cases - 1}")
         for case in asked
         if case >= study.cases
     ]
     if problems:
-        raise WrongInputError("an option is wrong", problems=problems)
+        raise WrongInputError("invalid-parameter", "an option is wrong", problems)
     return list(dict.fromkeys(asked))
 
 

@@ -82,7 +82,7 @@ def revoke(
         try:
             record = store.revoke_token(token_id)
         except TokenNotFound as error:
-            raise WrongInputError(str(error)) from error
+            raise WrongInputError("token-not-found", str(error)) from error
     if as_json:
         write_json(_json(record))
     else:

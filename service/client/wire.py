@@ -68,8 +68,9 @@ def require_finite(data: object, pointer: str = "") -> None:
         for index, item in enumerate(data):
             require_finite(item, f"{pointer}/{index}")
     elif isinstance(data, float) and not math.isfinite(data):
-        fault = {"pointer": pointer, "message": "must be a finite number", "value": str(data)}
+        fault = {"pointer": pointer, "code": "not-finite", "message": "must be a finite number", "value": str(data)}
         problem = {
+            "type": "/problems/invalid-spec",
             "title": "The study spec is not valid",
             "status": 422,
             "detail": f"{pointer}: must be a finite number (got {data})",

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Protocol, TypeVar, TypeVarTuple
 
+from sprag.service.faults import Kind
 from sprag.service.http.problems import ApiError
 from sprag.worker import models
 from sprag.worker.limits import LOAD_SECONDS
@@ -63,7 +64,7 @@ class Limits:
     seconds: float
     memory: int
     waiting: int = MAX_WAITING
-    problem: str = "timed-out"
+    problem: Kind = "timed-out"
     setting: str = ""
     leave_seconds: float = 2.0
 

@@ -13,12 +13,10 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 
-from sprag.service.faults import ErrorItem, FaultError, parameter_error, shown
-from sprag.service.http.problems import ApiError, api_error, problem_response
+from sprag.service.faults import Code, Fault, FaultError, Kind, ParameterFault, parameter_error, shown
+from sprag.service.http.problems import PROBLEM_TYPES, ApiError, api_error, problem_response
 from sprag.service.http.web.problem_page import problem_page
-from sprag.service.results.selection import SelectionError
-from sprag.service.spec.report import SpecError, spec_items
-from sprag.service.storage import errors as storage
+from sprag.service.storage.errors import PageTokenError, StoreError
 from sprag.worker.states import TransitionError
 
 _log = logging.getLogger("sprag.service")
@@ -27,34 +25,16 @@ _LATER = {"Retry-After": "5"}
 #: What the patterns of texts mean, for people.
 _PATTERNS = {r"^[!-~]+$": "printable ASCII characters without blanks"}
 
-#: Fault of the store -> kind of problem; the first that matches, so the special ones come first.
-_STORE_PROBLEMS: tuple[tuple[type[storage.StoreError], str], ...] = (
-    (storage.StudyNotFound, "study-not-found"),
-    (storage.ScheduleNotFound, "schedule-not-found"),
-    (storage.TooManySchedules, "wrong-state"),
-    (storage.IdempotencyConflict, "idempotency-conflict"),
-    (storage.StudyBusy, "wrong-state"),
-    (storage.StudyEnded, "wrong-state"),
-    (storage.NothingToRetry, "wrong-state"),
-    (storage.DatabaseFullError, "storage-full"),
-    (storage.StoreError, "unavailable"),
-)
-
 
 def as_api_error(error: Exception) -> ApiError | None:
     """What a client is told about an exception; None when it is a fault of the program."""
     if isinstance(error, FaultError):
         return api_error(error)
-    if isinstance(error, SpecError):
-        return ApiError("invalid-spec", str(error), spec_items(error.problems))
-    if isinstance(error, SelectionError):
-        return ApiError("invalid-selection", str(error), error.errors)
-    if isinstance(error, TransitionError):
-        return ApiError("wrong-state", _sentence(error))
-    if isinstance(error, storage.PageTokenError):
-        return api_error(parameter_error("page_token", str(error), allowed="`next_page_token` of a page"))
-    if isinstance(error, storage.StoreError):
-        kind = next(problem for fault, problem in _STORE_PROBLEMS if isinstance(error, fault))
+    if isinstance(error, PageTokenError):
+        fault = parameter_error("page_token", "invalid-text", str(error), allowed="`next_page_token` of a page")
+        return api_error(fault)
+    if isinstance(error, TransitionError | StoreError):
+        kind: Kind = error.code if error.code in PROBLEM_TYPES else "unavailable"
         return ApiError(kind, _sentence(error), headers=_LATER if kind == "unavailable" else None)
     return None
 
@@ -115,23 +95,37 @@ def _methods_at(app: FastAPI, path: str) -> set[str]:
 def _invalid(request: Request, error: Exception) -> Response:
     raised = cast("RequestValidationError", error)
     items = tuple(_parameter_item(fault) for fault in raised.errors())
-    detail = "; ".join(f"{item.parameter}: {item.message}" for item in items)
+    detail = "; ".join(f"{item.where}: {item.message}" for item in items)
     return _answer(request, ApiError("invalid-parameter", detail, items))
 
 
-def _parameter_item(fault: dict[str, Any]) -> ErrorItem:
+def _parameter_item(fault: dict[str, Any]) -> Fault:
     _place, *name = fault["loc"]
     bounds = fault.get("ctx", {})
     value = fault.get("input")
     message = str(fault["msg"]).removeprefix("Value error, ")
     if "pattern" in bounds:
         message = "has characters that are not allowed here"
-    return ErrorItem(
+    return ParameterFault(
+        str(name[0]) if name else _place,
+        _code(str(fault["type"])),
         message[:1].lower() + message[1:],
-        parameter=str(name[0]) if name else _place,
         value=shown(value) if isinstance(value, str) else None,
         allowed=_allowed(bounds),
     )
+
+
+def _code(kind: str) -> Code:
+    """The code of what pydantic found."""
+    if kind == "missing":
+        return "required"
+    if kind in ("literal_error", "enum"):
+        return "invalid-choice"
+    if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
+        return "out-of-range"
+    if kind in ("too_long", "string_too_long"):
+        return "too-long"
+    return "invalid-text" if kind.startswith(("string", "value_error")) else "wrong-type"
 
 
 def _allowed(bounds: dict[str, Any]) -> str | None:
@@ -145,7 +139,7 @@ def _allowed(bounds: dict[str, Any]) -> str | None:
 def install(app: FastAPI) -> None:
     """Give ``app`` its error handlers."""
     handled: Iterable[tuple[type[Exception], Callable[[Request, Exception], Response]]] = (
-        *((kind, _known) for kind in (FaultError, SpecError, SelectionError, TransitionError, storage.StoreError)),
+        *((kind, _known) for kind in (FaultError, TransitionError, StoreError)),
         (ClientDisconnect, _left),
         (HTTPException, _http),
         (RequestValidationError, _invalid),

@@ -2,12 +2,12 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
-from sprag.service.faults import ErrorItem, FaultError
+from sprag.service.faults import Fault, FaultError, Kind
 from sprag.service.json_text import to_bytes
 
 PROBLEM_MEDIA_TYPE = "application/problem+json"
@@ -18,7 +18,7 @@ PROBLEM_PATH = "/problems/"
 class ProblemType:
     """A kind of problem: the last part of its type URI, status, title, and a sentence that explains it."""
 
-    slug: str
+    slug: Kind
     status: int
     title: str
     help: str
@@ -29,13 +29,13 @@ class ProblemType:
         return PROBLEM_PATH + self.slug
 
 
-def _catalogue(*types: ProblemType) -> dict[str, ProblemType]:
+def _catalogue(*types: ProblemType) -> dict[Kind, ProblemType]:
     return {item.slug: item for item in types}
 
 
 _FIELDS_HELP = "`errors` lists every fault: where it is, what was given, what is allowed."
 _P = ProblemType
-PROBLEM_TYPES: dict[str, ProblemType] = _catalogue(
+PROBLEM_TYPES: dict[Kind, ProblemType] = _catalogue(
     _P("invalid-spec", 422, "The study spec is not valid", _FIELDS_HELP),
     _P("invalid-body", 422, "The request body is not valid", _FIELDS_HELP),
     _P("invalid-parameter", 422, "A request parameter is not valid", "`errors` names each and what it may be."),
@@ -87,10 +87,12 @@ class ApiError(FaultError):
         Headers that the answer must have.
     """
 
+    code: Kind
+
     def __init__(
-        self, code: str, detail: str, errors: Iterable[ErrorItem] = (), headers: Mapping[str, str] | None = None
+        self, code: Kind, detail: str, faults: Iterable[Fault] = (), headers: Mapping[str, str] | None = None
     ) -> None:
-        super().__init__(code, detail, errors)
+        super().__init__(code, detail, faults)
         self.headers = dict(headers or {})
 
     @property
@@ -104,13 +106,13 @@ def api_error(fault: FaultError) -> ApiError:
     if isinstance(fault, ApiError):
         return fault
     headers = {} if fault.retry_after is None else {"Retry-After": str(fault.retry_after)}
-    return ApiError(fault.code, fault.detail, fault.errors, headers)
+    return ApiError(cast("Kind", fault.code), fault.detail, fault.faults, headers)
 
 
-def problem_json(kind: ProblemType, detail: str, errors: Iterable[ErrorItem] = ()) -> dict[str, Any]:
+def problem_json(kind: ProblemType, detail: str, faults: Iterable[Fault] = ()) -> dict[str, Any]:
     """A problem document as JSON data."""
     document: dict[str, Any] = {"type": kind.uri, "title": kind.title, "status": kind.status, "detail": detail}
-    items = [item.to_json() for item in errors]
+    items = [item.to_json() for item in faults]
     if items:
         document["errors"] = items
     return document
@@ -118,16 +120,17 @@ def problem_json(kind: ProblemType, detail: str, errors: Iterable[ErrorItem] = (
 
 def problem_response(error: ApiError) -> Response:
     """The HTTP response for ``error``."""
-    body = to_bytes(problem_json(error.type, error.detail, error.errors))
+    body = to_bytes(problem_json(error.type, error.detail, error.faults))
     headers = {"Cache-Control": "no-store", **error.headers}
     return Response(body, status_code=error.type.status, media_type=PROBLEM_MEDIA_TYPE, headers=headers)
 
 
-class ErrorItemModel(BaseModel):
+class FaultModel(BaseModel):
     """One fault of a request."""
 
     pointer: str | None = Field(default=None, description="JSON Pointer to the faulty place in the body")
     parameter: str | None = Field(default=None, description="name of the faulty parameter, where it is not in the body")
+    code: str = Field(description="what is wrong, stable; docs/faults.md lists the codes")
     message: str = Field(description="what is wrong, as a sentence")
     value: Any = Field(default=None, description="what was received, shortened")
     allowed: str | None = Field(default=None, description="what is allowed: a range, or the possible values")
@@ -143,6 +146,4 @@ class Problem(BaseModel):
     title: str
     status: int
     detail: str = Field(description="what went wrong this time")
-    errors: list[ErrorItemModel] | None = Field(
-        default=None, description="every fault found, where there can be several"
-    )
+    errors: list[FaultModel] | None = Field(default=None, description="every fault found, where there can be several")

@@ -8,7 +8,7 @@ from typing import Literal
 from fastapi import Request
 from fastapi.dependencies.models import Dependant
 
-from sprag.service.faults import ErrorItem, shown
+from sprag.service.faults import ParameterFault, shown
 from sprag.service.http.problems import ApiError
 from sprag.service.spec.report import did_you_mean
 
@@ -32,7 +32,13 @@ async def read_body(request: Request) -> Body:
     charset = parameters.partition("charset=")[2].partition(";")[0].strip(' "').lower()
     if form is None or charset not in ("", "utf-8", "utf8"):
         allowed = " or ".join(_FORMATS)
-        item = ErrorItem("not a content type taken here", None, "Content-Type", shown(declared), f"{allowed}, in UTF-8")
+        item = ParameterFault(
+            "Content-Type",
+            "invalid-choice",
+            "not a content type taken here",
+            value=shown(declared),
+            allowed=f"{allowed}, in UTF-8",
+        )
         raise ApiError(
             "unsupported-media-type",
             f"The body must be {allowed}, in UTF-8.",
@@ -53,17 +59,23 @@ async def strict_query(request: Request) -> None:
     for name in (field.alias for field in dependant.header_params):
         values = request.headers.getlist(name)
         if len(values) > 1:
-            faults.append(ErrorItem("given more than once", None, name, shown(values[1]), "one value"))
+            faults.append(
+                ParameterFault(name, "repeated", "given more than once", value=shown(values[1]), allowed="one value")
+            )
     for name in request.query_params:
         values = request.query_params.getlist(name)
         if name not in known:
             allowed = ", ".join(known) or "no query parameter"
             message = f"unknown query parameter{did_you_mean(name, known)}"
-            faults.append(ErrorItem(message, None, shown(name), shown(values[0]), allowed))
+            faults.append(
+                ParameterFault(shown(name), "unknown-field", message, value=shown(values[0]), allowed=allowed)
+            )
         elif len(values) > 1 and not known[name]:
-            faults.append(ErrorItem("given more than once", None, name, shown(values[1]), "one value"))
+            faults.append(
+                ParameterFault(name, "repeated", "given more than once", value=shown(values[1]), allowed="one value")
+            )
     if faults:
-        detail = "; ".join(f"{item.parameter}: {item.message}" for item in faults)
+        detail = "; ".join(f"{item.where}: {item.message}" for item in faults)
         raise ApiError("invalid-parameter", detail, tuple(faults))
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from sprag.service.answers import filled
 from sprag.service.answers.results import Curve as CurveData
 from sprag.service.answers.results import CurvesData, MapData, MapResult, ResultMeaning
-from sprag.service.faults import ErrorItem
+from sprag.service.faults import ParameterFault
 from sprag.service.json_text import numbers
 from sprag.service.results.selection import (
     Fixed,
@@ -264,7 +264,9 @@ def draw_map(
     """One result over two axes of a grid; raises SelectionError as `select` does."""
     (result,) = _results(infos, "z", (z,))
     if study.combine == "zip":
-        raise SelectionError([ErrorItem("a map needs a grid; the axes of this study go together (zip)", parameter="x")])
+        raise SelectionError(
+            [ParameterFault("x", "not-a-grid", "a map needs a grid; the axes of this study go together (zip)")]
+        )
     x_axis, y_axis = require_axis(study, "x", x), require_axis(study, "y", y)
     fixed = locate_axes(study, at)
     _no_axis_twice({x: x_axis}, "y", {y: y_axis}, fixed)
@@ -297,12 +299,16 @@ def draw_map(
 def _results(infos: Sequence[ResultInfo], parameter: str, names: Sequence[str]) -> tuple[ResultInfo, ...]:
     names = tuple(dict.fromkeys(names))
     faults = [
-        ErrorItem(unknown_result(infos, name), parameter=parameter, value=name, allowed=listed(i.name for i in infos))
+        ParameterFault(
+            parameter, "unknown-name", unknown_result(infos, name), value=name, allowed=listed(i.name for i in infos)
+        )
         for name in names
         if result_of(infos, name) is None
     ]
     faults += [
-        ErrorItem("is a category, which comes with every point", parameter=parameter, value=name, allowed="a number")
+        ParameterFault(
+            parameter, "not-numeric", "is a category, which comes with every point", value=name, allowed="a number"
+        )
         for name in names
         if (info := result_of(infos, name)) is not None and info.kind == "category"
     ]
@@ -318,7 +324,7 @@ def _no_axis_twice(x: dict[str, int], second: str, others: dict[str, int], fixed
     for parameter, path, axis in uses:
         if axis in taken:
             message = f"the axis is already taken by {taken[axis]}; one axis can have one role only"
-            raise SelectionError([ErrorItem(message, parameter=parameter, value=path)])
+            raise SelectionError([ParameterFault(parameter, "repeated", message, value=path)])
         taken[axis] = f"{parameter}={path}"
 
 
@@ -327,7 +333,7 @@ def _check_size(points: int, results: int) -> None:
         message = (
             f"{points} points of {results} results are asked for; choose fewer with at=, or take them from the results"
         )
-        raise SelectionError([ErrorItem(message, parameter="at", allowed=f"<= {MAX_CURVE_VALUES} numbers")])
+        raise SelectionError([ParameterFault("at", "too-many", message, allowed=f"<= {MAX_CURVE_VALUES} numbers")])
 
 
 def _grid_lines(
@@ -336,9 +342,10 @@ def _grid_lines(
     axes = study.axes
     named = {x_axis, *by.values(), *fixed}
     faults = [
-        ErrorItem(
+        ParameterFault(
+            "at",
+            "not-fixed",
             f"the axis {axis.paths[0]} is left open: {way_out} its value as at={axis.paths[0]}=VALUE",
-            parameter="at",
             allowed=listed(axis.values),
             unit=unit_of(study, axis.paths[0]),
         )
@@ -377,7 +384,9 @@ def _zip_lines(
     cases = np.flatnonzero(chosen).astype(np.int64)
     if cases.size == 0:
         message = "no case has all these values together"
-        raise SelectionError([ErrorItem(message, parameter="at", value=listed(p for p, _ in fixed.values()))])
+        raise SelectionError(
+            [ParameterFault("at", "unknown-value", message, value=listed(p for p, _ in fixed.values()))]
+        )
     _check_size(cases.size, results)
     at = {path: axes[i].value(index) for i, (path, index) in fixed.items()}
     x_all = axes[x_axis].array

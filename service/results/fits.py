@@ -30,12 +30,12 @@ def read_fit(data: object) -> ClutchFit:
     found = dict(read_object(report, "", data, REQUEST_FIELDS) or {})
     backlash = read_number(report, "/backlash", found.pop("backlash", 0.0), _backlash())
     if backlash and found.get("angles_include_backlash") is not True:
-        report.problem(
-            "/backlash", "is taken off the angles only where they include it", backlash,
+        report.fault(
+            "/backlash", "not-used", "is taken off the angles only where they include it", backlash,
             allowed="with `angles_include_backlash` true; else 0 or left out", unit="rad",
         )  # fmt: skip
     clutch = None
-    if not report.problems:
+    if not report.faults:
         # Without rows this would be taken for a law that lacks its coefficients.
         clutch = read_clutch(report, "", {"data": None, **found}, "clutch.", [backlash or 0.0])
     report.raise_if_any()

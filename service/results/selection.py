@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.service.faults import ErrorItem, shown
+from sprag.service.faults import Fault, FaultError, ParameterFault, shown
 from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.report import did_you_mean, quantity_text
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
@@ -23,15 +23,12 @@ Fixed = dict[int, tuple[str, int]]
 _LISTED = 24
 
 
-class SelectionError(Exception):
-    """The selection of cases is not clear or not possible; ``errors`` names each parameter at fault."""
+class SelectionError(FaultError):
+    """The selection of cases is not clear or not possible; ``faults`` names each parameter at fault."""
 
-    def __init__(self, errors: Iterable[ErrorItem]) -> None:
-        self.errors = tuple(errors)
-        super().__init__("; ".join(f"{item.parameter}: {item.message}" for item in self.errors))
-
-    def __reduce__(self) -> tuple[type[SelectionError], tuple[tuple[ErrorItem, ...]]]:
-        return SelectionError, (self.errors,)
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        faults = tuple(faults)
+        super().__init__("invalid-selection", "; ".join(f"{item.where}: {item.message}" for item in faults), faults)
 
 
 def listed(values: Iterable[object]) -> str:
@@ -55,8 +52,12 @@ def require_axis(study: Study, parameter: str, path: str) -> int:
     ) + did_you_mean(path, study.axis_paths)
     raise SelectionError(
         [
-            ErrorItem(
-                message, parameter=parameter, value=shown(path), allowed=listed(study.axis_paths) or "no axis at all"
+            ParameterFault(
+                parameter,
+                "not-an-axis",
+                message,
+                value=shown(path),
+                allowed=listed(study.axis_paths) or "no axis at all",
             )
         ]
     )
@@ -96,7 +97,7 @@ def locate_axes(study: Study, at: Sequence[tuple[str, str]]) -> Fixed:
             raise _no_such_value(path, text, study.axes[position], unit)
         if fixed.setdefault(position, (path, index))[1] != index:
             raise SelectionError(
-                [ErrorItem("the axis is given two values", parameter="at", value=shown(f"{path}={text}"))]
+                [ParameterFault("at", "repeated", "the axis is given two values", value=shown(f"{path}={text}"))]
             )
     return fixed
 
@@ -106,16 +107,17 @@ def _value(path: str, text: str, unit: str) -> float:
         number, unit_text = split_quantity(text)
         return parse_quantity(text, unit) if unit_text else to_float(number)
     except QuantityError as error:
-        item = ErrorItem(f"{path} {error}", parameter="at", value=shown(f"{path}={text}"), unit=unit)
+        item = ParameterFault("at", error.code, f"{path} {error}", value=shown(f"{path}={text}"), unit=unit)
         raise SelectionError([item]) from error
 
 
 def _no_such_value(path: str, text: str, axis: Axis, unit: str) -> SelectionError:
     return SelectionError(
         [
-            ErrorItem(
+            ParameterFault(
+                "at",
+                "unknown-value",
                 "the axis has no such value",
-                parameter="at",
                 value=shown(f"{path}={text}"),
                 allowed=listed(np.sort(axis.array).tolist()),
                 unit=unit,

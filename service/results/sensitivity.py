@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from sprag.service.faults import ErrorItem
+from sprag.service.faults import Fault, ParameterFault
 from sprag.service.json_text import numbers
 from sprag.service.results.curves import Fetch
 from sprag.service.results.selection import SelectionError, axis_name, listed
@@ -123,21 +123,27 @@ def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fet
     Raises SelectionError for an unknown result, a study in which nothing varies, or one that is too large.
     """
     infos = models.study_results(study)
-    faults = [
-        ErrorItem(unknown_result(infos, name), parameter="y", value=name, allowed=listed(info.name for info in infos))
+    faults: list[Fault] = [
+        ParameterFault(
+            "y", "unknown-name", unknown_result(infos, name), value=name, allowed=listed(info.name for info in infos)
+        )
         for name in names
         if result_of(infos, name) is None
     ]
     faults += [
-        ErrorItem("is a category, which has no variance", parameter="y", value=name)
+        ParameterFault("y", "not-numeric", "is a category, which has no variance", value=name)
         for name in names
         if (info := result_of(infos, name)) is not None and info.kind == "category"
     ]
     varying = [axis for axis in study.axes if np.any(axis.array != axis.array[0])]
     if not varying and not faults:
-        faults = [ErrorItem("nothing varies in this study", parameter="y")]
+        faults = [ParameterFault("y", "nothing-varies", "nothing varies in this study")]
     if study.cases > MOST_CASES:
-        faults.append(ErrorItem("the study is too large for it", value=study.cases, allowed=f"<= {MOST_CASES:,} cases"))
+        faults.append(
+            Fault(
+                None, "too-many", "the study is too large for it", value=study.cases, allowed=f"<= {MOST_CASES:,} cases"
+            )
+        )
     if faults:
         raise SelectionError(faults)
     columns = fetch(np.arange(study.cases, dtype=np.int64), list(names))

@@ -6,6 +6,7 @@ from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Final
 from zoneinfo import ZoneInfo
 
+from sprag.service.faults import Code
 from sprag.service.schedules.times import TimingError, read_time_of_day
 from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker.limits import MAX_FINISH_DAYS
@@ -29,6 +30,10 @@ ALLOWED_OF_RUNS: Final = (
 class FinishError(ValueError):
     """No deadline that can be kept; the message is one clause."""
 
+    def __init__(self, code: Code, message: str) -> None:
+        super().__init__(message)
+        self.code: Code = code
+
 
 def finish_at(text: str, now: datetime) -> datetime:
     """The deadline (UTC) that ``text`` names at ``now``: a time with its offset, or a duration. Raises FinishError."""
@@ -39,14 +44,16 @@ def finish_at(text: str, now: datetime) -> datetime:
         return now + timedelta(seconds=_seconds(text))
     if moment.tzinfo is None:
         # A sign that was not encoded comes out of an address as a blank.
-        raise FinishError("has no offset from UTC; write Z, or +01:00 (in an address %2B01:00)")
+        raise FinishError("missing-unit", "has no offset from UTC; write Z, or +01:00 (in an address %2B01:00)")
     try:
         ahead = (moment - now).total_seconds()
         moment = moment.astimezone(UTC)
     except OverflowError:
-        raise FinishError("is too far away") from None
+        raise FinishError("out-of-range", "is too far away") from None
     if ahead <= 0.0:
-        raise FinishError(f"has passed already; it is {now.astimezone(UTC).isoformat(timespec='seconds')} now")
+        raise FinishError(
+            "out-of-range", f"has passed already; it is {now.astimezone(UTC).isoformat(timespec='seconds')} now"
+        )
     _require_near(ahead)
     return moment
 
@@ -55,16 +62,16 @@ def _seconds(text: str) -> float:
     try:
         seconds = parse_quantity(text, "s")
     except QuantityError:
-        raise FinishError("is neither a time nor a duration with its unit") from None
+        raise FinishError("invalid-time", "is neither a time nor a duration with its unit") from None
     if seconds <= 0.0:
-        raise FinishError("is no time to come")
+        raise FinishError("out-of-range", "is no time to come")
     _require_near(seconds)
     return seconds
 
 
 def _require_near(seconds: float) -> None:
     if not _LEAST_SECONDS <= seconds <= MAX_FINISH_DAYS * 86400.0:
-        raise FinishError("is too soon" if seconds < _LEAST_SECONDS else "is too far away")
+        raise FinishError("out-of-range", "is too soon" if seconds < _LEAST_SECONDS else "is too far away")
 
 
 def check_run_finish(text: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 from zoneinfo import ZoneInfo
 
@@ -10,7 +10,7 @@ from sprag.service.schedules.deadline import ALLOWED_OF_RUNS, FinishError, check
 from sprag.service.schedules.times import Timing, TimingError, Window, check_cron, read_moment, read_time_of_day, zones
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.fields import read_flag, read_object, read_whole
-from sprag.service.spec.report import Problem, Report, SpecError, did_you_mean
+from sprag.service.spec.report import Report, SpecError, did_you_mean
 from sprag.worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
 
 if TYPE_CHECKING:
@@ -101,17 +101,14 @@ def _read(data: object, now: datetime, old: ScheduleFields | None = None) -> Sch
 
 def _read_spec(report: Report, found: Mapping[str, Any], old: ScheduleFields | None) -> tuple[str, dict[str, Any]]:
     if "spec" not in found:
-        report.problem("/spec", "is missing", allowed="a study spec")
+        report.fault("/spec", "required", "is missing", allowed="a study spec")
         return "", {}
     if old is not None and found["spec"] == old.spec:
         return old.name, old.spec
     try:
         parsed = parse_spec(found["spec"])
     except SpecError as error:
-        report.problems += [
-            Problem(f"/spec{item.pointer}", item.message, item.value, item.allowed, item.unit)
-            for item in error.problems
-        ]
+        report.faults += [replace(item, where=f"/spec{item.where}") for item in error.faults]
         return "", {}
     return parsed.study.name, parsed.spec
 
@@ -120,8 +117,12 @@ def _read_name(report: Report, value: object, title: str) -> str:
     if value is None:
         return title
     if not isinstance(value, str) or not value.isprintable() or not 1 <= len(value) <= MAX_NAME_LENGTH:
-        report.problem(
-            "/name", "must be a printable text in one line", value, allowed=f"1 to {MAX_NAME_LENGTH} characters"
+        report.fault(
+            "/name",
+            "invalid-text",
+            "must be a printable text in one line",
+            value,
+            allowed=f"1 to {MAX_NAME_LENGTH} characters",
         )
         return ""
     return value
@@ -131,7 +132,9 @@ def _read_zone(report: Report, value: object) -> str:
     if isinstance(value, str) and value in zones():
         return value
     near = did_you_mean(value, zones()) if isinstance(value, str) else ""
-    report.problem("/zone", f"is no time zone{near}", value, allowed='a name such as "Europe/Berlin" or "UTC"')
+    report.fault(
+        "/zone", "unknown-name", f"is no time zone{near}", value, allowed='a name such as "Europe/Berlin" or "UTC"'
+    )
     return "UTC"
 
 
@@ -141,25 +144,27 @@ def _read_timing(
     cron, at = found.get("cron"), found.get("at")
     if (cron is None) == (at is None):
         message = "when it is to run is missing" if cron is None else "is given beside `at`"
-        report.problem("/cron", message, cron, allowed=f"either `cron`, {_CRON_ALLOWED}; or `at`, {_AT_ALLOWED}")
+        report.fault(
+            "/cron", "exactly-one", message, cron, allowed=f"either `cron`, {_CRON_ALLOWED}; or `at`, {_AT_ALLOWED}"
+        )
         return None
     if cron is not None:
         try:
             if not isinstance(cron, str) or len(cron) > _LONGEST_CRON:
-                raise TimingError("is no cron expression")
+                raise TimingError("invalid-time", "is no cron expression")
             check_cron(cron)
         except TimingError as error:
-            report.problem("/cron", str(error), cron, allowed=_CRON_ALLOWED)
+            report.fault("/cron", error.code, str(error), cron, allowed=_CRON_ALLOWED)
             return None
         return Timing(" ".join(cron.split()), None, zone)
     try:
         if not isinstance(at, str):
-            raise TimingError("is no time")
+            raise TimingError("wrong-type", "is no time")
         moment = read_moment(at, zone)
         if moment <= now and not (old is not None and old.timing.at == moment):
-            raise TimingError("has passed already")
+            raise TimingError("out-of-range", "has passed already")
     except TimingError as error:
-        report.problem("/at", str(error), at, allowed=_AT_ALLOWED)
+        report.fault("/at", error.code, str(error), at, allowed=_AT_ALLOWED)
         return None
     return Timing(None, moment, zone)
 
@@ -169,10 +174,10 @@ def _read_finish(report: Report, value: object) -> str | None:
         return None
     try:
         if not isinstance(value, str):
-            raise FinishError("is no text")
+            raise FinishError("wrong-type", "is no text")
         return check_run_finish(value)
     except FinishError as error:
-        report.problem("/finish_by", str(error), value, allowed=ALLOWED_OF_RUNS)
+        report.fault("/finish_by", error.code, str(error), value, allowed=ALLOWED_OF_RUNS)
         return None
 
 
@@ -180,13 +185,13 @@ def _read_window(report: Report, value: object, zone: str) -> Window | None:
     if value is None:
         return None
     if not (isinstance(value, list | tuple) and len(value) == 2 and all(isinstance(item, str) for item in value)):
-        report.problem("/window", "is no window", value, allowed=_WINDOW_ALLOWED)
+        report.fault("/window", "wrong-type", "is no window", value, allowed=_WINDOW_ALLOWED)
         return None
     try:
         begin, end = map(read_time_of_day, value)
         if begin == end:
-            raise TimingError("is never closed or never open")
+            raise TimingError("invalid-range", "is never closed or never open")
     except TimingError as error:
-        report.problem("/window", str(error), value, allowed=_WINDOW_ALLOWED)
+        report.fault("/window", error.code, str(error), value, allowed=_WINDOW_ALLOWED)
         return None
     return Window(begin, end, zone)

@@ -14,12 +14,18 @@ from zoneinfo import ZoneInfo, available_timezones
 
 from cronsim import CronSim, CronSimError
 
+from sprag.service.faults import Code
+
 #: Due times that are counted when many were missed; what is told is "this many or more".
 MOST_COUNTED = 1000
 
 
 class TimingError(ValueError):
     """A cron expression or a time that cannot be kept; the message is one clause."""
+
+    def __init__(self, code: Code, message: str) -> None:
+        super().__init__(message)
+        self.code: Code = code
 
 
 @lru_cache(maxsize=1)
@@ -72,14 +78,16 @@ class Timing:
 def check_cron(expression: str) -> None:
     """Raise TimingError when ``expression`` is no cron expression of five fields that is due some day."""
     if len(expression.split()) != 5:
-        raise TimingError("a cron expression has five fields: minute, hour, day of the month, month, day of the week")
+        raise TimingError(
+            "invalid-time", "a cron expression has five fields: minute, hour, day of the month, month, day of the week"
+        )
     try:
         next(CronSim(expression, datetime(2024, 1, 1, tzinfo=UTC)))
     except CronSimError as error:
         text = str(error)
-        raise TimingError(text[:1].lower() + text[1:]) from None
+        raise TimingError("invalid-time", text[:1].lower() + text[1:]) from None
     except StopIteration:
-        raise TimingError("is never due") from None
+        raise TimingError("invalid-time", "is never due") from None
 
 
 def read_moment(text: str, zone: str) -> datetime:
@@ -90,16 +98,16 @@ def read_moment(text: str, zone: str) -> datetime:
     try:
         moment = datetime.fromisoformat(text)
     except ValueError:
-        raise TimingError("is no time") from None
+        raise TimingError("invalid-time", "is no time") from None
     try:
         if moment.tzinfo is not None:
             return moment.astimezone(UTC)
         local = moment.replace(tzinfo=ZoneInfo(zone))
         found = local.astimezone(UTC)
         if found.astimezone(ZoneInfo(zone)).replace(tzinfo=None) != moment:
-            raise TimingError(f"there is no such time in {zone}: the clocks are put forward then")
+            raise TimingError("invalid-time", f"there is no such time in {zone}: the clocks are put forward then")
     except OverflowError:
-        raise TimingError("is too far away") from None
+        raise TimingError("out-of-range", "is too far away") from None
     return found
 
 
@@ -128,8 +136,8 @@ def read_time_of_day(text: str) -> time:
     if not (
         colon and len(minutes) == 2 and text.isascii() and hours.isdigit() and minutes.isdigit() and len(hours) < 3
     ):
-        raise TimingError("is no time of day")
+        raise TimingError("invalid-time", "is no time of day")
     try:
         return time(int(hours), int(minutes))
     except ValueError:
-        raise TimingError("is no time of day") from None
+        raise TimingError("invalid-time", "is no time of day") from None

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sprag.service.spec.axes.design import read_design
 from sprag.service.spec.fields import read_object
 from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.report import Problem, Report, SpecError, did_you_mean
+from sprag.service.spec.report import Report, SpecError, did_you_mean
 from sprag.service.spec.text import Format, load_spec
 from sprag.worker import models
 from sprag.worker.limits import MAX_NAME_LENGTH
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from sprag.service.spec.machine.machine import Machine
     from sprag.worker.models import ClutchFit
 
-__all__ = ["VERSION", "ParsedSpec", "Problem", "SpecError", "format_of", "load_spec", "parse_spec"]
+__all__ = ["VERSION", "ParsedSpec", "SpecError", "format_of", "load_spec", "parse_spec"]
 
 #: The version of the spec that this program reads.
 VERSION: Final = 1
@@ -94,13 +94,21 @@ def _read_version(report: Report, found: Mapping[str, Any]) -> None:
     version = found.get("sprag")
     if version is None or isinstance(version, bool) or version != VERSION or not isinstance(version, int):
         message = "is required: the version of the spec" if version is None else "is no version this program reads"
-        report.problem("/sprag", message, version, allowed=str(VERSION))
+        report.fault(
+            "/sprag", "required" if version is None else "unsupported-version", message, version, allowed=str(VERSION)
+        )
 
 
 def _read_name(report: Report, value: object) -> str:
     if isinstance(value, str) and 0 < len(value.strip()) <= len(value) <= MAX_NAME_LENGTH and value.isprintable():
         return value.strip()
-    report.problem("/name", "must be a printable text in one line", value, allowed=f"1 to {MAX_NAME_LENGTH} characters")
+    report.fault(
+        "/name",
+        "invalid-text",
+        "must be a printable text in one line",
+        value,
+        allowed=f"1 to {MAX_NAME_LENGTH} characters",
+    )
     return UNNAMED
 
 
@@ -110,7 +118,13 @@ def _read_model(report: Report, found: Mapping[str, Any]) -> str | None:
         return model
     hint = did_you_mean(model, known) if isinstance(model, str) else ""
     message = "is required" if model is None else f"is no model this program knows{hint}"
-    report.problem("/model", message, model, allowed=", ".join(f"'{name}'" for name in known))
+    report.fault(
+        "/model",
+        "required" if model is None else "unknown-name",
+        message,
+        model,
+        allowed=", ".join(f"'{name}'" for name in known),
+    )
     return None
 
 

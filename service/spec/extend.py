@@ -9,11 +9,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.service.faults import Fault
 from sprag.service.spec.axes.axes import axis_values
 from sprag.service.spec.document import ParsedSpec, parse_spec
 from sprag.service.spec.fields import read_object
 from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.report import Problem, Report, SpecError, join, quantity_text
+from sprag.service.spec.report import Report, SpecError, join, quantity_text
 
 if TYPE_CHECKING:
     from sprag.service.spec.machine.machine import Machine
@@ -31,14 +32,15 @@ def parse_extended(spec: Mapping[str, Any], study: Study, addition: object) -> P
             raise
         # The study itself is the first of the axes, what was added follows.
         before = 1 if study.axes else 0
-        raise SpecError([_moved(problem, before) for problem in error.problems]) from error
+        raise SpecError([_moved(fault, before) for fault in error.faults]) from error
 
 
-def _moved(problem: Problem, before: int) -> Problem:
-    head, _, rest = problem.pointer.removeprefix("/axes/").partition("/")
-    if not problem.pointer.startswith("/axes/") or not head.isdigit() or int(head) < before:
-        return problem
-    return replace(problem, pointer=f"/cases/{int(head) - before}" + (f"/{rest}" if rest else ""))
+def _moved(fault: Fault, before: int) -> Fault:
+    where = fault.where or ""
+    head, _, rest = where.removeprefix("/axes/").partition("/")
+    if not where.startswith("/axes/") or not head.isdigit() or int(head) < before:
+        return fault
+    return replace(fault, where=f"/cases/{int(head) - before}" + (f"/{rest}" if rest else ""))
 
 
 def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> dict[str, Any]:
@@ -61,11 +63,13 @@ def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> di
     report.raise_if_any()
     given = [name for name in ("axes", "cases") if name in found]
     if len(given) != 1:
-        report.problem("", "needs either `axes` or `cases`", given, allowed="one of axes, cases")
+        report.fault("", "exactly-one", "needs either `axes` or `cases`", given, allowed="one of axes, cases")
         raise report.error()
     items = found[given[0]]
     if not isinstance(items, list) or not items:
-        report.problem(f"/{given[0]}", "must be a list", items, allowed="1 item or more, as in the axes of a spec")
+        report.fault(
+            f"/{given[0]}", "wrong-type", "must be a list", items, allowed="1 item or more, as in the axes of a spec"
+        )
         raise report.error()
     kept = {key: value for key, value in spec.items() if key not in {"axes", "combine", "exclude"}}
     kept["name"] = found.get("name", study.name)
@@ -74,7 +78,7 @@ def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> di
         first = [{"combine": study.combine, "axes": own}] if own else []
         return {**kept, "combine": "union", "axes": [*first, *items]}
     if study.combine != "grid":
-        report.problem("/axes", "the axes of this study go together, case by case", allowed="`cases` instead")
+        report.fault("/axes", "conflict", "the axes of this study go together, case by case", allowed="`cases` instead")
         raise report.error()
     machine = part_of(study.model).read_base(Report(), spec.get("base"))
     for index, item in enumerate(items):
@@ -94,12 +98,14 @@ def _add(
     positions = {study.axis_of(path) for path in paths}
     position = next(iter(positions))
     if len(positions) > 1:
-        report.problem(join(pointer, "path"), "names parameters of several axes", list(paths), allowed="one axis")
+        report.fault(
+            join(pointer, "path"), "conflict", "names parameters of several axes", list(paths), allowed="one axis"
+        )
     elif position is not None:
         axes[position]["values"] = list(dict.fromkeys([*axes[position]["values"], *values.tolist()]))
     else:
         bases = list(dict.fromkeys(study.base[path] for path in paths))
         if len(bases) > 1:
             told = [quantity_text(base, machine.parameters[paths[0]].unit) for base in bases]
-            report.problem(join(pointer, "path"), "ties parameters whose values in the base differ", told)
+            report.fault(join(pointer, "path"), "conflict", "ties parameters whose values in the base differ", told)
         axes.append({"path": list(paths), "values": list(dict.fromkeys([*bases, *values.tolist()]))})

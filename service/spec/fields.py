@@ -27,7 +27,7 @@ def exact(value: object, parameter: Parameter) -> Fraction:
     """The exact SI number that ``value`` means; QuantityError when it is none, or out of ``parameter``'s range."""
     number = parse_exact(value, parameter.unit)
     if not parameter.accepts(to_float(number)):
-        raise QuantityError("is out of range")
+        raise QuantityError("out-of-range", "is out of range")
     return number
 
 
@@ -38,7 +38,7 @@ def read_exact(report: Report, pointer: str, value: object, parameter: Parameter
     try:
         return exact(value, parameter)
     except QuantityError as error:
-        report.problem(pointer, str(error), value, allowed=parameter.range_text(), unit=parameter.unit)
+        report.fault(pointer, error.code, str(error), value, allowed=parameter.range_text(), unit=parameter.unit)
         return None
 
 
@@ -51,10 +51,10 @@ def read_number(report: Report, pointer: str, value: object, parameter: Paramete
 def read_whole(report: Report, pointer: str, value: object, low: int, high: int) -> int | None:
     """A whole number from ``low`` to ``high``; None, and a problem noted, when it is not one."""
     if isinstance(value, bool) or not isinstance(value, int):
-        report.problem(pointer, "must be a whole number", value, allowed=f"{low} to {high:,}")
+        report.fault(pointer, "wrong-type", "must be a whole number", value, allowed=f"{low} to {high:,}")
         return None
     if not low <= value <= high:
-        report.problem(pointer, "is out of range", value, allowed=f"{low} to {high:,}")
+        report.fault(pointer, "out-of-range", "is out of range", value, allowed=f"{low} to {high:,}")
         return None
     return value
 
@@ -63,7 +63,7 @@ def read_flag(report: Report, pointer: str, value: object) -> bool | None:
     """true or false; None, and a problem noted, when it is neither."""
     if isinstance(value, bool):
         return value
-    report.problem(pointer, "must be true or false", value, allowed="true or false")
+    report.fault(pointer, "wrong-type", "must be true or false", value, allowed="true or false")
     return None
 
 
@@ -72,7 +72,13 @@ def read_object(report: Report, pointer: str, value: object, known: Iterable[str
     known = tuple(known)
     if not isinstance(value, Mapping):
         message = "is required" if value is None else "must be an object"
-        report.problem(pointer, message, value, allowed="an object with the fields " + ", ".join(known))
+        report.fault(
+            pointer,
+            "required" if value is None else "wrong-type",
+            message,
+            value,
+            allowed="an object with the fields " + ", ".join(known),
+        )
         return None
     report.unknown_fields(pointer, value, known)
     return value
@@ -103,8 +109,9 @@ def read_parameters(
 
 def missing(report: Report, pointer: str, parameter: Parameter) -> None:
     """Notes that a required number is missing."""
-    report.problem(
+    report.fault(
         pointer,
+        "required",
         f"is required ({parameter.help}, for example {example(parameter.unit)})",
         allowed=parameter.range_text(),
         unit=parameter.unit,

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.service.faults import Fault, FaultError
 from sprag.service.spec.numbers import parse_number
-from sprag.service.spec.report import Problem
 from sprag.worker.limits import MAX_CLUTCH_ROWS
 
 #: Problems told of one file; a file of another kind has one in every line.
@@ -52,12 +52,12 @@ class MeasuredData:
     warnings: tuple[str, ...] = ()
 
 
-class MeasuredDataError(Exception):
-    """The text holds no measured data; ``problems`` name the lines of the text."""
+class MeasuredDataError(FaultError):
+    """The text is not measured data; ``faults`` name the lines of the text."""
 
-    def __init__(self, problems: Iterable[Problem]) -> None:
-        self.problems = tuple(problems)
-        super().__init__("\n".join(map(str, self.problems)))
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        faults = tuple(faults)
+        super().__init__("invalid-data", "\n".join(map(str, faults)), faults)
 
 
 def parse_measured(text: str, convert: Callable[[str, str], float]) -> MeasuredData:
@@ -81,7 +81,7 @@ def parse_measured(text: str, convert: Callable[[str, str], float]) -> MeasuredD
         if (stripped := line.strip()) and not stripped.startswith("#")
     ]
     if not lines:
-        raise MeasuredDataError([Problem("line 1", "there are no data", None, "rows of angle and torque")])
+        raise MeasuredDataError([Fault("line 1", "empty", "there are no data", None, "rows of angle and torque")])
     factors: tuple[float | None, float | None] = (None, None)
     if _is_header(_cells(lines[0][1])):
         factors = _factors(*lines[0], convert)
@@ -115,7 +115,7 @@ def _factors(number: int, line: str, convert: Callable[[str, str], float]) -> tu
         cells = [cell.strip() for cell in re.split(r"(?<=[\])])\s+|\s{2,}", line) if cell.strip()]
     if len(cells) != 2:
         raise MeasuredDataError(
-            [Problem(f"line {number}", "the header has not two columns", line[:80], "angle, torque")]
+            [Fault(f"line {number}", "unequal-lengths", "the header has not two columns", line[:80], "angle, torque")]
         )
     factors: list[float | None] = []
     problems = []
@@ -123,7 +123,7 @@ def _factors(number: int, line: str, convert: Callable[[str, str], float]) -> tu
         try:
             factors.append(_factor(cell, unit, words, convert))
         except ValueError as error:
-            problems.append(Problem(f"line {number}", f"column {name}: {error}", cell, f"a unit of {unit}"))
+            problems.append(Fault(f"line {number}", "wrong-unit", f"column {name}: {error}", cell, f"a unit of {unit}"))
     if problems:
         raise MeasuredDataError(problems)
     return factors[0], factors[1]
@@ -159,13 +159,15 @@ def _numbers(lines: list[tuple[int, str]], factors: tuple[float | None, float | 
         raise MeasuredDataError(problems[:_MAX_PROBLEMS])
     if not 1 <= len(lines) <= MAX_CLUTCH_ROWS:
         message = "there are no rows under the header" if not lines else f"{len(lines)} rows"
-        raise MeasuredDataError([Problem("data", message, len(lines), f"1 .. {MAX_CLUTCH_ROWS} rows")])
+        raise MeasuredDataError(
+            [Fault("data", "empty" if not lines else "too-many", message, len(lines), f"1 .. {MAX_CLUTCH_ROWS} rows")]
+        )
     rows = np.array([[float(cell) for cell in _cells(line)] for _, line in lines], dtype=np.float64)
     scaled = rows * np.array([1.0 if factor is None else factor for factor in factors])
     return MeasuredData(scaled, tuple(number for number, _ in lines), tuple(_assumed(factors, rows)))
 
 
-def _wrong_rows(lines: list[tuple[int, str]]) -> Iterator[Problem]:
+def _wrong_rows(lines: list[tuple[int, str]]) -> Iterator[Fault]:
     for number, line in lines:
         cells = _cells(line)
         if len(cells) != 2:
@@ -173,11 +175,11 @@ def _wrong_rows(lines: list[tuple[int, str]]) -> Iterator[Problem]:
             allowed = "two columns: angle, torque"
             if "," in line:
                 allowed += "; decimal commas only where tabs or semicolons part the columns, else 0.25"
-            yield Problem(f"line {number}", few, line.replace("\t", " ")[:80], allowed)
+            yield Fault(f"line {number}", "unequal-lengths", few, line.replace("\t", " ")[:80], allowed)
             continue
         for cell, (name, _) in zip(cells, _QUANTITIES, strict=True):
             value = parse_number(cell)
             if value is None:
-                yield Problem(f"line {number}", f"the {name} is no number", cell[:80], "a number")
+                yield Fault(f"line {number}", "not-a-number", f"the {name} is no number", cell[:80], "a number")
             elif not math.isfinite(value):
-                yield Problem(f"line {number}", f"the {name} is not finite", cell[:80], "a finite number")
+                yield Fault(f"line {number}", "not-finite", f"the {name} is not finite", cell[:80], "a finite number")

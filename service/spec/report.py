@@ -1,119 +1,85 @@
-"""What a spec has wrong, said in one way: JSON Pointer, message, value received, allowed range and unit."""
+"""Collects the faults of a spec while it is read."""
 
 from __future__ import annotations
 
 import difflib
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
-from sprag.service.faults import ErrorItem
+from sprag.service.faults import Code, Fault, FaultError
 from sprag.worker.limits import MAX_PROBLEMS
 
 _LONGEST_TEXT = 60
 _LONGEST_LIST = 6
 
 
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """One thing wrong with a spec.
+class SpecError(FaultError):
+    """A spec that cannot be run, with everything wrong in it. ``str()`` gives a line for each fault."""
 
-    Attributes
-    ----------
-    pointer : str
-        JSON Pointer (RFC 6901) to the field; "" is the whole document.
-    message : str
-        What is wrong, for people, without the value.
-    value : object
-        The value received, shortened, always plain JSON data.
-    allowed : str or None
-        The allowed range or choice.
-    unit : str or None
-        The SI unit of the field.
-    """
-
-    pointer: str
-    message: str
-    value: object = None
-    allowed: str | None = None
-    unit: str | None = None
-
-    def __str__(self) -> str:
-        details = (
-            []
-            if self.value is None
-            else [f"got {self.value!r}" if isinstance(self.value, str) else f"got {self.value}"]
-        )
-        if self.allowed is not None:
-            details.append(f"allowed: {self.allowed}")
-        if self.unit is not None and (self.allowed is None or self.unit not in self.allowed):
-            details.append(f"unit {self.unit}")
-        where = self.pointer or "(the whole spec)"
-        return f"{where}: {self.message}" + (f" ({'; '.join(details)})" if details else "")
-
-
-class SpecError(Exception):
-    """A spec that cannot be run, with everything wrong in it. ``str()`` gives a line for each problem."""
-
-    def __init__(self, problems: Iterable[Problem]) -> None:
-        self.problems: tuple[Problem, ...] = tuple(problems)
-        super().__init__("\n".join(map(str, self.problems)))
-
-    def __reduce__(self) -> tuple[type[SpecError], tuple[tuple[Problem, ...]]]:
-        return SpecError, (self.problems,)
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        faults = tuple(faults)
+        super().__init__("invalid-spec", "\n".join(map(str, faults)), faults)
 
 
 class Report:
-    """Collects problems and warnings while ``source``, plain data that the user wrote, is read."""
+    """Collects faults and warnings while ``source``, plain data that the user wrote, is read."""
 
     def __init__(self, source: object = None) -> None:
         self._source = source
-        self.problems: list[Problem] = []
-        #: Problems that were found, those included that are not noted any more.
+        self.faults: list[Fault] = []
+        #: Number of faults, those included that are not noted any more.
         self.found = 0
         self.warnings: list[str] = []
 
-    def problem(
-        self, pointer: str, message: str, value: object = None, *, allowed: str | None = None, unit: str | None = None
+    def fault(
+        self,
+        pointer: str,
+        code: Code,
+        message: str,
+        value: object = None,
+        *,
+        allowed: str | None = None,
+        unit: str | None = None,
     ) -> None:
-        """Notes a problem, unless there are `MAX_PROBLEMS` already; numbers that the user wrote stand as written."""
+        """Note a fault, unless there are `MAX_PROBLEMS` already; numbers that the user wrote stand as written."""
         self.found += 1
         if not self.full:
             shown = _as_written(value, _at(self._source, pointer))
-            self.problems.append(Problem(pointer, message, shorten(shown), allowed, unit))
+            self.faults.append(Fault(pointer, code, message, shorten(shown), allowed, unit))
 
     @property
     def full(self) -> bool:
-        """Whether there are so many problems that looking for more would only take time."""
-        return len(self.problems) >= MAX_PROBLEMS
+        """Whether there are so many faults that looking for more would only take time."""
+        return len(self.faults) >= MAX_PROBLEMS
 
     def warn(self, message: str) -> None:
-        """Notes something that is allowed but probably not meant; the same sentence only once."""
+        """Note something that is allowed but probably not meant; the same sentence only once."""
         if message not in self.warnings:
             self.warnings.append(message)
 
     def unknown_fields(self, pointer: str, found: Mapping[str, object], known: Iterable[str]) -> None:
-        """Notes every key of ``found`` that is not ``known``, with the nearest known one."""
+        """Note every key of ``found`` that is not ``known``, with the nearest known one."""
         known = tuple(known)
         for key in found:
             if key not in known and not self.full:
-                self.problem(
+                self.fault(
                     join(pointer, key),
+                    "unknown-field",
                     f"unknown field{did_you_mean(key, known)}",
                     found[key],
                     allowed="the fields " + ", ".join(known),
                 )
 
     def raise_if_any(self) -> None:
-        """Raises `SpecError` with everything noted so far, if anything was."""
-        if self.problems:
+        """Raise `SpecError` with everything noted so far, if anything was."""
+        if self.faults:
             raise self.error()
 
     def error(self) -> SpecError:
         """The error with everything noted so far."""
-        more = [Problem("", f"only the first {MAX_PROBLEMS} problems are listed")] if self.full else []
-        return SpecError([*self.problems, *more])
+        more = [Fault("", "too-many-faults", f"only the first {MAX_PROBLEMS} faults are listed")] if self.full else []
+        return SpecError([*self.faults, *more])
 
 
 def _at(source: object, pointer: str) -> object:
@@ -193,11 +159,3 @@ def _shorten_mapping(value: Mapping[Any, object], depth: int) -> object:
     if depth == 0 or len(value) > _LONGEST_LIST:
         return f"an object of {len(value)} fields"
     return {shorten_text(str(key)): shorten(item, depth - 1) for key, item in value.items()}
-
-
-def spec_items(problems: Iterable[Problem]) -> tuple[ErrorItem, ...]:
-    """Problems of a spec as faults of a request."""
-    return tuple(
-        ErrorItem(item.message, item.pointer, value=item.value, allowed=item.allowed, unit=item.unit)
-        for item in problems
-    )

@@ -66,17 +66,23 @@ def read_run(report: Report, data: object, frequencies: NDArray[np.float64]) -> 
 def refuse_run(report: Report, data: object, why: str = "is not used: this model has no run") -> dict[str, Any]:
     """The empty run of a model that has none; every field of one that was given is noted in ``report``."""
     if not isinstance(data, Mapping):
-        report.problem("/run", "must be an object", data, allowed="nothing, or an empty object: this model has no run")
+        report.fault(
+            "/run",
+            "wrong-type",
+            "must be an object",
+            data,
+            allowed="nothing, or an empty object: this model has no run",
+        )
         return {}
     for name, value in data.items():
-        report.problem(join("/run", name), why, value, allowed="no `run`")
+        report.fault(join("/run", name), "not-used", why, value, allowed="no `run`")
     return {}
 
 
 def _read_settled(report: Report, found: Mapping[str, Any], run: dict[str, Any]) -> None:
     """Put what is given of a run until it is settled into ``run``."""
     if "until" in found and found["until"] != SETTLED:
-        report.problem("/run/until", "is not a valid choice", found["until"], allowed=f"'{SETTLED}'")
+        report.fault("/run/until", "invalid-choice", "is not a valid choice", found["until"], allowed=f"'{SETTLED}'")
     if "at_most" in found:
         run["at_most"] = _read_periods(report, found["at_most"])
     if "settled" in found:
@@ -95,8 +101,8 @@ def _refuse_settled(report: Report, found: Mapping[str, Any]) -> None:
     timed = " and ".join(f"`{name}`" for name in TIMED_FIELDS if name in found)
     for name in SETTLED_FIELDS:
         if name in found:
-            report.problem(
-                f"/run/{name}", f"contradicts {timed}: a run lasts until it is settled or for a given time",
+            report.fault(
+                f"/run/{name}", "conflict", f"contradicts {timed}: a run lasts until it is settled or for a given time",
                 found[name], allowed=f"no `{name}`, or neither `duration` nor `window`",
             )  # fmt: skip
 
@@ -106,12 +112,12 @@ def _read_periods(report: Report, value: object) -> int | None:
     try:
         number, unit = split_quantity(value) if isinstance(value, str) else (None, "")
     except QuantityError as error:
-        report.problem("/run/at_most", str(error), value, allowed=allowed)
+        report.fault("/run/at_most", error.code, str(error), value, allowed=allowed)
         return None
     if number is None or unit not in PERIOD_NAMES:
-        report.problem("/run/at_most", "must be a number of excitation periods", value, allowed=allowed)
+        report.fault("/run/at_most", "wrong-type", "must be a number of excitation periods", value, allowed=allowed)
     elif number.denominator != 1 or not MIN_SETTLED_PERIODS <= number <= MAX_SETTLED_PERIODS:
-        report.problem("/run/at_most", "is out of range", value, allowed=allowed)
+        report.fault("/run/at_most", "out-of-range", "is out of range", value, allowed=allowed)
     else:
         return int(number)
     return None
@@ -136,24 +142,30 @@ def _read_time(report: Report, pointer: str, value: object, *, positive: bool = 
             if text in PERIOD_NAMES:
                 unit = "periods"
             elif not text:
-                raise QuantityError("a text needs its unit: periods or s")
+                raise QuantityError("missing-unit", "a text needs its unit: periods or s")
             else:
                 number = parse_exact(value, "s")
         else:
             number = exact_number(value, "s")
         seconds = to_float(number)
     except QuantityError as error:
-        report.problem(pointer, str(error), value, allowed=allowed)
+        report.fault(pointer, error.code, str(error), value, allowed=allowed)
         return None
     if seconds < 0.0 or (positive and seconds == 0.0) or seconds > _MAX_SECONDS:
-        report.problem(pointer, "is out of range", value, allowed=allowed)
+        report.fault(pointer, "out-of-range", "is out of range", value, allowed=allowed)
         return None
     return [seconds + 0.0, unit]
 
 
 def _read_window(report: Report, data: object) -> list[Time] | None:
     if not isinstance(data, list) or len(data) != 2:
-        report.problem("/run/window", "must be a list of its start and its end", data, allowed=f"two times in {_TIME}")
+        report.fault(
+            "/run/window",
+            "wrong-type",
+            "must be a list of its start and its end",
+            data,
+            allowed=f"two times in {_TIME}",
+        )
         return None
     times = [_read_time(report, join("/run/window", index), item) for index, item in enumerate(data)]
     return None if None in times else [time for time in times if time is not None]
@@ -163,10 +175,10 @@ def _read_plain(report: Report, field: Described, value: object) -> float | None
     pointer, low, high = join("/run", field.name), field.low, field.high
     allowed = f"{low:g} to {high:g}, a plain number"
     if isinstance(value, bool) or not isinstance(value, int | float):
-        report.problem(pointer, "must be a plain number", value, allowed=allowed)
+        report.fault(pointer, "wrong-type", "must be a plain number", value, allowed=allowed)
         return None
     if not low <= value <= high:
-        report.problem(pointer, "is out of range", value, allowed=allowed)
+        report.fault(pointer, "out-of-range", "is out of range", value, allowed=allowed)
         return None
     return float(value)
 
@@ -175,7 +187,13 @@ def _read_reset(report: Report, value: object) -> str | None:
     if isinstance(value, str) and value in RESETS:
         return value
     hint = did_you_mean(value, RESETS) if isinstance(value, str) else ""
-    report.problem("/run/reset", f"must be one of the two readings{hint}", value, allowed="'contact' or 'literal'")
+    report.fault(
+        "/run/reset",
+        "invalid-choice",
+        f"must be one of the two readings{hint}",
+        value,
+        allowed="'contact' or 'literal'",
+    )
     return None
 
 
@@ -187,10 +205,13 @@ def _check_times(
         at = "" if _one_unit(run) else f" at {frequency:.6g} Hz"
         duration = in_periods(run["duration"], frequency)
         if duration > MAX_RUN_PERIODS:
-            report.problem(
-                "/run/duration", f"is {duration:.6g} excitation periods at {frequency:.6g} Hz", given.get("duration"),
+            report.fault(
+                "/run/duration",
+                "out-of-range",
+                f"is {duration:.6g} excitation periods at {frequency:.6g} Hz",
+                given.get("duration"),
                 allowed=f"at most {MAX_RUN_PERIODS:,.0f} periods in any case",
-            )  # fmt: skip
+            )
             return
         if run["window"] is None:
             if duration / 3.0 < 1.0 - _ROUNDING:
@@ -201,11 +222,17 @@ def _check_times(
             continue
         start, end = (in_periods(time, frequency) for time in run["window"])
         if not start < end * (1.0 - _ROUNDING):
-            report.problem("/run/window", f"starts at or after its end{at}", given["window"], allowed="start < end")
+            report.fault(
+                "/run/window",
+                "invalid-range",
+                f"starts at or after its end{at}",
+                given["window"],
+                allowed="start < end",
+            )
             return
         if end > duration * (1.0 + _ROUNDING):
-            report.problem(
-                "/run/window/1", f"the window ends after the run{at}", given["window"][1],
+            report.fault(
+                "/run/window/1", "out-of-range", f"the window ends after the run{at}", given["window"][1],
                 allowed=f"at most the duration, {time_text(run['duration'])}",
             )  # fmt: skip
             return

@@ -8,7 +8,8 @@ import re
 import tomllib
 from typing import Any, Final, Literal
 
-from sprag.service.spec.report import Problem, Report, SpecError, join
+from sprag.service.faults import Fault
+from sprag.service.spec.report import Report, SpecError, join
 from sprag.worker.limits import MAX_BODY_BYTES, MAX_DEPTH, MAX_INTEGER_DIGITS
 
 _LONGEST_BITS: Final = math.ceil(MAX_INTEGER_DIGITS * math.log2(10))
@@ -81,7 +82,7 @@ def _decode(text: str | bytes) -> str:
 
 
 def _fault(message: str, allowed: str | None = None) -> SpecError:
-    return SpecError([Problem("", message, allowed=allowed)])
+    return SpecError([Fault("", "unreadable", message, allowed=allowed)])
 
 
 def _too_deep() -> SpecError:
@@ -154,17 +155,19 @@ def _plain(data: object, pointer: str, depth: int, report: Report) -> object:
         return _plain_container(data, pointer, depth, report)
     if isinstance(data, str):
         if _halved(data):
-            report.problem(pointer, "the text holds half a character (a lone surrogate)", data)
+            report.fault(pointer, "invalid-text", "the text holds half a character (a lone surrogate)", data)
     elif isinstance(data, int):
         if data.bit_length() > _LONGEST_BITS:
-            report.problem(pointer, "is beyond the range of numbers", data)
+            report.fault(pointer, "out-of-range", "is beyond the range of numbers", data)
     elif isinstance(data, _LongInteger):
-        report.problem(pointer, "is beyond the range of numbers", f"an integer of {data.digits} digits")
+        report.fault(pointer, "out-of-range", "is beyond the range of numbers", f"an integer of {data.digits} digits")
     elif isinstance(data, float):
         if not math.isfinite(data):
-            report.problem(pointer, "must be a finite number (NaN, Infinity and what overflows are none)", data)
+            report.fault(
+                pointer, "not-finite", "must be a finite number (NaN, Infinity and what overflows are none)", data
+            )
     elif data is not None:
-        report.problem(pointer, "is a date or a time, which no field of a spec is", str(data))
+        report.fault(pointer, "wrong-type", "is a date or a time, which no field of a spec is", str(data))
     return data
 
 
@@ -173,10 +176,12 @@ def _plain_container(data: dict[str, Any] | list[Any], pointer: str, depth: int,
         return [_plain(item, f"{pointer}/{index}", depth + 1, report) for index, item in enumerate(data)]
     if isinstance(data, _Repeated):
         for key in data.repeated:
-            report.problem(join(pointer, key), "this field is given more than once")
+            report.fault(join(pointer, key), "repeated", "this field is given more than once")
     for key in data:
         if _halved(key):
-            report.problem(join(pointer, key), "the field's name holds half a character (a lone surrogate)")
+            report.fault(
+                join(pointer, key), "invalid-text", "the field's name holds half a character (a lone surrogate)"
+            )
     return {key: _plain(item, join(pointer, key), depth + 1, report) for key, item in data.items()}
 
 

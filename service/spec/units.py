@@ -18,6 +18,7 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
+from sprag.service.faults import Code
 from sprag.worker.limits import MAX_QUANTITY_LENGTH
 
 if TYPE_CHECKING:
@@ -96,7 +97,12 @@ _SIGNS: Final = str.maketrans(
 
 
 class QuantityError(ValueError):
-    """A value that is not a quantity of the unit asked for. ``str()`` is a plain sentence without the value."""
+    """A value that is not a quantity of the unit asked for. ``str()`` is a plain sentence without the
+    value, ``code`` is stable."""
+
+    def __init__(self, code: Code, message: str) -> None:
+        super().__init__(message)
+        self.code: Code = code
 
 
 def example(unit: str) -> str:
@@ -130,12 +136,12 @@ def parse_quantity(value: object, unit: str) -> float:
 def parse_exact(value: object, unit: str) -> Fraction:
     """As `parse_quantity`, but exact: the decimal number as it was written, times the exact factor of its unit."""
     if isinstance(value, str) and unit == "1":
-        raise QuantityError("must be a plain number, without a unit or quotation marks")
+        raise QuantityError("wrong-type", "must be a plain number, without a unit or quotation marks")
     if isinstance(value, str):
         number, text = split_quantity(value)
         if not text:
             raise QuantityError(
-                f"a text needs its unit, for example {example(unit)}; a plain number is taken in {unit}"
+                "missing-unit", f"a text needs its unit, for example {example(unit)}; a plain number is taken in {unit}"
             )
         return number * _factor(text, unit)
     return exact_number(value, unit)
@@ -145,28 +151,32 @@ def exact_number(value: object, unit: str) -> Fraction:
     """A plain JSON number as the decimal it was written as; QuantityError when it is none (a bool is none)."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         if unit == "1":
-            raise QuantityError("must be a plain number")
-        raise QuantityError(f"must be a number in {unit} or a text with its unit, for example {example(unit)}")
+            raise QuantityError("wrong-type", "must be a plain number")
+        raise QuantityError(
+            "wrong-type", f"must be a number in {unit} or a text with its unit, for example {example(unit)}"
+        )
     if isinstance(value, int):
         if value.bit_length() > 1024:
-            raise QuantityError("is beyond the range of numbers")
+            raise QuantityError("out-of-range", "is beyond the range of numbers")
         return Fraction(value)
     if not math.isfinite(value):
-        raise QuantityError("must be a finite number")
+        raise QuantityError("not-finite", "must be a finite number")
     return Fraction(repr(value))
 
 
 def split_quantity(text: str) -> tuple[Fraction, str]:
     """Number and unit's text of "2 mm"; the unit may be empty. QuantityError when there is no number in front."""
     if len(text) > MAX_QUANTITY_LENGTH:
-        raise QuantityError(f"is longer than the {MAX_QUANTITY_LENGTH} characters of any quantity")
+        raise QuantityError("too-long", f"is longer than the {MAX_QUANTITY_LENGTH} characters of any quantity")
     match = _QUANTITY.fullmatch(text.translate(_SIGNS).strip())
     if match is None:
-        raise QuantityError("must begin with a number (decimal point, no thousands separators) followed by its unit")
+        raise QuantityError(
+            "not-a-number", "must begin with a number (decimal point, no thousands separators) followed by its unit"
+        )
     number = Fraction(match[1])
     to_float(number)
     if match[2].startswith((",", ".")):
-        raise QuantityError("must have a decimal point and no thousands separators")
+        raise QuantityError("not-a-number", "must have a decimal point and no thousands separators")
     return number, match[2].strip()
 
 
@@ -175,9 +185,9 @@ def to_float(number: Fraction) -> float:
     try:
         value = number.numerator / number.denominator
     except OverflowError:
-        raise QuantityError("is beyond the range of numbers") from None
+        raise QuantityError("out-of-range", "is beyond the range of numbers") from None
     if value == 0.0 and number:
-        raise QuantityError("is too small for a number, yet not 0")
+        raise QuantityError("out-of-range", "is too small for a number, yet not 0")
     return value
 
 
@@ -213,7 +223,7 @@ def _factor(text: str, unit: str) -> Fraction:
     try:
         factor, dimensions = _measure(text)
     except QuantityError as error:
-        raise QuantityError(f"{error}; {expected}") from None
+        raise QuantityError(error.code, f"{error}; {expected}") from None
     wanted_factor, wanted = _wanted(unit)
     angle = dimensions.pop("radian", 0)
     if {**dimensions, "radian": 0} == {**wanted, "radian": 0}:
@@ -223,7 +233,7 @@ def _factor(text: str, unit: str) -> Fraction:
             return factor / wanted_factor / Fraction(_TWO_PI)
         if unit == "N*m*s/rad" and angle == 0:
             return factor / wanted_factor  # N*m*s, as most books write it
-    raise QuantityError(f"is in '{text}', which is no unit of this field; {expected}")
+    raise QuantityError("wrong-unit", f"is in '{text}', which is no unit of this field; {expected}")
 
 
 def _measure(text: str) -> tuple[Fraction, dict[str, int]]:
@@ -233,20 +243,22 @@ def _measure(text: str) -> tuple[Fraction, dict[str, int]]:
     that no text reaches it that could mean a computation.
     """
     if len(text) > _LONGEST_UNIT:
-        raise QuantityError(f"has a unit longer than {_LONGEST_UNIT} characters")
+        raise QuantityError("wrong-unit", f"has a unit longer than {_LONGEST_UNIT} characters")
     tokens: list[str] = []
     position = 0
     spelled = _SUPERSCRIPT.sub(lambda found: "^" + found[0].translate(_SUPERSCRIPTS), text)
     while position < len(spelled):
         match = _TOKEN.match(spelled, position)
         if match is None:
-            raise QuantityError(f"has a unit that cannot be read: '{text}'{_power_hint(spelled, position)}")
+            raise QuantityError(
+                "wrong-unit", f"has a unit that cannot be read: '{text}'{_power_hint(spelled, position)}"
+            )
         tokens.append(f"^{match['power']}" if match["power"] else match[0].strip())
         position = match.end()
     tokens.reverse()
     factor, powers = _product(tokens, text)
     if tokens:
-        raise QuantityError(f"has a unit that cannot be read: '{text}'")
+        raise QuantityError("wrong-unit", f"has a unit that cannot be read: '{text}'")
     return factor, {name: power for name, power in powers.items() if power}
 
 
@@ -290,7 +302,7 @@ def _operand(tokens: list[str], text: str) -> tuple[Fraction, Counter[str]]:
         power = int(tokens.pop()[1:]) if tokens and tokens[-1][0] == "^" else 1
         factor, root = _named(first)
         return factor**power, Counter({name: power * of_one for name, of_one in root})
-    raise QuantityError(f"has a unit that cannot be read: '{text}'")
+    raise QuantityError("wrong-unit", f"has a unit that cannot be read: '{text}'")
 
 
 @lru_cache(maxsize=1024)
@@ -302,7 +314,7 @@ def _named(name: str) -> tuple[Fraction, tuple[tuple[str, int], ...]]:
     try:
         factor, root = registry.get_root_units(registry.parse_units(name))
     except pint.UndefinedUnitError:
-        raise QuantityError(_unknown(name)) from None
+        raise QuantityError("wrong-unit", _unknown(name)) from None
     return Fraction(str(factor)), tuple((str(unit), int(str(power))) for unit, power in root._units.items())
 
 

@@ -22,15 +22,24 @@ __all__ = [
 
 
 class DatabaseError(StoreError):
-    """The database cannot be opened or used."""
+    """The database cannot be opened or used; ``code`` says why where the class does not."""
+
+    def __init__(self, message: str, code: str | None = None) -> None:
+        super().__init__(message)
+        if code is not None:
+            self.code = code
 
 
 class SchemaError(DatabaseError):
     """The database has another revision than this program; the message names the command that mends it."""
 
+    code = "wrong-revision"
+
 
 class DatabaseBusyError(DatabaseError):
     """Another process kept the database for longer than the busy timeout."""
+
+    code = "database-busy"
 
 
 class EndingError(DatabaseError):
@@ -40,9 +49,13 @@ class EndingError(DatabaseError):
 class DatabaseFullError(DatabaseError, StoreFullError):
     """The disk has no room, or does not take what is written."""
 
+    code = "storage-full"
+
 
 class StudyNotFound(StoreError):  # noqa: N818 - the name callers read
     """There is no study of that id."""
+
+    code = "study-not-found"
 
     def __init__(self, study_id: str) -> None:
         super().__init__(f"there is no study {study_id!r}")
@@ -55,6 +68,8 @@ class StudyNotFound(StoreError):  # noqa: N818 - the name callers read
 class ScheduleNotFound(StoreError):  # noqa: N818
     """There is no schedule of that id."""
 
+    code = "schedule-not-found"
+
     def __init__(self, schedule_id: str) -> None:
         super().__init__(f"there is no schedule {schedule_id!r}")
 
@@ -62,9 +77,13 @@ class ScheduleNotFound(StoreError):  # noqa: N818
 class TooManySchedules(StoreError):  # noqa: N818
     """There are as many schedules as are kept."""
 
+    code = "wrong-state"
+
 
 class TokenNotFound(StoreError):  # noqa: N818
     """There is no token of that id."""
+
+    code = "token-not-found"
 
     def __init__(self, token_id: str) -> None:
         super().__init__(f"there is no token {token_id!r}")
@@ -73,18 +92,28 @@ class TokenNotFound(StoreError):  # noqa: N818
 class StudyBusy(StoreError):  # noqa: N818
     """The study has not come to its end, so it cannot be deleted."""
 
+    code = "wrong-state"
+
 
 class StudyEnded(StoreError):  # noqa: N818
     """The study has come to its end, so its priority cannot be changed."""
+
+    code = "wrong-state"
 
 
 class NothingToRetry(StoreError):  # noqa: N818
     """The study has no case that could be run again as asked."""
 
+    code = "wrong-state"
+
 
 class IdempotencyConflict(StoreError):  # noqa: N818
     """The idempotency key was already used with another body or other parameters."""
 
+    code = "idempotency-conflict"
+
 
 class PageTokenError(StoreError):
     """A page token that no list has given out."""
+
+    code = "invalid-parameter"

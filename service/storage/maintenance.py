@@ -38,7 +38,7 @@ def revision(session: Session) -> str | None:
             ).scalar_one_or_none()
             return found
     if names:
-        raise SchemaError(f"{session.location} is a database of another program; name another one")
+        raise SchemaError(f"{session.location} is a database of another program; name another one", "not-a-database")
     return None
 
 
@@ -108,7 +108,7 @@ def require_sound(session: Session) -> None:
     with session.read() as connection:
         if connection.exec_driver_sql("PRAGMA quick_check(1)").scalar_one() != "ok":
             session.damage = damaged(session.path)
-            raise DatabaseError(session.damage)
+            raise DatabaseError(session.damage, "database-damaged")
 
 
 def check(session: Session) -> CheckReport:
@@ -167,12 +167,13 @@ def backup(session: Session, path: Path) -> None:
     """
     if session.on_server:
         raise DatabaseError(
-            f"{session.location} is backed up with PostgreSQL's own tools, such as `pg_dump --format=custom`"
+            f"{session.location} is backed up with PostgreSQL's own tools, such as `pg_dump --format=custom`",
+            "unsupported-database",
         )
     if path.exists():
-        raise DatabaseError(f"{path} exists already; a backup never replaces a file")
+        raise DatabaseError(f"{path} exists already; a backup never replaces a file", "file-exists")
     if not path.parent.is_dir():
-        raise DatabaseError(f"the backup cannot be written: there is no folder {path.parent}")
+        raise DatabaseError(f"the backup cannot be written: there is no folder {path.parent}", "write-failed")
     sweep(path.parent.glob(f".{glob.escape(path.name)}.*{PART_SUFFIX}"))
     part = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PART_SUFFIX}")
     try:
@@ -187,6 +188,6 @@ def backup(session: Session, path: Path) -> None:
         os.replace(part, path)
         sync_folder(path.parent)
     except OSError as error:
-        raise DatabaseError(f"the backup {path} cannot be written: {error.strerror}") from None
+        raise DatabaseError(f"the backup {path} cannot be written: {error.strerror}", "write-failed") from None
     finally:
         part.unlink(missing_ok=True)

@@ -48,14 +48,19 @@ def checked(url: URL) -> URL:
     Raises DatabaseError for a URL that is not understood.
     """
     if url.drivername not in {"postgresql", "postgresql+psycopg"}:
-        raise DatabaseError(f"the driver {url.get_driver_name()!r} is not supported; write postgresql://...")
+        raise DatabaseError(
+            f"the driver {url.get_driver_name()!r} is not supported; write postgresql://...", "invalid-database-url"
+        )
     unknown = sorted(set(url.query) - URL_OPTIONS)
     if unknown:
         raise DatabaseError(
-            f"a PostgreSQL URL takes no option {', '.join(unknown)} here; known are {', '.join(sorted(URL_OPTIONS))}"
+            f"a PostgreSQL URL takes no option {', '.join(unknown)} here; known are {', '.join(sorted(URL_OPTIONS))}",
+            "invalid-database-url",
         )
     if not url.database:
-        raise DatabaseError(f"{location(url)} names no database; a URL looks like postgresql://user@host/sprag")
+        raise DatabaseError(
+            f"{location(url)} names no database; a URL looks like postgresql://user@host/sprag", "invalid-database-url"
+        )
     host = str(url.query.get("host", url.host or ""))
     if "sslmode" not in url.query and host not in _LOCAL and not host.startswith("/"):
         url = url.update_query_dict({"sslmode": "require"})
@@ -106,7 +111,8 @@ def _require_version(connection: Any, _record: object) -> None:
     version = connection.info.server_version
     if version < OLDEST_SERVER:
         raise DatabaseError(
-            f"PostgreSQL {version // 10_000} is too old; Sprag needs {OLDEST_SERVER // 10_000} or newer"
+            f"PostgreSQL {version // 10_000} is too old; Sprag needs {OLDEST_SERVER // 10_000} or newer",
+            "unsupported-database",
         )
 
 
@@ -118,7 +124,9 @@ def connect(url: URL, lock_seconds: float, application: str = "sprag") -> psycop
     try:
         return psycopg.connect(autocommit=True, **{**named, **given})
     except psycopg.Error as error:
-        raise explained(error, location(url)) or DatabaseError(_unreachable(error, location(url))) from None
+        raise explained(error, location(url)) or DatabaseError(
+            _unreachable(error, location(url)), "database-unreachable"
+        ) from None
 
 
 def _first_line(error: BaseException) -> str:
@@ -140,12 +148,16 @@ def explained(error: BaseException, where: str) -> DatabaseError | None:
     if state.startswith(("53", "58")):
         return DatabaseBusyError(f"the server of the database {where} is in trouble: {_first_line(error)}")
     if state == "42501":
-        return DatabaseError(f"the user may not do that in the database {where}: {_first_line(error)}")
+        return DatabaseError(
+            f"the user may not do that in the database {where}: {_first_line(error)}", "database-forbidden"
+        )
     if state == "25006":
-        return DatabaseError(f"the database {where} is read-only; name the primary server, not its copy")
+        return DatabaseError(
+            f"the database {where} is read-only; name the primary server, not its copy", "database-read-only"
+        )
     # A lost connection has no state, or one of classes 08 (connection) and 57 (the server is shutting down).
     if state.startswith(("08", "57")) or (not state and isinstance(error, psycopg.OperationalError)):
-        return DatabaseError(_unreachable(error, where))
+        return DatabaseError(_unreachable(error, where), "database-unreachable")
     return None
 
 

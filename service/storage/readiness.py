@@ -60,7 +60,7 @@ class Readiness:
                 self._next_check = self._store.clock.monotonic() + _CHECK_SECONDS
                 self._store.require_sound()
             if self._store.session.damage is not None:
-                raise DatabaseError(self._store.session.damage)
+                raise DatabaseError(self._store.session.damage, "database-damaged")
             if not self._store.session.can_write(self._locked_seconds):
                 return [
                     f"The write lock of the database was not free for {self._locked_seconds:g} s: a process that holds "

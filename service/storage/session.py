@@ -101,12 +101,14 @@ class Session:
         except (sa.exc.ArgumentError, ValueError):  # the latter of a port that is no number
             raise DatabaseError(
                 f"{_without_password(url)!r} is no database URL; one looks like sqlite:////path/to/sprag.sqlite3 or "
-                "postgresql://user@host:5432/database"
+                "postgresql://user@host:5432/database",
+                "invalid-database-url",
             ) from None
         if "@" in (self.url.host or ""):
             raise DatabaseError(
                 "the database URL has more than one @ before its host: "
-                "in a name or password write @ as %40 and / as %2F"
+                "in a name or password write @ as %40 and / as %2F",
+                "invalid-database-url",
             )
         self._path: Path | None = None
         #: Device and number of the file that was opened first.
@@ -123,7 +125,9 @@ class Session:
                 begin = {"read": "", "write": _postgres().TAKE_WRITER}
                 reading = {"isolation_level": "REPEATABLE READ", "postgresql_readonly": True}
             case other:
-                raise DatabaseError(f"databases of kind {other!r} are not supported; use sqlite or postgresql")
+                raise DatabaseError(
+                    f"databases of kind {other!r} are not supported; use sqlite or postgresql", "invalid-database-url"
+                )
         sa.event.listen(self._engine, "begin", _begin)
         self._turn = Condition()
         self._writing = self._refusing = False
@@ -134,9 +138,11 @@ class Session:
 
     def _open_file(self) -> sa.Engine:
         if self.url.query:
-            raise DatabaseError(f"a database URL takes no options here ({', '.join(sorted(self.url.query))})")
+            raise DatabaseError(
+                f"a database URL takes no options here ({', '.join(sorted(self.url.query))})", "invalid-database-url"
+            )
         if self.url.database in (None, "", ":memory:"):
-            raise DatabaseError("the database must be a file: several processes work on it")
+            raise DatabaseError("the database must be a file: several processes work on it", "invalid-database-url")
         self._path = Path(str(self.url.database)).absolute()
         self.location = str(self._path)
         self._check_place()
@@ -184,19 +190,21 @@ class Session:
         try:
             folder.mkdir(PRIVATE_FOLDER_MODE, parents=True, exist_ok=True)
         except OSError as error:
-            raise DatabaseError(f"the folder {folder} cannot be made: {error.strerror}") from None
+            raise DatabaseError(f"the folder {folder} cannot be made: {error.strerror}", "write-failed") from None
         if self.path.is_dir():
-            raise DatabaseError(f"{self.path} is a folder, not a database file")
+            raise DatabaseError(f"{self.path} is a folder, not a database file", "not-a-database")
         if not os.access(folder, os.W_OK):
             raise DatabaseError(
                 f"the folder {folder} is read-only, and the database needs to write beside its file: "
-                f"`chmod u+w {folder}`, or name another place with --db"
+                f"`chmod u+w {folder}`, or name another place with --db",
+                "database-read-only",
             )
         kind = file_system_of(self.path.resolve())
         if kind in NETWORK_FILE_SYSTEMS:
             raise DatabaseError(
                 f"{self.path} lies on a network file system ({kind}), which cannot hold a database safely: "
-                "name a file on a local disk with --db"
+                "name a file on a local disk with --db",
+                "unsupported-database",
             )
 
     def _note_file(self, _connection: Any, _record: object) -> None:
@@ -213,12 +221,14 @@ class Session:
         except OSError:
             raise DatabaseError(
                 f"the database file {self.path} was deleted or moved while it was in use: stop Sprag, put the file or "
-                "a backup in its place, and start again"
+                "a backup in its place, and start again",
+                "database-replaced",
             ) from None
         if self._file != (found.st_dev, found.st_ino):
             raise DatabaseError(
                 f"the database file {self.path} was replaced while it was in use: stop Sprag, delete the files beside "
-                "it that end in -wal and -shm if it is a backup, and start again"
+                "it that end in -wal and -shm if it is a backup, and start again",
+                "database-replaced",
             )
 
     def can_write(self, seconds: float) -> bool:
@@ -350,7 +360,9 @@ def _postgres() -> ModuleType:
     try:
         from sprag.service.storage import postgres
     except ImportError:
-        raise DatabaseError("PostgreSQL needs a driver that is not installed: pip install 'sprag[postgres]'") from None
+        raise DatabaseError(
+            "PostgreSQL needs a driver that is not installed: pip install 'sprag[postgres]'", "missing-extra"
+        ) from None
     return postgres
 
 
@@ -361,10 +373,16 @@ def explained(error: sa.exc.DBAPIError, path: Path) -> Exception:
         "database is locked": DatabaseBusyError(_BUSY.format(path)),
         "database or disk is full": DatabaseFullError(f"the disk that holds {path} is full"),
         "disk I/O error": DatabaseFullError(f"the disk that holds {path} reports an error on reading or writing"),
-        "readonly database": DatabaseError(f"the database {path} is read-only: `chmod u+w {path}`, and its folder too"),
-        "unable to open database": DatabaseError(f"the database {path} cannot be opened; check the folder's rights"),
-        "file is not a database": DatabaseError(f"{path} is not a Sprag database; name another file with --db"),
-        "malformed": DatabaseError(damaged(path)),
+        "readonly database": DatabaseError(
+            f"the database {path} is read-only: `chmod u+w {path}`, and its folder too", "database-read-only"
+        ),
+        "unable to open database": DatabaseError(
+            f"the database {path} cannot be opened; check the folder's rights", "database-unreachable"
+        ),
+        "file is not a database": DatabaseError(
+            f"{path} is not a Sprag database; name another file with --db", "not-a-database"
+        ),
+        "malformed": DatabaseError(damaged(path), "database-damaged"),
     }
     return next((explanation for phrase, explanation in known.items() if phrase in text), error)
 

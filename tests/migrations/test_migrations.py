@@ -23,6 +23,7 @@ from sprag.service.storage.store import Store
 from sprag.service.storage.tables import HEAD_REVISION, all_tables
 from sprag.worker.states import StudyState
 from tests import postgres
+from tests.faults import refused
 from tests.migrations.freeze import FOLDER
 from tests.service.spec_sample import changed
 from tests.worker import fakes
@@ -202,7 +203,7 @@ def test_an_older_database_names_the_command_that_mends_it(
 ) -> None:
     upgrade(url)
     monkeypatch.setattr(maintenance, "HEAD_REVISION", "0099")
-    with pytest.raises(SchemaError, match=f"has revision {HEAD_REVISION}.*run `sprag db upgrade`") as caught:
+    with refused(SchemaError, "wrong-revision") as caught:
         Store.open(url)
     assert "\n" not in str(caught.value)
 
@@ -210,9 +211,9 @@ def test_an_older_database_names_the_command_that_mends_it(
 def test_a_newer_database_is_left_alone(url: str, file: Path) -> None:
     upgrade(url)
     set_revision(file, "9999")
-    with pytest.raises(SchemaError, match=r"newer than this program knows.*`sprag db upgrade`"):
+    with refused(SchemaError, "wrong-revision"):
         Store.open(url)
-    with pytest.raises(SchemaError, match="newer"):
+    with refused(SchemaError, "wrong-revision"):
         upgrade(url)
     session = Session(url)
     assert any("newer" in problem for problem in maintenance.check(session).problems)
@@ -223,13 +224,13 @@ def test_a_database_of_another_program_is_left_alone(url: str, file: Path) -> No
     connection = sqlite_driver().connect(file)
     connection.execute("CREATE TABLE birds (name)")
     connection.close()
-    with pytest.raises(SchemaError, match="another program"):
+    with refused(SchemaError, "not-a-database"):
         Store.open(url)
 
 
 def test_what_is_no_database_is_told_in_one_sentence(url: str, file: Path) -> None:
     file.write_bytes(b"this is a letter, not a database" * 100)
-    with pytest.raises(DatabaseError, match="is not a Sprag database"):
+    with refused(DatabaseError, "not-a-database"):
         Store.open(url)
     assert any("not a Sprag database" in problem for problem in _problems(url))
 

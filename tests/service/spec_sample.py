@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from sprag.service.spec.document import ParsedSpec, Problem, SpecError, parse_spec
+from sprag.service.faults import Fault
+from sprag.service.spec.document import ParsedSpec, SpecError, parse_spec
 
 #: The example of the spec's own documentation.
 SPEC: dict[str, Any] = {
@@ -64,11 +65,11 @@ def parsed(changes: dict[str, Any]) -> ParsedSpec:
     return parse_spec(changed(changes))
 
 
-def problems(changes: dict[str, Any]) -> dict[str, Problem]:
+def problems(changes: dict[str, Any]) -> dict[str, Fault]:
     """Problems of the sample spec with changes, by their pointers (which must differ)."""
     with pytest.raises(SpecError) as caught:
         parse_spec(changed(changes))
-    found = {problem.pointer: problem for problem in caught.value.problems}
-    assert len(found) == len(caught.value.problems)
+    found = {str(fault.where): fault for fault in caught.value.faults}
+    assert len(found) == len(caught.value.faults)
     assert str(caught.value)
     return found

@@ -74,7 +74,7 @@ def test_wrong_settings_are_refused(wrong: dict[str, object]) -> None:
 def test_commands_say_what_is_wrong_with_a_setting(settings: Settings) -> None:
     with pytest.raises(WrongInputError) as caught:
         read_settings(token="short")
-    (problem,) = caught.value.problems
+    (problem,) = caught.value.faults
     assert str(problem).startswith("SPRAG_TOKEN: a token needs at least 16 ASCII characters")
 
 

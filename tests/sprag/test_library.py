@@ -81,7 +81,7 @@ def test_what_is_wrong_with_a_study_is_named() -> None:
 
     with pytest.raises(SpecError) as refused:
         sprag.run(SPEC | {"base": SPEC["base"] | {"shaft": {"inertia": -1.0}}})
-    assert [problem.pointer for problem in refused.value.problems] == ["/base/shaft/inertia"]
+    assert [problem.where for problem in refused.value.faults] == ["/base/shaft/inertia"]
     with pytest.raises(sprag.SpecFileError, match="no-such-file"):
         sprag.run("no-such-file.toml")
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from sprag.engine import ENGINE_VERSION, Ending, Run, Span
 from sprag.engine.catalogue import Parameter, ResultInfo
-from sprag.engine.machine_shaft.problems import ExpressionError, InsufficientInertiaError, MachineError
+from sprag.engine.machine_shaft.problems import ExpressionError, InsufficientInertiaError, MachineError, TableError
 from sprag.engine.outcome import Engagements, Trajectory
 from sprag.engine.run import MEANS_FROM_PERIODS
 from sprag.engine.sources import engine_folder, source_hash
@@ -88,6 +88,7 @@ __all__ = [
     "ResultInfo",
     "Run",
     "Span",
+    "TableError",
     "Trajectory",
     "WorkerEnding",
     "cache_folder",

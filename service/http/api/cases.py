@@ -59,9 +59,13 @@ def list_cases(
 ) -> Response:
     """Finished cases, in order of their numbers; of a cancelled study also those that were never run."""
     if ending is not None and ending not in models.ENDING_SENTENCES:
-        raise parameter_error("ending", "there is no such ending", shown(ending), ", ".join(models.ENDING_SENTENCES))
+        raise parameter_error(
+            "ending", "invalid-choice", "there is no such ending", shown(ending), ", ".join(models.ENDING_SENTENCES)
+        )
     if regime is not None and regime not in models.REGIME_SENTENCES:
-        raise parameter_error("regime", "there is no such regime", shown(regime), ", ".join(models.REGIME_SENTENCES))
+        raise parameter_error(
+            "regime", "invalid-choice", "there is no such regime", shown(regime), ", ".join(models.REGIME_SENTENCES)
+        )
     after = _after(page_token)
     # One more than the page, which tells whether there is another.
     block = context.store.case_page(study_id, after_case=after, limit=page_size + 1, ending=ending, regime=regime)
@@ -75,7 +79,7 @@ def _after(page_token: str | None) -> int:
         return -1
     if not (page_token.isascii() and page_token.isdigit() and len(page_token) < 19):
         raise parameter_error(
-            "page_token", "not a token of this list", shown(page_token), "`next_page_token` of a page"
+            "page_token", "invalid-text", "not a token of this list", shown(page_token), "`next_page_token` of a page"
         )
     return int(page_token)
 

@@ -16,7 +16,7 @@ from sprag.service.http.respond import JSON
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks
 from sprag.service.spec.described import FIT, schemas
-from sprag.service.spec.report import SpecError, spec_items
+from sprag.service.spec.report import SpecError
 
 router = APIRouter(tags=["clutch"], dependencies=[Depends(strict_query)])
 
@@ -53,5 +53,5 @@ async def fit_clutch(work: Attended, received: Annotated[Body, Depends(read_body
     try:
         report = await work.check(checks.clutch_fit, received.content, received.format)
     except SpecError as error:
-        raise ApiError("invalid-body", str(error), spec_items(error.problems)) from error
+        raise ApiError("invalid-body", str(error), error.faults) from error
     return Response(report, media_type=JSON)

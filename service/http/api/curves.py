@@ -188,6 +188,8 @@ def _pairs(at: list[str] | None) -> tuple[tuple[str, str], ...]:
     for item in at or ():
         path, separator, value = item.partition("=")
         if not separator or not path.strip() or not value.strip():
-            raise parameter_error("at", "must be path=value", shown(item), "for instance shaft.load=0.1 N*m")
+            raise parameter_error(
+                "at", "invalid-text", "must be path=value", shown(item), "for instance shaft.load=0.1 N*m"
+            )
         pairs.append((path.strip(), value.strip()))
     return tuple(pairs)

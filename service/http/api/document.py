@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from http import HTTPStatus
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from fastapi import FastAPI, Header, Query
 from fastapi.openapi.utils import get_openapi
 from typing_extensions import is_typeddict
 
 from sprag.service.answers import catalogue, results, schedules, studies
-from sprag.service.faults import ErrorItem
+from sprag.service.faults import Fault, Kind, ParameterFault
 from sprag.service.http.api.links import add_links
 from sprag.service.http.problems import PROBLEM_MEDIA_TYPE, PROBLEM_TYPES, Problem, ProblemType, problem_json
 from sprag.service.http.views import API_PREFIX
@@ -36,7 +36,7 @@ def problems(*slugs: str) -> Responses:
     """Documentation of the problems an operation may answer with, by status, each with an example."""
     by_status: dict[int, list[ProblemType]] = {}
     for slug in slugs:
-        kind = PROBLEM_TYPES[slug]
+        kind = PROBLEM_TYPES[cast("Kind", slug)]
         by_status.setdefault(kind.status, []).append(kind)
     return {status: _problem_response(status, kinds) for status, kinds in sorted(by_status.items())}
 
@@ -52,12 +52,28 @@ def _problem_response(status: int, kinds: Iterable[ProblemType]) -> dict[str, An
 
 _EXAMPLE_ERRORS: Final = {
     "invalid-spec": (
-        ErrorItem("is out of range", "/base/pendulums/0/inertia", value=-0.001, allowed="> 0 kg*m^2", unit="kg*m^2"),
+        Fault(
+            "/base/pendulums/0/inertia",
+            "out-of-range",
+            "is out of range",
+            value=-0.001,
+            allowed="> 0 kg*m^2",
+            unit="kg*m^2",
+        ),
     ),
-    "invalid-body": (ErrorItem("is missing", "/accuracy", allowed="> 0 N*m", unit="N*m"),),
-    "invalid-parameter": (ErrorItem("must be at most 1000", None, "page_size", 5000, "1 .. 1000"),),
+    "invalid-body": (Fault("/accuracy", "required", "is missing", allowed="> 0 N*m", unit="N*m"),),
+    "invalid-parameter": (
+        ParameterFault("page_size", "out-of-range", "must be at most 1000", value=5000, allowed="1 .. 1000"),
+    ),
     "invalid-selection": (
-        ErrorItem("the axis has no such value", None, "at", "shaft.load=0.7", "0.02, 0.1, 0.3", "N*m"),
+        ParameterFault(
+            "at",
+            "unknown-value",
+            "the axis has no such value",
+            value="shaft.load=0.7",
+            allowed="0.02, 0.1, 0.3",
+            unit="N*m",
+        ),
     ),
 }
 

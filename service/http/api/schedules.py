@@ -23,7 +23,7 @@ from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
 from sprag.service.jobs import checks
 from sprag.service.schedules.deadline import ALLOWED_OF_RUNS
 from sprag.service.schedules.fields import ScheduleFields
-from sprag.service.spec.report import SpecError, spec_items
+from sprag.service.spec.report import SpecError
 from sprag.service.storage.schedules import ScheduleRecord
 from sprag.worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
 
@@ -146,7 +146,7 @@ def _told() -> Iterator[None]:
     try:
         yield
     except SpecError as error:
-        raise ApiError("invalid-body", str(error), spec_items(error.problems)) from error
+        raise ApiError("invalid-body", str(error), error.faults) from error
 
 
 @router.get("/schedules", response_model=m.ScheduleList, responses=problems("invalid-parameter"))

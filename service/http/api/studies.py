@@ -65,7 +65,7 @@ def _finish(context: Context, text: str | None) -> datetime | None:
     try:
         return finish_at(text, context.store.clock.now())
     except FinishError as error:
-        raise parameter_error("finish_by", str(error), text, ALLOWED) from None
+        raise parameter_error("finish_by", error.code, str(error), text, ALLOWED) from None
 
 
 @router.post(
@@ -209,7 +209,7 @@ def retry_study(
     """Run the cases of an ended study that did not end ok again, and no others."""
     for name in ending or ():
         if name not in _FAILED:
-            raise parameter_error("ending", "no ending of a failed case", name, ", ".join(_FAILED))
+            raise parameter_error("ending", "invalid-choice", "no ending of a failed case", name, ", ".join(_FAILED))
     return json_response(views.summary(context.store.retry_study(study_id, ending)), 202)
 
 
@@ -279,7 +279,9 @@ async def run_longer(
     """Submit a study of the cases of a settled study that are not settled, with more time for each."""
     there = await run_in_threadpool(context.store.regimes, study_id)
     if regime not in there:
-        raise parameter_error("regime", "no case of this study has it", regime, ", ".join(there) or "none: not settled")
+        raise parameter_error(
+            "regime", "unknown-name", "no case of this study has it", regime, ", ".join(there) or "none: not settled"
+        )
     given = _given(regime=regime, at_most=at_most)
     now = context.store.clock.now()
     made = await work.check(checks.longer_study, context.library, study_id, regime, at_most, now, given)

@@ -60,7 +60,7 @@ def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = 
     try:
         span = _span(study, case, begin, end)
     except FaultError as error:
-        faults = error.errors
+        faults = error.faults
     query = urlencode([("from", repr(span[0])), ("to", repr(span[1]))]) if span else ""
     own = f"/studies/{study_id}/cases/{case}"
     infos = models.study_results(study)

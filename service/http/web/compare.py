@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
@@ -11,7 +11,7 @@ from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from sprag.service.faults import ErrorItem
+from sprag.service.faults import ParameterFault
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx
 from sprag.service.http.drawing import Drawing, picture
@@ -86,7 +86,7 @@ def comparison(context: Context, given: QueryParams) -> Comparison:
     ]
     if not axes:
         message = "these studies have no varying parameter in common, so that nothing can be drawn against it"
-        raise SelectionError([ErrorItem(message, parameter="study")])
+        raise SelectionError([ParameterFault("study", "nothing-varies", message)])
     known = [{info.name for info in models.study_results(study)} for study in studies]
     results = [info for info in models.study_results(studies[0]) if all(info.name in names for names in known)]
     main = main_query(studies[0], models.study_results(studies[0]))
@@ -108,17 +108,7 @@ def drawn(context: Context, chosen: Comparison) -> list[tuple[str, Curves]]:
         try:
             selection = select(study, models.study_results(study), chosen.query(position))
         except SelectionError as error:
-            faults = [
-                ErrorItem(
-                    f"{chosen.label(position)}: {item.message}",
-                    None,
-                    item.parameter,
-                    item.value,
-                    item.allowed,
-                    item.unit,
-                )
-                for item in error.errors
-            ]
+            faults = [replace(item, message=f"{chosen.label(position)}: {item.message}") for item in error.faults]
             raise SelectionError(faults) from error
         found.append((chosen.label(position), draw(selection, partial(context.store.rows_for_cases, record.id))))
     return found
@@ -137,7 +127,7 @@ def compare_page(context: Ctx, request: Request) -> Response:
             for position, study in enumerate(chosen.studies):
                 held_at.append(select(study, models.study_results(study), chosen.query(position)).held)
         except SelectionError as error:
-            faults = error.errors
+            faults = error.faults
     query = "" if chosen is None else urlencode(chosen.pairs())
     return page(
         "compare.html",

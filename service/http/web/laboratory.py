@@ -29,7 +29,7 @@ from sprag.service.results.wording import number, words
 from sprag.service.spec.catalogue import parameter_of
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.numbers import parse_number
-from sprag.service.spec.report import SpecError, spec_items
+from sprag.service.spec.report import SpecError
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity
 from sprag.worker import models
 
@@ -113,8 +113,8 @@ def setting(given: Mapping[str, str]) -> Setting:
         study = parse_spec(overridden(spec, values)).study
     except SpecError as error:
         study = own
-        for item in spec_items(error.problems):
-            path = (item.pointer or "").removeprefix("/base/").replace("/", ".")
+        for item in error.faults:
+            path = (item.where or "").removeprefix("/base/").replace("/", ".")
             faults.setdefault(path if path in own.base else "", []).append(message(item))
     sliders = [_slider(own, study, path, given.get(path, "")) for path in own.base if _limits(own, path)]
     further = {path: given[path].strip() for path in values if not _limits(own, path)}

@@ -25,7 +25,7 @@ def problem_page(request: Request, error: ApiError) -> Response | None:
     if not wants_page(request):
         return None
     response = page(
-        "error.html", status=error.type.status, problem=error.type, detail=error.detail, faults=error.errors
+        "error.html", status=error.type.status, problem=error.type, detail=error.detail, faults=error.faults
     )
     response.headers.update({"Cache-Control": "no-store", **error.headers})
     return response

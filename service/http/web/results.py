@@ -52,7 +52,7 @@ def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
         held = selection.held
         values = sum(line.cases.size for line in selection.lines) * len(selection.results)
     except SelectionError as error:
-        faults = error.errors
+        faults = error.faults
     shown = query or curve_query(study, infos, type(request.query_params)())
     assert shown is not None
     pairs = pairs_of(shown)
@@ -89,7 +89,7 @@ def map_page(
             return RedirectResponse(f"/studies/{study_id}", status_code=303)
         held = select(study, infos, CurveQuery(query.x, (query.z,), (query.y,), query.at)).held
     except SelectionError as error:
-        faults = error.errors
+        faults = error.faults
     shown = query or map_query(study, infos, type(request.query_params)())
     assert shown is not None
     pairs = pairs_of(shown)

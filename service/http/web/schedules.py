@@ -98,9 +98,9 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
         else:
             await run_in_threadpool(context.store.change_schedule, schedule_id, fields)
     except SpecError as error:
-        for problem in error.problems:
-            first = problem.pointer.split("/")[1] if problem.pointer else ""
-            sentence = f"{problem.message}; allowed: {problem.allowed}" if problem.allowed else problem.message
+        for fault in error.faults:
+            first = fault.where.split("/")[1] if fault.where else ""
+            sentence = f"{fault.message}; allowed: {fault.allowed}" if fault.allowed else fault.message
             faults.setdefault(_FIELD_OF.get(first, first), []).append(sentence)
     except (StudyNotFound, TooManySchedules) as error:
         faults["source"] = [str(error)]

@@ -10,7 +10,7 @@ import numpy as np
 from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
-from sprag.service.faults import ErrorItem
+from sprag.service.faults import ParameterFault
 from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.web.study import fixed_choices, study_frame
 from sprag.service.http.web.templates import page
@@ -69,7 +69,7 @@ def cases_page(
     try:
         found = _page(context, study_id, study, _Wanted(sort, ending, regime, at, after))
     except SelectionError as error:
-        faults = error.errors
+        faults = error.faults
     kept = [
         ("ending", ending),
         ("regime", regime),
@@ -115,9 +115,9 @@ class _Wanted:
 def _page(context: Context, study_id: str, study: Study, wanted: _Wanted) -> TablePage:
     ending, regime, after = wanted.ending, wanted.regime, wanted.after
     if ending and ending not in models.ENDING_SENTENCES:
-        raise SelectionError([ErrorItem("there is no such ending", parameter="ending", value=ending)])
+        raise SelectionError([ParameterFault("ending", "invalid-choice", "there is no such ending", value=ending)])
     if regime and regime not in models.REGIME_SENTENCES:
-        raise SelectionError([ErrorItem("there is no such regime", parameter="regime", value=regime)])
+        raise SelectionError([ParameterFault("regime", "invalid-choice", "there is no such regime", value=regime)])
     if not wanted.sort and not wanted.at:
         block = context.store.case_page(study_id, after - 1, _ROWS + 1, ending or None, regime or None)
         rows = list(block.rows())
@@ -137,7 +137,7 @@ def _ordered(context: Context, study_id: str, study: Study, wanted: _Wanted) -> 
     cases = study.cases_at(fixed)
     if cases.size > MOST_SORTED:
         message = f"{cases.size:,} cases are too many to sort; hold further axes at a value, or take all results"
-        raise SelectionError([ErrorItem(message, parameter="sort", allowed=f"<= {MOST_SORTED:,} cases")])
+        raise SelectionError([ParameterFault("sort", "too-many", message, allowed=f"<= {MOST_SORTED:,} cases")])
     name = sort.removeprefix("-")
     infos = models.study_results(study)
     by_result, info = result_of(infos, name) is not None, models.regime_info(infos) if wanted.regime else None
@@ -157,7 +157,7 @@ def _ordered(context: Context, study_id: str, study: Study, wanted: _Wanted) -> 
             np.float64
         )
     else:
-        raise SelectionError([ErrorItem("there is no such column", parameter="sort", value=name)])
+        raise SelectionError([ParameterFault("sort", "invalid-choice", "there is no such column", value=name)])
     cases, keys = cases[finished], np.asarray(keys, dtype=np.float64)[finished]
     # What could not be computed stands last, whichever way the rest goes.
     missing = np.isnan(keys)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 
-from sprag.service.faults import ErrorItem
+from sprag.service.faults import ParameterFault
 from sprag.service.results.figures.curves import curves_figure, doubtful_marks, map_quantities
 from sprag.service.results.figures.figure import OTHER_LOOK, PALETTE, shortened
 from sprag.service.results.figures.motion import motion_figure
@@ -160,7 +160,7 @@ def check_size(what: str, count: int, most: int) -> None:
     """SelectionError when a picture would show more than ``most``."""
     if count > most:
         message = f"{count} {what} are too many for one picture; choose fewer, or take the numbers"
-        raise SelectionError([ErrorItem(message, parameter="format", allowed=f"<= {most} {what}")])
+        raise SelectionError([ParameterFault("format", "too-many", message, allowed=f"<= {most} {what}")])
 
 
 @cache

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.faults import ErrorItem
+from sprag.service.faults import ParameterFault
 from sprag.service.results.pictures.curves import Picture, axis_label, head, render
 from sprag.service.results.selection import SelectionError
 
@@ -28,7 +28,7 @@ def draw_sensitivity(found: Sequence[Sensitivity], title: str, picture: Picture)
     """A row of two plots for each result; raises SelectionError when there are more than one picture can show."""
     if len(found) > MOST_RESULTS:
         message = f"{len(found)} results are too many for one picture; choose fewer, or take the numbers"
-        raise SelectionError([ErrorItem(message, parameter="y", allowed=f"<= {MOST_RESULTS} results")])
+        raise SelectionError([ParameterFault("y", "too-many", message, allowed=f"<= {MOST_RESULTS} results")])
     axes = len(found[0].effects)
     return render(partial(_paint, found, title), picture, (10.0, 0.8 + len(found) * max(2.6, 1.0 + 0.45 * axes)))
 

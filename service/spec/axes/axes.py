@@ -30,7 +30,7 @@ def read_axes(report: Report, data: object, combine: Combine, machine: Machine) 
     Counts are compared with the limits before a value is computed, so that no spec can ask for much memory.
     """
     if not isinstance(data, list) or len(data) > MAX_AXES:
-        report.problem("/axes", "must be a list of axes", data, allowed=f"a list of 0 to {MAX_AXES} axes")
+        report.fault("/axes", "wrong-type", "must be a list of axes", data, allowed=f"a list of 0 to {MAX_AXES} axes")
         return None
     before = report.found
     read = [read_axis(report, join("/axes", index), item, machine) for index, item in enumerate(data)]
@@ -73,8 +73,11 @@ def read_axis(
     ways = [name for name in PLANS if name in found]
     if len(ways) != 1:
         given = f"{len(ways)} are given: {', '.join(ways)}" if ways else "none is given"
-        report.problem(
-            pointer, f"needs exactly one of {', '.join(PLANS)}; {given}", allowed="one of " + ", ".join(PLANS)
+        report.fault(
+            pointer,
+            "exactly-one",
+            f"needs exactly one of {', '.join(PLANS)}; {given}",
+            allowed="one of " + ", ".join(PLANS),
         )
         return paths, None
     if paths is None:
@@ -87,27 +90,34 @@ def read_paths(report: Report, pointer: str, data: object, machine: Machine) -> 
     """The paths of one axis, all known and of one unit; None, and problems noted, otherwise."""
     items = data if isinstance(data, list) else [data]
     if data is None or not 1 <= len(items) <= MAX_TIED_PATHS:
-        report.problem(
-            pointer, "must name what varies" if data is not None else "is required", data,
+        report.fault(
+            pointer,
+            "required" if data is None else "wrong-type",
+            "must name what varies" if data is not None else "is required",
+            data,
             allowed=f"a path such as 'excitation.frequency', or a list of 1 to {MAX_TIED_PATHS} of them",
-        )  # fmt: skip
+        )
         return None
     found: list[Parameter] = []
     for index, path in enumerate(items):
         where = join(pointer, index) if isinstance(data, list) else pointer
         if not isinstance(path, str):
-            report.problem(where, "must be a path, as text", path, allowed="a path such as 'excitation.frequency'")
+            report.fault(
+                where, "wrong-type", "must be a path, as text", path, allowed="a path such as 'excitation.frequency'"
+            )
         elif path in machine.parameters:
             found.append(machine.parameters[path])
         elif report.full:
             break
         elif not machine.assumed(path):
-            report.problem(where, machine.why_not(path), path, allowed="the path of a number in `base`")
+            report.fault(where, "invalid-path", machine.why_not(path), path, allowed="the path of a number in `base`")
     if len(found) < len(items):
         return None
     units = list(dict.fromkeys(entry.unit for entry in found))
     if len(units) > 1:
-        report.problem(pointer, f"ties parameters of different units: {', '.join(units)}", data, allowed="one unit")
+        report.fault(
+            pointer, "wrong-unit", f"ties parameters of different units: {', '.join(units)}", data, allowed="one unit"
+        )
         return None
     return tuple(entry.path for entry in found)
 
@@ -118,10 +128,10 @@ def check_paths(report: Report, axes: Sequence[tuple[str, ...]], pointer: str = 
     for index, paths in enumerate(axes):
         for path, times in Counter(paths).items():
             if times > 1:
-                report.problem(join(pointer, index, "path"), "names the same path twice", path)
+                report.fault(join(pointer, index, "path"), "repeated", "names the same path twice", path)
             if path in taken:
-                report.problem(
-                    join(pointer, index, "path"), f"this path already stands on axis {taken[path]}", path,
+                report.fault(
+                    join(pointer, index, "path"), "repeated", f"this path already stands on axis {taken[path]}", path,
                     allowed="each path on one axis",
                 )  # fmt: skip
             taken.setdefault(path, index)
@@ -132,24 +142,31 @@ def _sizes_fit(report: Report, plans: list[Plan], combine: Combine) -> bool:
     before = report.found
     for plan in plans:
         if plan.count > MAX_AXIS_VALUES:
-            report.problem(
-                plan.pointer, f"asks for {count_text(plan.count)} values", allowed=f"at most {MAX_AXIS_VALUES:,} values"
+            report.fault(
+                plan.pointer,
+                "too-many",
+                f"asks for {count_text(plan.count)} values",
+                allowed=f"at most {MAX_AXIS_VALUES:,} values",
             )
     if report.found == before and sum(counts) > MAX_AXIS_VALUES:
-        report.problem(
+        report.fault(
             "/axes",
+            "too-many",
             f"the axes ask for {count_text(sum(counts))} values together",
             allowed=f"at most {MAX_AXIS_VALUES:,}",
         )
     if combine == "zip":
         if len(set(counts)) > 1:
-            report.problem(
-                "/axes", "axes that are zipped must have equally many values", [count_text(count) for count in counts],
+            report.fault(
+                "/axes",
+                "unequal-lengths",
+                "axes that are zipped must have equally many values",
+                [count_text(count) for count in counts],
                 allowed="axes of one length, or combine: 'grid'",
-            )  # fmt: skip
+            )
     elif report.found == before and math.prod(counts) > MAX_CASES:
-        report.problem(
-            "/axes", f"the grid has {count_text(math.prod(counts))} cases "
+        report.fault(
+            "/axes", "too-many", f"the grid has {count_text(math.prod(counts))} cases "
             f"({' x '.join(count_text(count) for count in counts)})", allowed=f"at most {MAX_CASES:,} cases",
         )  # fmt: skip
     return report.found == before
@@ -173,14 +190,14 @@ def expand(report: Report, plan: Plan, parameters: list[Parameter], combine: Com
     value = float(values[index])
     if refused <= repeated:
         refusing = next(entry for entry in parameters if not accepted[entry.path][index])
-        report.problem(
-            where, f"value {index} is out of range for {refusing.path}", _shown(plan, value, refusing),
+        report.fault(
+            where, "out-of-range", f"value {index} is out of range for {refusing.path}", _shown(plan, value, refusing),
             allowed=refusing.range_text(), unit=refusing.unit,
         )  # fmt: skip
     else:
         before = _first(values == value)
-        report.problem(
-            where, f"value {index} repeats value {before}", _shown(plan, value, parameters[0]),
+        report.fault(
+            where, "repeated", f"value {index} repeats value {before}", _shown(plan, value, parameters[0]),
             allowed="each value once", unit=parameters[0].unit,
         )  # fmt: skip
     return None
@@ -216,8 +233,8 @@ def _rows_differ(report: Report, axes: list[Axis], machine: Machine) -> bool:
     before = _first(np.logical_and.reduce([axis.array == axis.array[case] for axis in axes]))
     pairs = [(axis.paths[0], float(axis.array[case])) for axis in axes]
     values = [f"{path} = {quantity_text(value, machine.parameters[path].unit)}" for path, value in pairs]
-    report.problem(
-        "/axes", f"cases {before} and {case} are the same: every zipped axis repeats its value", values,
+    report.fault(
+        "/axes", "repeated", f"cases {before} and {case} are the same: every zipped axis repeats its value", values,
         allowed="each combination of values once",
     )  # fmt: skip
     return False

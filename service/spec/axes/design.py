@@ -57,10 +57,10 @@ def read_design(report: Report, found: Mapping[str, Any], machine: Machine) -> t
         return read_axes(report, items, chosen_combine, machine), chosen_combine
     conditions = read_exclude(report, found["exclude"], machine) if "exclude" in found else []
     block = _group(report, "", items, combine, machine)
-    if block is None or report.problems or not _fits(report, block):
+    if block is None or report.faults or not _fits(report, block):
         return None, "zip"
     columns = block.make()
-    if columns is None or report.problems:
+    if columns is None or report.faults:
         return None, "zip"
     if conditions:
         columns = chosen(columns, kept(conditions, columns, machine.values, _length(columns)))
@@ -79,7 +79,7 @@ def _as_axes(
     count = _length(columns)
     if not count:
         message = "every case is excluded" if excluded else "nothing varies"
-        report.problem("/exclude" if excluded else "/axes", message, allowed="at least one case that is left")
+        report.fault("/exclude" if excluded else "/axes", "empty", message, allowed="at least one case that is left")
         return None
     first = first_rows(columns)
     if first.size < count:
@@ -92,7 +92,7 @@ def _as_axes(
         if lines:
             message = f"lines {lines[before]} and {lines[again]} are the same"
         where = "/axes/0/points" if lines else "/axes"
-        report.problem(where, message, values, allowed="each combination of values once")
+        report.fault(where, "repeated", message, values, allowed="each combination of values once")
         return None
     return as_axes(columns)
 
@@ -114,7 +114,7 @@ def _read_combine(report: Report, pointer: str, data: object) -> str | None:
     if isinstance(data, str) and data in COMBINE:
         return data
     hint = did_you_mean(data, COMBINE) if isinstance(data, str) else ""
-    report.problem(pointer, f"must be 'grid', 'zip' or 'union'{hint}", data, allowed=_ALLOWED)
+    report.fault(pointer, "invalid-choice", f"must be 'grid', 'zip' or 'union'{hint}", data, allowed=_ALLOWED)
     return None
 
 
@@ -122,7 +122,7 @@ def _group(report: Report, pointer: str, items: object, combine: str | None, mac
     """The block of a list of axes, samples, points and (at the top) groups."""
     where = join(pointer, "axes")
     if not isinstance(items, list) or not 1 <= len(items) <= MAX_AXES:
-        report.problem(where, "must be a list of axes", items, allowed=f"a list of 1 to {MAX_AXES} axes")
+        report.fault(where, "wrong-type", "must be a list of axes", items, allowed=f"a list of 1 to {MAX_AXES} axes")
         return None
     top = not pointer
     read = [_item(report, join(where, i), item, combine, machine, top=top) for i, item in enumerate(items)]
@@ -133,10 +133,13 @@ def _group(report: Report, pointer: str, items: object, combine: str | None, mac
         check_paths(report, [block.paths for block in blocks], where)
     counts = [block.count for block in blocks]
     if combine == "zip" and len(set(counts)) > 1:
-        report.problem(
-            where, "axes that are zipped must have equally many values", [count_text(count) for count in counts],
+        report.fault(
+            where,
+            "unequal-lengths",
+            "axes that are zipped must have equally many values",
+            [count_text(count) for count in counts],
             allowed="axes of one length, or combine: 'grid'",
-        )  # fmt: skip
+        )
         return None
     count = {"grid": math.prod(counts), "zip": counts[0], "union": sum(counts)}[combine]
     paths = tuple(dict.fromkeys(path for block in blocks for path in block.paths))
@@ -154,7 +157,7 @@ def _make(
     if combine == "grid":
         return product(tables, counts)
     if combine == "zip" and len(set(counts)) > 1:  # a union inside had the same cases twice
-        report.problem(where, "axes that are zipped must have equally many different cases", counts)
+        report.fault(where, "unequal-lengths", "axes that are zipped must have equally many different cases", counts)
         return None
     if combine == "zip":
         return side_by_side(tables)
@@ -162,8 +165,12 @@ def _make(
     lacking = [path for path in dict.fromkeys(path for columns in tables for path in columns)
                if path not in machine.values and any(path not in columns for columns in tables)]  # fmt: skip
     for path in lacking:
-        report.problem(where, f"varies {path} in a part of the cases only, and `base` does not give it for the others",
-                       allowed="its value in `base` too")  # fmt: skip
+        report.fault(
+            where,
+            "required",
+            f"varies {path} in a part of the cases only, and `base` does not give it for the others",
+            allowed="its value in `base` too",
+        )
     return None if lacking else one_after_another(tables, counts, machine.values)
 
 
@@ -178,7 +185,7 @@ def _item(
         return _axis(report, pointer, data, "zip" if combine == "zip" else "grid", machine)
     found = read_object(report, pointer, data, GROUP_FIELDS) or {}
     if not top:
-        report.problem(pointer, "is a group inside a group", allowed="an axis, a sample or points")
+        report.fault(pointer, "conflict", "is a group inside a group", allowed="an axis, a sample or points")
         return None
     inner = _read_combine(report, join(pointer, "combine"), found.get("combine", "grid"))
     return _group(report, pointer, found.get("axes"), inner, machine)
@@ -190,7 +197,7 @@ def _axis(report: Report, pointer: str, data: object, combine: Combine, machine:
         return None
     counts = Counter(paths)
     if max(counts.values()) > 1:
-        report.problem(join(pointer, "path"), "names the same path twice", counts.most_common(1)[0][0])
+        report.fault(join(pointer, "path"), "repeated", "names the same path twice", counts.most_common(1)[0][0])
         return None
 
     def make() -> dict[str, NDArray[np.float64]] | None:
@@ -203,13 +210,16 @@ def _axis(report: Report, pointer: str, data: object, combine: Combine, machine:
 def _fits(report: Report, block: Block) -> bool:
     """Whether the table may be made: every number of it is kept with the study."""
     if len(block.paths) > MAX_COLUMNS:
-        report.problem("/axes", f"{len(block.paths)} parameters vary", allowed=f"at most {MAX_COLUMNS} parameters")
+        report.fault(
+            "/axes", "too-many", f"{len(block.paths)} parameters vary", allowed=f"at most {MAX_COLUMNS} parameters"
+        )
         return False
     most = MAX_AXIS_VALUES // max(len(block.paths), 1)
     if block.count <= most:
         return True
-    report.problem(
+    report.fault(
         "/axes",
+        "too-many",
         f"{count_text(block.count)} cases of {len(block.paths)} parameters are to be written out one by one",
         allowed=f"at most {MAX_AXIS_VALUES:,} numbers, here {most:,} cases; a plain grid may have more",
     )

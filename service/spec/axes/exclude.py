@@ -25,14 +25,24 @@ Condition = dict[str, list[tuple[str, float]]]
 def read_exclude(report: Report, data: object, machine: Machine) -> list[Condition]:
     """The conditions: a case is excluded when all parts of any one hold. Problems are noted."""
     if not isinstance(data, list):
-        report.problem("/exclude", "must be a list of conditions", data, allowed="a list of objects, each by its paths")
+        report.fault(
+            "/exclude",
+            "wrong-type",
+            "must be a list of conditions",
+            data,
+            allowed="a list of objects, each by its paths",
+        )
         return []
     found = []
     for index, item in enumerate(data):
         pointer = join("/exclude", index)
         if not isinstance(item, Mapping) or not item:
-            report.problem(
-                pointer, "must say what is excluded", item, allowed='such as {"shaft.load": {"above": "0.5 N*m"}}'
+            report.fault(
+                pointer,
+                "wrong-type",
+                "must say what is excluded",
+                item,
+                allowed='such as {"shaft.load": {"above": "0.5 N*m"}}',
             )
             continue
         parts = {
@@ -45,13 +55,13 @@ def read_exclude(report: Report, data: object, machine: Machine) -> list[Conditi
 def _parts(report: Report, pointer: str, path: str, data: object, machine: Machine) -> list[tuple[str, float]]:
     parameter = machine.parameters.get(path)
     if parameter is None:
-        report.problem(pointer, machine.why_not(path), path, allowed="the path of a number in `base`")
+        report.fault(pointer, "invalid-path", machine.why_not(path), path, allowed="the path of a number in `base`")
         return []
     found = read_object(report, pointer, data, FIELDS)
     if found is None:
         return []
     if not found:
-        report.problem(pointer, "says nothing of the values", data, allowed="one of " + ", ".join(FIELDS))
+        report.fault(pointer, "required", "says nothing of the values", data, allowed="one of " + ", ".join(FIELDS))
     parts: list[tuple[str, float]] = []
     for name in FIELDS:
         if name not in found:
@@ -60,7 +70,7 @@ def _parts(report: Report, pointer: str, path: str, data: object, machine: Machi
         if isinstance(given, list):
             if name != "is" or not 1 <= len(given) <= MAX_AXIS_VALUES:
                 allowed = "one quantity" if name != "is" else "1 value or more"
-                report.problem(join(pointer, name), "must be a quantity", given, allowed=allowed)
+                report.fault(join(pointer, name), "wrong-type", "must be a quantity", given, allowed=allowed)
                 continue
             values = [read_number(report, join(pointer, name, i), item, parameter) for i, item in enumerate(given)]
         else:

@@ -35,17 +35,17 @@ def read_points(report: Report, pointer: str, data: Mapping[str, Any], machine: 
     where, text = join(pointer, "points"), found.get("points")
     if not isinstance(text, str):
         allowed = "a header of paths, then a line for each case"
-        report.problem(where, "must be the text of a CSV file", text, allowed=allowed)
+        report.fault(where, "wrong-type", "must be the text of a CSV file", text, allowed=allowed)
         return None
     try:
         rows = _rows(text.removeprefix("\ufeff"))
     except csv.Error as error:
-        report.problem(where, f"is no CSV text: {error}")
+        report.fault(where, "unreadable", f"is no CSV text: {error}")
         return None
     columns = len(rows[0].cells) if rows else 0
     if len(rows) < 2 or not 1 <= columns <= MAX_COLUMNS or len(rows) - 1 > MAX_AXIS_VALUES:
-        report.problem(
-            where, f"has {max(len(rows) - 1, 0)} lines of {columns} columns under its header",
+        report.fault(
+            where, "out-of-range", f"has {max(len(rows) - 1, 0)} lines of {columns} columns under its header",
             allowed=f"1 line or more of 1 to {MAX_COLUMNS} columns",
         )  # fmt: skip
         return None
@@ -58,7 +58,7 @@ def read_points(report: Report, pointer: str, data: Mapping[str, Any], machine: 
         return None
     paths = tuple(heading.parameter.path for heading in known)
     if len(set(paths)) < len(paths):
-        report.problem(where, "names the same path twice", [shorten_text(path) for path in paths])
+        report.fault(where, "repeated", "names the same path twice", [shorten_text(path) for path in paths])
         return None
     lines = tuple(row.line for row in rows[1:])
     return Block(pointer, paths, len(lines), lambda: dict(zip(paths, values, strict=True)), lines)
@@ -96,7 +96,9 @@ def _rows(text: str) -> list[_Row]:
 def _read_heading(report: Report, where: str, cell: str, machine: Machine) -> _Heading | None:
     match = _HEADING.fullmatch(cell)
     if match is None:
-        report.problem(where, "has a heading that names no parameter", cell, allowed="a path, its unit in brackets")
+        report.fault(
+            where, "invalid-path", "has a heading that names no parameter", cell, allowed="a path, its unit in brackets"
+        )
         return None
     paths = read_paths(report, where, match[1], machine)
     return None if paths is None else _Heading(machine.parameters[paths[0]], match[2] or "")
@@ -109,15 +111,17 @@ def _read_cells(
     before = report.found
     for number, (line, row) in enumerate(rows):
         if len(row) != len(headings):
-            report.problem(where, f"line {line} has {len(row)} cells", allowed=f"{len(headings)} cells")
+            report.fault(
+                where, "unequal-lengths", f"line {line} has {len(row)} cells", allowed=f"{len(headings)} cells"
+            )
             continue
         for column, cell, heading in zip(columns, row, headings, strict=True):
             try:
                 column[number] = _read_cell(cell.strip(), heading)
             except QuantityError as error:
                 written = f"{cell.strip()} {heading.unit}" if heading.unit and _is_number(cell) else cell.strip()
-                report.problem(
-                    where, f"line {line}, column {shorten_text(str(heading))}: {error}", written,
+                report.fault(
+                    where, error.code, f"line {line}, column {shorten_text(str(heading))}: {error}", written,
                     allowed=heading.parameter.range_text(), unit=heading.parameter.unit,
                 )  # fmt: skip
         if report.full:
@@ -128,7 +132,7 @@ def _read_cells(
 def _read_cell(cell: str, heading: _Heading) -> float:
     """A cell: a number in the unit of its column (SI where there is none), or a text with a unit of its own."""
     if not cell:
-        raise QuantityError("is empty")
+        raise QuantityError("empty", "is empty")
     if not _is_number(cell):
         return to_float(exact(cell, heading.parameter))
     return to_float(exact(f"{cell} {heading.unit}" if heading.unit else float(cell), heading.parameter))

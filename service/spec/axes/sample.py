@@ -56,14 +56,23 @@ def read_sample(report: Report, pointer: str, data: Mapping[str, Any], machine: 
     items = found.get("ranges")
     if not isinstance(items, list) or not 1 <= len(items) <= MAX_AXES:
         message = "must be a list of ranges" if "ranges" in found else "is required"
-        report.problem(join(pointer, "ranges"), message, items, allowed=f"a list of 1 to {MAX_AXES} ranges")
+        report.fault(
+            join(pointer, "ranges"),
+            "wrong-type" if "ranges" in found else "required",
+            message,
+            items,
+            allowed=f"a list of 1 to {MAX_AXES} ranges",
+        )
         return None
     ranges = [_read_range(report, join(pointer, "ranges", index), item, machine) for index, item in enumerate(items)]
     if count is not None and method != "latin_hypercube" and count & (count - 1):
-        report.problem(
-            join(pointer, "count"), f"a {method} sample fills its ranges evenly only with a power of two", count,
+        report.fault(
+            join(pointer, "count"),
+            "out-of-range",
+            f"a {method} sample fills its ranges evenly only with a power of two",
+            count,
             allowed="a power of 2",
-        )  # fmt: skip
+        )
     if report.found > before or method is None or count is None or seed is None:
         return None
     known = tuple(item for item in ranges if item is not None)
@@ -90,10 +99,12 @@ def _read_range(report: Report, pointer: str, data: object, machine: Machine) ->
     low, high = (float(end) for end in ends if end is not None)
     unit = machine.parameters[paths[0]].unit
     if low == high:
-        report.problem(join(pointer, "to"), "is the same as `from`", high, allowed="another value", unit=unit)
+        report.fault(
+            join(pointer, "to"), "invalid-range", "is the same as `from`", high, allowed="another value", unit=unit
+        )
         return None
     if scale == "log" and low * high <= 0.0:
-        report.problem(pointer, "a log scale needs two ends of one sign, neither of them 0",
+        report.fault(pointer, "invalid-range", "a log scale needs two ends of one sign, neither of them 0",
                        [found.get("from"), found.get("to")], unit=unit)  # fmt: skip
         return None
     return None if scale is None else SampleRange(paths, low, high, "log" if scale == "log" else "linear")
@@ -104,7 +115,13 @@ def _choice(report: Report, pointer: str, value: object, known: tuple[str, ...])
         return value
     hint = did_you_mean(value, known) if isinstance(value, str) else ""
     message = "is required" if value is None else f"there is no such choice{hint}"
-    report.problem(pointer, message, value, allowed=", ".join(f"'{name}'" for name in known))
+    report.fault(
+        pointer,
+        "required" if value is None else "invalid-choice",
+        message,
+        value,
+        allowed=", ".join(f"'{name}'" for name in known),
+    )
     return None
 
 

@@ -53,7 +53,9 @@ def plan_values(report: Report, pointer: str, data: object, parameter: Parameter
     """The plan of a plain list of quantities."""
     if not isinstance(data, list) or not data:
         message = "has no values" if data == [] else "must be a list of values"
-        report.problem(pointer, message, data, allowed=f"1 to {MAX_AXIS_VALUES:,} values")
+        report.fault(
+            pointer, "empty" if data == [] else "wrong-type", message, data, allowed=f"1 to {MAX_AXIS_VALUES:,} values"
+        )
         return None
     plain = _plain_numbers(data)
     if plain is not None and in_range(plain, parameter).all():
@@ -98,7 +100,7 @@ def plan_geomspace(report: Report, pointer: str, data: object, parameter: Parame
         return None
     start, stop, count = division
     if start * stop <= 0:
-        report.problem(pointer, "a geometric range needs two ends of one sign, neither of them 0", data)
+        report.fault(pointer, "invalid-range", "a geometric range needs two ends of one sign, neither of them 0", data)
         return None
     return Plan(pointer, count, lambda: _multiples(to_float(start), to_float(stop), count))
 
@@ -113,14 +115,16 @@ def plan_range(report: Report, pointer: str, data: object, parameter: Parameter)
     try:
         step = parse_exact(items[2], parameter.unit)
     except QuantityError as error:
-        report.problem(join(pointer, 2), str(error), items[2], unit=parameter.unit)
+        report.fault(join(pointer, 2), error.code, str(error), items[2], unit=parameter.unit)
         return None
     if start is None or stop is None:
         return None
     if step == 0 or (stop - start) * step < 0:
         message = "is 0" if step == 0 else "leads away from the end"
         allowed = "a step greater than 0" if stop >= start else "a step less than 0, since the range goes down"
-        report.problem(join(pointer, 2), f"the step {message}", items[2], allowed=allowed, unit=parameter.unit)
+        report.fault(
+            join(pointer, 2), "invalid-range", f"the step {message}", items[2], allowed=allowed, unit=parameter.unit
+        )
         return None
     whole = math.floor((stop - start) / step + _STEP_ROUNDING)
     return Plan(pointer, whole + 1, lambda: _stepped(start, stop, step, whole))
@@ -142,7 +146,7 @@ def count_text(count: int) -> str:
 def _three(report: Report, pointer: str, data: object, allowed: str) -> Sequence[Any] | None:
     if isinstance(data, list) and len(data) == 3:
         return data
-    report.problem(pointer, "must be a list of three", data, allowed=allowed)
+    report.fault(pointer, "wrong-type", "must be a list of three", data, allowed=allowed)
     return None
 
 
@@ -158,8 +162,12 @@ def _division(
     if start is None or stop is None or count is None:
         return None
     if count == 1 and start != stop:
-        report.problem(
-            join(pointer, 2), "one value cannot stand at two different ends", count, allowed="2 or more, or equal ends"
+        report.fault(
+            join(pointer, 2),
+            "invalid-range",
+            "one value cannot stand at two different ends",
+            count,
+            allowed="2 or more, or equal ends",
         )
         return None
     return start, stop, count

@@ -82,8 +82,9 @@ def read_clutch(report: Report, pointer: str, data: object, prefix: str, backlas
         return None
     by_law, by_data = [name for name in _BY_LAW if name in found], [name for name in _BY_DATA if name in found]
     if by_law and by_data:
-        report.problem(
+        report.fault(
             pointer,
+            "conflict",
             f"is given both as a law ({', '.join(by_law)}) and as measured data ({', '.join(by_data)})",
             allowed=f"either {', '.join(_BY_LAW)} or {', '.join(_BY_DATA)}",
         )
@@ -101,10 +102,10 @@ def _given(report: Report, pointer: str, data: Mapping[str, Any], prefix: str) -
     if "windup_limit" in data:
         limit = read_number(report, join(pointer, "windup_limit"), data["windup_limit"], CLUTCH_WINDUP_LIMIT)
     if items is None:
-        report.problem(where, "is required (or `data` with `accuracy`)", allowed=allowed)
+        report.fault(where, "required", "is required (or `data` with `accuracy`)", allowed=allowed)
         return None
     if not isinstance(items, list) or not 1 <= len(items) <= MAX_COEFFICIENTS:
-        report.problem(where, "must be a list of clutch coefficients", items, allowed=allowed)
+        report.fault(where, "wrong-type", "must be a list of clutch coefficients", items, allowed=allowed)
         return None
     numbers = [
         read_number(report, join(where, k), item, placed(CLUTCH_COEFFICIENT, f"{prefix}coefficients.{k}"))
@@ -134,8 +135,9 @@ def _measured(
             options[name] = read_flag(report, join(pointer, name), data[name])
     if options.get("angles_include_backlash"):
         if len(set(backlashes)) > 1:
-            report.problem(
+            report.fault(
                 join(pointer, "angles_include_backlash"),
+                "conflict",
                 "one clutch for all pendulums needs one backlash for all of them to be taken off the angles; give the "
                 "clutch in each pendulum instead",
                 [quantity_text(backlash, "rad") for backlash in backlashes],
@@ -149,8 +151,12 @@ def _measured(
     try:
         fit = models.fit_clutch(rows, accuracy, **options)
     except models.ClutchFitError as error:
-        report.problem(
-            join(pointer, *(error.name or "data").split(".")), error.message, _shown(error.value), allowed=error.allowed
+        report.fault(
+            join(pointer, *(error.name or "data").split(".")),
+            "no-clutch-law",
+            error.message,
+            _shown(error.value),
+            allowed=error.allowed,
         )
         return None
     for warning in fit.warnings:
@@ -162,13 +168,13 @@ def _rows(report: Report, pointer: str, data: object) -> list[tuple[float, float
     allowed = f"a list of 2 to {MAX_CLUTCH_ROWS:,} rows [angle, torque]"
     if not isinstance(data, list) or not 2 <= len(data) <= MAX_CLUTCH_ROWS:
         message = "is required" if data is None else "must be a list of measured rows"
-        report.problem(pointer, message, data, allowed=allowed)
+        report.fault(pointer, "required" if data is None else "wrong-type", message, data, allowed=allowed)
         return []
     rows: list[tuple[float, float]] = []
     for index, row in enumerate(data):
         where = join(pointer, index)
         if not isinstance(row, list) or len(row) != 2:
-            report.problem(where, "must be a row of two numbers", row, allowed="[angle, torque]")
+            report.fault(where, "wrong-type", "must be a row of two numbers", row, allowed="[angle, torque]")
             continue
         angle = read_number(report, join(where, 0), row[0], _ANGLE)
         torque = read_number(report, join(where, 1), row[1], _TORQUE)
@@ -213,8 +219,9 @@ def check_laws(report: Report, clutches: Iterable[Clutch], axes: Sequence[Axis],
 def _check_zipped(report: Report, clutch: Clutch, varied: Mapping[str, tuple[float, ...]], pointer: str) -> None:
     laws = dict.fromkeys(zip(*varied.values(), strict=True))
     if len(laws) > MAX_CLUTCH_LAWS:
-        report.problem(
+        report.fault(
             pointer,
+            "too-many",
             f"zips {len(laws):,} different clutch laws, too many to check one by one for negative torque",
             allowed=f"at most {MAX_CLUTCH_LAWS:,} different laws, or smallest coefficients that make a law without",
         )
@@ -243,7 +250,7 @@ def _check_law(report: Report, clutch: Clutch, values: Mapping[str, float], poin
         law = models.check_law(coefficients, limit)
     except models.ClutchLawError as error:
         where = pointer or join(clutch.pointer, *(error.name or "coefficients").split("."))
-        report.problem(where, error.message, coefficients, allowed=error.allowed)
+        report.fault(where, "no-clutch-law", error.message, coefficients, allowed=error.allowed)
         return False
     for warning in law.warnings:
         report.warn(f"{pointer or clutch.pointer}: {warning}")

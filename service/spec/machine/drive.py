@@ -103,7 +103,7 @@ def _read_section(
     names = (*parameters, "clutch") if prefix.startswith("pendulums.") else tuple(parameters)
     if data is None:
         required = [name for name, entry in parameters.items() if entry.default is None]
-        report.problem(pointer, f"is required, with at least {', '.join(required)}", allowed="an object")
+        report.fault(pointer, "required", f"is required, with at least {', '.join(required)}", allowed="an object")
         return
     found = read_object(report, pointer, data, names)
     if found is not None:
@@ -113,7 +113,13 @@ def _read_section(
 def _read_pendulums(report: Report, pointer: str, data: object, entries: list[Parameter], machine: Drive) -> None:
     if not isinstance(data, list) or not 1 <= len(data) <= MAX_PENDULUMS:
         message = "is required" if data is None else "must be a list of pendulums"
-        report.problem(pointer, message, data, allowed=f"a list of 1 to {MAX_PENDULUMS} pendulums")
+        report.fault(
+            pointer,
+            "required" if data is None else "wrong-type",
+            message,
+            data,
+            allowed=f"a list of 1 to {MAX_PENDULUMS} pendulums",
+        )
         return
     machine.pendulums = len(data)
     for index, pendulum in enumerate(data):
@@ -130,15 +136,17 @@ def _read_clutches(report: Report, base: Mapping[str, Any], machine: Drive) -> N
     known = [value for value in backlashes if value is not None]
     if "clutch" in base:
         if own:
-            report.problem(
+            report.fault(
                 "/base/clutch",
+                "conflict",
                 f"is common to all pendulums, yet pendulums {', '.join(map(str, own))} also have their own",
                 allowed="one clutch in `base`, or one in each pendulum",
             )
         _add(machine, read_clutch(report, "/base/clutch", base["clutch"], "clutch.", known))
     elif not own:
-        report.problem(
+        report.fault(
             "/base/clutch",
+            "required",
             "is required: coefficients, or measured data with an accuracy",
             allowed="one clutch in `base`, or one in each pendulum",
         )
@@ -150,8 +158,9 @@ def _read_clutches(report: Report, base: Mapping[str, Any], machine: Drive) -> N
             shared = [] if backlash is None else [backlash]
             _add(machine, read_clutch(report, pointer, pendulums[index]["clutch"], prefix, shared))
         elif "clutch" not in base:
-            report.problem(
+            report.fault(
                 pointer,
+                "required",
                 f"is required, since pendulum {own[0]} has its own",
                 allowed="one clutch in `base`, or one in each pendulum",
             )

@@ -52,7 +52,13 @@ def read_plain(report: Report, data: object, catalogue: tuple[Parameter, ...]) -
     machine = Machine(parameters={entry.path: entry for entry in catalogue})
     if not isinstance(data, Mapping):
         message = "is required" if data is None else "must be an object"
-        report.problem("/base", message, data, allowed="an object with the fields " + ", ".join(_fields("", machine)))
+        report.fault(
+            "/base",
+            "required" if data is None else "wrong-type",
+            message,
+            data,
+            allowed="an object with the fields " + ", ".join(_fields("", machine)),
+        )
         return machine
     _unknown_fields(report, "", data, machine)
     read_numbers(report, data, machine)
@@ -85,7 +91,7 @@ def _unknown_fields(report: Report, prefix: str, data: Mapping[str, Any], machin
         if isinstance(data[name], Mapping):
             _unknown_fields(report, f"{part}.", data[name], machine)
         else:
-            report.problem(join(pointer, name), "must be an object", data[name])
+            report.fault(join(pointer, name), "wrong-type", "must be an object", data[name])
 
 
 def _read(report: Report, found: Mapping[str, Any], path: str, entry: Parameter) -> float | None:

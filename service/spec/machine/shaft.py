@@ -112,13 +112,17 @@ def _read_structure(report: Report, found: Mapping[str, Any], places: dict[str, 
 def _unused(report: Report, found: Mapping[str, Any], structure: Mapping[str, Any]) -> None:
     """Notes numbers that this machine has no use for, which a user surely means otherwise."""
     if structure["balance"] == "motor" and "mean_speed" in found:
-        report.problem("/base/mean_speed", "is not required of a machine with a motor: the speed is a result",
+        report.fault("/base/mean_speed", "not-used", "is not required of a machine with a motor: the speed is a result",
                        found["mean_speed"], allowed='no mean_speed, or another balance than "motor"')  # fmt: skip
     drive = found.get("drive")
     if isinstance(drive, Mapping) and "scale" in drive and "drive.scale" not in machine_shaft.parameters_of(structure):
-        report.problem("/base/drive/scale", "is the factor on a table or formula of the driving torque, and there is "
-                       "none", drive["scale"])  # fmt: skip
+        report.fault(
+            "/base/drive/scale",
+            "not-used",
+            "is the factor on a table or formula of the driving torque, and there is none",
+            drive["scale"],
+        )
     operation = found.get("operation")
     if isinstance(operation, Mapping) and structure["operation"]["over"] == "angle" and "during" in operation:
-        report.problem("/base/operation/during", "tells strokes, and this diagram goes over the angle",
+        report.fault("/base/operation/during", "not-used", "tells strokes, and this diagram goes over the angle",
                        operation["during"], allowed='with `over` "stroke" only')  # fmt: skip

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cache, partial
-from typing import Any, Final
+from typing import Any, Final, cast
 
+from sprag.service.faults import Code
 from sprag.service.spec.report import Report
 from sprag.worker.models import (
     Ending,
@@ -13,6 +14,7 @@ from sprag.worker.models import (
     InsufficientInertiaError,
     KernelShape,
     MachineError,
+    TableError,
     is_compiled,
     load,
     machine_shaft,
@@ -86,23 +88,37 @@ def check_machine(
     try:
         machine_shaft.check(structure, values)
     except ExpressionError as error:
-        report.problem(places.get(error.part, "/base"), str(error), structure.get(error.part, {}).get("formula"))
+        report.fault(
+            places.get(error.part, "/base"), "invalid-formula", str(error), structure.get(error.part, {}).get("formula")
+        )
     except InsufficientInertiaError as error:
         allowed = f"> {error.least_mean_speed:.6g} rad/s"
-        report.problem("/base/mean_speed", str(error), error.asked, allowed=allowed, unit="rad/s")
+        report.fault("/base/mean_speed", "inertia-insufficient", str(error), error.asked, allowed=allowed, unit="rad/s")
     except machine_shaft.RelationError as error:
-        report.problem("/base/" + error.path.replace(".", "/"), str(error), error.value, allowed=error.allowed)
+        report.fault(
+            "/base/" + error.path.replace(".", "/"), "conflict", str(error), error.value, allowed=error.allowed
+        )
     except MachineError as error:
         pointer = _POINTERS.get(error.ending)
         if error.ending in {Ending.CANNOT_ASSEMBLE, Ending.NEAR_SINGULAR}:
             pointer = places["mechanism"]
         if error.ending is Ending.NEGATIVE_INERTIA and structure["mechanism"]["kind"] in {"table", "formula"}:
             pointer = places["mechanism"]
-        report.problem(pointer or "/base", str(error))
+        report.fault(pointer or "/base", code_of(error), str(error))
+
+
+def code_of(error: MachineError) -> Code:
+    """The code of a fault that concerns the machine as a whole or one of its tables and formulas."""
+    if isinstance(error, ExpressionError):
+        return "invalid-formula"
+    if isinstance(error, TableError):
+        return "invalid-table"
+    # Where one case of a grid would end so, the code is the name of that ending.
+    return "invalid-machine" if error.ending is None else cast("Code", error.ending.value.replace("_", "-"))
 
 
 def _note(report: Report, pointer: str, check: Callable[[], None], value: object = None) -> None:
     try:
         check()
     except MachineError as error:
-        report.problem(pointer, str(error), value)
+        report.fault(pointer, code_of(error), str(error), value)

@@ -57,7 +57,13 @@ def read_choice(
         return value
     hint = did_you_mean(value, choices) if isinstance(value, str) else ""
     message = "is required" if value is None else f"is none of the choices{hint}"
-    report.problem(join(pointer, name), message, value, allowed=", ".join(f"'{choice}'" for choice in choices))
+    report.fault(
+        join(pointer, name),
+        "required" if value is None else "invalid-choice",
+        message,
+        value,
+        allowed=", ".join(f"'{choice}'" for choice in choices),
+    )
     return None
 
 
@@ -69,14 +75,14 @@ def read_cycle(report: Report, value: object) -> int | None:
         try:
             turns = parse_quantity(value, "rad") / (2.0 * math.pi)
         except QuantityError as error:
-            report.problem("/base/cycle", str(error), value, allowed=f"1 to {most} revolutions")
+            report.fault("/base/cycle", error.code, str(error), value, allowed=f"1 to {most} revolutions")
             return None
     elif isinstance(value, int | float) and not isinstance(value, bool):
         turns = float(value)
     for known in machine_shaft.REVOLUTIONS:
         if turns is not None and math.isclose(turns, known, rel_tol=1e-12):
             return known
-    report.problem("/base/cycle", "must be a whole number of revolutions", value,
+    report.fault("/base/cycle", "wrong-type", "must be a whole number of revolutions", value,
                    allowed=f'"1 revolution" to "{most} revolutions", or 1 to {most}')  # fmt: skip
     return None
 
@@ -95,14 +101,20 @@ def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, A
     if balance is None or drive is None:
         return balance
     if balance == "motor" and not motor:
-        report.problem("/base/drive/motor", 'is required by the balance "motor"', allowed="a motor, linear or kloss")
+        report.fault(
+            "/base/drive/motor", "required", 'is required by the balance "motor"', allowed="a motor, linear or kloss"
+        )
         return None
     if balance != "motor" and motor:
-        report.problem("/base/balance", "is not that of a machine with a motor", balance, allowed="'motor'")
+        report.fault("/base/balance", "conflict", "is not that of a machine with a motor", balance, allowed="'motor'")
         return None
     if balance == "scale" and not given:
-        report.problem("/base/drive/torque", 'is required by the balance "scale", which multiplies it by a factor',
-                       allowed="a torque, a table or a formula")  # fmt: skip
+        report.fault(
+            "/base/drive/torque",
+            "required",
+            'is required by the balance "scale", which multiplies it by a factor',
+            allowed="a torque, a table or a formula",
+        )
         return None
     return balance
 
@@ -111,11 +123,13 @@ def read_constants(report: Report, data: object) -> list[str] | None:
     """Names of the constants of formulas."""
     if not isinstance(data, Mapping) or len(data) > machine_shaft.MAX_CONSTANTS:
         allowed = f"an object of at most {machine_shaft.MAX_CONSTANTS} names with their numbers"
-        report.problem("/base/constants", "must be an object of names with their numbers", data, allowed=allowed)
+        report.fault(
+            "/base/constants", "wrong-type", "must be an object of names with their numbers", data, allowed=allowed
+        )
         return None
     wrong = [name for name in data if not _NAME.fullmatch(name)]
     for name in wrong:
-        report.problem(join("/base/constants", name), "is no name for a constant", name,
+        report.fault(join("/base/constants", name), "invalid-text", "is no name for a constant", name,
                        allowed="letters, digits and _, at most 40, no digit first")  # fmt: skip
     return None if wrong else sorted(data)
 
@@ -129,7 +143,7 @@ def read_drive(report: Report, data: object, places: dict[str, str]) -> dict[str
     drive: dict[str, Any] = {"form": "constant", "table": None, "formula": None, "motor": None}
     if "motor" in found:
         if "torque" in found:
-            report.problem("/base/drive/torque", "stands beside a motor, which gives the torque by itself",
+            report.fault("/base/drive/torque", "conflict", "stands beside a motor, which gives the torque by itself",
                            found["torque"], allowed="a torque or a motor")  # fmt: skip
             return None
         return _read_motor(report, found["motor"], drive)
@@ -163,7 +177,9 @@ def _numbers_of(structure: Mapping[str, Any], prefix: str) -> list[str]:
 def _refuse_foreign(report: Report, pointer: str, found: Mapping[str, Any], own: Sequence[str], what: str) -> None:
     for name in found:
         if name not in own:
-            report.problem(join(pointer, name), f"is no field of {what}", found[name], allowed=", ".join(own))
+            report.fault(
+                join(pointer, name), "unknown-field", f"is no field of {what}", found[name], allowed=", ".join(own)
+            )
 
 
 def read_mechanism(report: Report, data: object, places: dict[str, str]) -> dict[str, Any] | None:
@@ -177,7 +193,7 @@ def read_mechanism(report: Report, data: object, places: dict[str, str]) -> dict
     kinds = [kind for kind in MECHANISMS if kind in found]
     if len(kinds) != 1:
         given = f"{len(kinds)} are given: {', '.join(kinds)}" if kinds else "none is given"
-        report.problem("/base/mechanism", f"needs exactly one of {', '.join(MECHANISMS)}; {given}",
+        report.fault("/base/mechanism", "exactly-one", f"needs exactly one of {', '.join(MECHANISMS)}; {given}",
                        allowed="one of " + ", ".join(MECHANISMS))  # fmt: skip
         return None
     kind = kinds[0]
@@ -186,7 +202,9 @@ def read_mechanism(report: Report, data: object, places: dict[str, str]) -> dict
         diagram = _diagram(report, "/base/mechanism", found, _ANGLE, _unit("kg*m^2"))
         return None if diagram is None else {"kind": kind, "table": diagram["table"], "formula": diagram["formula"]}
     if "interpolation" in found:
-        report.problem("/base/mechanism/interpolation", "belongs to a table, and there is none", found["interpolation"])
+        report.fault(
+            "/base/mechanism/interpolation", "not-used", "belongs to a table, and there is none", found["interpolation"]
+        )
     choices = MECHANISM_CHOICES[kind]
     own = read_object(report, pointer, found[kind], (*choices, *number_fields(f"mechanism.{kind}.")))
     if own is None:
@@ -214,7 +232,7 @@ def read_operation(report: Report, data: object, places: dict[str, str]) -> dict
     forms = [form for form in FORMS if form in found]
     if len(forms) != 1:
         given = f"{len(forms)} are given: {', '.join(forms)}" if forms else "none is given"
-        report.problem("/base/operation", f"needs exactly one of {', '.join((*FORMS, 'gas'))}; {given}",
+        report.fault("/base/operation", "exactly-one", f"needs exactly one of {', '.join((*FORMS, 'gas'))}; {given}",
                        allowed="one of " + ", ".join((*FORMS, "gas")))  # fmt: skip
         return None
     defaults = {
@@ -243,8 +261,13 @@ def read_operation(report: Report, data: object, places: dict[str, str]) -> dict
 def _read_gas(report: Report, found: Mapping[str, Any]) -> dict[str, Any] | None:
     foreign = [name for name in found if name not in {"gas", "scale"}]
     for name in foreign:
-        report.problem(join("/base/operation", name), "does not belong to a gas, which is compressed by the working "
-                       "part over the whole cycle", found[name], allowed="gas, scale")  # fmt: skip
+        report.fault(
+            join("/base/operation", name),
+            "not-used",
+            "does not belong to a gas, which is compressed by the working part over the whole cycle",
+            found[name],
+            allowed="gas, scale",
+        )
     known = number_fields("operation.gas.")
     if foreign or read_object(report, "/base/operation/gas", found["gas"], known) is None:
         return None
@@ -254,7 +277,9 @@ def _read_gas(report: Report, found: Mapping[str, Any]) -> dict[str, Any] | None
 def _read_steps(report: Report, data: object) -> int | None:
     most = machine_shaft.MAX_STEPS
     if not isinstance(data, list) or not 1 <= len(data) <= most:
-        report.problem("/base/operation/steps", "must be a list of steps", data, allowed=f"1 to {most} steps")
+        report.fault(
+            "/base/operation/steps", "wrong-type", "must be a list of steps", data, allowed=f"1 to {most} steps"
+        )
         return None
     read = [read_object(report, join("/base/operation/steps", k), item, STEP_FIELDS) for k, item in enumerate(data)]
     return None if any(item is None for item in read) else len(data)
@@ -270,7 +295,9 @@ def _diagram(
     """Form, table and formula of what is given as one of both."""
     given = [form for form in ("table", "formula") if form in found]
     if len(given) != 1:
-        report.problem(pointer, "needs a table or a formula, one of both", dict(found), allowed="table or formula")
+        report.fault(
+            pointer, "exactly-one", "needs a table or a formula, one of both", dict(found), allowed="table or formula"
+        )
         return None
     if given[0] == "formula":
         return _formula(report, pointer, found)
@@ -285,11 +312,13 @@ def _diagram(
 def _formula(report: Report, pointer: str, found: Mapping[str, Any]) -> dict[str, Any] | None:
     formula = found["formula"]
     if "interpolation" in found:
-        report.problem(join(pointer, "interpolation"), "belongs to a table, and this is a formula",
+        report.fault(join(pointer, "interpolation"), "not-used", "belongs to a table, and this is a formula",
                        found["interpolation"])  # fmt: skip
         return None
     if not isinstance(formula, str) or not formula.strip():
-        report.problem(join(pointer, "formula"), "must be a text", formula, allowed="a formula of phi, in rad")
+        report.fault(
+            join(pointer, "formula"), "wrong-type", "must be a text", formula, allowed="a formula of phi, in rad"
+        )
         return None
     return {"form": "formula", "table": None, "formula": formula}
 
@@ -297,13 +326,15 @@ def _formula(report: Report, pointer: str, found: Mapping[str, Any]) -> dict[str
 def _rows(report: Report, pointer: str, data: object, place: Parameter, value: Parameter) -> list[list[float]]:
     most = machine_shaft.MAX_ROWS
     if not isinstance(data, list) or not 2 <= len(data) <= most:
-        report.problem(pointer, "must be a list of rows", data, allowed=f"2 to {most:,} rows [{place.path}, value]")
+        report.fault(
+            pointer, "wrong-type", "must be a list of rows", data, allowed=f"2 to {most:,} rows [{place.path}, value]"
+        )
         return []
     rows: list[list[float]] = []
     for index, row in enumerate(data):
         where = join(pointer, index)
         if not isinstance(row, list) or len(row) != 2:
-            report.problem(where, "must be a row of two numbers", row, allowed=f"[{place.path}, value]")
+            report.fault(where, "wrong-type", "must be a row of two numbers", row, allowed=f"[{place.path}, value]")
             continue
         x, y = (read_number(report, join(where, k), row[k], entry) for k, entry in enumerate((place, value)))
         if x is not None and y is not None:

@@ -24,7 +24,7 @@ from sprag.service.cli.console import (
 )
 from sprag.service.cli.extend import _what_is_new
 from sprag.service.cli.pictures import show_curves
-from sprag.service.spec.report import Problem
+from sprag.service.faults import Fault
 
 
 @pytest.mark.parametrize(
@@ -57,16 +57,27 @@ def test_how_a_study_is_going() -> None:
 
 
 def test_a_failure_for_people_and_for_programs() -> None:
-    failure = WrongInputError(
-        "spec.json: not valid", problems=[Problem("/a", "is wrong", -1, allowed="> 0 m", unit="m")]
-    )
+    fault = Fault("/a", "out-of-range", "is wrong", -1, allowed="> 0 m", unit="m")
+    failure = WrongInputError("invalid-spec", "spec.json: not valid", [fault])
     assert list(failure.lines()) == ["spec.json: not valid", "  /a: is wrong (got -1; allowed: > 0 m)"]
     assert failure.document() == {
         "error": "spec.json: not valid",
+        "code": "invalid-spec",
         "exit_code": 2,
-        "problems": [{"pointer": "/a", "message": "is wrong", "value": -1, "allowed": "> 0 m", "unit": "m"}],
+        "problems": [
+            {
+                "pointer": "/a",
+                "code": "out-of-range",
+                "message": "is wrong",
+                "value": -1,
+                "allowed": "> 0 m",
+                "unit": "m",
+            }
+        ],
     }
-    assert TroubleError("no").document() == {"error": "no", "exit_code": ExitCode.TROUBLE}
+    assert TroubleError("unavailable", "no").document() == {
+        "error": "no", "code": "unavailable", "exit_code": ExitCode.TROUBLE,
+    }  # fmt: skip
 
 
 def test_data_and_messages_go_apart(capsys: pytest.CaptureFixture[str]) -> None:

@@ -13,22 +13,22 @@ def test_parameters_are_called_as_the_options_are() -> None:
     }
     title = "The cases asked for cannot be drawn"
     failure = refusal(RefusedError(422, {"title": title, "detail": "by: ...", "errors": [item]}))
-    assert failure.message == title
-    assert str(failure.problems[0]) == (
+    assert failure.detail == title
+    assert str(failure.faults[0]) == (
         "--by: the axis is already taken by --x shaft.load; name it in --by, or give --at shaft.load=VALUE"
     )
     paged = refusal(RefusedError(422, {"errors": [{"parameter": "page_size", "message": "no"}]}))
-    assert paged.problems[0].pointer == "--page-size"
+    assert paged.faults[0].where == "--page-size"
 
 
 def test_fields_of_a_spec_keep_their_pointers_and_messages() -> None:
-    item = {"pointer": "/base/shaft/load", "message": "must be finite"}
-    (problem,) = refusal(RefusedError(422, {"title": "no", "errors": [item]})).problems
-    assert (problem.pointer, problem.message) == ("/base/shaft/load", "must be finite")
+    item = {"pointer": "/base/shaft/load", "code": "not-finite", "message": "must be finite"}
+    (problem,) = refusal(RefusedError(422, {"title": "no", "errors": [item]})).faults
+    assert (problem.where, problem.code, problem.message) == ("/base/shaft/load", "not-finite", "must be finite")
 
 
 def test_a_missing_token_is_asked_for_by_its_variable() -> None:
     failure = refusal(RefusedError(401, {"detail": "This request carries no valid token."}))
-    assert failure.code == 3
-    assert "--token" in failure.message
-    assert "SPRAG_TOKEN" in failure.message
+    assert failure.exit_code == 3
+    assert "--token" in failure.detail
+    assert "SPRAG_TOKEN" in failure.detail

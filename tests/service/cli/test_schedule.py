@@ -74,13 +74,12 @@ def test_a_schedule_is_kept_shown_changed_and_deleted(run: Run, service: Service
 
 
 def test_what_is_wrong_is_told_by_field(run: Run, spec_file: str) -> None:
-    code, _, err = run("add", spec_file)
-    assert code == 2
-    assert "/cron: when it is to run is missing" in err
-    code, _, err = run("add", spec_file, "--cron", "0 1 * * *", "--window", "night")
-    assert code == 2
-    assert "--window: is no window" in err
+    for arguments, where, told in (
+        ([], "/cron", "exactly-one"),
+        (["--cron", "0 1 * * *", "--window", "night"], "--window", "invalid-text"),
+    ):
+        code, _, err = run("add", spec_file, *arguments, "--json")
+        assert (code, [(item["pointer"], item["code"]) for item in json.loads(err)["problems"]]) == (2, [(where, told)])
     assert run("change", "sc_0")[0] == 2
-    code, _, err = run("disable", "sc_0")
-    assert code == 2
-    assert "no schedule 'sc_0'" in err
+    code, _, err = run("disable", "sc_0", "--json")
+    assert (code, json.loads(err)["code"]) == (2, "schedule-not-found")

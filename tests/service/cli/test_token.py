@@ -37,9 +37,8 @@ def test_tokens_are_created_listed_and_revoked(settings: Settings, capsys: pytes
     assert record.id in run("list", *db)[1]
     assert run("revoke", record.id, *db)[0] == 0
     assert json.loads(run("list", "--json", *db)[1])["tokens"][0]["revoked_at"].startswith("20")
-    code, _, err = run("revoke", "tk_0", *db)
-    assert code == 2
-    assert "no token 'tk_0'" in err
+    code, _, err = run("revoke", "tk_0", "--json", *db)
+    assert (code, json.loads(err)["code"]) == (2, "token-not-found")
     made = json.loads(run("create", "--name", "x", "--json", *db)[1])
     assert (made["scope"], made["token"][:6]) == ("write", "sprag_")
 

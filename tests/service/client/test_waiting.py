@@ -20,6 +20,7 @@ from sprag.service.client import (
     UnreachableError,
     waiting,
 )
+from tests.faults import refused
 
 DOWN, BUSY, PROXY, GONE = "down", 503, 502, 404
 EVENT = b'id: 1\nevent: progress\ndata: {"state": "running"}\n\n'
@@ -129,14 +130,14 @@ def test_without_a_stream_it_is_looked_now_and_then(
 
 
 def test_what_waiting_does_not_help_against_is_raised(wait: Waits, sleeps: list[float]) -> None:
-    with pytest.raises(RefusedError, match="not now") as caught:
+    with pytest.raises(RefusedError) as caught:
         wait(Scripted([study("running"), study("running"), GONE], [[EVENT]]))
     assert caught.value.status == 404
     assert sleeps == []
 
 
 def test_the_time_ends_waiting_for_a_lost_service_too(wait: Waits, sleeps: list[float]) -> None:
-    with pytest.raises(StudyTimeoutError, match="is running after 0 s"):
+    with refused(StudyTimeoutError, "not-done"):
         wait(Scripted([study("running"), study("running")], []), timeout=0.0)
     with pytest.raises(UnreachableError):
         wait(Scripted([study("running"), DOWN], []), timeout=0.0)

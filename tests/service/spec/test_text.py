@@ -24,8 +24,8 @@ plain = st.recursive(
 def pointers(text: str | bytes, kind: str) -> list[str]:
     with pytest.raises(SpecError) as caught:
         load_spec(text, kind)  # type: ignore[arg-type]
-    json.dumps([(problem.message, problem.value) for problem in caught.value.problems], allow_nan=False)
-    return [problem.pointer for problem in caught.value.problems]
+    json.dumps([(problem.message, problem.value) for problem in caught.value.faults], allow_nan=False)
+    return [problem.where for problem in caught.value.faults]
 
 
 @given(plain)
@@ -108,7 +108,7 @@ def test_any_text_is_data_or_refused(text: str, kind: str) -> None:
     try:
         data = load_spec(text, kind)  # type: ignore[arg-type]
     except SpecError as error:
-        assert error.problems  # noqa: PT017
+        assert error.faults  # noqa: PT017
     else:
         json.dumps(data, allow_nan=False)
 

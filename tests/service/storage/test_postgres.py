@@ -36,6 +36,7 @@ from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.states import StudyState
 from tests import postgres
 from tests.conftest import ROOT, Finished
+from tests.faults import refused
 from tests.service.conftest import API, InThread, Service
 from tests.worker import fakes
 
@@ -55,16 +56,16 @@ def eventually(true: Callable[[], Any], seconds: float = DEADLINE) -> float:
 
 
 @pytest.mark.parametrize(
-    ("url", "message"),
+    ("url", "code"),
     [
-        ("postgresql+psycopg2://host/db", "driver 'psycopg2' is not supported"),
-        ("postgresql://host/db?sslmode=require&options=-c", "takes no option options here"),
-        ("postgresql://me:secret@host/", r"^postgresql://me@host.* names no database"),
-        ("mysql://host/db", "kind 'mysql' are not supported"),
+        ("postgresql+psycopg2://host/db", "invalid-database-url"),
+        ("postgresql://host/db?sslmode=require&options=-c", "invalid-database-url"),
+        ("postgresql://me:secret@host/", "invalid-database-url"),
+        ("mysql://host/db", "invalid-database-url"),
     ],
 )
-def test_urls_that_are_not_understood_are_refused_in_one_sentence(url: str, message: str) -> None:
-    with pytest.raises(DatabaseError, match=message) as caught:
+def test_urls_that_are_not_understood_are_refused_in_one_sentence(url: str, code: str) -> None:
+    with refused(DatabaseError, code) as caught:
         Session(url)
     assert "secret" not in str(caught.value)
 
@@ -88,18 +89,18 @@ def test_without_the_driver_the_command_that_brings_it_is_named(monkeypatch: pyt
     monkeypatch.delitem(sys.modules, "sprag.service.storage.postgres")
     monkeypatch.delattr("sprag.service.storage.postgres")
     monkeypatch.setitem(sys.modules, "psycopg", None)
-    with pytest.raises(DatabaseError, match=r"pip install 'sprag\[postgres\]'"):
+    with refused(DatabaseError, "missing-extra"):
         Session("postgresql://localhost/sprag")
 
 
 def test_a_server_that_is_not_there_is_told_in_one_line_without_the_password(tmp_path: Path) -> None:
     url = f"postgresql://me:secret@/sprag?host={tmp_path}"
-    with pytest.raises(DatabaseError, match=r"postgresql://me@/sprag cannot be reached: .*No such file") as caught:
+    with refused(DatabaseError, "database-unreachable") as caught:
         Store.open(url)
     assert "secret" not in str(caught.value)
     assert "\n" not in str(caught.value)
     lock = storage.ServerLock(storage.checked(sa.make_url(url)), "a", 1.0)
-    with pytest.raises(DatabaseError, match="cannot be reached"):
+    with refused(DatabaseError, "database-unreachable"):
         lock.take()
 
 
@@ -114,21 +115,21 @@ class _Error(psycopg.Error):
 
 
 @pytest.mark.parametrize(
-    ("state", "kind", "text"),
+    ("state", "kind", "code"),
     [
-        ("55P03", "DatabaseBusyError", "try again"),
-        ("53100", "DatabaseFullError", "disk of the server"),
-        ("53300", "DatabaseBusyError", "in trouble: first line$"),
-        ("42501", "DatabaseError", "the user may not do that"),
-        ("25006", "DatabaseError", "read-only"),
-        ("57P01", "DatabaseError", "cannot be reached: first line$"),
+        ("55P03", "DatabaseBusyError", "database-busy"),
+        ("53100", "DatabaseFullError", "storage-full"),
+        ("53300", "DatabaseBusyError", "database-busy"),
+        ("42501", "DatabaseError", "database-forbidden"),
+        ("25006", "DatabaseError", "database-read-only"),
+        ("57P01", "DatabaseError", "database-unreachable"),
     ],
 )
-def test_errors_of_the_server_are_told_by_what_they_mean(state: str, kind: str, text: str) -> None:
+def test_errors_of_the_server_are_told_by_what_they_mean(state: str, kind: str, code: str) -> None:
     found = storage.explained(_Error(state, "first line\nsecond line"), "here")
     assert type(found).__name__ == kind
-    with pytest.raises(DatabaseError, match=text):
-        raise found or AssertionError
+    assert found is not None
+    assert (found.code, "second line" in str(found)) == (code, False)
 
 
 def test_what_the_program_did_wrong_is_not_explained_away() -> None:
@@ -156,7 +157,7 @@ def test_a_database_of_another_program_is_left_alone(postgres_server: postgres.S
     with session.write() as connection:
         connection.exec_driver_sql("CREATE TABLE birds (name text)")
     session.close()
-    with pytest.raises(SchemaError, match="another program"):
+    with refused(SchemaError, "not-a-database"):
         Store.open(url)
 
 
@@ -165,7 +166,7 @@ def test_one_writer_at_a_time_and_readers_of_one_moment(postgres_url: str, monke
     with Store.open(postgres_url) as store, Store.open(postgres_url) as other:
         with store.session.write():
             assert other.list_studies().studies == ()
-            with pytest.raises(DatabaseBusyError, match="try again"), other.session.write():
+            with refused(DatabaseBusyError, "database-busy"), other.session.write():
                 pass
         with store.session.read() as connection:
             count = sa.select(sa.func.count()).select_from(STUDIES)
@@ -188,7 +189,7 @@ def test_one_dispatcher_at_a_time(postgres_url: str) -> None:
         first.seize()
         assert first.holder() == "host:1"
         assert not third.take()
-        with pytest.raises(DatabaseError, match="cannot be reached"):
+        with refused(DatabaseError, "database-unreachable"):
             second.holder()  # its connection was ended
         first.release()
         second.release()
@@ -376,7 +377,7 @@ def test_a_server_that_crashes_ends_the_worker_with_a_sentence_and_loses_nothing
                 said = process.stderr.read()
             assert "cannot be reached" in said
             assert "Traceback" not in said
-            with pytest.raises(DatabaseError, match="cannot be reached"):
+            with refused(DatabaseError, "database-unreachable"):
                 store.get_study(record.id)
             server.start()
             with worker(url) as process:

@@ -14,6 +14,7 @@ from sprag.service.storage.room import RESERVE_BYTES
 from sprag.service.storage.store import Store
 from sprag.worker.chunking import Chunking
 from sprag.worker.ports import StoreFullError
+from tests.faults import refused
 from tests.worker import fakes
 
 PLENTY = 10**12
@@ -109,7 +110,7 @@ def test_a_database_that_takes_nothing_more_says_so_and_stays_whole(store: Store
             assert store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
             stored.append(chunk)
 
-    with pytest.raises(DatabaseFullError, match="is full") as caught:
+    with refused(DatabaseFullError, "storage-full") as caught:
         commit_all()
     assert isinstance(caught.value, StoreFullError)
     assert 0 < len(stored) < len(chunks)

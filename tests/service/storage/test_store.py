@@ -18,6 +18,7 @@ from sprag.service.storage.progress import RECENT_CHUNKS, FinishedChunk, Running
 from sprag.service.storage.session import Session, file_system_of, sqlite_warning
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import STUDIES
+from tests.faults import refused
 from tests.worker import fakes
 
 
@@ -37,31 +38,31 @@ def test_the_studies_kept_in_memory_are_few_values(url: str, monkeypatch: pytest
 
 
 @pytest.mark.parametrize(
-    ("url", "message"),
+    ("url", "code"),
     [
-        ("postgresql://me:pass@host:abc/x", "'postgresql://...@host:abc/x' is no database URL"),
-        ("postgresql://me:a@@pass/1@host/x", "more than one @ before its host"),
-        ("no url", "is no database URL"),
-        ("mysql://host/db", "kind 'mysql' are not supported; use sqlite or postgresql"),
-        ("sqlite://", "must be a file"),
-        ("sqlite:///:memory:", "must be a file"),
-        ("sqlite:///rel.db?mode=ro", r"takes no options here \(mode\)"),
-        ("sqlite:////dev/null/x/sprag.sqlite3", "cannot be made"),
+        ("postgresql://me:pass@host:abc/x", "invalid-database-url"),
+        ("postgresql://me:a@@pass/1@host/x", "invalid-database-url"),
+        ("no url", "invalid-database-url"),
+        ("mysql://host/db", "invalid-database-url"),
+        ("sqlite://", "invalid-database-url"),
+        ("sqlite:///:memory:", "invalid-database-url"),
+        ("sqlite:///rel.db?mode=ro", "invalid-database-url"),
+        ("sqlite:////dev/null/x/sprag.sqlite3", "write-failed"),
     ],
 )
-def test_databases_that_cannot_be_used_are_refused_in_one_sentence(url: str, message: str) -> None:
-    with pytest.raises(DatabaseError, match=message):
+def test_databases_that_cannot_be_used_are_refused_in_one_sentence(url: str, code: str) -> None:
+    with refused(DatabaseError, code):
         Session(url)
 
 
 def test_a_folder_is_no_database(tmp_path: Path) -> None:
-    with pytest.raises(DatabaseError, match="is a folder"):
+    with refused(DatabaseError, "not-a-database"):
         Session(f"sqlite:///{tmp_path}")
 
 
 def test_network_file_systems_are_refused(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(session_module, "file_system_of", lambda _: "nfs4")
-    with pytest.raises(DatabaseError, match=r"network file system \(nfs4\)"):
+    with refused(DatabaseError, "unsupported-database"):
         Session(url)
 
 
@@ -70,8 +71,9 @@ def test_a_read_only_folder_is_refused_with_the_command_that_mends_it(
 ) -> None:
     # Root may write everywhere, so the system's answer is made up.
     monkeypatch.setattr(session_module.os, "access", lambda *_: False)
-    with pytest.raises(DatabaseError, match=r"is read-only.*`chmod u\+w .*--db"):
+    with refused(DatabaseError, "database-read-only") as caught:
         Session(url)
+    assert "`chmod u+w " in str(caught.value)
 
 
 def test_threads_queue_for_the_one_that_writes_and_give_up_in_the_end(
@@ -138,7 +140,7 @@ def test_writers_take_the_lock_at_once_and_readers_go_on(url: str, monkeypatch: 
     monkeypatch.setattr(session_module, "BUSY_SECONDS", 0.05)
     with Store.open(url) as store, Store.open(url) as other, store.session.write():
         assert other.list_studies().studies == ()
-        with pytest.raises(DatabaseBusyError, match="try again"), other.session.write():
+        with refused(DatabaseBusyError, "database-busy"), other.session.write():
             pass
 
 
@@ -171,9 +173,9 @@ def test_a_backup_is_a_whole_database_and_replaces_nothing(url: str, tmp_path: P
         with store.session.write() as connection:  # others may be at work
             connection.execute(sa.update(STUDIES).values(name="changed"))
             store.backup(copy)
-        with pytest.raises(DatabaseError, match="exists already"):
+        with refused(DatabaseError, "file-exists"):
             store.backup(copy)
-        with pytest.raises(DatabaseError, match="no folder"):
+        with refused(DatabaseError, "write-failed"):
             store.backup(tmp_path / "nowhere" / "copy.sqlite3")
     with Store.open(f"sqlite:///{copy}") as restored:
         assert restored.get_study(record.id) == record

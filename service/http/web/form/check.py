@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
-from sprag.service.faults import ErrorItem
+from sprag.service.faults import Fault
 from sprag.service.http.web.figures.fit import FitChart, fit_chart
 from sprag.service.http.web.form.spec import Faults, clutch_pointers, field_of, pendulums_of, spec_of
 from sprag.service.jobs.preview import preview_json
@@ -17,7 +17,7 @@ from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
 from sprag.service.spec.document import ParsedSpec, SpecError, load_spec, parse_spec
 from sprag.service.spec.machine.clutch import read_clutch
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
-from sprag.service.spec.report import Report, spec_items
+from sprag.service.spec.report import Report
 from sprag.service.spec.units import QuantityError, parse_quantity
 
 if TYPE_CHECKING:
@@ -99,8 +99,8 @@ def check_form(
     try:
         found.parsed = parse_spec(spec)
     except SpecError as error:
-        for item in spec_items(error.problems):
-            name = field_of(item.pointer or "", values)
+        for item in error.faults:
+            name = field_of(item.where or "", values)
             # Data that could not be read were told of already, line by line.
             if not (name in faults and name.endswith("/data")):
                 found.faults.setdefault(name, []).append(message(item))
@@ -132,19 +132,14 @@ def check_text(
         loaded = load_spec(text, "toml" if form == "toml" else "json")
         found.parsed = parse_spec(loaded)
     except SpecError as error:
-        places = [(problem.pointer or "the spec", item) for problem, item in _with_items(error)]
-        found.faults["/text"] = [f"{pointer}: {message(item)}" for pointer, item in places]
+        found.faults["/text"] = [f"{item.where or 'the spec'}: {message(item)}" for item in error.faults]
         return found
     found.spec = found.parsed.spec
     found.preview = preview_json(found.parsed, chunking, known(found.parsed.study), left)
     return found
 
 
-def _with_items(error: SpecError) -> list[tuple[Any, ErrorItem]]:
-    return list(zip(error.problems, spec_items(error.problems), strict=True))
-
-
-def message(item: ErrorItem) -> str:
+def message(item: Fault) -> str:
     """A fault as a sentence beside its field."""
     parts = [item.message]
     if item.value is not None and not isinstance(item.value, list | dict):

@@ -6,9 +6,9 @@ import re
 from collections.abc import Mapping
 from typing import Any, Final
 
+from sprag.service.faults import Fault
 from sprag.service.http.web.form.fields import FORM_MODEL, pendulum, sections
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
-from sprag.service.spec.report import Problem
 from sprag.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
 from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker.limits import MAX_AXES
@@ -123,7 +123,7 @@ def _clutch(values: Mapping[str, str], pointer: str, faults: Faults) -> dict[str
             measured = parse_measured(text, parse_quantity)
             found["data"] = measured.rows.tolist()
         except MeasuredDataError as error:
-            faults[f"{pointer}/data"] = [_told(problem) for problem in error.problems]
+            faults[f"{pointer}/data"] = [_told(fault) for fault in error.faults]
     found |= _given(values, f"{pointer}/accuracy", "accuracy") | _given(values, f"{pointer}/max_degree", "max_degree")
     # A box that is not ticked is not sent, so that both are always said.
     found["through_origin"] = values.get(f"{pointer}/through_origin") == "on"
@@ -131,10 +131,10 @@ def _clutch(values: Mapping[str, str], pointer: str, faults: Faults) -> dict[str
     return found
 
 
-def _told(problem: Problem) -> str:
-    """A problem of measured data as a sentence: the line, what is wrong, what stands there, what may."""
-    parts = [f"{problem.pointer}: {problem.message}", *([] if problem.value is None else [f"got {problem.value}"])]
-    return "; ".join([*parts, *([f"allowed: {problem.allowed}"] if problem.allowed else [])])
+def _told(fault: Fault) -> str:
+    """A fault of measured data as a sentence: the line, what is wrong, what stands there, what may."""
+    parts = [f"{fault.where}: {fault.message}", *([] if fault.value is None else [f"got {fault.value}"])]
+    return "; ".join([*parts, *([f"allowed: {fault.allowed}"] if fault.allowed else [])])
 
 
 def _run(values: Mapping[str, str]) -> dict[str, Any]:

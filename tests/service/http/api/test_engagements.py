@@ -83,7 +83,7 @@ def test_a_machine_without_clutches_has_no_engagements(service: Service) -> None
     study_id = service.submit(press)
     response = asked(service, study_id, case=0)
     assert response.status_code == 404
-    assert response.json()["detail"] == "A machine of model machine-shaft has no clutches, so that nothing engages."
+    assert response.json()["type"] == "/problems/not-found"
     assert "engagements" not in service.get(f"/studies/{study_id}/cases/0")["links"]
     page = service.http.get(f"/studies/{study_id}/cases/0/engagements")
     assert page.status_code == 404

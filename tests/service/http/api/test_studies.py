@@ -79,7 +79,7 @@ def test_a_useless_idempotency_key_is_refused(service: Service, key: str) -> Non
     assert error["parameter"] == "Idempotency-Key"
     assert "[!-~]" not in response.text
     if key in ("a b", "caf\u00e9"):
-        assert error["allowed"] == "printable ASCII characters without blanks"
+        assert error["code"] == "invalid-text"
 
 
 def test_two_keys_are_one_too_many(service: Service) -> None:
@@ -87,7 +87,7 @@ def test_two_keys_are_one_too_many(service: Service) -> None:
     response = service.http.post(STUDIES, json=SPEC, headers=keys)
     assert response.status_code == 422
     (error,) = response.json()["errors"]
-    assert (error["parameter"], error["message"]) == ("Idempotency-Key", "given more than once")
+    assert (error["parameter"], error["code"]) == ("Idempotency-Key", "repeated")
     assert service.get("/studies")["studies"] == []
 
 
@@ -209,7 +209,6 @@ def test_failed_cases_are_run_again(service: Service) -> None:
     assert "timed_out" in unknown.json()["errors"][0]["allowed"]
     none = service.http.post(address, params={"ending": ["crashed", "timed_out"]})
     assert (none.status_code, none.json()["type"]) == (409, "/problems/wrong-state")
-    assert "ended as crashed or timed_out" in none.json()["detail"]
     again = service.http.post(address, params={"ending": ["chatter"]})
     fits(studies.StudySummary, again.json())
     assert (again.status_code, again.json()["state"]) == (202, "queued")
@@ -238,7 +237,6 @@ def test_a_study_that_has_ended_gets_no_priority(service: Service) -> None:
     service.fill(study_id)
     refused = service.http.post(f"{STUDIES}/{study_id}:prioritize", params={"priority": 5})
     assert (refused.status_code, refused.json()["type"]) == (409, "/problems/wrong-state")
-    assert "is finished" in refused.json()["detail"]
     assert service.get(f"/studies/{study_id}")["priority"] == 0
 
 
@@ -251,4 +249,3 @@ def test_a_key_with_other_parameters_is_a_conflict(service: Service, changed: di
     assert (first.status_code, again.json()["id"]) == (202, first.json()["id"])
     other = service.http.post(STUDIES, json=SPEC, headers=headers, params=changed)
     assert (other.status_code, other.json()["type"]) == (422, "/problems/idempotency-conflict")
-    assert "other parameters" in other.json()["detail"]

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from sprag.service.faults import ErrorItem
+from sprag.service.faults import Fault
 from sprag.service.http.web.figures.answers import motion_figures
 from sprag.service.http.web.figures.thinning import thin
 from sprag.service.http.web.form.check import check_form, check_text, message
@@ -270,8 +270,8 @@ def test_units_of_pasted_data_that_are_taken_for_granted_are_told() -> None:
 
 
 def test_values_are_repeated_as_people_write_them() -> None:
-    assert "got 25;" in message(ErrorItem("is wrong", value=25.0, allowed="0 .. 1"))
-    assert "got 25.5;" in message(ErrorItem("is wrong", value=25.5, allowed="0 .. 1"))
+    assert "got 25;" in message(Fault(None, "out-of-range", "is wrong", value=25.0, allowed="0 .. 1"))
+    assert "got 25.5;" in message(Fault(None, "out-of-range", "is wrong", value=25.5, allowed="0 .. 1"))
 
 
 def test_a_part_after_the_run_stopped_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import re
 import tracemalloc
 from fractions import Fraction
 from typing import Any
@@ -28,10 +27,10 @@ def values_of(path: str | list[str], **way: Any) -> tuple[float, ...]:
 
 
 def only_problem(*axes: Any, **changes: Any) -> tuple[str, str]:
-    """Pointer and whole text of the one problem of these axes."""
+    """Pointer and code of the one fault of these axes."""
     found = problems({"/axes": list(axes)} | {f"/{key}": value for key, value in changes.items()})
     (problem,) = found.values()
-    return problem.pointer, str(problem)
+    return str(problem.where), problem.code
 
 
 def load(**way: Any) -> dict[str, Any]:
@@ -113,38 +112,38 @@ def test_tied_paths_and_every_kind_of_path() -> None:
 
 
 @pytest.mark.parametrize(
-    ("path", "says"),
+    ("path", "code"),
     [
-        ("shaft.laod", "did you mean 'shaft.load'"),
-        ("base.shaft.load", "did you mean 'shaft.load'"),
-        ("excitation", "names no numeric parameter"),
-        ("name", "names no numeric parameter"),
-        ("run.duration", "names no numeric parameter"),
-        ("", "names no numeric parameter"),
-        ("pendulums.1.mass", "there is no pendulum 1: pendulums are numbered from 0 to 0"),
-        ("pendulums.999999999.mass", "there is no pendulum 999999999"),
-        ("pendulums.-1.mass", "names no numeric parameter"),
-        ("pendulums.N.mass", "did you mean 'pendulums.0.mass'"),
-        ("pendulums.0.massa", "did you mean 'pendulums.0.mass'"),
-        ("clutch.coefficients.4", "numbered from 0 (c_1) to 3 (c_4)"),
-        ("clutch.coefficients", "names no numeric parameter of the clutch"),
-        ("clutch.data.0.1", "names no numeric parameter of the clutch"),
-        ("pendulums.0.clutch.coefficients.1", "as in 'clutch.coefficients.1'"),
-        (3, "must be a path"),
-        (None, "is required"),
-        ([], "must name what varies"),
-        (["shaft.load", 3], "must be a path"),
-        (["shaft.load"] * 300, "must name what varies"),
-        (["shaft.load", "excitation.frequency"], "different units: N*m, Hz"),
-        (["shaft.load", "shaft.load"], "names the same path twice"),
-        (["clutch.coefficients.1", "clutch.coefficients.2"], "different units"),
-        ("x" * 10_000, "names no numeric parameter"),
+        ("shaft.laod", "invalid-path"),
+        ("base.shaft.load", "invalid-path"),
+        ("excitation", "invalid-path"),
+        ("name", "invalid-path"),
+        ("run.duration", "invalid-path"),
+        ("", "invalid-path"),
+        ("pendulums.1.mass", "invalid-path"),
+        ("pendulums.999999999.mass", "invalid-path"),
+        ("pendulums.-1.mass", "invalid-path"),
+        ("pendulums.N.mass", "invalid-path"),
+        ("pendulums.0.massa", "invalid-path"),
+        ("clutch.coefficients.4", "invalid-path"),
+        ("clutch.coefficients", "invalid-path"),
+        ("clutch.data.0.1", "invalid-path"),
+        ("pendulums.0.clutch.coefficients.1", "invalid-path"),
+        (3, "wrong-type"),
+        (None, "required"),
+        ([], "wrong-type"),
+        (["shaft.load", 3], "wrong-type"),
+        (["shaft.load"] * 300, "wrong-type"),
+        (["shaft.load", "excitation.frequency"], "wrong-unit"),
+        (["shaft.load", "shaft.load"], "repeated"),
+        (["clutch.coefficients.1", "clutch.coefficients.2"], "wrong-unit"),
+        ("x" * 10_000, "invalid-path"),
     ],
 )
-def test_paths_that_are_refused(path: object, says: str) -> None:
-    pointer, text = only_problem({"path": path, "values": [1, 2]})
+def test_paths_that_are_refused(path: object, code: str) -> None:
+    pointer, told = only_problem({"path": path, "values": [1, 2]})
     assert pointer.startswith("/axes/0/path")
-    assert says in text
+    assert told == code
 
 
 def test_clutch_paths_follow_where_the_clutch_stands() -> None:
@@ -157,96 +156,92 @@ def test_clutch_paths_follow_where_the_clutch_stands() -> None:
 def test_a_fitted_clutch_is_not_varied(path: str) -> None:
     data = {"data": [[0, 0], [0.01, 2], [0.02, 4]], "accuracy": 0.1}
     found = problems({"/base/clutch": data, "/axes": [{"path": path, "values": [1]}]})
-    assert "measured data" in found["/axes/0/path"].message
+    assert found["/axes/0/path"].code == "invalid-path"
 
 
 def test_a_path_stands_on_one_axis() -> None:
     tied = {"path": ["gravity", "gravity"], "values": [1]}
-    pointer, text = only_problem(load(values=[1]), tied | {"path": "gravity"}, load(values=[2]))
-    assert pointer == "/axes/2/path"
-    assert "already stands on axis 0" in text
+    found = only_problem(load(values=[1]), tied | {"path": "gravity"}, load(values=[2]))
+    assert found == ("/axes/2/path", "repeated")
 
 
 @pytest.mark.parametrize(
-    ("way", "at", "says"),
+    ("way", "at", "code"),
     [
-        ({}, "", "exactly one of"),
-        ({"values": [1], "linspace": [0, 1, 2]}, "", "2 are given: values, linspace"),
-        ({"values": []}, "/values", "has no values"),
-        ({"values": 3}, "/values", "must be a list"),
-        ({"values": {"0": 1}}, "/values", "must be a list"),
-        ({"values": [1, -2, 3]}, "/values/1", "out of range.*got -2.*>= 0 N\\*m"),
-        ({"values": [1, "2 m"]}, "/values/1", "expected N\\*m"),
-        ({"values": [1, None]}, "/values/1", "must be a number"),
-        ({"values": [1, True]}, "/values/1", "must be a number"),
-        ({"values": [1, [2]]}, "/values/1", "must be a number"),
-        ({"values": [1, float("nan")]}, "/values/1", "finite"),
-        ({"values": [1, 2, 1]}, "/values/2", "value 2 repeats value 0"),
-        ({"values": [1, "1000 N*mm"]}, "/values/1", "value 1 repeats value 0"),
-        ({"linspace": [0, 1]}, "/linspace", "list of three"),
-        ({"linspace": [0, 1, 2, 3]}, "/linspace", "list of three"),
-        ({"linspace": [0, 1, 0]}, "/linspace/2", "out of range"),
-        ({"linspace": [0, 1, -3]}, "/linspace/2", "out of range"),
-        ({"linspace": [0, 1, 2.0]}, "/linspace/2", "whole number"),
-        ({"linspace": [0, 1, "3"]}, "/linspace/2", "whole number"),
-        ({"linspace": [0, 1, True]}, "/linspace/2", "whole number"),
-        ({"linspace": [0, 1, 1]}, "/linspace/2", "two different ends"),
-        ({"linspace": [1, 1, 2]}, "/linspace", "value 1 repeats value 0"),
-        ({"linspace": [-1, 1, 3]}, "/linspace/0", "out of range"),
-        ({"linspace": [0, "1 Hz", 3]}, "/linspace/1", "expected N\\*m"),
-        ({"geomspace": [0, 1, 3]}, "/geomspace", "one sign"),
-        ({"geomspace": [1, 10, 1]}, "/geomspace/2", "two different ends"),
-        ({"range": [0, 1, 0]}, "/range/2", "step is 0"),
-        ({"range": [0, 1, -0.1]}, "/range/2", "leads away"),
-        ({"range": [1, 0, 0.1]}, "/range/2", "leads away"),
-        ({"range": [0, 1, "0.1 Hz"]}, "/range/2", "expected N\\*m"),
-        ({"range": [0, 1]}, "/range", "list of three"),
+        ({}, "", "exactly-one"),
+        ({"values": [1], "linspace": [0, 1, 2]}, "", "exactly-one"),
+        ({"values": []}, "/values", "empty"),
+        ({"values": 3}, "/values", "wrong-type"),
+        ({"values": {"0": 1}}, "/values", "wrong-type"),
+        ({"values": [1, -2, 3]}, "/values/1", "out-of-range"),
+        ({"values": [1, "2 m"]}, "/values/1", "wrong-unit"),
+        ({"values": [1, None]}, "/values/1", "wrong-type"),
+        ({"values": [1, True]}, "/values/1", "wrong-type"),
+        ({"values": [1, [2]]}, "/values/1", "wrong-type"),
+        ({"values": [1, float("nan")]}, "/values/1", "not-finite"),
+        ({"values": [1, 2, 1]}, "/values/2", "repeated"),
+        ({"values": [1, "1000 N*mm"]}, "/values/1", "repeated"),
+        ({"linspace": [0, 1]}, "/linspace", "wrong-type"),
+        ({"linspace": [0, 1, 2, 3]}, "/linspace", "wrong-type"),
+        ({"linspace": [0, 1, 0]}, "/linspace/2", "out-of-range"),
+        ({"linspace": [0, 1, -3]}, "/linspace/2", "out-of-range"),
+        ({"linspace": [0, 1, 2.0]}, "/linspace/2", "wrong-type"),
+        ({"linspace": [0, 1, "3"]}, "/linspace/2", "wrong-type"),
+        ({"linspace": [0, 1, True]}, "/linspace/2", "wrong-type"),
+        ({"linspace": [0, 1, 1]}, "/linspace/2", "invalid-range"),
+        ({"linspace": [1, 1, 2]}, "/linspace", "repeated"),
+        ({"linspace": [-1, 1, 3]}, "/linspace/0", "out-of-range"),
+        ({"linspace": [0, "1 Hz", 3]}, "/linspace/1", "wrong-unit"),
+        ({"geomspace": [0, 1, 3]}, "/geomspace", "invalid-range"),
+        ({"geomspace": [1, 10, 1]}, "/geomspace/2", "invalid-range"),
+        ({"range": [0, 1, 0]}, "/range/2", "invalid-range"),
+        ({"range": [0, 1, -0.1]}, "/range/2", "invalid-range"),
+        ({"range": [1, 0, 0.1]}, "/range/2", "invalid-range"),
+        ({"range": [0, 1, "0.1 Hz"]}, "/range/2", "wrong-unit"),
+        ({"range": [0, 1]}, "/range", "wrong-type"),
     ],
 )
-def test_values_that_are_refused(way: dict[str, Any], at: str, says: str) -> None:
-    pointer, text = only_problem(load(**way))
-    assert pointer == "/axes/0" + at
-    assert re.search(says, text)
+def test_values_that_are_refused(way: dict[str, Any], at: str, code: str) -> None:
+    assert only_problem(load(**way)) == ("/axes/0" + at, code)
 
 
 def test_a_change_of_sign_in_a_geometric_range() -> None:
-    pointer, text = only_problem({"path": "pendulums.0.arm", "geomspace": [-1, 1, 3]})
-    assert (pointer, "one sign" in text) == ("/axes/0/geomspace", True)
+    found = only_problem({"path": "pendulums.0.arm", "geomspace": [-1, 1, 3]})
+    assert found == ("/axes/0/geomspace", "invalid-range")
 
 
 @pytest.mark.parametrize(
-    ("axes", "at", "says"),
+    ("axes", "at", "code"),
     [
-        ([load(linspace=[0, 1, 10**9])], "/axes/0/linspace/2", "got 1000000000; allowed: 1 to 1,000,000"),
-        ([load(linspace=[0, 1, 10**300])], "/axes/0/linspace/2", "allowed: 1 to 1,000,000"),
-        ([load(geomspace=[1, 2, 10**9])], "/axes/0/geomspace/2", "allowed: 1 to 1,000,000"),
-        ([load(range=[0, 1, "1e-9 N*m"])], "/axes/0/range", "asks for 1,000,000,001 values"),
-        ([load(range=[0, 1e9, 1e-300])], "/axes/0/range", "asks for about 10^309 values"),
+        ([load(linspace=[0, 1, 10**9])], "/axes/0/linspace/2", "out-of-range"),
+        ([load(linspace=[0, 1, 10**300])], "/axes/0/linspace/2", "out-of-range"),
+        ([load(geomspace=[1, 2, 10**9])], "/axes/0/geomspace/2", "out-of-range"),
+        ([load(range=[0, 1, "1e-9 N*m"])], "/axes/0/range", "too-many"),
+        ([load(range=[0, 1e9, 1e-300])], "/axes/0/range", "too-many"),
         (
             [{"path": path, "linspace": [1, 2, 1000]} for path in ("shaft.load", "gravity", "excitation.phase")],
             "/axes",
-            "the grid has 1,000,000,000 cases (1,000 x 1,000 x 1,000) (allowed: at most 10,000,000 cases)",
+            "too-many",
         ),
         (
             [{"path": path, "linspace": [1, 2, MAX_AXIS_VALUES]} for path in ("shaft.load", "gravity")],
             "/axes",
-            "2,000,000 values together",
+            "too-many",
         ),
-        ([load(values=[1])] * (MAX_AXES + 1), "/axes", "list of 0 to 16 axes"),
-        ({"path": "shaft.load"}, "/axes", "must be a list"),
-        (None, "/axes", "must be a list"),
-        (["shaft.load"], "/axes/0", "must be an object"),
+        ([load(values=[1])] * (MAX_AXES + 1), "/axes", "wrong-type"),
+        ({"path": "shaft.load"}, "/axes", "wrong-type"),
+        (None, "/axes", "wrong-type"),
+        (["shaft.load"], "/axes/0", "wrong-type"),
     ],
 )
-def test_sizes_are_checked_before_expansion(axes: Any, at: str, says: str) -> None:
+def test_sizes_are_checked_before_expansion(axes: Any, at: str, code: str) -> None:
     tracemalloc.start()
     try:
         (problem,) = problems({"/axes": axes}).values()
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert problem.pointer == at
-    assert says in str(problem)
+    assert (problem.where, problem.code) == (at, code)
     assert peak < 2_000_000
 
 
@@ -286,7 +281,7 @@ def test_every_value_of_a_division_is_the_nearest_double(start: Fraction, stop: 
 def test_the_first_fault_of_a_long_list_is_told() -> None:
     values = [index / 100.0 for index in range(1000)]
     repeated = [*values, 0.5, 0.25]
-    assert "value 1000 repeats value 50" in only_problem(load(values=repeated))[1]
+    assert only_problem(load(values=repeated)) == ("/axes/0/values/1000", "repeated")
     assert only_problem(load(values=[*values, -1.0, 0.5]))[0] == "/axes/0/values/1000"
 
 
@@ -300,9 +295,9 @@ def test_zips() -> None:
     study = parsed({"/axes": zipped, "/combine": "zip"}).study
     assert (study.cases, study.case_parameters(1)) == (3, {"shaft.load": 1.0, "gravity": 9.5})
     unequal = problems({"/axes": [load(values=[1, 2]), {"path": "gravity", "values": [1]}], "/combine": "zip"})
-    assert "equally many values" in unequal["/axes"].message
+    assert unequal["/axes"].code == "unequal-lengths"
     twice = problems({"/axes": [load(values=[1, 2, 1]), {"path": "gravity", "values": [1, 2, 1]}], "/combine": "zip"})
-    assert "cases 0 and 2 are the same" in twice["/axes"].message
+    assert twice["/axes"].code == "repeated"
 
 
 @pytest.mark.parametrize("combine", ["Grid", "product", 3, None, ["grid"]])
@@ -320,7 +315,7 @@ def test_a_law_negative_somewhere_on_a_grid() -> None:
     found = problems({"/axes": [load(values=[1]), *LAW_AXES]})
     assert list(found) == ["/axes/1"]
     assert found["/axes/1"].value == [0.0, 100.0, 0.0, -20000.0]
-    assert "pull the shaft back" in found["/axes/1"].message
+    assert found["/axes/1"].code == "no-clutch-law"
     parsed({"/axes": LAW_AXES, "/base/clutch/windup_limit": 0.05})
     wide = {"path": "clutch.windup_limit", "values": [0.01, 0.08]}
     assert list(problems({"/axes": [*LAW_AXES, wide]})) == ["/axes/0"]
@@ -333,7 +328,7 @@ def test_a_law_negative_somewhere_in_a_zip() -> None:
     found = problems(changes | {"/axes": LAW_AXES})
     assert found["/axes/0"].value == [0.0, 100.0, 0.0, -20000.0]
     many = [{"path": f"clutch.coefficients.{k}", "linspace": [-1, k, 20_000]} for k in (1, 3)]
-    assert "20,000 different clutch laws" in problems({"/axes": many, "/combine": "zip"})["/axes/0"].message
+    assert problems({"/axes": many, "/combine": "zip"})["/axes/0"].code == "too-many"
 
 
 @pytest.mark.parametrize(
@@ -364,5 +359,5 @@ def test_a_law_negative_somewhere_in_a_zip() -> None:
 )  # fmt: skip
 def test_values_stand_in_messages_as_they_were_written(changes: dict[str, Any], pointer: str, value: object) -> None:
     (problem,) = problems(changes).values()
-    assert (problem.pointer, problem.value) == (pointer, value)
+    assert (problem.where, problem.value) == (pointer, value)
     assert type(problem.value) is type(value)

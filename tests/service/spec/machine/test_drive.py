@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import re
 from typing import Any
 
 import pytest
@@ -31,7 +30,7 @@ def test_every_parameter_keeps_its_range(entry: Any) -> None:
     for value in [*([low] if low > -1e300 else []), *([entry.high * 1.001] if entry.high < 1e300 else [])]:
         found = problems({pointer: value, "/axes": []})
         assert list(found) == [pointer]
-        assert found[pointer].message == "is out of range"
+        assert found[pointer].code == "out-of-range"
         assert found[pointer].value == value
         assert unit in str(found[pointer].allowed)
         assert found[pointer].unit == unit
@@ -45,7 +44,7 @@ def test_a_parameter_is_required_or_has_its_default(entry: Any) -> None:
     pointer = "/base/" + path.replace(".", "/")
     change = {"/axes": []} if entry.path == "gravity" else {"/axes": [], pointer: ...}
     if entry.default is None:
-        assert problems(change)[pointer].message.startswith("is required")
+        assert problems(change)[pointer].code == "required"
     else:
         assert parsed(change).study.base[path] == entry.default
 
@@ -104,61 +103,61 @@ def test_one_clutch_in_each_pendulum() -> None:
 def test_a_clutch_is_given_once() -> None:
     both = problems({"/base/pendulums": pendulums({"clutch": LAW}, {})})
     assert list(both) == ["/base/clutch"]
-    assert "common to all" in both["/base/clutch"].message
+    assert both["/base/clutch"].code == "conflict"
     none = problems({"/base/clutch": ...})
     assert list(none) == ["/base/clutch"]
-    assert "is required" in none["/base/clutch"].message
+    assert none["/base/clutch"].code == "required"
     some = problems({"/base/clutch": ..., "/base/pendulums": pendulums({}, {"clutch": LAW}, {})})
     assert list(some) == ["/base/pendulums/0/clutch", "/base/pendulums/2/clutch"]
-    assert "pendulum 1 has its own" in some["/base/pendulums/0/clutch"].message
+    assert some["/base/pendulums/0/clutch"].code == "required"
 
 
 @pytest.mark.parametrize(
-    ("clutch", "at", "says"),
+    ("clutch", "at", "code"),
     [
-        ({"coefficients": []}, "/coefficients", "list of clutch coefficients"),
-        ({"coefficients": [0] * MAX_COEFFICIENTS + [1]}, "/coefficients", "list of clutch coefficients"),
-        ({"coefficients": 200}, "/coefficients", "list of clutch coefficients"),
-        ({}, "/coefficients", "is required"),
-        ({"windup_limit": 1}, "/coefficients", "is required"),
-        ({"coefficients": [0, "200 N*m"]}, "/coefficients/1", "expected N\\*m/rad"),
-        ({"coefficients": [0, 1, "2 N*m/rad"]}, "/coefficients/2", "expected N\\*m/rad\\^2"),
-        ({"coefficients": [0, 200], "windup_limit": 0}, "/windup_limit", "out of range"),
-        ({"coefficients": [0, 200], "windup_limit": "3 mm"}, "/windup_limit", "expected rad"),
-        ({"coefficients": [0, 0]}, "/coefficients", "every coefficient is zero"),
-        ({"coefficients": [0, -200]}, "/coefficients", "pull the shaft back"),
-        ({"coefficients": [-1, 200]}, "/coefficients", "pull the shaft back"),
-        ({"coefficients": [0, 200, 0, -20000]}, "/coefficients", "windup_limit"),
-        ({"coefficients": [0, 200, 0, -20000], "windup_limit": 0.2}, "/coefficients", "lower windup_limit"),
-        ({"coefficients": [0, 200], "data": ROWS}, "", "both as a law"),
-        ([0, 200], "", "must be an object"),
-        (None, "", "is required"),
-        ({"data": ROWS}, "/accuracy", "is required"),
-        ({"accuracy": 1}, "/data", "is required"),
-        ({"data": {}, "accuracy": 1}, "/data", "list of measured rows"),
-        ({"data": [[0, 0]], "accuracy": 1}, "/data", "list of measured rows"),
-        ({"data": [[0, 0]] * (MAX_CLUTCH_ROWS + 1), "accuracy": 1}, "/data", "list of measured rows"),
-        ({"data": [[0, 0], [1]], "accuracy": 1}, "/data/1", "row of two"),
-        ({"data": [[0, 0], 1], "accuracy": 1}, "/data/1", "row of two"),
-        ({"data": [[0, 0], ["1 m", 1]], "accuracy": 1}, "/data/1/0", "expected rad"),
-        ({"data": [[0, 0], [1, float("nan")]], "accuracy": 1}, "/data/1/1", "finite"),
-        ({"data": [[0, 0], [-1, 1]], "accuracy": 1}, "/data/1/0", "out of range"),
-        (MEASURED | {"accuracy": 0}, "/accuracy", "out of range"),
-        (MEASURED | {"accuracy": "1 m"}, "/accuracy", "expected N\\*m"),
-        (MEASURED | {"accuracy": 1e-9, "max_degree": 2}, "/accuracy", "not reached up to degree 2"),
-        (MEASURED | {"max_degree": 0}, "/max_degree", "out of range"),
-        (MEASURED | {"max_degree": 12}, "/max_degree", "out of range"),
-        (MEASURED | {"max_degree": 2.0}, "/max_degree", "whole number"),
-        (MEASURED | {"max_degree": True}, "/max_degree", "whole number"),
-        (MEASURED | {"through_origin": 1}, "/through_origin", "true or false"),
-        (MEASURED | {"angles_include_backlash": "no"}, "/angles_include_backlash", "true or false"),
-        ({"data": [[0, 0], [0.1, -1], [0.2, -2]], "accuracy": 1}, "/data", "pull the shaft back"),
+        ({"coefficients": []}, "/coefficients", "wrong-type"),
+        ({"coefficients": [0] * MAX_COEFFICIENTS + [1]}, "/coefficients", "wrong-type"),
+        ({"coefficients": 200}, "/coefficients", "wrong-type"),
+        ({}, "/coefficients", "required"),
+        ({"windup_limit": 1}, "/coefficients", "required"),
+        ({"coefficients": [0, "200 N*m"]}, "/coefficients/1", "wrong-unit"),
+        ({"coefficients": [0, 1, "2 N*m/rad"]}, "/coefficients/2", "wrong-unit"),
+        ({"coefficients": [0, 200], "windup_limit": 0}, "/windup_limit", "out-of-range"),
+        ({"coefficients": [0, 200], "windup_limit": "3 mm"}, "/windup_limit", "wrong-unit"),
+        ({"coefficients": [0, 0]}, "/coefficients", "no-clutch-law"),
+        ({"coefficients": [0, -200]}, "/coefficients", "no-clutch-law"),
+        ({"coefficients": [-1, 200]}, "/coefficients", "no-clutch-law"),
+        ({"coefficients": [0, 200, 0, -20000]}, "/coefficients", "no-clutch-law"),
+        ({"coefficients": [0, 200, 0, -20000], "windup_limit": 0.2}, "/coefficients", "no-clutch-law"),
+        ({"coefficients": [0, 200], "data": ROWS}, "", "conflict"),
+        ([0, 200], "", "wrong-type"),
+        (None, "", "required"),
+        ({"data": ROWS}, "/accuracy", "required"),
+        ({"accuracy": 1}, "/data", "required"),
+        ({"data": {}, "accuracy": 1}, "/data", "wrong-type"),
+        ({"data": [[0, 0]], "accuracy": 1}, "/data", "wrong-type"),
+        ({"data": [[0, 0]] * (MAX_CLUTCH_ROWS + 1), "accuracy": 1}, "/data", "wrong-type"),
+        ({"data": [[0, 0], [1]], "accuracy": 1}, "/data/1", "wrong-type"),
+        ({"data": [[0, 0], 1], "accuracy": 1}, "/data/1", "wrong-type"),
+        ({"data": [[0, 0], ["1 m", 1]], "accuracy": 1}, "/data/1/0", "wrong-unit"),
+        ({"data": [[0, 0], [1, float("nan")]], "accuracy": 1}, "/data/1/1", "not-finite"),
+        ({"data": [[0, 0], [-1, 1]], "accuracy": 1}, "/data/1/0", "out-of-range"),
+        (MEASURED | {"accuracy": 0}, "/accuracy", "out-of-range"),
+        (MEASURED | {"accuracy": "1 m"}, "/accuracy", "wrong-unit"),
+        (MEASURED | {"accuracy": 1e-9, "max_degree": 2}, "/accuracy", "no-clutch-law"),
+        (MEASURED | {"max_degree": 0}, "/max_degree", "out-of-range"),
+        (MEASURED | {"max_degree": 12}, "/max_degree", "out-of-range"),
+        (MEASURED | {"max_degree": 2.0}, "/max_degree", "wrong-type"),
+        (MEASURED | {"max_degree": True}, "/max_degree", "wrong-type"),
+        (MEASURED | {"through_origin": 1}, "/through_origin", "wrong-type"),
+        (MEASURED | {"angles_include_backlash": "no"}, "/angles_include_backlash", "wrong-type"),
+        ({"data": [[0, 0], [0.1, -1], [0.2, -2]], "accuracy": 1}, "/data", "no-clutch-law"),
     ],
 )
-def test_clutches_that_are_refused(clutch: object, at: str, says: str) -> None:
+def test_clutches_that_are_refused(clutch: object, at: str, code: str) -> None:
     found = problems({"/base/clutch": clutch})
     assert list(found) == ["/base/clutch" + at]
-    assert re.search(says, found["/base/clutch" + at].message)
+    assert found["/base/clutch" + at].code == code
 
 
 def test_a_measured_clutch_is_fitted() -> None:

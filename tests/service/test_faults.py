@@ -1,0 +1,81 @@
+"""Codes of faults: listed, explained on a page, raised somewhere, and the same in another process."""
+
+from __future__ import annotations
+
+import pickle
+import re
+from typing import get_args
+
+import pytest
+
+from sprag.engine import Ending
+from sprag.engine.machine_shaft import problems
+from sprag.service import faults
+from sprag.service.faults import CODES, LOCAL_KINDS, Code, Fault, FaultError, Kind, ParameterFault
+from sprag.service.http.problems import PROBLEM_TYPES
+from sprag.service.results.selection import SelectionError
+from sprag.service.spec.report import SpecError
+from sprag.service.storage import errors as storage
+from sprag.worker.ports import StoreError
+from tests.conftest import ROOT
+
+PAGE = (ROOT / "docs" / "faults.md").read_text(encoding="utf-8")
+SOURCES = "\n".join(
+    path.read_text(encoding="utf-8")
+    for package in ("service", "worker", "sprag")
+    for path in (ROOT / package).rglob("*.py")
+    if path.resolve() not in {(ROOT / "service" / name).resolve() for name in ("faults.py", "http/problems.py")}
+)
+
+
+def test_every_code_is_explained_here_and_on_the_page() -> None:
+    assert sorted(CODES) == sorted(get_args(Code))
+    rows = dict(re.findall(r"^\| `([a-z-]+)` \| (.+) \|$", PAGE, re.MULTILINE))
+    assert rows == CODES | LOCAL_KINDS
+
+
+def test_every_kind_is_a_problem_over_http_or_a_local_one() -> None:
+    assert {*PROBLEM_TYPES} | {*LOCAL_KINDS} == {*get_args(Kind)}
+    assert not {*PROBLEM_TYPES} & {*LOCAL_KINDS}
+
+
+@pytest.mark.parametrize("code", sorted({*CODES, *get_args(Kind)}))
+def test_every_code_is_raised_somewhere(code: str) -> None:
+    assert f'"{code}"' in SOURCES or code.replace("-", "_") in [*Ending]
+
+
+def test_every_error_of_the_store_has_a_kind() -> None:
+    kinds = {
+        error.code for error in vars(storage).values() if isinstance(error, type) and issubclass(error, StoreError)
+    }
+    assert kinds <= {*get_args(Kind)}
+
+
+def test_every_fault_of_a_machine_is_told_with_a_code() -> None:
+    from sprag.service.spec.machine.shaft_check import code_of
+
+    told = {code_of(kind.__new__(kind)) for kind in vars(problems).values() if isinstance(kind, type) and
+            issubclass(kind, problems.MachineError)}  # fmt: skip
+    assert told <= {*CODES}
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        SpecError([Fault("/run", "wrong-type", "must be an object", 1, "an object")]),
+        SelectionError([ParameterFault("at", "unknown-value", "the axis has no such value")]),
+        FaultError("queue-full", "Too many studies wait.", retry_after=5),
+        storage.StudyNotFound("st_1"),
+    ],
+)
+def test_a_fault_is_the_same_in_another_process(error: Exception) -> None:
+    again = pickle.loads(pickle.dumps(error))
+    assert (type(again), str(again), vars(again)) == (type(error), str(error), vars(error))
+
+
+def test_a_fault_as_text_and_as_data() -> None:
+    fault = Fault("/a", "out-of-range", "is out of range", -1, "> 0 m", "m")
+    assert str(fault) == "/a: is out of range (got -1; allowed: > 0 m)"
+    told = {"code": "out-of-range", "message": "is out of range", "value": -1, "allowed": "> 0 m", "unit": "m"}
+    assert fault.to_json() == {"pointer": "/a", **told}
+    assert faults.parameter_error("x", "required", "is missing").faults[0].to_json()["parameter"] == "x"
