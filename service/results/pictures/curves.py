@@ -78,18 +78,18 @@ def draw_curves(curves: Curves, title: str, picture: Picture) -> bytes:
     Raises SelectionError when there are more curves or points than one picture can show.
     """
     require_drawable([curves])
-    return _draw(curves_figure([("", curves)], by_unit=True), title, picture)
+    return draw_figure(curves_figure([("", curves)], by_unit=True), title, picture)
 
 
 def draw_compare(drawn: Sequence[tuple[str, Curves]], picture: Picture) -> bytes:
     """Curves of studies, each with its name, a plot for each result; raises SelectionError as `draw_curves` does."""
     require_drawable([curves for _, curves in drawn])
-    return _draw(curves_figure(drawn), "", picture)
+    return draw_figure(curves_figure(drawn), "", picture)
 
 
 def draw_motion(made: Trajectory, shown: Presentation, title: str, picture: Picture) -> bytes:
     """The motion of one case: its variables above the states of the parts of the machine."""
-    return _draw(motion_figure(made, shown), title, picture)
+    return draw_figure(motion_figure(made, shown), title, picture)
 
 
 def require_drawable(drawn: Sequence[Curves]) -> None:
@@ -100,7 +100,8 @@ def require_drawable(drawn: Sequence[Curves]) -> None:
     check_size("points", points, MAX_PICTURE_POINTS)
 
 
-def _draw(figure: Described, title: str, picture: Picture) -> bytes:
+def draw_figure(figure: Described, title: str, picture: Picture) -> bytes:
+    """Any described figure as a picture."""
     legend = 0.24 * len(figure.listed) / _COLUMNS if figure.studies > 1 else 0.5 * len(figure.spans)
     size = (8.0, 1.2 + (2.1 if figure.motion else 3.6) * figure.rows + legend)
     return render(partial(paint_figure, drawn=figure, title=title), picture, size)
