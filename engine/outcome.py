@@ -57,6 +57,35 @@ class Trajectory:
 
 
 @dataclass(frozen=True, slots=True)
+class Portrait:
+    """How one case comes to its motion: its state at the strobes, one excitation period apart, and the orbit.
+
+    Attributes
+    ----------
+    regime : str
+        Name of the settled motion's regime; "" for a run of a given time.
+    order : int
+        Excitation periods in one turn of the orbit; 0 where there is none.
+    strobes : Trajectory
+        From the start (of a long run, the last ones): shaft's speed, pendulums' angles, speeds and windups, states.
+    orbit : Trajectory
+        Whole turns of the settled motion, equally spaced, the first point again at the end; no points where there is
+        no orbit. Its times count from the start of an excitation period.
+    points : int
+        Points of the orbit in one excitation period: every so many of them is a strobe.
+    ending : Ending
+        Of the run to the settled motion, or of the given time.
+    """
+
+    regime: str
+    order: int
+    strobes: Trajectory
+    orbit: Trajectory
+    points: int
+    ending: Ending
+
+
+@dataclass(frozen=True, slots=True)
 class Engagement:
     """One stretch in which a clutch transmits torque.
 

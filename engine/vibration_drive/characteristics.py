@@ -86,6 +86,31 @@ def characteristics(lay: Layout, matrix: Floats, sums: Floats) -> Floats:
     return np.column_stack([out[info.name] for info in result_infos(lay.n)])
 
 
+def tied_clutches(lay: Layout, matrix: Floats, sums: Floats) -> NDArray[np.bool_]:
+    """Clutches that stay in interaction with a held shaft, without letting go: their pendulums' angles and windups
+    differ by a constant all the time.
+
+    Parameters
+    ----------
+    lay, matrix, sums :
+        As of ``characteristics``, over a whole turn of an orbit.
+
+    Returns
+    -------
+    array, shape (cases, pendulums)
+        A clutch that takes up its backlash all the time is among them where nothing else happens.
+    """
+    cases = _Cases(lay, matrix, sums)
+    held = cases.shaft("time_rotating") == 0.0
+    columns = []
+    for i in range(lay.n):
+        wound = (cases.pendulum(i, "time_engaged") == cases.shaft("time_held")) & (
+            cases.pendulum(i, "engagements") == 0.0
+        )
+        columns.append(held & (wound | (sums[:, OUT_EVENTS] == 0.0)))
+    return np.column_stack(columns)
+
+
 _SMALLEST = ("speed_min", "p_phi_min", "p_speed_min", "p_acc_min")
 _LARGEST = (
     "speed_max", "acc_max", "sum_max", "power_max", "driving_max", "p_phi_max", "p_speed_max", "p_acc_max",

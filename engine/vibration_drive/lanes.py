@@ -281,8 +281,9 @@ def settle(
             Z[lane, ev.EVENTS_IN_PERIOD] = 0
             if Z[lane, ev.PERIOD] < turns.shape[1]:
                 turns[lane, Z[lane, ev.PERIOD]] = W[lay.turn * lanes + lane]
-        if at_strobe and 0 < Z[lane, ev.PERIOD] <= strobes.shape[1]:
-            note(W, Z, lay, lane, strobe, strobes[case, Z[lane, ev.PERIOD] - 1])
+        kept = strobes.shape[1]
+        if at_strobe and kept > 0 and Z[lane, ev.PERIOD] > 0:
+            note(W, Z, lay, lane, strobe, strobes[case, (Z[lane, ev.PERIOD] - 1) % kept])
         if not next_stop(W, Z, lay, lane, cases, strobe, sums[case]):
             ending = _OK
     if ending == _RUNNING:

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from sprag.engine.compile.jit import compiled, part
 from sprag.engine.vibration_drive.orbits import list_free, same_states, tie
+from sprag.engine.vibration_drive.strobes import ANGLE, PENDULUM_WIDTH, SHAFT_WIDTH, WINDUP
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 #: Rises of the power of two in the power method that squares: beyond it nothing changes any more.
 _SQUARINGS = 44
@@ -120,6 +122,44 @@ def spectral_radius(a: Floats, n: int) -> float:
     return math.exp(log_norm)
 
 
+@part
+def _place(columns: Ints, n: int, column: int) -> int:
+    """Where a column stands among the first ``n``; -1 where it does not."""
+    for k in range(n):
+        if columns[k] == column:
+            return k
+    return -1
+
+
+@part
+def _tie_windups(jacobian: Floats, move: Floats, columns: Ints, n: int, tied: Flags) -> int:
+    """Let windups of tied clutches move with their angles, and locked pendulums not at all; how many columns are left.
+
+    The angle of a tied clutch's pendulum and its windup differ by a constant: another one is another orbit, no
+    disturbance that has to die away.
+    """
+    for i in range(tied.shape[0]):
+        if not tied[i]:
+            continue
+        base = SHAFT_WIDTH + i * PENDULUM_WIDTH
+        gone = _place(columns, n, base + WINDUP)
+        angle = _place(columns, n, base + ANGLE)
+        if gone >= 0:
+            for row in range(n):
+                jacobian[row, angle] += jacobian[row, gone]
+        else:
+            gone = angle
+        n -= 1
+        for row in range(gone, n):
+            columns[row], move[row] = columns[row + 1], move[row + 1]
+            for column in range(n + 1):
+                jacobian[row, column] = jacobian[row + 1, column]
+        for column in range(gone, n):
+            for row in range(n):
+                jacobian[row, column] = jacobian[row, column + 1]
+    return n
+
+
 @compiled
 def step(
     points: Floats,
@@ -128,6 +168,7 @@ def step(
     units: Floats,
     size: float,
     steady_shaft: bool,
+    tied: Flags,
     moved: Floats,
     told: Floats,
 ) -> None:
@@ -140,6 +181,8 @@ def step(
         Where the rows of `disturb` came to.
     first, units, size, steady_shaft :
         As of `disturb`.
+    tied : array, shape (points, pendulums)
+        Clutches that stay as they are between pendulum and a held shaft (`characteristics.tied_clutches`).
     moved : array, shape (points, columns)
         Gets the points after the step.
     told : array, shape (points, 4)
@@ -165,18 +208,25 @@ def step(
             for j in range(n):
                 change = ends[first[k] + 1 + j, columns[i]] - base[columns[i]]
                 jacobian[i, j] = change / (units[k, columns[i]] * size)
-                matrix[i, j] = (1.0 if i == j else 0.0) - jacobian[i, j]
             move[i] = (base[columns[i]] - points[k, columns[i]]) / units[k, columns[i]]
         residual = 0.0
         for i in range(n):
             residual = max(residual, abs(move[i]))
         told[k, RESIDUAL] = residual
+        n = _tie_windups(jacobian, move, columns, n, tied[k])
         told[k, MULTIPLIER] = spectral_radius(jacobian, n)
+        for i in range(n):
+            for j in range(n):
+                matrix[i, j] = (1.0 if i == j else 0.0) - jacobian[i, j]
         if not _solve(matrix, move, n):
             continue
         largest = 0.0
         for i in range(n):
             largest = max(largest, abs(move[i]))
             moved[k, columns[i]] += move[i] * units[k, columns[i]]
+        for i in range(tied.shape[1]):
+            base = SHAFT_WIDTH + i * PENDULUM_WIDTH
+            if tied[k, i]:
+                moved[k, base + WINDUP] += moved[k, base + ANGLE] - points[k, base + ANGLE]
         tie(moved[k])
         told[k, STEP] = largest

@@ -33,7 +33,7 @@ _SENTENCES = {
     Regime.PERIODIC: (
         "The motion repeats itself after regime.order excitation periods, and disturbances of it die away."
     ),
-    Regime.HELD: "The pendulums settle to a periodic motion and never turn the shaft.",
+    Regime.HELD: "The pendulums settle to a periodic motion, or to rest, and never turn the shaft.",
     Regime.COASTING: "Without a load the shaft turns steadily at the limit of a vanishing load.",
     Regime.IRREGULAR: (
         "The motion never repeats itself but its means are steady: means stand with the half width of their 95 % "

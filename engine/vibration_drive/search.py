@@ -12,11 +12,24 @@ from numpy.typing import NDArray
 from sprag.engine.endings import ENDING_CODES, Ending
 from sprag.engine.run import Run, SettledRun
 from sprag.engine.vibration_drive import newton, orbits
+from sprag.engine.vibration_drive.automaton import Clutch
 from sprag.engine.vibration_drive.cases import with_lengths
+from sprag.engine.vibration_drive.characteristics import tied_clutches
 from sprag.engine.vibration_drive.integration import Integration, integrate
 from sprag.engine.vibration_drive.kernel import Kernel
 from sprag.engine.vibration_drive.lanes import OUT_ENDING, OUT_EVENTS, OUT_STEPS
-from sprag.engine.vibration_drive.strobes import BEGIN, FRACTION, NOT_GIVEN, SHAFT, TURN, from_rest, width
+from sprag.engine.vibration_drive.strobes import (
+    BEGIN,
+    CLUTCH,
+    FRACTION,
+    NOT_GIVEN,
+    PENDULUM_WIDTH,
+    SHAFT,
+    SHAFT_WIDTH,
+    TURN,
+    from_rest,
+    width,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -175,7 +188,8 @@ class Search:
             last = orders[where][disturbed] - 1
             moved, told = np.empty_like(own), np.empty((len(where), 4))
             ends = np.ascontiguousarray(done.strobes[np.arange(len(last)), last])
-            newton.step(own, ends, first, units[where], DISTURBANCE, self.steady_shaft, moved, told)
+            tied = self._tied(cases[where], own, orders[where], done.sums[first[:-1]])
+            newton.step(own, ends, first, units[where], DISTURBANCE, self.steady_shaft, tied, moved, told)
             away = np.empty(len(where))
             orbits.distances(moved, begun[where], units[where], away)
             residual, size, multiplier = told[:, newton.RESIDUAL], told[:, newton.STEP], told[:, newton.MULTIPLIER]
@@ -214,6 +228,12 @@ class Search:
         )
         done = integrate(self.kernel, matrix, self.run, starts=rows[:count], strobes=int(orders.max()))
         return of_row, first, done
+
+    def _tied(self, cases: Ints, points: Floats, orders: Ints, sums: Floats) -> Flags:
+        """Clutches of orbits that never let go of a held shaft, shape (orbits, pendulums)."""
+        matrix = with_lengths(self.matrix[cases], points[:, BEGIN], orders.astype(float), windowed=True)
+        interacts: Flags = points[:, SHAFT_WIDTH + CLUTCH :: PENDULUM_WIDTH] != Clutch.FREE
+        return interacts & tied_clutches(self.kernel.LAYOUT, matrix, sums)
 
     def _failed(self, cases: Ints) -> None:
         """Let cases run on before the next search."""

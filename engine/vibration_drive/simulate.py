@@ -14,15 +14,16 @@ from sprag.engine.run import Run, SettledRun
 from sprag.engine.vibration_drive.automaton import Clutch, Shaft
 from sprag.engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count
 from sprag.engine.vibration_drive.characteristics import characteristics
-from sprag.engine.vibration_drive.integration import PENDULUM_SAMPLES, SHAFT_SAMPLES, integrate
+from sprag.engine.vibration_drive.integration import PENDULUM_SAMPLES, SHAFT_SAMPLES, Integration, integrate
 from sprag.engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
 from sprag.engine.vibration_drive.lanes import OUT_ENDING
 from sprag.engine.vibration_drive.parameters import PARAMETERS
 
 Floats = NDArray[np.float64]
 
-_CLUTCH_NAMES = {int(state): state.name.lower() for state in Clutch}
-_SHAFT_NAMES = {int(state): state.name.lower() for state in Shaft}
+#: States as trajectories tell them, by their numbers.
+CLUTCH_NAMES = {int(state): state.name.lower() for state in Clutch}
+SHAFT_NAMES = {int(state): state.name.lower() for state in Shaft}
 
 
 def _kernel(columns: Mapping[str, ArrayLike], run: Run) -> Kernel:
@@ -115,9 +116,25 @@ def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike) -> 
         raise ValueError(f"times must ascend within 0 .. {end:g} s")
     periods = np.minimum(asked * frequency, run.duration.in_periods(frequency))
     found = integrate(_kernel(values, run), case_matrix(values, run, 1), run, times=periods)
+    return sampled(values, found, asked)
+
+
+def sampled(values: Mapping[str, float], found: Integration, times: Floats) -> Trajectory:
+    """The instantaneous values that a call of the kernel has left of one case, by name.
+
+    Parameters
+    ----------
+    values : mapping
+        The case, as for ``trajectory``.
+    found : Integration
+        Of a call that was asked for samples.
+    times : array, shape (m,)
+        The same times in s, from the start of an excitation period.
+    """
     n, done = pendulum_count(values), found.recorded
+    frequency = values["excitation.frequency"]
     names, units = _trajectory_columns(n)
-    times_done, samples, states = asked[:done], found.samples[:done], found.states[:done]
+    times_done, samples, states = times[:done], found.samples[:done], found.states[:done]
     defaults = {parameter.path: parameter.default for parameter in PARAMETERS}
     value = {**{k: v for k, v in defaults.items() if v is not None}, **values}
     nu = 2.0 * math.pi * frequency
@@ -144,9 +161,9 @@ def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike) -> 
         out[f"pendulums.{i}.power.loss"] = damping * block[:, 1] ** 2
     out["power.input"] = sum((out[f"pendulums.{i}.power.input"] for i in range(n)), np.zeros(done))
     out["power.loss"] = sum((out[f"pendulums.{i}.power.loss"] for i in range(n)), np.zeros(done))
-    named = {"shaft": [_SHAFT_NAMES[int(s)] for s in states[:, 0]]}
+    named = {"shaft": [SHAFT_NAMES[int(s)] for s in states[:, 0]]}
     for i in range(n):
-        named[f"pendulums.{i}"] = [_CLUTCH_NAMES[int(s)] for s in states[:, 1 + i]]
+        named[f"pendulums.{i}"] = [CLUTCH_NAMES[int(s)] for s in states[:, 1 + i]]
     ending = ENDING_CODES[int(found.sums[0, OUT_ENDING])]
     return Trajectory(times_done, names, units, np.column_stack([out[name] for name in names]), named, ending)
 

@@ -49,6 +49,27 @@ def from_rest(cases: int, pendulums: int) -> Floats:
     return rows
 
 
+def in_order(recorded: Floats, periods: Ints) -> Floats:
+    """The last strobes of each case, the newest last, of rows that the kernel has filled around and around.
+
+    Parameters
+    ----------
+    recorded : array, shape (cases, kept, columns)
+    periods : array, shape (cases,)
+        Whole periods that each case was run.
+
+    Returns
+    -------
+    array, shape (cases, kept, columns)
+        Where a case has fewer strobes, the first rows are as of `from_rest`: like no other strobe.
+    """
+    cases, kept, columns = recorded.shape
+    number = periods[:, None] - kept + np.arange(kept)
+    rows: Floats = recorded[np.arange(cases)[:, None], number % kept]
+    rows[number < 0] = from_rest(1, (columns - SHAFT_WIDTH) // PENDULUM_WIDTH)[0]
+    return rows
+
+
 @part
 def begin_at(W: Floats, Z: Ints, lay: Layout, lane: int, start: Floats) -> None:
     """Put a lane, whose case has just been loaded, into the state of a strobe."""

@@ -144,6 +144,25 @@ def test_the_multiplier_of_a_pendulum_that_never_engages_is_its_damping() -> Non
     assert row["regime.multiplier"] == pytest.approx(math.exp(-0.01 / 25.0 / (2.0 * 0.001)), abs=1e-6)
 
 
+def test_a_pendulum_that_comes_to_rest_on_its_clutch_holds_the_shaft() -> None:
+    """It leans on a clutch that never lets go: another windup is another rest, and does not make this one unstable."""
+    moment, inertia, damping = 0.5 * 9.80665 * 0.03, 0.001, 0.5
+    leaning = {
+        "pendulums__0__spring_rate": 0.0, "pendulums__0__initial_angle": 0.3, "pendulums__0__damping": damping,
+    }  # fmt: skip
+    row, regime = _settled(_one(25.0, 0.0, 0.2, **leaning))
+    assert regime is Regime.HELD
+    assert row["regime.order"] == 1
+    assert row["torque.mean"] == pytest.approx(moment * math.sin(row["pendulums.0.angle.mean"]), rel=1e-9)
+    assert row["pendulums.0.angle.max"] - row["pendulums.0.angle.min"] < 1e-9
+    assert row["regime.multiplier"] == pytest.approx(math.exp(-damping / 25.0 / (2.0 * inertia)), abs=1e-6)
+    locks = {"pendulums__0__backlash": 0.0, "clutch__coefficients__0": 1.0}
+    row, regime = _settled(_one(25.0, 0.0, 0.2, **leaning, **locks))
+    assert regime is Regime.HELD
+    assert row["regime.multiplier"] == row["shaft.speed.max"] == 0.0
+    assert row["torque.max"] == pytest.approx(moment * math.sin(row["pendulums.0.angle.mean"]), rel=1e-9)
+
+
 @pytest.mark.parametrize(
     "changes",
     [

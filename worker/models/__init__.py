@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from sprag.engine import ENGINE_VERSION, Ending, Run, Span
 from sprag.engine.catalogue import Parameter, ResultInfo
 from sprag.engine.machine_shaft.problems import ExpressionError, InsufficientInertiaError, MachineError, TableError
-from sprag.engine.outcome import Engagements, Trajectory
+from sprag.engine.outcome import Engagements, Portrait, Trajectory
 from sprag.engine.run import MEANS_FROM_PERIODS
 from sprag.engine.sources import engine_folder, source_hash
 from sprag.engine.vibration_drive.clutch import (
@@ -84,6 +84,7 @@ __all__ = [
     "Model",
     "Panel",
     "Parameter",
+    "Portrait",
     "Presentation",
     "ResultInfo",
     "Run",
@@ -106,6 +107,7 @@ __all__ = [
     "fit_clutch",
     "flags_of",
     "has_clutches",
+    "has_strobes",
     "is_compiled",
     "is_settled",
     "kernel_source",
@@ -124,6 +126,7 @@ __all__ = [
     "run_chunk",
     "run_engagements",
     "run_of",
+    "run_portrait",
     "run_task",
     "run_trajectory",
     "settled_study",
@@ -276,6 +279,16 @@ def has_clutches(study: Study) -> bool:
 def run_engagements(study: Study, case: int) -> Engagements:
     """What the clutches of one case do; ValueError where its machine has none."""
     return model_of(study.model).engagements(study, case)
+
+
+def has_strobes(study: Study) -> bool:
+    """Whether the cases of ``study`` have a `run_portrait`."""
+    return model_of(study.model).has_strobes
+
+
+def run_portrait(study: Study, case: int) -> Portrait:
+    """How one case comes to its motion, strobe by strobe; ValueError where its machine has no strobes."""
+    return model_of(study.model).portrait(study, case)
 
 
 def estimate_seconds_per_case(study: Study) -> float:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from sprag.engine import Ending
     from sprag.engine.catalogue import Parameter, ResultInfo
-    from sprag.engine.outcome import Engagements, Trajectory
+    from sprag.engine.outcome import Engagements, Portrait, Trajectory
     from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
     from sprag.worker.study import Study
 
@@ -90,6 +90,15 @@ class Model(Protocol):
     def engagements(self, study: Study, case: int) -> Engagements:
         """What the clutches of one case do; ValueError where there are none."""
         raise ValueError(f"a machine of model {self.name} has no clutches")
+
+    @property
+    def has_strobes(self) -> bool:
+        """Whether its cases are looked at once in each period of an excitation, so that there is a `portrait`."""
+        return False
+
+    def portrait(self, study: Study, case: int) -> Portrait:
+        """How one case comes to its motion; ValueError where there are no strobes."""
+        raise ValueError(f"a machine of model {self.name} has no strobes")
 
     def estimate_seconds_per_case(self, study: Study) -> float:
         """Rough time of one case on one core, in s."""

@@ -24,6 +24,8 @@ REGIME_FLAGS: Final[dict[str, str]] = {
 }
 #: Periods that a periodic case takes on average, and the share of cases that take all they may (docs/performance.md).
 _PERIODIC_PERIODS, _IRREGULAR_SHARE = 150.0, 0.12
+#: Periods that a run of a given time is followed on, on average: so many times its own, at most so many.
+_FOLLOWED_TIMES, _FOLLOWED_PERIODS = 2.0, 120.0
 
 
 def is_settled(run: Mapping[str, Any]) -> bool:
@@ -51,6 +53,11 @@ def settled_study(study: Study, at_most: int | None = None) -> Study:
     run: dict[str, Any] = {"at_most": usual.at_most, "settled": usual.settled, "max_period": usual.max_period}
     run |= {name: value for name, value in study.run.items() if name not in {"duration", "window"}}
     return replace(study, run=run | {"until": SETTLED} | ({} if at_most is None else {"at_most": at_most}))
+
+
+def followed_periods(periods: float) -> float:
+    """About the periods for which a run of a given time is followed on, on average, to judge whether it had settled."""
+    return min(_FOLLOWED_TIMES * periods, _FOLLOWED_PERIODS)
 
 
 def mean_periods(run: Mapping[str, Any]) -> float:

@@ -21,7 +21,7 @@ from sprag.engine.vibration_drive.results import result_infos
 from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
 from sprag.worker.models.drive_presentation import PRESENTATION
 from sprag.worker.models.model import Model
-from sprag.worker.models.settled import REGIME_FLAGS, is_settled, mean_periods, settings_of
+from sprag.worker.models.settled import REGIME_FLAGS, followed_periods, is_settled, mean_periods, settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.engine.catalogue import Parameter, ResultInfo
-    from sprag.engine.outcome import Engagements, Trajectory
+    from sprag.engine.outcome import Engagements, Portrait, Trajectory
     from sprag.engine.run import Reset, Unit
     from sprag.worker.study import Study
 
@@ -37,13 +37,12 @@ MODEL = "vibration-drive"
 
 #: Flag of a case some of whose clutches worked beyond the end of the measured data.
 WINDUP_OUT_OF_DATA = "windup_out_of_data"
-#: Flag of a case whose window shows no steady motion, and the share of the work from which on it is raised.
+#: Flag of a case whose window does not show the settled motion.
 NOT_SETTLED = "not_settled"
-SETTLED_SHARE = 0.01
 FLAG_SENTENCES: dict[str, str] = {
     NOT_SETTLED: (
-        "The machine's own energy changed over the window by more than 1 % of the work done: the motion had not "
-        "settled, and means (the efficiency above all) are not those of steady running."
+        "The motion had not settled in the window: the settled mean speed (with the shaft held, the swing of a "
+        "pendulum) is another by more than 1 %. Results are not those of steady running."
     ),
     WINDUP_OUT_OF_DATA: "Some clutch was wound up beyond the measured data; its law was continued straight there.",
     **REGIME_FLAGS,
@@ -98,17 +97,17 @@ def run_of(run: Mapping[str, Any]) -> Run:
     )
 
 
-def _flags(infos: Iterable[ResultInfo], values: NDArray[np.float64]) -> list[str]:
-    """Flags of every case, joined by commas."""
+def _flags(
+    infos: Iterable[ResultInfo], values: NDArray[np.float64], not_settled: NDArray[np.bool_] | None = None
+) -> list[str]:
+    """Flags of every case, joined by commas; ``not_settled`` of runs of a given time."""
     column = {info.name: values[:, index] for index, info in enumerate(infos)}
     beyond = np.column_stack([values for name, values in column.items() if name.endswith(".fraction.beyond_data")])
     raised = {WINDUP_OUT_OF_DATA: np.any(beyond > 0.0, axis=1)}
     if "regime" in column:
         raised |= {flag: column["regime"] == Regime[flag.upper()] for flag in REGIME_FLAGS}
-    else:
-        work = [np.abs(column[f"power.{kind}.mean"]) for kind in ("input", "loss", "useful")]
-        unsteady = np.abs(column["power.stored.mean"]) > SETTLED_SHARE * np.max(work, axis=0)
-        raised = {NOT_SETTLED: unsteady, **raised}
+    if not_settled is not None:
+        raised = {NOT_SETTLED: not_settled, **raised}
     return [",".join(name for name, cases in raised.items() if cases[case]) for case in range(len(values))]
 
 
@@ -133,7 +132,8 @@ def _mean_periods(study: Study) -> float:
             break
     else:
         frequency = study.base["excitation.frequency"]
-    return duration.in_periods(frequency)
+    periods = duration.in_periods(frequency)
+    return periods + followed_periods(periods)
 
 
 def kernel_source(pendulums: int, coefficients: int, tolerance: float) -> str:
@@ -179,15 +179,16 @@ class VibrationDrive(Model):
 
     def run(self, task: ChunkTask) -> ChunkResult:
         from sprag.engine.vibration_drive.settle import settle
-        from sprag.engine.vibration_drive.simulate import simulate
+        from sprag.engine.vibration_drive.transients import simulate_judged
 
         number = _key_of(task.shape).pendulums
         if is_settled(task.run):
             settled = settle(task.columns, settings_of(task.run), cases=task.count)
             flags = _flags(settled_infos(number), settled.values)
             return chunk_result(task.first, settled.endings, flags, settled.values)
-        batch = simulate(task.columns, run_of(task.run), cases=task.count)
-        return chunk_result(task.first, batch.endings, _flags(result_infos(number), batch.values), batch.values)
+        judged = simulate_judged(task.columns, run_of(task.run), cases=task.count)
+        batch, flags = judged.batch, _flags(result_infos(number), judged.batch.values, judged.off)
+        return chunk_result(task.first, batch.endings, flags, batch.values)
 
     def extent(self, study: Study, case: int) -> Extent:
         """The run of one case; its periods are those of the excitation.
@@ -217,6 +218,18 @@ class VibrationDrive(Model):
         if is_settled(study.run):
             return settled_engagements(columns, settings_of(study.run))
         return engagements(columns, run_of(study.run))
+
+    @property
+    def has_strobes(self) -> bool:
+        return True
+
+    def portrait(self, study: Study, case: int) -> Portrait:
+        from sprag.engine.vibration_drive.portrait import portrait, settled_portrait
+
+        columns = {**study.base, **study.case_parameters(case)}
+        if is_settled(study.run):
+            return settled_portrait(columns, settings_of(study.run))
+        return portrait(columns, run_of(study.run))
 
     def estimate_seconds_per_case(self, study: Study) -> float:
         from sprag.engine.vibration_drive.simulate import estimate_seconds

@@ -1,0 +1,149 @@
+"""How one case comes to its motion: the states at its strobes, and the orbit that they come to."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.outcome import Portrait, Trajectory
+from sprag.engine.run import Run, SettledRun, Span
+from sprag.engine.vibration_drive.automaton import Clutch
+from sprag.engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count, with_lengths
+from sprag.engine.vibration_drive.integration import integrate
+from sprag.engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
+from sprag.engine.vibration_drive.lanes import OUT_ENDING
+from sprag.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag.engine.vibration_drive.settle import settle
+from sprag.engine.vibration_drive.simulate import CLUTCH_NAMES, SHAFT_NAMES, sampled
+from sprag.engine.vibration_drive.strobes import (
+    ANGLE,
+    BEGIN,
+    CLUTCH,
+    PENDULUM_WIDTH,
+    SHAFT,
+    SHAFT_SPEED,
+    SHAFT_WIDTH,
+    SPEED,
+    WINDUP,
+    in_order,
+)
+
+Floats = NDArray[np.float64]
+
+#: Strobes that are told at most: the last ones of a longer run.
+MAX_STROBES = 1000
+#: Strobes of a settled case at least, and turns of its orbit after it is settled.
+_LEAST, _TURNS = 40, 2
+#: Points of an orbit in one period, and of a whole orbit about at most.
+_POINTS, _ALL_POINTS, _LEAST_POINTS = 400, 6000, 40
+
+
+def portrait(columns: Mapping[str, ArrayLike], run: Run) -> Portrait:
+    """The strobes of a run of a given time; there is no orbit.
+
+    Parameters
+    ----------
+    columns : mapping
+        As for ``simulate``, scalars only.
+    run : Run
+
+    Raises
+    ------
+    ValueError
+        If a required parameter is missing or the number of pendulums or coefficients is out of range.
+    """
+    values = _scalars(columns)
+    frequency = values["excitation.frequency"]
+    periods = int(run.duration.in_periods(frequency) * (1.0 + 1e-12))
+    ending, strobes = _strobes(values, run, periods)
+    return Portrait("", 0, strobes, _nothing(), 0, ending)
+
+
+def settled_portrait(columns: Mapping[str, ArrayLike], settings: SettledRun) -> Portrait:
+    """The strobes of a case from its own start until it is settled, and one turn of its orbit.
+
+    Of an irregular or unsettled motion the strobes of the whole search are told, and there is no orbit.
+
+    Parameters
+    ----------
+    columns : mapping
+        As for ``simulate``, scalars only.
+    settings : SettledRun
+
+    Raises
+    ------
+    ValueError
+        If a required parameter is missing or the number of pendulums or coefficients is out of range.
+    """
+    values = _scalars(columns)
+    found = settle(values, settings, cases=1)
+    regime, ending = Regime(int(found.regimes[0])), ENDING_CODES[int(found.endings[0])]
+    names = [info.name for info in settled_infos(pendulum_count(values))]
+    row = dict(zip(names, found.values[0].tolist(), strict=True))
+    repeats = regime in (Regime.PERIODIC, Regime.HELD, Regime.COASTING)
+    order = int(row["regime.order"]) if repeats else 0
+    run = Run(
+        duration=Span(float(settings.at_most)),
+        tolerance=settings.tolerance,
+        reset=settings.reset,
+        max_events_per_period=settings.max_events_per_period,
+    )
+    periods = settings.at_most
+    if repeats and row["regime.settled_after"] < periods:
+        periods = min(periods, max(_LEAST, int(np.ceil(row["regime.settled_after"])) + _TURNS * order))
+    _, strobes = _strobes(values, run, periods)
+    if not order:
+        return Portrait(regime.name.lower() if regime else "", 0, strobes, _nothing(), 0, ending)
+    orbit, points = _orbit(values, run, found.points, order)
+    return Portrait(regime.name.lower(), order, strobes, orbit, points, ending)
+
+
+def _scalars(columns: Mapping[str, ArrayLike]) -> dict[str, float]:
+    return {path: float(np.asarray(value)) for path, value in columns.items()}
+
+
+def _kernel(values: Mapping[str, float], run: Run) -> Kernel:
+    return kernel(pendulum_count(values), coefficient_count(values), order_for(run.tolerance), lane_count())
+
+
+def _nothing() -> Trajectory:
+    return Trajectory(np.empty(0), (), (), np.empty((0, 0)), {}, Ending.OK)
+
+
+def _strobes(values: Mapping[str, float], run: Run, periods: int) -> tuple[Ending, Trajectory]:
+    """How the case ends, and its last strobes."""
+    n = pendulum_count(values)
+    matrix = with_lengths(case_matrix(values, run, 1), np.zeros(1), np.array([float(periods)]), windowed=False)
+    kept = min(periods, MAX_STROBES)
+    done = integrate(_kernel(values, run), matrix, run, strobes=kept)
+    ending = ENDING_CODES[int(done.sums[0, OUT_ENDING])]
+    # A run that did not end ok has no more than its first strobes.
+    rows = in_order(done.strobes, np.array([periods]))[0] if kept else done.strobes[0]
+    told = ~np.isnan(rows[:, SHAFT])
+    rows, numbers = rows[told], np.arange(periods - kept, periods)[told]
+    names, units, columns = ["shaft.speed"], ["rad/s"], [rows[:, SHAFT_SPEED]]
+    states = {"shaft": [SHAFT_NAMES[int(state)] for state in rows[:, SHAFT]]}
+    for i in range(n):
+        own = rows[:, SHAFT_WIDTH + i * PENDULUM_WIDTH :]
+        names += [f"pendulums.{i}.{name}" for name in ("angle", "speed", "windup")]
+        units += ["rad", "rad/s", "rad"]
+        windup = np.where(own[:, CLUTCH] >= Clutch.ENGAGED, own[:, WINDUP], 0.0)
+        columns += [own[:, ANGLE], own[:, SPEED], windup]
+        states[f"pendulums.{i}"] = [CLUTCH_NAMES[int(state)] for state in own[:, CLUTCH]]
+    times = (numbers + 1) / values["excitation.frequency"]
+    return ending, Trajectory(times, tuple(names), tuple(units), np.column_stack(columns), states, ending)
+
+
+def _orbit(values: Mapping[str, float], run: Run, points: Floats, order: int) -> tuple[Trajectory, int]:
+    """One turn of an orbit from the state ``points`` (shape (1, columns)) on it, and its points in a period."""
+    each = max(_LEAST_POINTS, min(_POINTS, _ALL_POINTS // order))
+    begin = float(points[0, BEGIN])
+    # The turn begins with the first whole period.
+    first = np.ceil(begin)
+    matrix = with_lengths(
+        case_matrix(values, run, 1), points[:, BEGIN], np.array([first + order - begin]), windowed=False
+    )
+    turn = np.arange(order * each + 1) / each
+    found = integrate(_kernel(values, run), matrix, run, starts=points, times=first + turn)
+    return sampled(values, found, turn / values["excitation.frequency"]), each

@@ -1,0 +1,178 @@
+"""Runs of a given time, and whether their windows show the settled motion (docs/theory.md, "Runs of a given time").
+
+Every decision about a case follows from that case alone, so its flag does not depend on the batch.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.outcome import Batch
+from sprag.engine.run import Run, SettledRun
+from sprag.engine.vibration_drive.cases import (
+    SHAFT_COLUMNS,
+    STOPS,
+    Column,
+    case_matrix,
+    coefficient_count,
+    pendulum_count,
+    with_lengths,
+)
+from sprag.engine.vibration_drive.characteristics import characteristics
+from sprag.engine.vibration_drive.integration import integrate
+from sprag.engine.vibration_drive.kernel import kernel, lane_count, order_for
+from sprag.engine.vibration_drive.lanes import OUT_ENDING
+from sprag.engine.vibration_drive.results import result_infos
+from sprag.engine.vibration_drive.search import ROUND, Search
+from sprag.engine.vibration_drive.simulate import simulate
+from sprag.engine.vibration_drive.strobes import BEGIN, SHAFT_SPEED, TURN, in_order
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+#: Share of the settled mean from which on the mean over the window is off.
+OFF = 0.01
+#: Excitation periods that a run is followed on at most: so many times its own, and so many in all.
+TIMES, MOST = 6, 340
+#: Amplitude in rad below which a pendulum does not swing.
+_STILL = 1e-6
+#: The first of them, before the rounds of `ROUND`.
+_FIRST = 20
+#: Last periods of these whose mean stands for the settled one where no orbit was found.
+_MEAN_OVER = 160
+_OK = ENDING_CODES.index(Ending.OK)
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedBatch:
+    """Results of runs of a given time.
+
+    Attributes
+    ----------
+    batch : Batch
+        As of ``simulate.simulate``.
+    off : bool array, shape (cases,)
+        Whether the motion in the window was not the settled one: its mean speed is off by more than ``OFF``, or, with
+        the shaft held, the swing of a pendulum.
+    spent : array, shape (cases,)
+        Excitation periods that were computed for that beyond the run itself.
+    """
+
+    batch: Batch
+    off: Flags
+    spent: Floats
+
+
+def simulate_judged(columns: Mapping[str, ArrayLike], run: Run, *, cases: int) -> JudgedBatch:
+    """Run a batch of cases, and judge from their strobes whether they had settled.
+
+    The run of each case is followed on from its last strobe until the orbit is found that it goes to, at most
+    ``TIMES`` times as long and ``MOST`` periods.
+
+    Parameters
+    ----------
+    columns, run, cases :
+        As of ``simulate.simulate``.
+
+    Raises
+    ------
+    ValueError
+        If a required parameter is missing or the number of pendulums or coefficients is out of range.
+    """
+    if cases == 0:
+        return JudgedBatch(simulate(columns, run, cases=0), np.zeros(0, dtype=np.bool_), np.zeros(0))
+    n = pendulum_count(columns)
+    module = kernel(n, coefficient_count(columns), order_for(run.tolerance), lane_count())
+    matrix = case_matrix(columns, run, cases)
+    settings = SettledRun(
+        at_most=MOST + ROUND,
+        tolerance=run.tolerance,
+        reset=run.reset,
+        max_events_per_period=run.max_events_per_period,
+    )
+    search = Search(module, matrix, settings)
+    kept = search.history.shape[1]
+    done = integrate(module, matrix, run, strobes=kept)
+    endings = done.sums[:, OUT_ENDING].astype(np.int8)
+    values = characteristics(module.LAYOUT, matrix, done.sums)
+    batch = Batch(values, endings)
+    duration = np.sum(matrix[:, SHAFT_COLUMNS + 2 * (STOPS - 1) : SHAFT_COLUMNS + 2 * STOPS], axis=1)
+    periods = np.floor(duration).astype(np.int64)
+    ran = endings == _OK
+    search.history[ran] = in_order(done.strobes[ran], periods[ran])
+    search.starts[ran] = search.history[ran, -1]
+    search.starts[:, TURN] = 0.0
+    search.count = kept
+    settled = _Settled(search, n, values)
+    _follow(search, np.flatnonzero(ran), np.minimum(TIMES * duration, MOST), settled)
+    return JudgedBatch(batch, ran & settled.off(values), search.spent)
+
+
+class _Settled:
+    """What is judged of the settled motions, as far as they are known, shape (cases, 1 + pendulums): mean speed of the
+    shaft, amplitude of each pendulum.
+    """
+
+    def __init__(self, search: Search, pendulums: int, values: Floats) -> None:
+        names = [info.name for info in result_infos(pendulums)]
+        swings = (f"pendulums.{i}.angle.amplitude" for i in range(pendulums))
+        self.columns = [names.index(name) for name in ("shaft.speed.mean", *swings)]
+        self.seen = values[:, self.columns].copy()
+        self._search = search
+
+    def off(self, values: Floats) -> Flags:
+        """Whether the windows show others."""
+        own = values[:, self.columns]
+        scale = np.abs(self.seen)
+        scale[:, 1:] = np.maximum(scale[:, 1:], _STILL)
+        off = np.abs(own - self.seen) > OFF * scale
+        held = (own[:, 0] == 0.0) & (self.seen[:, 0] == 0.0)
+        return np.where(held, np.any(off[:, 1:], axis=1), off[:, 0])
+
+    def lost(self, cases: Ints) -> None:
+        """Note cases that end otherwise than ok when they are followed on: their windows do not show what comes."""
+        self.seen[cases] = np.inf
+
+    def look(self, active: Ints) -> Ints:
+        """Write the means of cases whose orbits are found; the others, with the means of their last periods."""
+        search = self._search
+        found = search.look(active)
+        if len(found.cases):
+            lay, cases = search.kernel.LAYOUT, found.cases
+            turns = found.orders.astype(float)
+            matrix = with_lengths(search.matrix[cases], found.points[:, BEGIN], turns, windowed=True)
+            self.seen[cases] = characteristics(lay, matrix, found.sums)[:, self.columns]
+        active = active[~np.isin(active, found.cases)]
+        if not len(active):
+            return active
+        last = int(search.periods[active[0]])
+        if last:
+            over = min(last, _MEAN_OVER)
+            turned = np.add.reduce(search.turns[active, last - over : last], axis=1)
+            self.seen[active, 0] = turned / (over * search.matrix[active, Column.PERIOD])
+        speeds = search.history[active, -ROUND:, SHAFT_SPEED]
+        # Without a load nothing slows the shaft down: its speed is settled when no clutch changes it any more.
+        steady = (search.matrix[active, Column.LOAD] == 0.0) & np.all(speeds == speeds[:, :1], axis=1)
+        self.seen[active[steady], 0] = speeds[steady, 0]
+        others: Ints = active[~steady]
+        return others
+
+
+def _follow(search: Search, active: Ints, most: Floats, settled: _Settled) -> None:
+    """Run cases on, each for about as many periods as it may take, until their settled means are known."""
+    active = settled.look(active)
+    ran = 0
+    while True:
+        active = active[most[active] > ran]
+        if not len(active):
+            return
+        length = ROUND if ran else _FIRST
+        search.advance(active, length, windowed=False)
+        ran += length
+        ended = search.endings[active] != _OK
+        settled.lost(active[ended])
+        active = settled.look(active[~ended])
