@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 from zoneinfo import ZoneInfo
 
-from sprag.service.schedules.deadline import ALLOWED_OF_RUNS, FinishError, check_run_finish
+from sprag.service.schedules.deadline import ALLOWED_OF_RUNS, FinishError, check_run_finish, run_finish_at
 from sprag.service.schedules.times import Timing, TimingError, Window, check_cron, read_moment, read_time_of_day, zones
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.fields import read_flag, read_object, read_whole
@@ -22,6 +22,8 @@ _CRON_ALLOWED: Final = 'five fields, such as "0 22 * * 1-5": at 22:00 from Monda
 _AT_ALLOWED: Final = 'a time to come, such as "2027-01-31T22:00"'
 _WINDOW_ALLOWED: Final = 'two different times of day, such as ["22:00", "06:00"]'
 _LONGEST_CRON: Final = 200
+#: Runs of a new schedule whose window is compared with their deadline.
+_RUNS_LOOKED_AT: Final = 7
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +41,11 @@ class ScheduleFields:
     fresh: bool
     enabled: bool
     finish_by: str | None = None
+
+    @property
+    def times(self) -> tuple[Timing, Window | None, str | None, bool]:
+        """What tells when its runs begin, go on and end."""
+        return self.timing, self.window, self.finish_by, self.enabled
 
     def next_due(self, now: datetime) -> datetime | None:
         """The next due time; None for a schedule that is disabled or over."""
@@ -96,7 +103,31 @@ def _read(data: object, now: datetime, old: ScheduleFields | None = None) -> Sch
     name = _read_name(report, found.get("name"), title)
     report.raise_if_any()
     assert timing is not None
-    return ScheduleFields(name, spec, timing, window, priority or 0, bool(fresh), bool(enabled), finish_by)
+    fields = ScheduleFields(name, spec, timing, window, priority or 0, bool(fresh), bool(enabled), finish_by)
+    if old is None or fields.times != old.times:
+        _require_open_window(report, fields, now)
+        report.raise_if_any()
+    return fields
+
+
+def _require_open_window(report: Report, fields: ScheduleFields, now: datetime) -> None:
+    """Refuse a window that is closed from each due time to its deadline: no run would ever do anything."""
+    window, finish_by = fields.window, fields.finish_by
+    if window is None or finish_by is None:
+        return
+    due, looked_at = fields.next_due(now), 0
+    while due is not None and looked_at < _RUNS_LOOKED_AT:
+        if window.opens_between(due, run_finish_at(finish_by, fields.timing.zone, due)):
+            return
+        due, looked_at = fields.timing.next_after(due), looked_at + 1
+    if looked_at:
+        report.fault(
+            "/window",
+            "conflict",
+            f"is closed from each due time to its deadline ({finish_by}), so that no case would be run",
+            [f"{window.begin:%H:%M}", f"{window.end:%H:%M}"],
+            allowed=_WINDOW_ALLOWED,
+        )
 
 
 def _read_spec(report: Report, found: Mapping[str, Any], old: ScheduleFields | None) -> tuple[str, dict[str, Any]]:

@@ -126,6 +126,15 @@ class Window:
             return self.begin <= wall < self.end
         return wall >= self.begin or wall < self.end
 
+    def opens_between(self, begin: datetime, end: datetime) -> bool:
+        """Whether the window is open at any time from ``begin`` on and before ``end`` (UTC)."""
+        if self.open_at(begin):
+            return True
+        zone = ZoneInfo(self.zone)
+        today = begin.astimezone(zone).date()
+        openings = (datetime.combine(today + timedelta(days=day), self.begin, zone).astimezone(UTC) for day in range(3))
+        return next(opening for opening in openings if opening >= begin) < end
+
     def __str__(self) -> str:
         return f"{self.begin:%H:%M} to {self.end:%H:%M} ({self.zone})"
 

@@ -208,7 +208,7 @@ def _check_times(
             report.fault(
                 "/run/duration",
                 "out-of-range",
-                f"is {duration:.6g} excitation periods at {frequency:.6g} Hz",
+                f"is {duration:.8g} excitation periods at {frequency:.6g} Hz",
                 given.get("duration"),
                 allowed=f"at most {MAX_RUN_PERIODS:,.0f} periods in any case",
             )

@@ -135,7 +135,8 @@ class Studies(Orders):
                     )
                 )
             announce(connection)
-            return record_of(connection.execute(sa.select(*RECORD_COLUMNS).where(STUDIES.c.number == number)).one())
+            written = connection.execute(sa.select(*RECORD_COLUMNS).where(STUDIES.c.number == number)).one()
+            return self._told(connection, record_of(written))
 
     def get_study(self, study_id: str) -> StudyRecord:
         """The study of that id; raises StudyNotFound."""
@@ -274,7 +275,7 @@ class Studies(Orders):
                     .where(STUDIES.c.number == row.number)
                     .values(waits_for=None, reason=None, revision=STUDIES.c.revision + 1)
                 )
-            return record_of(self._row(connection, study_id, *RECORD_COLUMNS))
+            return self._told(connection, record_of(self._row(connection, study_id, *RECORD_COLUMNS)))
 
     def prioritize_study(self, study_id: str, priority: int) -> StudyRecord:
         """Give the study another priority: of studies that wait, the highest goes first.
@@ -292,7 +293,7 @@ class Studies(Orders):
                 .values(priority=priority, revision=STUDIES.c.revision + 1)
             )
             announce(connection)
-            return record_of(self._row(connection, study_id, *RECORD_COLUMNS))
+            return self._told(connection, record_of(self._row(connection, study_id, *RECORD_COLUMNS)))
 
     def study_of_key(self, idempotency_key: str, body_hash: str | None) -> StudyRecord | None:
         """The study that was submitted with that key, with any body where ``body_hash`` is None.

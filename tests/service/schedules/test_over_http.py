@@ -86,6 +86,18 @@ def test_what_is_wrong_is_named(service: Service, given: dict[str, Any], pointer
     assert all(error["allowed"] for error in answer.json()["errors"])
 
 
+@pytest.mark.parametrize("times", [{"cron": "0 22 * * *"}, {"at": "2026-01-05T22:00"}])
+def test_a_window_that_is_closed_until_the_deadline_is_refused(service: Service, times: dict[str, str]) -> None:
+    wrong = {"spec": SPEC, **times, "zone": "Europe/Berlin", "window": ["06:00", "22:00"], "finish_by": "06:00"}
+    refused = service.http.post(API, json=wrong)
+    assert refused.status_code == 422
+    (error,) = refused.json()["errors"]
+    assert error["pointer"] == "/window"
+    assert error["code"] == "conflict"
+    for right in ({"window": ["22:00", "06:00"]}, {"finish_by": "06:01"}, {"finish_by": "25 h"}, {"enabled": False}):
+        assert service.http.post(API, json={**wrong, **right}).status_code == 201
+
+
 def test_a_near_name_of_a_zone_is_offered(service: Service) -> None:
     answer = service.http.post(API, json={"spec": SPEC, "cron": "0 1 * * *", "zone": "Europe/Berlim"})
     assert "did you mean 'Europe/Berlin'?" in answer.text

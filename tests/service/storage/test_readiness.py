@@ -92,6 +92,10 @@ def test_a_silent_worker_is_told_by_readyz_and_by_studies(
         "a worker is at work"
     )
     assert {record.reason for record in (*store.list_studies().studies, store.look(study.id)[0])} == {reason}
+    late = store.create_study({}, fakes.study(4))
+    assert {late.reason, store.prioritize_study(late.id, 1).reason} == {reason}, "in the answers to a change too"
+    assert store.pause_study(late.id).reason is None
+    assert store.resume_study(late.id).reason == reason
     store.heartbeat(epoch)
     clock.seconds += 10.0
     assert http.get("/readyz").status_code == 200
