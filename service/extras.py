@@ -13,7 +13,7 @@ class MissingExtraError(ImportError):
 
 
 def command_for(missing: ModuleNotFoundError, extra: str = "server") -> str | None:
-    """The command that installs what is missing; None where it is no package of an extra."""
+    """The command that installs what is missing; None where it is not a package of an extra."""
     package = (missing.name or "").partition(".")[0]
     return None if not package or package in _OWN else f'pip install "sprag[{extra}]"'
 

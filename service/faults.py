@@ -1,4 +1,4 @@
-"""Faults as whoever caused them is told of them: where, what was given, what is allowed, and a code that stays.
+"""Faults as they are reported to whoever caused them: where, what was given, what is allowed, and a code that stays.
 
 Wording is free; codes are what programs and tests rely on. ``docs/faults.md`` lists them.
 """
@@ -241,7 +241,7 @@ class ParameterFault(Fault):
 
 
 class FaultError(Exception):
-    """Something that whoever asked for it is told of; how HTTP tells it stands in ``sprag.service.http.problems``.
+    """A failure that is reported to the caller; its form over HTTP is in ``sprag.service.http.problems``.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Logs: one line a happening, as plain text for people or as JSON for machines, with the ids of request and studies."""
+"""Logs: one line per event, as plain text for people or as JSON for machines, with the ids of request and studies."""
 
 from __future__ import annotations
 

@@ -231,7 +231,7 @@ def _read_file(settings_cls: type[BaseSettings]) -> dict[str, Any]:
     except OSError as error:
         raise SettingsFileError(f"The settings {name} ({FILE_VARIABLE}) cannot be read: {error.strerror}.") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SettingsFileError(f"The settings {name} ({FILE_VARIABLE}) are no TOML: {error}.") from None
+        raise SettingsFileError(f"The settings {name} ({FILE_VARIABLE}) are not valid TOML: {error}.") from None
     unknown = [key for key in found if key not in settings_cls.model_fields]
     if unknown:
         known = ", ".join(settings_cls.model_fields)

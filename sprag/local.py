@@ -47,7 +47,7 @@ def run(
     finish_by : datetime, optional
         An aware time at which the run ends with what is done, coarse to fine.
     on_progress : function, optional
-        Is told of the progress a few times a second.
+        Called with the progress a few times a second.
 
     Returns
     -------

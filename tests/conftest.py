@@ -67,7 +67,7 @@ def sprag(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -
         code = execute([str(argument) for argument in arguments])
         captured = capsys.readouterr()
         assert "Traceback" not in captured.err
-        assert "fault of Sprag" not in captured.err
+        assert "bug in Sprag" not in captured.err
         return Finished(code, captured.out, captured.err)
 
     return run

@@ -142,7 +142,7 @@ class Dispatcher:
         shortage = self._store.shortage()
         dropped = self._full is not None
         if dropped:
-            shortage = shortage or f"{self._full}; it is tried again from time to time"
+            shortage = shortage or f"{self._full}; it is retried from time to time"
         going = any(study.state in {StudyState.QUEUED, StudyState.RUNNING} for study in studies)
         if shortage is not None or self._clock.monotonic() < self._try_again:
             if going or dropped:

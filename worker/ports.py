@@ -235,7 +235,7 @@ class News(Protocol):
         """Whether something has changed since the last call, or may have; waits for it at most ``timeout`` s."""
 
     def close(self) -> None:
-        """Hear nothing more."""
+        """Stop listening."""
 
 
 class Clock(Protocol):

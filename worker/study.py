@@ -100,7 +100,7 @@ class Study:
         "reset": "contact"}``; times in "periods" or "s". Empty for a model without a run.
     axes : tuple of Axis
     structure : dict or None
-        What of the machine is no number, as plain JSON data, where its model knows such (a machine shaft's mechanism,
+        What is not a number in the machine, as plain JSON data, where its model has such (a machine shaft's mechanism,
         tables and formulas); never changed.
     combine : "grid" or "zip"
         Grid: every combination, the first axis varies slowest. Zip: the axes go together, all of one length.

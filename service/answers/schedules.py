@@ -14,9 +14,9 @@ class ScheduleRun(TypedDict):
 
     due: Moment
     state: Annotated[str, Doc("taken: about to be submitted; submitted; refused, see `problem`")]
-    missed: Annotated[int, Doc("earlier due times that nobody was there for; they are not run")]
+    missed: Annotated[int, Doc("earlier due times that were missed; they are not run")]
     begun_at: Moment
-    study: Annotated[str | None, Doc("id of its study; null where there is none, or none any more")]
+    study: Annotated[str | None, Doc("id of its study; null where there is none, or it was deleted")]
     address: Annotated[str | None, Doc("address of the study")]
     problem: Annotated[str | None, Doc("why no study came of it")]
 

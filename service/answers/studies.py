@@ -57,7 +57,7 @@ class _Study(TypedDict):
     cases: Annotated[int, Doc("number of cases")]
     reused: Annotated[int, Doc("cases whose rows were taken from other studies instead of being run")]
     warnings: Annotated[list[str], Doc("what is allowed but probably not meant")]
-    priority: Annotated[int, Doc("of the studies that wait, those of the highest priority go first")]
+    priority: Annotated[int, Doc("waiting studies with the highest priority run first")]
     created_at: Moment
     started_at: Moment | None
     finished_at: Moment | None

@@ -158,7 +158,7 @@ def _invoke(arguments: Sequence[str]) -> int:
             )
         if os.environ.get(DEBUG_VARIABLE):
             traceback.print_exc()
-        sentence = f"This is a fault of Sprag: {type(error).__name__}: {error}. {DEBUG_VARIABLE}=1 shows where it lies."
+        sentence = f"This is a bug in Sprag: {type(error).__name__}: {error}. {DEBUG_VARIABLE}=1 shows where."
         return _report(TroubleError("internal", sentence), as_json)
 
 

@@ -64,7 +64,7 @@ class WrongInputError(CommandFailureError):
 
 
 class TroubleError(CommandFailureError):
-    """The service or the storage is in trouble: exit code 3."""
+    """The service or the storage has a problem: exit code 3."""
 
 
 def write_json(data: object) -> None:

@@ -77,7 +77,7 @@ def prune(
     older_than: Annotated[
         int, typer.Option("--older-than", metavar="DAYS", min=1, max=36_500, help="Days since a study ended.")
     ],
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only tell which.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only list them.")] = False,
     db: Database = None,
     as_json: JsonFlag = False,
 ) -> None:
@@ -132,4 +132,4 @@ def clock(db: Database = None) -> None:
     with Store.open(url) as store:
         now = store.clock.now()
         store.note_clock(now)
-        say(f"the clock is believed: it is {now.isoformat(timespec='seconds')}")
+        say(f"the clock is trusted: it is {now.isoformat(timespec='seconds')}")

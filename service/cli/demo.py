@@ -38,7 +38,7 @@ _BAR = 20
 
 
 def demo(
-    leave: Annotated[bool, typer.Option("--exit", help="End after the demonstration instead of serving on.")] = False,
+    leave: Annotated[bool, typer.Option("--exit", help="Stop after the demonstration instead of serving on.")] = False,
     folder: Annotated[str, typer.Option("--dir", metavar="FOLDER", help="Folder for database and picture.")] = "demo",
     as_json: JsonFlag = False,
 ) -> None:
@@ -79,7 +79,7 @@ def _address(process: subprocess.Popen[bytes]) -> str:
     with process.stdout as output:
         line = output.readline()
     if not line:
-        raise TroubleError("unavailable", "The service did not start; what it said stands above.")
+        raise TroubleError("unavailable", "The service did not start; its messages are above.")
     return str(json.loads(line)["address"])
 
 
@@ -104,7 +104,7 @@ def _show(client: ServiceClient, picture: Path, as_json: bool) -> dict[str, Any]
     created = client.create_study(spec)
     say(f"Submitted {created['name']!r} to {client.server}: {created['cases']} cases.")
     if not any(cache_folder().iterdir()):
-        say("The kernel is compiled first; that takes some seconds, this once.")
+        say("The kernel is compiled first; this takes a few seconds, once.")
     start = time.monotonic()
     study = follow(client, created["id"], patient=False)
     say(f"{study['progress']['done']} cases done in {time.monotonic() - start:.1f} s, {study['progress']['ok']} ok.")

@@ -42,9 +42,7 @@ class Finding:
 
 def doctor(
     db: Database = None,
-    kernel: Annotated[
-        bool, typer.Option("--kernel", help="Print the generated source of a kernel instead, for readers.")
-    ] = False,
+    kernel: Annotated[bool, typer.Option("--kernel", help="Print the generated source of a kernel instead.")] = False,
     pendulums: Annotated[int | None, typer.Option(min=1, help="Pendulums of that kernel; default: 1.")] = None,
     coefficients: Annotated[int | None, typer.Option(min=1, help="Its clutch coefficients; default: 4.")] = None,
     tolerance: Annotated[
@@ -64,7 +62,7 @@ def doctor(
             Fault(f"--{name}", "not-used", "belongs to --kernel, which is not given", value)
             for name, value in given.items()
         ]
-        raise WrongInputError("invalid-parameter", "an option is wrong", problems)
+        raise WrongInputError("invalid-parameter", "invalid option", problems)
     findings = list(examine(db))
     sound = all(finding.ok for finding in findings)
     if as_json:
@@ -84,8 +82,8 @@ def _show_kernel(shape: dict[str, Any], as_json: bool) -> None:
 
     for name, most in (("pendulums", MAX_PENDULUMS), ("coefficients", MAX_COEFFICIENTS)):
         if shape[name] > most:
-            problem = Fault(f"--{name}", "unknown-name", "there is no such kernel", shape[name], allowed=f"1 .. {most}")
-            raise WrongInputError("invalid-parameter", "an option is wrong", [problem])
+            problem = Fault(f"--{name}", "unknown-name", "is out of range", shape[name], allowed=f"1 .. {most}")
+            raise WrongInputError("invalid-parameter", "invalid option", [problem])
     text = kernel_source(**shape)
     if as_json:
         write_json({**shape, "source": text})
@@ -138,7 +136,7 @@ def _database(url: str, file: Path | None) -> tuple[bool, str]:
     from sprag.service.storage.tables import HEAD_REVISION
 
     if file is not None and not file.exists():
-        return True, f"{file} (not made yet)"
+        return True, f"{file} (not created yet)"
     session = Session(url)
     try:
         found, location = revision(session), session.location
@@ -186,7 +184,7 @@ def _backups() -> tuple[bool, str]:
 
     folder = read_settings().backup_folder
     if not folder:
-        return True, "none are made (SPRAG_BACKUP_FOLDER is not set)"
+        return True, "no backups are made (SPRAG_BACKUP_FOLDER is not set)"
     found = backups(Path(folder).expanduser())
     if not found:
         return False, f"there is none in {folder} yet: is `sprag serve` or `sprag worker` running?"
@@ -202,7 +200,7 @@ def _cache() -> tuple[bool, str]:
     with tempfile.NamedTemporaryFile(dir=folder, prefix=".doctor-") as probe:
         probe.write(b"x")
     if not cache_is_wanted():
-        return False, f"the folder wanted cannot be written, kernels are kept in {folder}: set SPRAG_KERNEL_CACHE"
+        return False, f"the configured folder is not writable, so kernels are kept in {folder}: set SPRAG_KERNEL_CACHE"
     return os.access(folder, os.W_OK | os.X_OK), str(folder)
 
 

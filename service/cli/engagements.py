@@ -66,4 +66,4 @@ def _require(study: Study, case: int) -> None:
         raise WrongInputError("invalid-parameter", "this study has no engagements", [problem])
     if case >= study.cases:
         problem = Fault("--case", "unknown-name", "there is no such case", case, allowed=f"0 .. {study.cases - 1}")
-        raise WrongInputError("invalid-parameter", "an option is wrong", [problem])
+        raise WrongInputError("invalid-parameter", "invalid option", [problem])

@@ -87,7 +87,7 @@ def _addition(axes: list[str], points: str | None) -> dict[str, Any]:
         problem = Fault(
             "--axis", "exactly-one", "or --points is needed, and not both", allowed="--axis shaft.load=0.5,0.7"
         )
-        raise WrongInputError("invalid-parameter", "an option is missing", [problem])
+        raise WrongInputError("invalid-parameter", "missing option", [problem])
     if points is not None:
         return {"cases": [{"points": decode(points, read_bytes(points, MAX_BODY_BYTES))}]}
     made = []
@@ -95,7 +95,7 @@ def _addition(axes: list[str], points: str | None) -> dict[str, Any]:
         path, sign, values = text.partition("=")
         if not sign or not path.strip() or not values.strip():
             problem = Fault("--axis", "invalid-text", "must be PATH=VALUES", text, allowed="such as shaft.load=0.5,0.7")
-            raise WrongInputError("invalid-parameter", "an option is wrong", [problem])
+            raise WrongInputError("invalid-parameter", "invalid option", [problem])
         made.append({"path": path.strip(), "values": [_value(item.strip()) for item in values.split(",")]})
     return {"axes": made}
 

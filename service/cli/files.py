@@ -58,7 +58,7 @@ def read_bytes(path: str, limit: int) -> bytes:
 def decode(path: str, data: bytes) -> str:
     """The text of a UTF-8 file, with or without a byte order mark.
 
-    Raises WrongInputError when it is no text.
+    Raises WrongInputError when it is not text.
     """
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise WrongInputError("invalid-file", f"{path}: UTF-16 text; save it as UTF-8 (spreadsheets call it CSV UTF-8)")
@@ -66,10 +66,10 @@ def decode(path: str, data: bytes) -> str:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise WrongInputError(
-            "invalid-file", f"{path}: no UTF-8 text (byte {error.start} is {data[error.start]:#04x})"
+            "invalid-file", f"{path}: not UTF-8 text (byte {error.start} is {data[error.start]:#04x})"
         ) from error
     if "\0" in text:
-        raise WrongInputError("invalid-file", f"{path}: a binary file, no text")
+        raise WrongInputError("invalid-file", f"{path}: a binary file, not text")
     return text
 
 
@@ -92,7 +92,7 @@ def read_spec(path: str, points: str | None = None, limit: int = MAX_DATA_BYTES)
 
     if path == points == "-":
         problem = Fault("--points", "conflict", "standard input is the spec already", allowed="a file")
-        raise WrongInputError("invalid-parameter", "an option is wrong", [problem])
+        raise WrongInputError("invalid-parameter", "invalid option", [problem])
     data = read_bytes(path, MAX_BODY_BYTES)
     try:
         spec = load_spec(data, _format(path, data))
@@ -202,7 +202,7 @@ def _told(path: Path | str) -> Iterator[None]:
     except OSError as error:
         raise file_failure(path, error) from error
     except ValueError as error:  # a zero byte in the name
-        raise WrongInputError("invalid-file", f"{path!r} is no file name") from error
+        raise WrongInputError("invalid-file", f"{path!r} is not a file name") from error
 
 
 @contextmanager

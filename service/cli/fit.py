@@ -52,7 +52,7 @@ def fit(
         problem = Fault(
             "--backlash", "not-used", "is taken off the angles only with --angles-include-backlash", backlash
         )
-        raise WrongInputError("invalid-parameter", "an option is wrong", [problem])
+        raise WrongInputError("invalid-parameter", "invalid option", [problem])
     measured = _measured(data)
     made = _fitted(
         measured,
@@ -80,7 +80,7 @@ def _quantity(option: str, text: str, unit: str) -> float:
         return parse_quantity(text if number is None else number, unit)
     except QuantityError as error:
         raise WrongInputError(
-            "invalid-parameter", "an option is wrong", [Fault(option, error.code, str(error), text, unit=unit)]
+            "invalid-parameter", "invalid option", [Fault(option, error.code, str(error), text, unit=unit)]
         ) from error
 
 

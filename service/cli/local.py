@@ -138,7 +138,9 @@ def trajectory(
     spec: SpecFile,
     case: Annotated[int, typer.Option("--case", min=0, metavar="N", help="Number of the case, from 0.")] = 0,
     file: OutputFile = None,
-    form: Annotated[ValueFormat | None, typer.Option("--format", help="Default: as FILE ends, else csv.")] = None,
+    form: Annotated[
+        ValueFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
+    ] = None,
     start: Annotated[
         str | None, typer.Option("--from", metavar="TIME", help='First time, in s, or as "40 periods"; default: 0.')
     ] = None,
@@ -182,14 +184,14 @@ def _trajectory(study: Study, case: int, start: str | None, end: str | None, poi
 
     if case >= study.cases:
         problem = Fault("--case", "unknown-name", "there is no such case", case, allowed=f"0 .. {study.cases - 1}")
-        raise WrongInputError("invalid-parameter", "an option is wrong", [problem])
+        raise WrongInputError("invalid-parameter", "invalid option", [problem])
     try:
         first, last = span(study, case, start, end)
     except FaultError as error:
         problems = [
             Fault(f"--{item.where}", item.code, item.message, item.value, item.allowed) for item in error.faults
         ]
-        raise WrongInputError("invalid-parameter", "an option is wrong", problems) from error
+        raise WrongInputError("invalid-parameter", "invalid option", problems) from error
     return run_trajectory(study, case, first, last, points)
 
 
@@ -224,11 +226,11 @@ def presets(
         problem = Fault(
             "NAME",
             "unknown-name",
-            f"there is no such preset{did_you_mean(name, names)}",
+            f"unknown preset{did_you_mean(name, names)}",
             name,
             allowed=", ".join(names),
         )
-        raise WrongInputError("invalid-parameter", "an argument is wrong", [problem])
+        raise WrongInputError("invalid-parameter", "invalid argument", [problem])
     file, text = preset_text(name)
     if as_json:
         write_json({"name": name, "file": file, "text": text})
@@ -240,9 +242,12 @@ def run(
     spec: SpecFile,
     points: PointsFile = None,
     file: OutputFile = None,
-    form: Annotated[TableFormat | None, typer.Option("--format", help="Default: as FILE ends, else csv.")] = None,
+    form: Annotated[
+        TableFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
+    ] = None,
     db: Annotated[
-        str | None, typer.Option("--db", metavar="URL", help="Database to keep the study in; default: a passing one.")
+        str | None,
+        typer.Option("--db", metavar="URL", help="Database to keep the study in; default: a temporary database."),
     ] = None,
     processes: Processes = None,
     chunk: ChunkCases = None,
@@ -322,7 +327,7 @@ def _finish(text: str | None) -> datetime | None:
         return None if text is None else finish_at(text, datetime.now(UTC))
     except FinishError as error:
         problem = Fault("--finish-by", error.code, str(error), text, allowed=ALLOWED)
-        raise WrongInputError("invalid-parameter", "an option is wrong", [problem]) from None
+        raise WrongInputError("invalid-parameter", "invalid option", [problem]) from None
 
 
 def _rows(done: LocalRun, study: Study, form: Format | ReportFormat) -> Iterator[bytes]:

@@ -18,7 +18,7 @@ PointsFile = Annotated[
     typer.Option(
         "--points",
         metavar="FILE",
-        help="CSV file of cases, its header the paths of parameters, in the place of the spec's axes.",
+        help="CSV file of cases, instead of the spec's axes; its header names the parameters.",
     ),
 ]
 OutputFile = Annotated[
@@ -48,21 +48,23 @@ ChunkCases = Annotated[
     ),
 ]
 
-Fresh = Annotated[bool, typer.Option("--fresh", help="Run every case, also those that other studies have already.")]
+Fresh = Annotated[
+    bool, typer.Option("--fresh", help="Run every case, including those that other studies already have.")
+]
 
 FinishBy = Annotated[
     str | None,
     typer.Option(
         "--finish-by",
         metavar="TIME",
-        help='Run coarse to fine, and stop then: as 2027-01-31T06:00+01:00, or after a while, as "8 h".',
+        help='Run coarse to fine until a time, such as 2027-01-31T06:00+01:00, or for a duration, such as "8 h".',
     ),
 ]
 
 WaitTimeout = Annotated[
     float | None,
     typer.Option(
-        "--timeout", metavar="SECONDS", min=0.0, help="Longest time to wait, then exit code 3; default: without end."
+        "--timeout", metavar="SECONDS", min=0.0, help="Longest time to wait, then exit code 3; default: no limit."
     ),
 ]
 

@@ -30,7 +30,7 @@ def file_format(file: str, allowed: tuple[str, ...], what: str) -> str:
         names = ", ".join(f".{name}" for name in allowed[:-1]) + f" or .{allowed[-1]}"
         raise WrongInputError(
             "invalid-parameter",
-            "an option is wrong",
+            "invalid option",
             [Fault("--output", "invalid-choice", f"no kind of {what}", file, allowed=f"a name that ends in {names}")],
         )
     return form
@@ -39,7 +39,7 @@ def file_format(file: str, allowed: tuple[str, ...], what: str) -> str:
 def curve(
     study_id: StudyId,
     x: Annotated[str, typer.Option("--x", metavar="PATH", help="Axis along the curve, such as shaft.load.")],
-    y: Annotated[list[str], typer.Option("--y", metavar="RESULT", help="Result to draw; may be given again.")],
+    y: Annotated[list[str], typer.Option("--y", metavar="RESULT", help="Result to draw; may be repeated.")],
     by: Annotated[
         list[str] | None, typer.Option("--by", metavar="PATH", help="Axis with one curve for each value.")
     ] = None,
@@ -103,7 +103,7 @@ def _show_map(found: dict[str, Any]) -> None:
 
 def sensitivity(
     study_id: StudyId,
-    y: Annotated[list[str], typer.Option("--y", metavar="RESULT", help="Result; may be given again.")],
+    y: Annotated[list[str], typer.Option("--y", metavar="RESULT", help="Result; may be repeated.")],
     file: PictureFile = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,

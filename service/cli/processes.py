@@ -51,7 +51,7 @@ def worker(
         bool,
         typer.Option(
             "--take-over",
-            help="Do not wait for another worker: it can store nothing more; one that hangs is killed.",
+            help="Do not wait for another worker, which can then store nothing more; kill it if it hangs.",
         ),
     ] = False,
 ) -> None:

@@ -49,7 +49,7 @@ _PARAMETER_IN_TEXT = re.compile(r"(?<![\w.-])(x|y|by|at)=(?=(\w?))")
 
 PriorityOption = Annotated[
     int,
-    typer.Option(min=-MAX_PRIORITY, max=MAX_PRIORITY, help="The highest goes first of those that wait."),
+    typer.Option(min=-MAX_PRIORITY, max=MAX_PRIORITY, help="Waiting studies with the highest priority run first."),
 ]
 
 
@@ -88,7 +88,7 @@ def connection(server: str, token: str | None) -> Iterator[ServiceClient]:
         except RefusedError as error:
             raise refusal(error) from error
         except StudyTimeoutError as error:
-            raise TroubleError("not-done", f"{error}; it goes on.") from error
+            raise TroubleError("not-done", f"{error}; it continues.") from error
 
 
 def refusal(error: RefusedError) -> CommandFailureError:
@@ -179,7 +179,7 @@ def follow(
             held = study["state"] == StudyState.PAUSED and not study["time_over"]
             if held and study.get("reason") not in told:
                 told.add(study.get("reason"))
-                say(f"{study_id} is paused: {study.get('reason') or 'somebody asked for it'}")
+                say(f"{study_id} is paused: {study.get('reason') or 'on request'}")
 
         return wait_for(client, study_id, Waiting(tell, timeout, patient=patient, notify=say))
 
@@ -277,7 +277,7 @@ def pause(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = Non
 
 
 def resume(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
-    """Go on with a study that is held; a deadline that has passed does not count any more."""
+    """Resume a study that is held; a deadline in the past no longer applies."""
     _act(study_id, "resume", server, token, as_json)
 
 
@@ -285,7 +285,7 @@ def retry(
     study_id: StudyId,
     ending: Annotated[
         list[str] | None,
-        typer.Option("--ending", metavar="ENDING", help="Only cases that ended so; may be given again."),
+        typer.Option("--ending", metavar="ENDING", help="Only cases with this ending; may be repeated."),
     ] = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
@@ -310,7 +310,9 @@ def prioritize(
 
 def export(
     study_id: StudyId,
-    form: Annotated[TableFormat | None, typer.Option("--format", help="Default: as FILE ends, else csv.")] = None,
+    form: Annotated[
+        TableFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
+    ] = None,
     file: OutputFile = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,

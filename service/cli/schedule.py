@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 app = typer.Typer(
-    help="Studies that the service submits by itself, once or again and again.",
+    help="Studies that the service submits on a schedule, once or repeatedly.",
     no_args_is_help=True,
     rich_markup_mode="rich",
 )
@@ -28,23 +28,26 @@ Cron = Annotated[
     typer.Option(
         "--cron",
         metavar="FIELDS",
-        help='Again and again: minute, hour, day, month, weekday, as "0 22 * * 1-5".',
+        help='Recurring: minute, hour, day, month, weekday, such as "0 22 * * 1-5".',
     ),
 ]
-At = Annotated[str | None, typer.Option("--at", metavar="TIME", help="Once, as 2027-01-31T22:00.")]
+At = Annotated[str | None, typer.Option("--at", metavar="TIME", help="Once, such as 2027-01-31T22:00.")]
 Zone = Annotated[
-    str | None, typer.Option("--zone", metavar="NAME", help="Time zone, as Europe/Berlin; default for a new one: UTC.")
+    str | None,
+    typer.Option("--zone", metavar="NAME", help="Time zone, such as Europe/Berlin; default for a new one: UTC."),
 ]
 WindowOption = Annotated[
     str | None,
-    typer.Option("--window", metavar="FROM-TO", help='Run between these times only, as 22:00-06:00; "" for any time.'),
+    typer.Option(
+        "--window", metavar="FROM-TO", help='Run between these times only, such as 22:00-06:00; "" for any time.'
+    ),
 ]
 RunFinish = Annotated[
     str | None,
     typer.Option(
         "--finish-by",
         metavar="TIME",
-        help='Run coarse to fine, and stop then: a time of day, as 06:00, or after a while, as "8 h"; "" for none.',
+        help='Run coarse to fine until a time of day, such as 06:00, or for a duration, such as "8 h"; "" for none.',
     ),
 ]
 Name = Annotated[str | None, typer.Option("--name", help="Name of its studies; default: that of the spec.")]
@@ -136,7 +139,8 @@ def change(
         int | None, typer.Option(min=-MAX_PRIORITY, max=MAX_PRIORITY, help="Priority of its studies.")
     ] = None,
     fresh: Annotated[
-        bool | None, typer.Option("--fresh/--no-fresh", help="Run every case, also those that studies have.")
+        bool | None,
+        typer.Option("--fresh/--no-fresh", help="Run every case, including those that other studies already have."),
     ] = None,
     finish_by: RunFinish = None,
     server: Server = DEFAULT_SERVER,
@@ -151,7 +155,7 @@ def change(
         fields["spec"] = read_spec(spec)
     if not fields:
         raise WrongInputError(
-            "invalid-parameter", "nothing is given to change; `sprag schedule change --help` lists what can be"
+            "invalid-parameter", "nothing to change; `sprag schedule change --help` lists what can be"
         )
     _change(schedule_id, fields, server, token, as_json)
 
@@ -202,8 +206,8 @@ def _window(text: str | None) -> dict[str, Any]:
         return {"window": []}
     begin, dash, end = text.partition("-")
     if not dash:
-        problem = Fault("--window", "invalid-text", "is no window", text, allowed="as 22:00-06:00")
-        raise WrongInputError("invalid-parameter", "an option is wrong", [problem])
+        problem = Fault("--window", "invalid-text", "is not a time window", text, allowed="as 22:00-06:00")
+        raise WrongInputError("invalid-parameter", "invalid option", [problem])
     return {"window": [begin.strip(), end.strip()]}
 
 

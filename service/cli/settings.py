@@ -39,4 +39,4 @@ def read_settings(**options: object) -> Settings:
                     value,
                 )
             )
-        raise WrongInputError("invalid-settings", "a setting is wrong", problems) from error
+        raise WrongInputError("invalid-settings", "invalid setting", problems) from error

@@ -85,7 +85,7 @@ def _chosen(study: Study, asked: list[int] | None) -> list[int]:
         if case >= study.cases
     ]
     if problems:
-        raise WrongInputError("invalid-parameter", "an option is wrong", problems)
+        raise WrongInputError("invalid-parameter", "invalid option", problems)
     return list(dict.fromkeys(asked))
 
 

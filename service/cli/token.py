@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from sprag.service.storage.tokens import TokenRecord
 
 app = typer.Typer(
-    help="Create, list and revoke tokens; alone: make a secret for SPRAG_TOKEN.",
+    help="Create, list and revoke tokens; without a command: make a secret for SPRAG_TOKEN.",
     invoke_without_command=True,
     rich_markup_mode="rich",
 )
@@ -40,7 +40,7 @@ def token(context: typer.Context, as_json: JsonFlag = False) -> None:
 
 @app.command()
 def create(
-    name: Annotated[str, typer.Option("--name", help="Whose it is, or what it is for.")],
+    name: Annotated[str, typer.Option("--name", help="Owner or purpose of the token.")],
     scope: Annotated[
         TokenScope, typer.Option("--scope", help="read: look at everything; write: change it too.")
     ] = TokenScope.WRITE,

@@ -70,7 +70,7 @@ class Curves:
         table["ending"] = table["ending"].map(ENDING_CODES)
         indexed = table.set_index(dims)[[*names, "ending", "case"]]
         if not indexed.index.is_unique:
-            raise ValueError("several points have the same parameters, so that they are no grid; see `to_pandas`")
+            raise ValueError("several points have the same parameters, so they do not form a grid; see `to_pandas`")
         grid = indexed.to_xarray()
         for name in (*dims, *names):
             grid[name].attrs["units"] = self.units[name]

@@ -43,7 +43,7 @@ class ServiceClient:
     Raises
     ------
     ValueError
-        When ``server`` is no http address.
+        When ``server`` is not an HTTP address.
     """
 
     def __init__(self, server: str, token: str | None = None, *, transport: httpx.BaseTransport | None = None) -> None:

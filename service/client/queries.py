@@ -21,7 +21,7 @@ Spec = Mapping[str, Any]
 
 
 class Progressing(Protocol):
-    """Is told of a study now and then."""
+    """Called with a study from time to time."""
 
     def __call__(self, study: StudyDetail, /) -> None:
         """Take note of the study as it is now."""
@@ -36,7 +36,7 @@ def spec_of(spec: Spec | str | PathLike[str]) -> Spec:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise SpecFileError(f"no spec can be read from the file {str(path)!r}: {reason}") from error
+        raise SpecFileError(f"cannot read a spec from the file {str(path)!r}: {reason}") from error
     try:
         if path.suffix.lower() == ".toml":
             import tomllib

@@ -129,7 +129,7 @@ class Study:
         Parameters
         ----------
         progress : bool or callable
-            True shows a bar on standard error; a function is told the study now and then.
+            True shows a bar on standard error; a function is called with the study from time to time.
         timeout : float, optional
             Seconds after which StudyTimeoutError is raised; the study goes on.
         """

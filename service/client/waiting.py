@@ -35,13 +35,13 @@ class Waiting:
     Parameters
     ----------
     tell : callable
-        Is told the study at every look.
+        Called with the study at every poll.
     timeout : float, optional
         Seconds after which StudyTimeoutError is raised; None waits without end.
     patient : bool
         Whether to wait while the service does not answer; otherwise the failure is raised.
     notify : callable
-        Is told a sentence when the service stops answering, and when it answers again; by default the log.
+        Called with a sentence when the service stops answering, and when it answers again; by default the log.
     """
 
     def __init__(

@@ -26,13 +26,13 @@ Query = Sequence[tuple[str, str]]
 
 
 def connection_options(server: str, token: str | None) -> dict[str, Any]:
-    """Options of an httpx client of the service at ``server``; ValueError when that is no http address."""
+    """Options of an httpx client of the service at ``server``; ValueError when that is not an HTTP address."""
     try:
         url = httpx.URL(server)
     except httpx.InvalidURL as error:
-        raise ValueError(f"{server!r} is no address: {error}") from error
+        raise ValueError(f"{server!r} is not an address: {error}") from error
     if url.scheme not in ("http", "https") or not url.host:
-        raise ValueError(f"{server!r} is no address of a service, such as http://127.0.0.1:8000")
+        raise ValueError(f"{server!r} is not the address of a service, such as http://127.0.0.1:8000")
     headers = {"Authorization": f"Bearer {token}"} if token else {}
     # A proxy of the environment never leads to this machine itself.
     return {"base_url": server, "headers": headers, "timeout": TIMEOUT, "trust_env": not is_loopback(url.host)}
@@ -47,7 +47,7 @@ def within(seconds: float | None) -> httpx.Timeout:
 
 
 def document(server: str, response: httpx.Response) -> dict[str, Any]:
-    """The JSON object that was answered; RefusedError for a problem, UnreachableError for an answer that is none."""
+    """The JSON object that was answered; RefusedError for a problem, UnreachableError for anything else."""
     if response.is_error:
         raise refusal(response)
     try:
@@ -55,12 +55,12 @@ def document(server: str, response: httpx.Response) -> dict[str, Any]:
     except ValueError:
         data = None
     if not isinstance(data, dict):
-        raise UnreachableError(server, "what answers there is not Sprag")
+        raise UnreachableError(server, "the answer is not from Sprag")
     return data
 
 
 def require_finite(data: object, pointer: str = "") -> None:
-    """RefusedError, as the service's own, at the first number in ``data`` that is none; JSON cannot say such."""
+    """Raise RefusedError, as the service would, at the first number in ``data`` that is not finite."""
     if isinstance(data, Mapping):
         for key, item in data.items():
             require_finite(item, f"{pointer}/{str(key).replace('~', '~0').replace('/', '~1')}")
@@ -108,7 +108,7 @@ def refusal(response: httpx.Response) -> ServiceError:
 def reason(error: httpx.HTTPError) -> str:
     """Why nobody answered, in a few words."""
     if isinstance(error, httpx.ConnectError):
-        return "nobody answers there"
+        return "cannot connect"
     if isinstance(error, httpx.TimeoutException):
         return "no answer in time"
     return str(error) or type(error).__name__

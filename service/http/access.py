@@ -66,7 +66,7 @@ ASKING: ContextVar[Grant | None] = ContextVar("asking", default=None)
 
 
 class Access:
-    """Knows the tokens of one service, and who tried others. For one event loop.
+    """Know the tokens of one service, and who tried others. For one event loop.
 
     Parameters
     ----------

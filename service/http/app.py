@@ -71,7 +71,7 @@ TAGS = [
     {"name": "studies", "description": "Submit, preview, follow and cancel studies."},
     {"name": "results", "description": "Curves, maps and all rows of a study."},
     {"name": "cases", "description": "Single cases and their instantaneous values."},
-    {"name": "schedules", "description": "Studies that are submitted by themselves."},
+    {"name": "schedules", "description": "Studies that are submitted on a schedule."},
     {"name": "clutch", "description": "Clutch laws from measured data."},
     {"name": "models", "description": "Parameters, results and endings; studies to start from."},
     {"name": "health", "description": "Whether the service is up."},
@@ -226,7 +226,7 @@ async def _make_ready(checker: ProcessComputer, context: Context) -> None:
         except JobStoppedError:
             return
         except (ProcessStartError, ProcessDiedError, StoreError) as error:
-            _LOG.error("The processes that check what is submitted do not start (%s); they are tried again.", error)
+            _LOG.error("The processes that check what is submitted do not start (%s); they are retried.", error)
             await asyncio.sleep(_AGAIN_SECONDS)
         else:
             context.ready.set()

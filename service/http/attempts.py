@@ -1,4 +1,4 @@
-"""Attempts to come in with a token that is not valid: told in the log, answered ever more slowly, limited in number.
+"""Attempts to log in with an invalid token: logged, answered more and more slowly, limited in number.
 
 Delays hold up refusals only: a valid token is let in at once, unless several refusals of its address wait; so guessing
 does not get faster with more connections. Guessers at many addresses shut nobody else out.
@@ -91,7 +91,7 @@ class Attempts:
             raise _too_many()
 
     async def failed(self, scope: Scope, place: str) -> None:
-        """Note that a token was not valid at ``place``, and wait before it is told.
+        """Note that a token was not valid at ``place``, and wait before answering.
 
         Raises ApiError at once where too many refusals wait already.
         """

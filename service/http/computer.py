@@ -24,7 +24,7 @@ R = TypeVar("R")
 #: Computations that may wait for the process; more are refused at once rather than late.
 MAX_WAITING = 8
 _LATER = {"Retry-After": "5"}
-_ENDING = "The service is ending: what was asked for was not done."
+_ENDING = "The service is shutting down; the request was not carried out."
 
 
 class Computes(Protocol):
@@ -53,7 +53,7 @@ class Limits:
     waiting : int
         Computations that may be there at once; more are refused at once rather than late.
     problem : str
-        Key of the problem that its client is told of.
+        Kind of the problem that its client gets.
     setting : str
         Name of the setting of the time, where there is one.
     leave_seconds : float
@@ -188,7 +188,7 @@ class ProcessComputer:
         return self._pool
 
     def close(self) -> None:
-        """End the processes, whatever they are doing; what waits is told that the service ends."""
+        """End the processes, whatever they are doing; what waits is told that the service is shutting down."""
         with self._lock:
             pool, self._pool, self._closed = self._pool, None, True
         if pool is not None:

@@ -56,7 +56,7 @@ class Context:
     check_shares: Shares = field(default_factory=lambda: Shares(1, MAX_CHECKS_EACH))
 
     def cut(self) -> None:
-        """End what is being computed and let no write begin: what waits is told so. Takes as long as killing does."""
+        """Stop computations and let no write begin; what waits is notified. Takes as long as killing does."""
         self.store.session.refuse_writes()
         for computer in (self.checker, self.computer):
             computer.close()

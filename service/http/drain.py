@@ -1,4 +1,4 @@
-"""The end of the service seen by requests: none is told that it failed when what it asked for was done.
+"""The end of the service seen by requests: none is told of a failure when its request was carried out.
 
 When the grace of the requests is over, what users define is ended and no write begins any more, so that every request
 comes to its own answer. One that the server cuts off all the same, and that changes something, is waited for.

@@ -100,7 +100,7 @@ class Guard:
         headers = Headers(scope=scope)
         hosts = headers.getlist("host")
         if len(hosts) != 1 or _host_name(hosts[0]) not in self._hosts:
-            detail = "This service does not answer under the name the request is addressed to"
+            detail = "This service does not answer to the host name of the request"
             raise ApiError("wrong-host", f"{detail}; SPRAG_ALLOWED_HOSTS adds names.")
         if scope["method"] not in SAFE_METHODS and _is_cross_site(headers):
             raise ApiError("cross-site", "A page of another site may not change anything here.")
@@ -110,7 +110,7 @@ class Guard:
             raise ApiError("not-found", "There is nothing at this address: it has a line feed in it.")
         length = headers.get("content-length", "0")
         if not (length.isascii() and length.isdigit()):
-            raise ApiError("bad-request", "Content-Length is no number.")
+            raise ApiError("bad-request", "Content-Length is not a number.")
         if len(length) > 18 or int(length) > MAX_BODY_BYTES:
             raise body_too_large()
 
@@ -134,7 +134,7 @@ class Guard:
         if not sent:
             grant = self._access.of_cookies(cookie_parser(headers.get("cookie", "")))
             if grant is not None and not safe and not _names_its_site(headers):
-                raise ApiError("cross-site", "A browser says for which page it asks; this request does not.")
+                raise ApiError("cross-site", "A browser says which page sent a request; this request does not.")
         if opened:
             return grant
         if grant is None:
@@ -163,7 +163,7 @@ _HOST: Final = re.compile(r"(\[[0-9a-f:.%]+\]|[^:@/\[\]]+)(:[0-9]{0,5})?")
 
 
 def _host_name(host: str) -> str:
-    """The name in a Host header, lower case, without its port; "" when it is no host and port."""
+    """The name in a Host header, lower case, without its port; "" when it is not a host and port."""
     found = _HOST.fullmatch(host.strip().lower())
     return "" if found is None else found[1]
 
@@ -191,7 +191,7 @@ def _limited(receive: Receive) -> Receive:
             message = await receive()
         if scope.cancelled_caught:
             raise ApiError(
-                "too-slow", f"The body did not come in within {BODY_SECONDS:g} s.", headers={"Connection": "close"}
+                "too-slow", f"The body did not arrive within {BODY_SECONDS:g} s.", headers={"Connection": "close"}
             )
         more = message["type"] == "http.request" and message.get("more_body", False)
         total += len(message.get("body", b""))

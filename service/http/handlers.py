@@ -27,7 +27,7 @@ _PATTERNS = {r"^[!-~]+$": "printable ASCII characters without blanks"}
 
 
 def as_api_error(error: Exception) -> ApiError | None:
-    """What a client is told about an exception; None when it is a fault of the program."""
+    """What a client is told about an exception; None when it is a bug in the program."""
     if isinstance(error, FaultError):
         return api_error(error)
     if isinstance(error, PageTokenError):

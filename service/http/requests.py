@@ -35,7 +35,7 @@ async def read_body(request: Request) -> Body:
         item = ParameterFault(
             "Content-Type",
             "invalid-choice",
-            "not a content type taken here",
+            "is not a supported content type",
             value=shown(declared),
             allowed=f"{allowed}, in UTF-8",
         )
@@ -49,7 +49,7 @@ async def read_body(request: Request) -> Body:
 
 
 async def strict_query(request: Request) -> None:
-    """Refuse query parameters that the operation does not have, or has once only: a misspelled one is no default.
+    """Refuse query parameters that the operation does not have, or takes once only, so misspelled ones are noticed.
 
     A header that the operation reads, such as an Idempotency-Key, is refused when it is there twice.
     """

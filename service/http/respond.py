@@ -64,7 +64,7 @@ def choose_format(request: Request, wanted: str | None, media_types: Mapping[str
     formats: Sequence[str] = tuple(media_types)
     if wanted is not None:
         if wanted not in media_types:
-            raise parameter_error("format", "invalid-choice", "there is no such format", wanted, ", ".join(formats))
+            raise parameter_error("format", "invalid-choice", "unknown format", wanted, ", ".join(formats))
         return wanted
     header = ",".join(request.headers.getlist("accept"))
     accept = parse_accept_header(header, MIMEAccept)

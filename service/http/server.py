@@ -114,7 +114,7 @@ class Supervisor(threading.Thread):
         child.terminate()
         child.join(_STOP_SECONDS)
         if child.exitcode is None:
-            _LOG.error("The worker does not end; it is killed.")
+            _LOG.error("The worker does not stop; it is killed.")
             child.kill()
             child.join()
 
@@ -185,7 +185,7 @@ class Server(uvicorn.Server):
 
 def _give_up() -> None:
     """End this process and all that it started, now."""
-    _LOG.critical("The service has not ended %g s after it was asked to; it is ended now.", _LAST_SECONDS)
+    _LOG.critical("The service did not stop within %g s; it is stopped now.", _LAST_SECONDS)
     for child in psutil.Process().children(recursive=True):
         with suppress(psutil.Error):
             child.kill()

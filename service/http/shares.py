@@ -36,7 +36,7 @@ class Shares:
         """Wait for one's turn; ApiError at once when the owner has too many already."""
         share = self._owners.setdefault(owner, _Share(self._at_work))
         if share.taken >= self._each:
-            detail = f"{self._each} requests of this token are being worked on, as many as one may have at once."
+            detail = f"{self._each} requests of this token are being worked on, the most that one may have at once."
             raise ApiError("too-many-requests", detail, headers={"Retry-After": "5"})
         share.taken += 1
         try:

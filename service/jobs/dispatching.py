@@ -146,7 +146,7 @@ def run_dispatcher(
                 _take_over(store, lock, say)
             elif not _stand_by(store, lock, stopping, say):
                 return
-            say(f"worker with {settings.processes} processes at work on {store.session.location}")
+            say(f"worker with {settings.processes} processes is working on {store.session.location}")
             dispatcher = Dispatcher(
                 store,
                 executor(settings),
@@ -175,10 +175,10 @@ def _possible(store: Store, plan: MaintenancePlan, say: Callable[[str], None]) -
 
 
 def _stand_by(store: Store, lock: OneHolder, stopping: Callable[[], bool], say: Callable[[str], None]) -> bool:
-    """Wait for the lock; False when ``stopping()`` came first. A holder that is not heard of any more is told once."""
+    """Wait for the lock; False when ``stopping()`` came first. A holder that no longer responds is reported once."""
     if lock.take():
         return True
-    say(f"another worker (process {lock.holder()}) is at work on {store.session.location}; waiting for its end")
+    say(f"another worker (process {lock.holder()}) is working on {store.session.location}; waiting for it to stop")
     told = False
     while not lock.take():
         if stopping():
@@ -186,7 +186,7 @@ def _stand_by(store: Store, lock: OneHolder, stopping: Callable[[], bool], say: 
         if not told and (silence := store.silence() or 0.0) > SILENT_SECONDS:
             told = True
             say(
-                f"nothing was heard of process {lock.holder()} for {silence:.0f} s; end it, or go on without it: "
+                f"process {lock.holder()} has not responded for {silence:.0f} s; stop it, or continue without it: "
                 "`sprag worker --take-over`"
             )
         time.sleep(STANDBY_SECONDS)

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 _FOLDER_PREFIX = "sprag-run-"
 #: What the reason of a study that is held for want of room ends with; true of services, and not here.
-_LATER = (f"; {GOES_ON}", "; it is tried again from time to time")
+_LATER = (f"; {GOES_ON}", "; it is retried from time to time")
 #: A study that takes less is not worth a pool.
 _NO_POOL_SECONDS = 1.0
 #: Seconds between two reports of progress.
@@ -173,7 +173,7 @@ class _Watch:
 
 def _told(record: StudyRecord, *, passing: bool) -> str:
     """Why the study was held, and what can be done where it was for want of room."""
-    reason = record.reason or "somebody paused it"
+    reason = record.reason or "it was paused"
     cause = next((reason.removesuffix(later) for later in _LATER if reason.endswith(later)), None)
     if cause is None:
         return reason

@@ -71,8 +71,8 @@ def backups(folder: Path) -> list[tuple[datetime, Path]]:
 
 @dataclass(slots=True)
 class _Task:
-    """Something to be done each night; `do` is told the time, when it was due and whether the clock is believed, and
-    says if it did it.
+    """A nightly task; `do` gets the time, when it was due and whether the clock is trusted, and returns whether it was
+    done.
 
     ``done`` is the due time that is done with, ``wait_until`` the time before which it is not tried again.
     """
@@ -84,7 +84,7 @@ class _Task:
 
 
 class Maintenance(threading.Thread):
-    """Does what the plan says, every night by the store's clock, until `stop`."""
+    """Carries out the plan every night by the store's clock, until `stop`."""
 
     def __init__(self, store: Store, plan: MaintenancePlan, watch: ClockWatch | None = None) -> None:
         super().__init__(name="sprag-maintenance", daemon=True)
@@ -99,7 +99,7 @@ class Maintenance(threading.Thread):
             self._tasks.append(_Task("deletion of old studies", self._prune))
 
     def run(self) -> None:
-        """Look, and again; at the clock even where nothing else is wanted. What was missed is made up for at once."""
+        """Run until stopped; watch the clock even where nothing else is enabled. What was missed is done at once."""
         self.look()
         while not self._ending.wait(LOOK_SECONDS):
             self.look()
@@ -129,7 +129,7 @@ class Maintenance(threading.Thread):
             except Exception as error:  # whatever it is, it must end neither the other tasks nor the nights to come
                 known = isinstance(error, StoreError | OSError)
                 _LOG.error(
-                    "The nightly %s failed and is tried again in 10 minutes: %s",
+                    "The nightly %s failed and is retried in 10 minutes: %s",
                     task.name,
                     error,
                     exc_info=None if known else error,

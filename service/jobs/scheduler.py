@@ -46,7 +46,7 @@ class Scheduler(threading.Thread):
         self._next_try: dict[tuple[int, int], float] = {}
 
     def run(self) -> None:
-        """Look, and again. Trouble with the database is said once and waited out."""
+        """Run until stopped. Trouble with the database is said once and waited out."""
         trouble = None
         while not self._ending.wait(LOOK_SECONDS):
             try:
@@ -55,9 +55,9 @@ class Scheduler(threading.Thread):
             except StoreError as error:
                 if str(error) != trouble:
                     trouble = str(error)
-                    _LOG.error("The schedules cannot be kept: %s", error)
+                    _LOG.error("The schedules cannot be updated: %s", error)
             except Exception:
-                _LOG.exception("A fault in keeping the schedules; it is tried again")
+                _LOG.exception("Updating the schedules failed; it is retried")
                 self._ending.wait(60.0)
 
     def stop(self) -> None:

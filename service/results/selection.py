@@ -79,7 +79,7 @@ def held_text(study: Study, path: str, value: float) -> str:
 def locate_axes(study: Study, at: Sequence[tuple[str, str]]) -> Fixed:
     """The axes and the positions on them that pairs of path and value (as text) name.
 
-    A path that is no axis is taken where its one value is the given one. Raises SelectionError otherwise.
+    A path that is not an axis is accepted where its only value is the given one. Raises SelectionError otherwise.
     """
     fixed: Fixed = {}
     for path, text in at:

@@ -153,7 +153,7 @@ def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fet
 
 
 def _saltelli_base(study: Study, spec: Mapping[str, Any]) -> int | None:
-    """Points that the study's Saltelli design was made from; None when its cases are no such design."""
+    """Points that the study's Saltelli design was made from; None when its cases are not such a design."""
     axes = spec.get("axes")
     if not (isinstance(axes, list) and len(axes) == 1 and isinstance(axes[0], Mapping)) or spec.get("exclude"):
         return None
@@ -259,7 +259,7 @@ def _saltelli_indices(y: Numbers, base: int, dimensions: int, notes: list[str]) 
 
 
 def _too_few(x: Numbers) -> str:
-    """The sentence for too few cases of a sample, shape (cases, axes); "" where they suffice or are no sample."""
+    """The sentence for too few cases of a sample, shape (cases, axes); "" where they suffice or are not a sample."""
     few = len(x) < LEAST_CASES and going_together(x) is None and all(scattered(column) for column in x.T)
     return f"too few cases for indices: {len(x)}, and {LEAST_CASES} are needed" if few else ""
 

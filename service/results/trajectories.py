@@ -23,7 +23,7 @@ def span(study: Study, case: int, start: str | None, end: str | None) -> tuple[f
     """First and last place of a part of the case's extent (time in s, angle in rad); by default from its `begin` on.
 
     ``start`` and ``end`` are SI numbers, or quantities with a unit or in periods. Raises FaultError, about the
-    parameter ``from`` or ``to``, when they are no places within it.
+    parameter ``from`` or ``to``, when they are not places within it.
     """
     extent = models.extent(study, case)
     last = extent.end if end is None else _place("to", end, extent)

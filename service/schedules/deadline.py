@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 #: Least time that a deadline leaves, in s: a shorter one is a slip.
 _LEAST_SECONDS: Final = 1.0
 ALLOWED: Final = (
-    'a time to come with its offset, such as "2027-01-31T06:00+01:00", or a duration from the submission, such as '
+    'a future time with its offset, such as "2027-01-31T06:00+01:00", or a duration from the submission, such as '
     f'"8 h"; 1 s to {MAX_FINISH_DAYS} days ahead'
 )
 ALLOWED_OF_RUNS: Final = (
@@ -52,7 +52,7 @@ def finish_at(text: str, now: datetime) -> datetime:
         raise FinishError("out-of-range", "is too far away") from None
     if ahead <= 0.0:
         raise FinishError(
-            "out-of-range", f"has passed already; it is {now.astimezone(UTC).isoformat(timespec='seconds')} now"
+            "out-of-range", f"is in the past; it is {now.astimezone(UTC).isoformat(timespec='seconds')} now"
         )
     _require_near(ahead)
     return moment
@@ -62,9 +62,9 @@ def _seconds(text: str) -> float:
     try:
         seconds = parse_quantity(text, "s")
     except QuantityError:
-        raise FinishError("invalid-time", "is neither a time nor a duration with its unit") from None
+        raise FinishError("invalid-time", "is neither a time nor a duration with a unit") from None
     if seconds <= 0.0:
-        raise FinishError("out-of-range", "is no time to come")
+        raise FinishError("out-of-range", "is not in the future")
     _require_near(seconds)
     return seconds
 

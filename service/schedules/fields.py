@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 FIELDS: Final = ("name", "spec", "cron", "at", "zone", "window", "priority", "fresh", "finish_by", "enabled")
 _CRON_ALLOWED: Final = 'five fields, such as "0 22 * * 1-5": at 22:00 from Monday to Friday'
-_AT_ALLOWED: Final = 'a time to come, such as "2027-01-31T22:00"'
+_AT_ALLOWED: Final = 'a future time, such as "2027-01-31T22:00"'
 _WINDOW_ALLOWED: Final = 'two different times of day, such as ["22:00", "06:00"]'
 _LONGEST_CRON: Final = 200
 #: Runs of a new schedule whose window is compared with their deadline.
@@ -164,7 +164,7 @@ def _read_zone(report: Report, value: object) -> str:
         return value
     near = did_you_mean(value, zones()) if isinstance(value, str) else ""
     report.fault(
-        "/zone", "unknown-name", f"is no time zone{near}", value, allowed='a name such as "Europe/Berlin" or "UTC"'
+        "/zone", "unknown-name", f"is not a time zone{near}", value, allowed='a name such as "Europe/Berlin" or "UTC"'
     )
     return "UTC"
 
@@ -174,7 +174,7 @@ def _read_timing(
 ) -> Timing | None:
     cron, at = found.get("cron"), found.get("at")
     if (cron is None) == (at is None):
-        message = "when it is to run is missing" if cron is None else "is given beside `at`"
+        message = "is required: the time to run" if cron is None else "is given beside `at`"
         report.fault(
             "/cron", "exactly-one", message, cron, allowed=f"either `cron`, {_CRON_ALLOWED}; or `at`, {_AT_ALLOWED}"
         )
@@ -182,7 +182,7 @@ def _read_timing(
     if cron is not None:
         try:
             if not isinstance(cron, str) or len(cron) > _LONGEST_CRON:
-                raise TimingError("invalid-time", "is no cron expression")
+                raise TimingError("invalid-time", "is not a cron expression")
             check_cron(cron)
         except TimingError as error:
             report.fault("/cron", error.code, str(error), cron, allowed=_CRON_ALLOWED)
@@ -190,10 +190,10 @@ def _read_timing(
         return Timing(" ".join(cron.split()), None, zone)
     try:
         if not isinstance(at, str):
-            raise TimingError("wrong-type", "is no time")
+            raise TimingError("wrong-type", "is not a time")
         moment = read_moment(at, zone)
         if moment <= now and not (old is not None and old.timing.at == moment):
-            raise TimingError("out-of-range", "has passed already")
+            raise TimingError("out-of-range", "is in the past")
     except TimingError as error:
         report.fault("/at", error.code, str(error), at, allowed=_AT_ALLOWED)
         return None
@@ -205,7 +205,7 @@ def _read_finish(report: Report, value: object) -> str | None:
         return None
     try:
         if not isinstance(value, str):
-            raise FinishError("wrong-type", "is no text")
+            raise FinishError("wrong-type", "must be a text")
         return check_run_finish(value)
     except FinishError as error:
         report.fault("/finish_by", error.code, str(error), value, allowed=ALLOWED_OF_RUNS)
@@ -216,12 +216,12 @@ def _read_window(report: Report, value: object, zone: str) -> Window | None:
     if value is None:
         return None
     if not (isinstance(value, list | tuple) and len(value) == 2 and all(isinstance(item, str) for item in value)):
-        report.fault("/window", "wrong-type", "is no window", value, allowed=_WINDOW_ALLOWED)
+        report.fault("/window", "wrong-type", "is not a time window", value, allowed=_WINDOW_ALLOWED)
         return None
     try:
         begin, end = map(read_time_of_day, value)
         if begin == end:
-            raise TimingError("invalid-range", "is never closed or never open")
+            raise TimingError("invalid-range", "begins and ends at the same time")
     except TimingError as error:
         report.fault("/window", error.code, str(error), value, allowed=_WINDOW_ALLOWED)
         return None

@@ -76,7 +76,7 @@ class Timing:
 
 
 def check_cron(expression: str) -> None:
-    """Raise TimingError when ``expression`` is no cron expression of five fields that is due some day."""
+    """Raise TimingError when ``expression`` is not a cron expression of five fields that is due some day."""
     if len(expression.split()) != 5:
         raise TimingError(
             "invalid-time", "a cron expression has five fields: minute, hour, day of the month, month, day of the week"
@@ -98,7 +98,7 @@ def read_moment(text: str, zone: str) -> datetime:
     try:
         moment = datetime.fromisoformat(text)
     except ValueError:
-        raise TimingError("invalid-time", "is no time") from None
+        raise TimingError("invalid-time", "is not a time") from None
     try:
         if moment.tzinfo is not None:
             return moment.astimezone(UTC)
@@ -145,8 +145,8 @@ def read_time_of_day(text: str) -> time:
     if not (
         colon and len(minutes) == 2 and text.isascii() and hours.isdigit() and minutes.isdigit() and len(hours) < 3
     ):
-        raise TimingError("invalid-time", "is no time of day")
+        raise TimingError("invalid-time", "is not a time of day")
     try:
         return time(int(hours), int(minutes))
     except ValueError:
-        raise TimingError("invalid-time", "is no time of day") from None
+        raise TimingError("invalid-time", "is not a time of day") from None

@@ -44,7 +44,7 @@ def unit_of(study: Study, path: str) -> str:
 
 
 def result_of(infos: Iterable[ResultInfo], name: str) -> ResultInfo | None:
-    """The entry of a result name; None when there is no such result."""
+    """The entry of a result name; None for an unknown name."""
     return next((info for info in infos if info.name == name), None)
 
 

@@ -93,7 +93,7 @@ def parse_spec(data: object) -> ParsedSpec:
 def _read_version(report: Report, found: Mapping[str, Any]) -> None:
     version = found.get("sprag")
     if version is None or isinstance(version, bool) or version != VERSION or not isinstance(version, int):
-        message = "is required: the version of the spec" if version is None else "is no version this program reads"
+        message = "is required: the version of the spec" if version is None else "is not a supported spec version"
         report.fault(
             "/sprag", "required" if version is None else "unsupported-version", message, version, allowed=str(VERSION)
         )
@@ -117,7 +117,7 @@ def _read_model(report: Report, found: Mapping[str, Any]) -> str | None:
     if isinstance(model, str) and model in known:
         return model
     hint = did_you_mean(model, known) if isinstance(model, str) else ""
-    message = "is required" if model is None else f"is no model this program knows{hint}"
+    message = "is required" if model is None else f"is not a known model{hint}"
     report.fault(
         "/model",
         "required" if model is None else "unknown-name",

@@ -68,7 +68,7 @@ def read_flag(report: Report, pointer: str, value: object) -> bool | None:
 
 
 def read_object(report: Report, pointer: str, value: object, known: Iterable[str]) -> Mapping[str, Any] | None:
-    """An object with none but ``known`` fields (others are noted); None, and a problem noted, when it is no object."""
+    """An object with ``known`` fields only (others are noted); None, and a fault noted, when it is not an object."""
     known = tuple(known)
     if not isinstance(value, Mapping):
         message = "is required" if value is None else "must be an object"

@@ -115,7 +115,15 @@ def _factors(number: int, line: str, convert: Callable[[str, str], float]) -> tu
         cells = [cell.strip() for cell in re.split(r"(?<=[\])])\s+|\s{2,}", line) if cell.strip()]
     if len(cells) != 2:
         raise MeasuredDataError(
-            [Fault(f"line {number}", "unequal-lengths", "the header has not two columns", line[:80], "angle, torque")]
+            [
+                Fault(
+                    f"line {number}",
+                    "unequal-lengths",
+                    "the header does not have two columns",
+                    line[:80],
+                    "angle, torque",
+                )
+            ]
         )
     factors: list[float | None] = []
     problems = []
@@ -140,14 +148,14 @@ def _factor(heading: str, unit: str, words: frozenset[str], convert: Callable[[s
 
 
 def _assumed(factors: tuple[float | None, float | None], rows: NDArray[np.float64]) -> Iterator[str]:
-    """What was taken for granted where the file names no units."""
+    """What was assumed where the file names no units."""
     bare = [
         f"{name}s are taken in {unit}"
         for factor, (name, unit) in zip(factors, _QUANTITIES, strict=True)
         if factor is None
     ]
     if bare:
-        yield f"the file does not name every unit: {' and '.join(bare)}; a header such as angle_deg,torque_Nm tells"
+        yield f"the file does not name every unit: {' and '.join(bare)}; use a header such as angle_deg,torque_Nm"
     largest = float(np.abs(rows[:, 0]).max())
     if factors[0] is None and largest > _LARGEST_PLAUSIBLE:
         yield f"the largest angle would be {largest:g} rad, {math.degrees(largest):.4g} degrees; was it in degrees?"
@@ -174,12 +182,12 @@ def _wrong_rows(lines: list[tuple[int, str]]) -> Iterator[Fault]:
             few = f"{len(cells)} column" + ("" if len(cells) == 1 else "s")
             allowed = "two columns: angle, torque"
             if "," in line:
-                allowed += "; decimal commas only where tabs or semicolons part the columns, else 0.25"
+                allowed += "; decimal commas only where tabs or semicolons separate the columns, otherwise 0.25"
             yield Fault(f"line {number}", "unequal-lengths", few, line.replace("\t", " ")[:80], allowed)
             continue
         for cell, (name, _) in zip(cells, _QUANTITIES, strict=True):
             value = parse_number(cell)
             if value is None:
-                yield Fault(f"line {number}", "not-a-number", f"the {name} is no number", cell[:80], "a number")
+                yield Fault(f"line {number}", "not-a-number", f"the {name} is not a number", cell[:80], "a number")
             elif not math.isfinite(value):
                 yield Fault(f"line {number}", "not-finite", f"the {name} is not finite", cell[:80], "a finite number")

@@ -158,16 +158,16 @@ def _plain(data: object, pointer: str, depth: int, report: Report) -> object:
             report.fault(pointer, "invalid-text", "the text holds half a character (a lone surrogate)", data)
     elif isinstance(data, int):
         if data.bit_length() > _LONGEST_BITS:
-            report.fault(pointer, "out-of-range", "is beyond the range of numbers", data)
+            report.fault(pointer, "out-of-range", "is too large for a number", data)
     elif isinstance(data, _LongInteger):
-        report.fault(pointer, "out-of-range", "is beyond the range of numbers", f"an integer of {data.digits} digits")
+        report.fault(pointer, "out-of-range", "is too large for a number", f"an integer of {data.digits} digits")
     elif isinstance(data, float):
         if not math.isfinite(data):
             report.fault(
                 pointer, "not-finite", "must be a finite number (NaN, Infinity and what overflows are none)", data
             )
     elif data is not None:
-        report.fault(pointer, "wrong-type", "is a date or a time, which no field of a spec is", str(data))
+        report.fault(pointer, "wrong-type", "is a date or a time; no field of a spec takes one", str(data))
     return data
 
 

@@ -157,7 +157,7 @@ def exact_number(value: object, unit: str) -> Fraction:
         )
     if isinstance(value, int):
         if value.bit_length() > 1024:
-            raise QuantityError("out-of-range", "is beyond the range of numbers")
+            raise QuantityError("out-of-range", "is too large for a number")
         return Fraction(value)
     if not math.isfinite(value):
         raise QuantityError("not-finite", "must be a finite number")
@@ -185,9 +185,9 @@ def to_float(number: Fraction) -> float:
     try:
         value = number.numerator / number.denominator
     except OverflowError:
-        raise QuantityError("out-of-range", "is beyond the range of numbers") from None
+        raise QuantityError("out-of-range", "is too large for a number") from None
     if value == 0.0 and number:
-        raise QuantityError("out-of-range", "is too small for a number, yet not 0")
+        raise QuantityError("out-of-range", "is too small for a number but not 0")
     return value
 
 
@@ -233,7 +233,7 @@ def _factor(text: str, unit: str) -> Fraction:
             return factor / wanted_factor / Fraction(_TWO_PI)
         if unit == "N*m*s/rad" and angle == 0:
             return factor / wanted_factor  # N*m*s, as most books write it
-    raise QuantityError("wrong-unit", f"is in '{text}', which is no unit of this field; {expected}")
+    raise QuantityError("wrong-unit", f"is in '{text}', which is not a unit of this field; {expected}")
 
 
 def _measure(text: str) -> tuple[Fraction, dict[str, int]]:

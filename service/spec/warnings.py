@@ -38,7 +38,7 @@ _PLAUSIBLE: Final[dict[str, tuple[float, str, str]]] = {
 
 
 def warn_vibration_drive(report: Report, study: Study) -> None:
-    """Notes what is implausible about a vibration drive anywhere on the axes of ``study``."""
+    """Note what is implausible about a vibration drive anywhere on the axes of ``study``."""
     for path in dict.fromkeys((*study.base, *study.axis_paths)):
         _plausible(report, study, path)
     if not any(_values(study, f"excitation.amplitude_{axis}").any() for axis in "xy"):
@@ -66,7 +66,7 @@ _PLAUSIBLE_SHAFT: Final[dict[str, tuple[float, str, str]]] = {
 
 
 def warn_machine_shaft(report: Report, study: Study) -> None:
-    """Notes what is implausible about a machine shaft anywhere on the axes of ``study``."""
+    """Note what is implausible about a machine shaft anywhere on the axes of ``study``."""
     for path in dict.fromkeys((*study.base, *study.axis_paths)):
         _plausible(report, study, path, _PLAUSIBLE_SHAFT)
     structure = study.structure or {}

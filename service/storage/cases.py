@@ -124,7 +124,7 @@ class Cases(Orders):
     def rows_for_cases(self, study_id: str, cases: ArrayLike, names: Sequence[str]) -> CaseColumns:
         """Results ``names`` of the given case numbers (shape (m,), any order), aligned with them.
 
-        Raises StudyNotFound, and KeyError for a name that is no result of the study.
+        Raises StudyNotFound, and KeyError for a name that is not a result of the study.
         """
         wanted: NDArray[np.int64] = np.asarray(cases, dtype=np.int64).reshape(-1)
         unique, position = np.unique(wanted, return_inverse=True)

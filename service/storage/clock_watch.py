@@ -24,7 +24,7 @@ FOLLOWED_AFTER: Final = timedelta(hours=1)
 #: The believed moment is written down after this time.
 NOTE_AFTER: Final = timedelta(minutes=10)
 MESSAGE: Final = (
-    "The clock jumped ahead, from {} to {}: nothing is deleted by age until it is set right, or until "
+    "The clock jumped ahead, from {} to {}: nothing is deleted by age until it is corrected, or until "
     "`sprag db clock` says that it is right"
 )
 
@@ -56,7 +56,7 @@ class ClockWatch:
                     _LOG.error("%s.", jump_message(expected, now))
                 return False
             if self._told:
-                _LOG.warning("The clock is believed again: it is %s.", now.isoformat(timespec="seconds"))
+                _LOG.warning("The clock is trusted again: it is %s.", now.isoformat(timespec="seconds"))
                 self._told = False
             back = self._put_back(now, expected, elapsed)
             self._believed = now if back else max(expected, now), elapsed

@@ -144,7 +144,7 @@ def _look_over_file(session: Session) -> list[str]:
 
 
 def _server_version(session: Session) -> str:
-    """Version of the server; "" where it does not answer, which is told elsewhere."""
+    """Version of the server; "" where it does not answer, which is reported elsewhere."""
     with suppress(DatabaseError), session.read() as connection:
         return str(connection.exec_driver_sql("SHOW server_version").scalar_one()).split()[0]
     return ""

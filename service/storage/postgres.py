@@ -146,11 +146,9 @@ def explained(error: BaseException, where: str) -> DatabaseError | None:
     if state == "53100":
         return DatabaseFullError(f"the disk of the server that holds {where} is full")
     if state.startswith(("53", "58")):
-        return DatabaseBusyError(f"the server of the database {where} is in trouble: {_first_line(error)}")
+        return DatabaseBusyError(f"the server of the database {where} has a problem: {_first_line(error)}")
     if state == "42501":
-        return DatabaseError(
-            f"the user may not do that in the database {where}: {_first_line(error)}", "database-forbidden"
-        )
+        return DatabaseError(f"permission denied in the database {where}: {_first_line(error)}", "database-forbidden")
     if state == "25006":
         return DatabaseError(
             f"the database {where} is read-only; name the primary server, not its copy", "database-read-only"
@@ -277,7 +275,7 @@ class News:
         return heard
 
     def close(self) -> None:
-        """Hear nothing more."""
+        """Stop listening."""
         connection, self._connection = self._connection, None
         if connection is not None:
             with suppress(psycopg.Error):

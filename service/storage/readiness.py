@@ -76,4 +76,4 @@ class Readiness:
         silence = self._store.silence()
         if silence is None or silence <= SILENT_SECONDS:
             return []
-        return [f"No worker has been heard of for {silence:.0f} s: studies are not run."]
+        return [f"No worker has responded for {silence:.0f} s: studies are not run."]

@@ -155,7 +155,7 @@ def _cut(connection: sa.Connection, number: int, runs: Sequence[Run]) -> None:
 def _pieces(number: int, chunk: _Done, inside: Sequence[Run]) -> list[dict[str, Any]]:
     """A finished chunk as pieces that wait (from, to: ``inside``) and pieces that stay done in between.
 
-    Those share the time it took by their numbers of cases, so that what is told of speed stays right.
+    Those share the time it took by their numbers of cases, so that the reported speed stays right.
     """
     waiting = {first for first, _ in inside}
     borders = sorted({chunk.first, chunk.first + chunk.count, *(border for part in inside for border in part)})

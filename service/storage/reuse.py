@@ -49,7 +49,8 @@ _NO_RESULT: Final = tuple(ending.value for ending in WorkerEnding)
 
 _MIXED: Final = (
     "The cases of this study were not all computed by one version of Sprag and its libraries on one kind of processor: "
-    "they may differ in more than their parameters, and no other study takes them. A fresh study runs them all alike."
+    "they may differ in more than their parameters, so other studies do not reuse them. A fresh study runs all of "
+    "them alike."
 )
 
 
@@ -219,7 +220,7 @@ def _has_rows(connection: sa.Connection, source: sa.Row[Any], study: Study, case
 
 
 def mark_origin(connection: sa.Connection, number: int) -> None:
-    """Note on a study that rows of this process's fingerprint come in; rows of several are told in a warning."""
+    """Note on a study that rows of this process's fingerprint come in; rows of several lead to a warning."""
     this = STUDIES.c.number == number
     origin, warnings = connection.execute(sa.select(STUDIES.c.fingerprint, STUDIES.c.warnings).where(this)).one()
     if origin is None:

@@ -33,7 +33,7 @@ RESERVE_BYTES = 4 * 1024 * 1024
 RESERVE_FILE_BYTES = 1024 * 1024
 #: Room where it is not known: enough for whatever is asked.
 UNKNOWN_BYTES = 1 << 62
-GOES_ON = "the study goes on by itself when there is room"
+GOES_ON = "the study continues when there is room"
 
 
 def room(session: Session) -> tuple[int, str]:
@@ -43,13 +43,13 @@ def room(session: Session) -> tuple[int, str]:
     when the file was moved, replaced or deleted while in use.
     """
     if session.on_server:
-        return UNKNOWN_BYTES, f"the server of {session.location} does not tell"
+        return UNKNOWN_BYTES, f"the server of {session.location} does not report its free space"
     session.require_same_file()
     free = shutil.disk_usage(session.path.parent).free
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
     size, log = _size(session.path), _size(session.path.with_name(f"{session.path.name}-wal"))
     disk = f"the disk that holds {session.path} has {free / 1e6:.3g} MB left"
-    limited = f"files may not grow beyond {limit / 1e6:.3g} MB here (ulimit -f)"
+    limited = f"files cannot grow beyond {limit / 1e6:.3g} MB here (ulimit -f)"
     capped = limit != resource.RLIM_INFINITY
     if free >= RESERVE_BYTES and not (capped and limit - size - log < RESERVE_BYTES):
         return (limit - size - log, limited) if capped and limit - size - log < free else (free, disk)

@@ -100,7 +100,7 @@ class Session:
             self.url: URL = make_url(url)
         except (sa.exc.ArgumentError, ValueError):  # the latter of a port that is no number
             raise DatabaseError(
-                f"{_without_password(url)!r} is no database URL; one looks like sqlite:////path/to/sprag.sqlite3 or "
+                f"{_without_password(url)!r} is not a database URL; one looks like sqlite:////path/to/sprag.sqlite3 or "
                 "postgresql://user@host:5432/database",
                 "invalid-database-url",
             ) from None
@@ -274,7 +274,7 @@ class Session:
             if not self._turn.wait_for(lambda: self._refusing or not self._writing, BUSY_SECONDS):
                 raise DatabaseBusyError(_BUSY.format(self.location))
             if self._refusing:
-                raise EndingError("the service is ending: nothing was written")
+                raise EndingError("the service is shutting down; nothing was written")
             self._writing = True
         try:
             with self._transaction(self._writer, "write", began) as connection:

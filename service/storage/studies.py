@@ -153,7 +153,7 @@ class Studies(Orders):
         since = moment(row.heartbeat_at).isoformat(timespec="seconds")
         return replace(
             record,
-            reason=f"nothing has been heard of the worker (process {row.owner}) since {since}; the study goes on when "
+            reason=f"the worker (process {row.owner}) has not responded since {since}; the study continues when "
             "a worker is at work",
         )
 

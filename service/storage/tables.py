@@ -47,7 +47,7 @@ STUDIES = sa.Table(
     sa.Column("deleted_at", sa.BigInteger),
     # Of two studies the one with the higher number goes first.
     sa.Column("priority", sa.Integer, nullable=False, server_default="0"),
-    # What a paused study waits for (`WAITS_FOR_ROOM` and below); NULL where somebody paused it, or a fault.
+    # What a paused study waits for (`WAITS_FOR_ROOM` and below); NULL where it was paused, or a fault.
     sa.Column("waits_for", sa.String(12)),
     # Equal for studies that may have cases in common (`sprag.worker.reuse`).
     sa.Column("kin_hash", sa.String(64), nullable=False, server_default="", index=True),

@@ -145,7 +145,7 @@ def test_a_database_that_is_none(tmp_path: Path, sprag: Sprag) -> None:
     for arguments in (("run", SMALL, "--db", file), ("db", "upgrade", "--db", file), ("db", "check", "--db", file)):
         done = sprag(*arguments)
         assert done.code == 3, arguments
-        assert "fault of Sprag" not in done.err
+        assert "bug in Sprag" not in done.err
     assert sprag("run", SMALL, "--db", "postgresql://localhost/x").code == 3
 
 

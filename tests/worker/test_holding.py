@@ -97,7 +97,7 @@ def test_a_store_that_takes_nothing_is_tried_again_and_nothing_is_lost(store: St
     Dispatcher(tank, Prompt(fakes.run), clock).run(turn)  # type: ignore[arg-type]
     assert tank.failures > 3
     reasons = {reason for _, state, reason in seen if state is StudyState.PAUSED}
-    assert reasons == {"the disk is full; it is tried again from time to time"}
+    assert reasons == {"the disk is full; it is retried from time to time"}
     assert endings(store, record) == dict.fromkeys(range(20), "ok")
     assert store.get_study(paused.id).state is StudyState.PAUSED
 

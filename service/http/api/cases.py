@@ -60,11 +60,11 @@ def list_cases(
     """Finished cases, in order of their numbers; of a cancelled study also those that were never run."""
     if ending is not None and ending not in models.ENDING_SENTENCES:
         raise parameter_error(
-            "ending", "invalid-choice", "there is no such ending", shown(ending), ", ".join(models.ENDING_SENTENCES)
+            "ending", "invalid-choice", "unknown ending", shown(ending), ", ".join(models.ENDING_SENTENCES)
         )
     if regime is not None and regime not in models.REGIME_SENTENCES:
         raise parameter_error(
-            "regime", "invalid-choice", "there is no such regime", shown(regime), ", ".join(models.REGIME_SENTENCES)
+            "regime", "invalid-choice", "unknown regime", shown(regime), ", ".join(models.REGIME_SENTENCES)
         )
     after = _after(page_token)
     # One more than the page, which tells whether there is another.

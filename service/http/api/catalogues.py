@@ -35,7 +35,7 @@ def list_models(request: Request) -> Any:
 def get_model(request: Request, name: ModelName) -> Any:
     """One model with its parameters, results and endings."""
     if name not in models.model_names():
-        raise ApiError("not-found", f"There is no such model; there is: {', '.join(models.model_names())}.")
+        raise ApiError("not-found", f"Unknown model; known models: {', '.join(models.model_names())}.")
     return _answer(request, _model(name))
 
 
@@ -51,7 +51,7 @@ def list_presets(request: Request) -> Any:
 def get_preset(request: Request, name: PresetName) -> Any:
     """One study that comes with the program."""
     if name not in preset_names():
-        raise ApiError("not-found", f"There is no such preset; there are: {', '.join(preset_names())}.")
+        raise ApiError("not-found", f"Unknown preset; known presets: {', '.join(preset_names())}.")
     return _answer(request, preset_of(name))
 
 

@@ -71,4 +71,4 @@ def _table(name: str) -> Table:
     for table in TABLES:
         if name == table:
             return table
-    raise parameter_error("table", "invalid-choice", "there is no such table", shown(name), ", ".join(TABLES))
+    raise parameter_error("table", "invalid-choice", "unknown table", shown(name), ", ".join(TABLES))

@@ -46,7 +46,7 @@ LastEventId = Annotated[
     },
 )
 async def get_events(context: Ctx, study_id: StudyId, last_event_id: LastEventId = None) -> Response:
-    """The progress of a study as it goes. Each event tells the whole state, so that a missed one is no loss."""
+    """The progress of a study as it goes. Each event has the whole state, so a missed one does not matter."""
     record = await run_in_threadpool(context.store.get_study, study_id)
     if record.state.terminal and last_event_id == str(record.revision):
         return Response(status_code=204)
@@ -79,7 +79,7 @@ async def _events(context: Context, study_id: str, last: str | None) -> AsyncIte
         try:
             record, progress = await run_in_threadpool(context.store.look, study_id)
         except StoreError:
-            return  # deleted, or the database is in trouble: a client that comes again is told which
+            return  # deleted, or the database has a problem: a client that comes again is told which
         if str(record.revision) != last:
             last, spoke = str(record.revision), time.monotonic()
             yield _event(record, progress)

@@ -41,11 +41,11 @@ _FIELDS: Final[dict[str, Any]] = {
     "spec": {"$ref": "#/components/schemas/Spec"},
     "cron": {
         "type": ["string", "null"],
-        "description": "again and again: minute, hour, day of the month, month, day of the week, in `zone`",
+        "description": "recurring: minute, hour, day of the month, month, day of the week, in `zone`",
     },
     "at": {
         "type": ["string", "null"],
-        "description": "once: a time to come, in `zone` unless it carries its own offset",
+        "description": "once: a future time, in `zone` unless it has its own offset",
     },
     "zone": {"type": "string", "default": "UTC", "description": "name of the time zone"},
     "window": {
@@ -56,7 +56,11 @@ _FIELDS: Final[dict[str, Any]] = {
         "description": "its studies run between these times of day, in `zone`, and are held outside",
     },
     "priority": {"type": "integer", "minimum": -MAX_PRIORITY, "maximum": MAX_PRIORITY, "default": 0},
-    "fresh": {"type": "boolean", "default": False, "description": "run every case, also those that studies have"},
+    "fresh": {
+        "type": "boolean",
+        "default": False,
+        "description": "run every case, including those that other studies already have",
+    },
     "finish_by": {
         "type": ["string", "null"],
         "maxLength": 80,

@@ -44,7 +44,7 @@ Priority = Annotated[
     Query(
         ge=-MAX_PRIORITY,
         le=MAX_PRIORITY,
-        description="of the studies that wait, those of the highest priority go first",
+        description="waiting studies with the highest priority run first",
         examples=[10],
     ),
 ]
@@ -82,7 +82,9 @@ async def create_study(
     received: SpecBody,
     idempotency_key: IdempotencyKey = None,
     priority: Priority = 0,
-    fresh: Annotated[bool, Query(description="run every case, also those that other studies have already")] = False,
+    fresh: Annotated[
+        bool, Query(description="run every case, including those that other studies already have")
+    ] = False,
     finish_by: FinishBy = None,
 ) -> Response:
     """Submit a study. Rows that other studies have are taken.
@@ -189,7 +191,7 @@ def _verb(name: str, sentence: str) -> None:
 
 _verb("cancel", "Stop a study for good: the cases that are done are kept, the others are not run.")
 _verb("pause", "Hold a study: no new cases are started until it is resumed.")
-_verb("resume", "Go on with a study that is held; a deadline that has passed does not count any more.")
+_verb("resume", "Resume a study that is held; a deadline in the past no longer applies.")
 
 
 @router.post(
@@ -203,7 +205,7 @@ def retry_study(
     study_id: StudyId,
     ending: Annotated[
         list[Annotated[str, Field(json_schema_extra=one_of(_FAILED))]] | None,
-        Query(description="only cases that ended so; may be given again", examples=[["chatter"]]),
+        Query(description="only cases with this ending; may be repeated", examples=[["chatter"]]),
     ] = None,
 ) -> Response:
     """Run the cases of an ended study that did not end ok again, and no others."""

@@ -104,7 +104,7 @@ def setting(given: Mapping[str, str]) -> Setting:
     """What an address sets; ApiError for a machine that there is not."""
     name = given.get("machine") or next(iter(machines()), "")
     if name not in machines():
-        raise ApiError("not-found", f"There is no such machine; there are: {', '.join(machines()) or 'none'}.")
+        raise ApiError("not-found", f"Unknown machine; known machines: {', '.join(machines()) or 'none'}.")
     spec: dict[str, Any] = preset_of(name)["spec"]
     own = parse_spec(overridden(spec, {})).study
     values = {path: plain(given[path]) for path in own.base if given.get(path, "").strip()}
@@ -244,7 +244,7 @@ async def laboratory_study(context: Ctx, work: Attended, request: Request, quest
     """One of the questions about the machine as it is set, as a study to be looked over and submitted."""
     chosen = await work.check(setting, dict(request.query_params))
     if question not in QUESTIONS:
-        raise ApiError("not-found", f"There is no such question; there are: {', '.join(QUESTIONS)}.")
+        raise ApiError("not-found", f"Unknown question; known questions: {', '.join(QUESTIONS)}.")
     paths = {
         "inertia": [s.path for s in chosen.sliders if s.path == "drive.inertia"],
         "masses": [s.path for s in chosen.sliders if s.unit == "kg" and s.path.startswith("mechanism.")],

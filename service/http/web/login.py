@@ -30,7 +30,7 @@ async def log_in(request: Request, values: Form) -> Response:
         grant = access.of_token(values.get("token", "").strip().encode("utf-8", "replace"))
         if grant is None:
             await access.attempts.failed(request.scope, "page /login")
-            return login_page(request, access, wanted, fault="This is no valid token.", status=401, kept=kept)
+            return login_page(request, access, wanted, fault="This token is not valid.", status=401, kept=kept)
     except ApiError as error:
         response = login_page(request, access, wanted, fault=error.detail, status=error.type.status, kept=kept)
         response.headers.update(error.headers)

@@ -68,7 +68,7 @@ async def openapi(request: Request) -> Response:
 async def problem(slug: str) -> Response:
     """What a kind of problem means."""
     if slug not in PROBLEM_TYPES:
-        raise ApiError("not-found", "There is no such kind of problem.")
+        raise ApiError("not-found", "Unknown kind of problem.")
     return page("problem.html", problem=PROBLEM_TYPES[slug])
 
 

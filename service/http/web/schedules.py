@@ -83,7 +83,7 @@ def act(context: Ctx, schedule_id: str, verb: str) -> Response:
         fields = change_fields(record.fields, {"enabled": verb == "enable"}, context.store.clock.now())
         context.store.change_schedule(schedule_id, fields)
     else:
-        raise ApiError("not-found", "There is no such thing to do with a schedule.")
+        raise ApiError("not-found", "Unknown action.")
     return RedirectResponse("/schedules", status_code=303)
 
 

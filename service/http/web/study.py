@@ -182,7 +182,7 @@ def act(context: Ctx, study_id: StudyId, verb: str) -> Response:
         "retry": context.store.retry_study,
     }
     if verb not in wishes:
-        raise ApiError("not-found", "There is no such thing to do with a study.")
+        raise ApiError("not-found", "Unknown action.")
     wishes[verb](study_id)
     return RedirectResponse(f"/studies/{study_id}", status_code=303)
 

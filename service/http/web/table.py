@@ -115,9 +115,9 @@ class _Wanted:
 def _page(context: Context, study_id: str, study: Study, wanted: _Wanted) -> TablePage:
     ending, regime, after = wanted.ending, wanted.regime, wanted.after
     if ending and ending not in models.ENDING_SENTENCES:
-        raise SelectionError([ParameterFault("ending", "invalid-choice", "there is no such ending", value=ending)])
+        raise SelectionError([ParameterFault("ending", "invalid-choice", "unknown ending", value=ending)])
     if regime and regime not in models.REGIME_SENTENCES:
-        raise SelectionError([ParameterFault("regime", "invalid-choice", "there is no such regime", value=regime)])
+        raise SelectionError([ParameterFault("regime", "invalid-choice", "unknown regime", value=regime)])
     if not wanted.sort and not wanted.at:
         block = context.store.case_page(study_id, after - 1, _ROWS + 1, ending or None, regime or None)
         rows = list(block.rows())
@@ -157,7 +157,7 @@ def _ordered(context: Context, study_id: str, study: Study, wanted: _Wanted) -> 
             np.float64
         )
     else:
-        raise SelectionError([ParameterFault("sort", "invalid-choice", "there is no such column", value=name)])
+        raise SelectionError([ParameterFault("sort", "invalid-choice", "unknown column", value=name)])
     cases, keys = cases[finished], np.asarray(keys, dtype=np.float64)[finished]
     # What could not be computed stands last, whichever way the rest goes.
     missing = np.isnan(keys)

@@ -83,7 +83,7 @@ def defaults(study: Study, spec: Mapping[str, Any]) -> list[str]:
 
 
 def choices(study: Study, spec: Mapping[str, Any]) -> dict[str, str]:
-    """What of the machine is no number, by its path in the base."""
+    """The fields of the machine that are not numbers, by their paths in the base."""
     return {choice.path: choice.text for choice in part_of(study.model).choices(study, spec)}
 
 

@@ -23,7 +23,7 @@ _GIVEN: Final = ("base", "run")
 class Source:
     """What is exported: a study, the description of its results, and where its rows come from, in order of cases.
 
-    ``spec`` is the user's own, which has what is no number: kinds, formulas, tables, measured points.
+    ``spec`` is the user's own, which has what is not a number: kinds, formulas, tables, measured points.
     """
 
     study: Study
@@ -36,7 +36,7 @@ class Source:
 def machine(source: Source) -> dict[str, Any]:
     """The machine and its run for programs, plain JSON data.
 
-    ``base`` and ``run`` in SI numbers, ``choices`` (what is no number), ``defaults`` (paths of what nobody gave), and
+    ``base`` and ``run`` in SI numbers, ``choices`` (what is not a number), ``defaults`` (paths left out), and
     ``given``, both as the user wrote them.
     """
     study, spec = source.study, source.spec

@@ -123,7 +123,7 @@ def read_paths(report: Report, pointer: str, data: object, machine: Machine) -> 
 
 
 def check_paths(report: Report, axes: Sequence[tuple[str, ...]], pointer: str = "/axes") -> None:
-    """Notes every path that stands twice, in one axis or on two; ``pointer`` is that of the list of axes."""
+    """Note every path that stands twice, in one axis or on two; ``pointer`` is that of the list of axes."""
     taken: dict[str, int] = {}
     for index, paths in enumerate(axes):
         for path, times in Counter(paths).items():
@@ -131,7 +131,7 @@ def check_paths(report: Report, axes: Sequence[tuple[str, ...]], pointer: str = 
                 report.fault(join(pointer, index, "path"), "repeated", "names the same path twice", path)
             if path in taken:
                 report.fault(
-                    join(pointer, index, "path"), "repeated", f"this path already stands on axis {taken[path]}", path,
+                    join(pointer, index, "path"), "repeated", f"this path is already on axis {taken[path]}", path,
                     allowed="each path on one axis",
                 )  # fmt: skip
             taken.setdefault(path, index)

@@ -61,7 +61,7 @@ def _parts(report: Report, pointer: str, path: str, data: object, machine: Machi
     if found is None:
         return []
     if not found:
-        report.fault(pointer, "required", "says nothing of the values", data, allowed="one of " + ", ".join(FIELDS))
+        report.fault(pointer, "required", "has no condition", data, allowed="one of " + ", ".join(FIELDS))
     parts: list[tuple[str, float]] = []
     for name in FIELDS:
         if name not in found:

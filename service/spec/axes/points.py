@@ -40,7 +40,7 @@ def read_points(report: Report, pointer: str, data: Mapping[str, Any], machine: 
     try:
         rows = _rows(text.removeprefix("\ufeff"))
     except csv.Error as error:
-        report.fault(where, "unreadable", f"is no CSV text: {error}")
+        report.fault(where, "unreadable", f"is not CSV: {error}")
         return None
     columns = len(rows[0].cells) if rows else 0
     if len(rows) < 2 or not 1 <= columns <= MAX_COLUMNS or len(rows) - 1 > MAX_AXIS_VALUES:

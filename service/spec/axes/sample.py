@@ -114,7 +114,7 @@ def _choice(report: Report, pointer: str, value: object, known: tuple[str, ...])
     if isinstance(value, str) and value in known:
         return value
     hint = did_you_mean(value, known) if isinstance(value, str) else ""
-    message = "is required" if value is None else f"there is no such choice{hint}"
+    message = "is required" if value is None else f"is not a valid choice{hint}"
     report.fault(
         pointer,
         "required" if value is None else "invalid-choice",

@@ -165,7 +165,7 @@ def _division(
         report.fault(
             join(pointer, 2),
             "invalid-range",
-            "one value cannot stand at two different ends",
+            "one value cannot be both ends of a range",
             count,
             allowed="2 or more, or equal ends",
         )

@@ -1,4 +1,4 @@
-"""What of a machine is no number, as a table of inputs shows it: a text for each choice, defaults included."""
+"""Fields of a machine that are not numbers, as shown in a table of inputs: a text for each choice, with defaults."""
 
 from __future__ import annotations
 

@@ -188,7 +188,7 @@ def _shown(value: object) -> object:
 
 
 def check_laws(report: Report, clutches: Iterable[Clutch], axes: Sequence[Axis], combine: Combine) -> None:
-    """Notes every clutch whose law is negative in its range, or zero everywhere, in some case of the study.
+    """Note every clutch whose law is negative in its range, or zero everywhere, in some case of the study.
 
     The torque rises with each coefficient, and a wider range only adds windups, so of a grid's laws the one with the
     smallest coefficients and the widest range is the worst, and the only one to look at.
@@ -223,7 +223,7 @@ def _check_zipped(report: Report, clutch: Clutch, varied: Mapping[str, tuple[flo
             pointer,
             "too-many",
             f"zips {len(laws):,} different clutch laws, too many to check one by one for negative torque",
-            allowed=f"at most {MAX_CLUTCH_LAWS:,} different laws, or smallest coefficients that make a law without",
+            allowed=f"at most {MAX_CLUTCH_LAWS:,} different laws, or coefficients that never make it negative",
         )
         return
     for law in laws:

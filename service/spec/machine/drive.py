@@ -97,7 +97,7 @@ def read_drive(report: Report, data: object) -> Drive:
 def _read_section(
     report: Report, pointer: str, data: object, prefix: str, entries: list[Parameter], machine: Drive
 ) -> None:
-    """Reads the object whose fields are the last names of ``entries``' paths, placed under ``prefix``."""
+    """Read the object whose fields are the last names of ``entries``' paths, placed under ``prefix``."""
     parameters = {name: placed(entry, f"{prefix}.{name}") for entry in entries if (name := entry.path.split(".")[-1])}
     machine.parameters.update({entry.path: entry for entry in parameters.values()})
     names = (*parameters, "clutch") if prefix.startswith("pendulums.") else tuple(parameters)

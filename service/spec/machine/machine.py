@@ -80,7 +80,7 @@ def _fields(prefix: str, machine: Machine) -> list[str]:
 
 
 def _unknown_fields(report: Report, prefix: str, data: Mapping[str, Any], machine: Machine) -> None:
-    """Note every field that no parameter is in, and every part that is no object."""
+    """Note every field that no parameter is in, and every part that is not an object."""
     pointer = join("/base", *prefix.split(".")[:-1])
     fields = _fields(prefix, machine)
     report.unknown_fields(pointer, data, tuple(fields))

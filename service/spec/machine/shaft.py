@@ -61,12 +61,10 @@ class ShaftMachine(Machine):
         if step and steps:
             return f"there is no step {step[1]}: steps are numbered from 0 to {steps - 1}"
         if path.startswith("constants.") and self.structure is not None:
-            return "is no constant of this machine" + did_you_mean(path, self.parameters)
+            return "is not a constant of this machine" + did_you_mean(path, self.parameters)
         catalogue = {entry.path for entry in models.parameter_catalogue(models.MACHINE_SHAFT)}
         if general_path(path) in catalogue:
-            return "is no parameter of this machine, whose parts are of another kind" + did_you_mean(
-                path, self.parameters
-            )
+            return "is not a parameter of this machine, which has other parts" + did_you_mean(path, self.parameters)
         return super().why_not(path)
 
 
@@ -124,5 +122,5 @@ def _unused(report: Report, found: Mapping[str, Any], structure: Mapping[str, An
         )
     operation = found.get("operation")
     if isinstance(operation, Mapping) and structure["operation"]["over"] == "angle" and "during" in operation:
-        report.fault("/base/operation/during", "not-used", "tells strokes, and this diagram goes over the angle",
+        report.fault("/base/operation/during", "not-used", "selects strokes, and this diagram is over the angle",
                        operation["during"], allowed='with `over` "stroke" only')  # fmt: skip

@@ -59,7 +59,7 @@ def _load(shape: KernelShape) -> None:
 def check_machine(
     report: Report, structure: Mapping[str, Any], values: Mapping[str, float], places: Mapping[str, str]
 ) -> None:
-    """Notes what is wrong with a machine whose numbers are all in range.
+    """Note what is wrong with a machine whose numbers are all in range.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The parts of a machine shaft in a spec: what is no number of drive, mechanism, operation and cycle."""
+"""The parts of a machine shaft in a spec: the fields of drive, mechanism, operation and cycle that are not numbers."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def read_choice(
     if isinstance(value, str) and value in choices:
         return value
     hint = did_you_mean(value, choices) if isinstance(value, str) else ""
-    message = "is required" if value is None else f"is none of the choices{hint}"
+    message = "is required" if value is None else f"is not a valid choice{hint}"
     report.fault(
         join(pointer, name),
         "required" if value is None else "invalid-choice",
@@ -106,7 +106,9 @@ def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, A
         )
         return None
     if balance != "motor" and motor:
-        report.fault("/base/balance", "conflict", "is not that of a machine with a motor", balance, allowed="'motor'")
+        report.fault(
+            "/base/balance", "conflict", "is not possible for a machine with a motor", balance, allowed="'motor'"
+        )
         return None
     if balance == "scale" and not given:
         report.fault(
@@ -129,7 +131,7 @@ def read_constants(report: Report, data: object) -> list[str] | None:
         return None
     wrong = [name for name in data if not _NAME.fullmatch(name)]
     for name in wrong:
-        report.fault(join("/base/constants", name), "invalid-text", "is no name for a constant", name,
+        report.fault(join("/base/constants", name), "invalid-text", "is not a valid name for a constant", name,
                        allowed="letters, digits and _, at most 40, no digit first")  # fmt: skip
     return None if wrong else sorted(data)
 
@@ -143,7 +145,7 @@ def read_drive(report: Report, data: object, places: dict[str, str]) -> dict[str
     drive: dict[str, Any] = {"form": "constant", "table": None, "formula": None, "motor": None}
     if "motor" in found:
         if "torque" in found:
-            report.fault("/base/drive/torque", "conflict", "stands beside a motor, which gives the torque by itself",
+            report.fault("/base/drive/torque", "conflict", "cannot be given with a motor, which sets the torque",
                            found["torque"], allowed="a torque or a motor")  # fmt: skip
             return None
         return _read_motor(report, found["motor"], drive)
@@ -178,12 +180,12 @@ def _refuse_foreign(report: Report, pointer: str, found: Mapping[str, Any], own:
     for name in found:
         if name not in own:
             report.fault(
-                join(pointer, name), "unknown-field", f"is no field of {what}", found[name], allowed=", ".join(own)
+                join(pointer, name), "unknown-field", f"is not a field of {what}", found[name], allowed=", ".join(own)
             )
 
 
 def read_mechanism(report: Report, data: object, places: dict[str, str]) -> dict[str, Any] | None:
-    """The mechanism: which one, and what of it is no number."""
+    """The mechanism: which one, and those of its fields that are not numbers."""
     places["mechanism"] = "/base/mechanism"
     if data is None:
         return {"kind": "none"}
@@ -203,7 +205,7 @@ def read_mechanism(report: Report, data: object, places: dict[str, str]) -> dict
         return None if diagram is None else {"kind": kind, "table": diagram["table"], "formula": diagram["formula"]}
     if "interpolation" in found:
         report.fault(
-            "/base/mechanism/interpolation", "not-used", "belongs to a table, and there is none", found["interpolation"]
+            "/base/mechanism/interpolation", "not-used", "applies to a table, and there is none", found["interpolation"]
         )
     choices = MECHANISM_CHOICES[kind]
     own = read_object(report, pointer, found[kind], (*choices, *number_fields(f"mechanism.{kind}.")))
@@ -296,7 +298,7 @@ def _diagram(
     given = [form for form in ("table", "formula") if form in found]
     if len(given) != 1:
         report.fault(
-            pointer, "exactly-one", "needs a table or a formula, one of both", dict(found), allowed="table or formula"
+            pointer, "exactly-one", "needs either a table or a formula", dict(found), allowed="table or formula"
         )
         return None
     if given[0] == "formula":
@@ -312,7 +314,7 @@ def _diagram(
 def _formula(report: Report, pointer: str, found: Mapping[str, Any]) -> dict[str, Any] | None:
     formula = found["formula"]
     if "interpolation" in found:
-        report.fault(join(pointer, "interpolation"), "not-used", "belongs to a table, and this is a formula",
+        report.fault(join(pointer, "interpolation"), "not-used", "applies to a table, and this is a formula",
                        found["interpolation"])  # fmt: skip
         return None
     if not isinstance(formula, str) or not formula.strip():

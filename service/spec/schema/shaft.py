@@ -106,7 +106,7 @@ def _drive(entries: dict[str, Parameter]) -> Schema:
             "interpolation": _INTERPOLATION,
             "formula": _formula("torque in N*m as a formula of phi (rad)"),
         },
-        description="a table or a formula, one of both",
+        description="either a table or a formula",
     )
     numbers = _numbers(entries, "drive.")
     torque = numbers["torque"]

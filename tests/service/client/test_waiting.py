@@ -105,7 +105,7 @@ def test_a_restart_is_waited_over_and_told(wait: Waits, sleeps: list[float], cap
     assert not scripted.looks
     assert seen == ["running"] * 4 + ["finished"]
     assert [record.message.partition(" - ")[0] for record in caplog.records] == [
-        "http://sprag: nobody answers there",
+        "http://sprag: cannot connect",
         "The service answers again.",
     ]
     assert sleeps[1:] == list(waiting.TRIES[:3])
@@ -176,7 +176,7 @@ def test_the_command_says_what_it_waits_for(
     assert remote.follow(client, "st_1")["state"] == "finished"
     assert capsys.readouterr().err.splitlines() == [
         "st_1 is paused: the disk is full",
-        "http://sprag: nobody answers there - waiting for the service to answer again; the study is not lost.",
+        "http://sprag: cannot connect - waiting for the service to answer again; the study is not lost.",
         "The service answers again.",
     ]
 

@@ -110,7 +110,7 @@ def test_a_hostile_file_is_refused_by_the_commands(
         assert execute(command) == 2
         told = "".join(capsys.readouterr())
         assert isinstance(json.loads(told), dict)
-        assert "fault of Sprag" not in told
+        assert "bug in Sprag" not in told
         assert len(told) < 60_000
 
 

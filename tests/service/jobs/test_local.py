@@ -149,8 +149,8 @@ def test_a_standby_waits_and_says_so(url: str, monkeypatch: pytest.MonkeyPatch) 
 
         run_dispatcher(WorkerSettings(url, 1, DEADLINE), stopping, say=said.append, executor=inline)
     assert f"process {os.getpid()}" in said[0]
-    assert "waiting for its end" in said[0]
-    assert "at work on" in said[1]
+    assert "waiting for it to stop" in said[0]
+    assert "is working on" in said[1]
 
 
 def test_a_standby_tells_of_a_silent_worker_and_one_that_takes_over_does_not_wait(
@@ -166,7 +166,7 @@ def test_a_standby_tells_of_a_silent_worker_and_one_that_takes_over_does_not_wai
         turns = iter([False, False, False, True])
         run_dispatcher(settings, lambda: next(turns), say=said.append, executor=inline)
         assert [line for line in said if "--take-over" in line] == [said[1]]
-        assert f"nothing was heard of process {os.getpid()}" in said[1]
+        assert f"process {os.getpid()} has not responded" in said[1]
         run_dispatcher(settings, lambda: True, say=said.append, executor=inline, take_over=True)
         with pytest.raises(EpochLostError):
             store.heartbeat(epoch)

@@ -99,7 +99,7 @@ def test_a_time_with_its_offset_or_a_duration_is_a_deadline(text: str, expected:
     [
         ("2026-03-02T06:00", "no offset"),
         ("2026-03-02T06:00 01:00", "neither a time nor a duration"),
-        ("2026-03-01T12:00Z", "has passed already; it is 2026-03-01T12:00:00\\+00:00 now"),
+        ("2026-03-01T12:00Z", "is in the past; it is 2026-03-01T12:00:00\\+00:00 now"),
         ("2027-03-03T00:00Z", "too far away"),
         ("9999-12-31T23:59-23:59", "too far away"),
         ("0.5 s", "too soon"),

@@ -270,4 +270,4 @@ def test_the_thread_looks_again_after_trouble(
         assert looked.acquire(timeout=20)
     scheduler.stop()
     assert not scheduler.is_alive()
-    assert caplog.messages == ["The schedules cannot be kept: the database is busy"]
+    assert caplog.messages == ["The schedules cannot be updated: the database is busy"]

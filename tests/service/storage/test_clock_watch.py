@@ -80,10 +80,10 @@ def test_a_jump_deletes_nothing_and_is_told_and_survives_a_restart(
     assert caplog.text.count("The clock jumped ahead, from 2026-01-01T12:00:20+00:00 to 2035-12-30T12:00:20") == 1
     store.take_over("here:1")
     answer = http.get("/readyz").json()
-    assert "nothing is deleted by age until it is set right" in answer["warnings"][0]
+    assert "nothing is deleted by age until it is corrected" in answer["warnings"][0]
     clock.ahead = timedelta()
     looker.look()
-    assert "The clock is believed again: it is 2026-01-0" in caplog.text
+    assert "The clock is trusted again: it is 2026-01-0" in caplog.text
     assert store.get_study(study).id == study
     clock.seconds = 31.5 * DAY
     looker.look()

@@ -287,7 +287,7 @@ def test_a_standby_takes_over_in_seconds_when_the_dispatcher_is_killed_or_loses_
             workers.append(worker(postgres_url))
             standby = workers[1].stderr
             assert standby is not None
-            assert f":{workers[0].pid}) is at work on postgresql://sprag@/" in standby.readline()
+            assert f":{workers[0].pid}) is working on postgresql://sprag@/" in standby.readline()
             record = store.create_study({}, fakes.study(40))
             eventually(lambda: store.get_study(record.id).done > 0)
             workers[0].send_signal(signal.SIGKILL)
@@ -303,7 +303,7 @@ def test_a_standby_takes_over_in_seconds_when_the_dispatcher_is_killed_or_loses_
             workers.append(worker(postgres_url))
             third = workers[2].stderr
             assert third is not None
-            assert "waiting for its end" in third.readline()
+            assert "waiting for it to stop" in third.readline()
             with store.session.plain() as connection:
                 connection.exec_driver_sql(
                     "SELECT pg_terminate_backend(pid) FROM pg_locks WHERE locktype = 'advisory' AND objid = 2 "

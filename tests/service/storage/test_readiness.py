@@ -85,10 +85,10 @@ def test_a_silent_worker_is_told_by_readyz_and_by_studies(
     clock.seconds = 158.0
     answer = http.get("/readyz")
     assert (answer.status_code, answer.json()["detail"]) == (
-        503, "No worker has been heard of for 158 s: studies are not run.",
+        503, "No worker has responded for 158 s: studies are not run.",
     )  # fmt: skip
     reason = (
-        "nothing has been heard of the worker (process here:1) since 2026-01-01T00:00:00+00:00; the study goes on when "
+        "the worker (process here:1) has not responded since 2026-01-01T00:00:00+00:00; the study continues when "
         "a worker is at work"
     )
     assert {record.reason for record in (*store.list_studies().studies, store.look(study.id)[0])} == {reason}

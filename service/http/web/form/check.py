@@ -36,7 +36,7 @@ class Checked:
 
     ``faults`` has the messages by field ("" for those of no field); ``preview`` is None while there are any. ``fits``
     has the report and the picture of each clutch that could be fitted, whatever else is wrong; ``notes`` what was taken
-    for granted in measured data. ``finish`` is the deadline, which is no part of the spec.
+    for granted in measured data. ``finish`` is the deadline, which is not part of the spec.
     """
 
     spec: dict[str, Any]
@@ -116,7 +116,7 @@ def check_form(
 
 
 def _assumed(text: str) -> list[str]:
-    """What is taken for granted of pasted data; nothing of such as cannot be read, which is told elsewhere."""
+    """Assumptions about pasted data; none for data that cannot be read, which is reported elsewhere."""
     try:
         return [f"Measured data: {note}." for note in parse_measured(text, parse_quantity).warnings]
     except MeasuredDataError:

@@ -83,7 +83,7 @@ def _start(context: Context, preset: str | None, clone: str | None) -> dict[str,
     if preset is None:
         return None
     if preset not in preset_names():
-        raise ApiError("not-found", f"There is no such example; there are: {', '.join(preset_names())}.")
+        raise ApiError("not-found", f"Unknown example; known examples: {', '.join(preset_names())}.")
     found: dict[str, Any] = preset_of(preset)["spec"]
     return found
 

@@ -170,7 +170,7 @@ def _axis(values: Mapping[str, str], index: int) -> dict[str, Any] | None:
 
 
 def field_of(pointer: str, values: Mapping[str, str]) -> str:
-    """The field beside which a fault at ``pointer`` of the spec is told; "" for the whole form."""
+    """The field beside which a fault at ``pointer`` of the spec is shown; "" for the whole form."""
     match = re.fullmatch(r"/axes/(\d+)(?:/(.*))?", pointer)
     if match:
         # Axes that are not filled in are not in the spec.

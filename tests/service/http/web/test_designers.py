@@ -106,7 +106,7 @@ def test_what_is_wrong_is_said_beside_the_field(visitor: Visitor) -> None:
     page = visitor.page
     page.goto("/new?preset=one_pendulum")
     named(page, "/base/pendulums/0/mass").fill("0.5 mm")
-    expect(wrong(page, "/base/pendulums/0/mass")).to_contain_text("'mm', which is no unit of this field")
+    expect(wrong(page, "/base/pendulums/0/mass")).to_contain_text("'mm', which is not a unit of this field")
     expect(named(page, "/base/pendulums/0/mass")).to_have_attribute("aria-invalid", "true")
     named(page, "/base/pendulums/0/mass").fill("0.5 kg")
     expect(wrong(page, "/base/pendulums/0/mass")).to_be_empty()
@@ -317,9 +317,9 @@ def test_everything_works_without_javascript(visitor: Visitor, office: Office, e
     page.goto("/new?preset=one_pendulum")
     page.get_by_role("button", name="Add a pendulum").click()
     expect(page.locator("legend", has_text="Pendulum 1")).to_be_visible()
-    page.get_by_role("button", name="Take the last one away").click()
+    page.get_by_role("button", name="Remove the last one").click()
     for _ in range(2):
-        page.get_by_role("button", name="Take this axis away").first.click()
+        page.get_by_role("button", name="Remove this axis").first.click()
     expect(page.locator(".axis")).to_have_count(1)
     named(page, "/base/shaft/inertia").fill("2 mm")
     page.get_by_role("button", name="Submit the study").click()
