@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast, get_args
 
 import typer
 
@@ -37,7 +36,7 @@ from sprag.service.cli.options import (
     WaitTimeout,
 )
 from sprag.service.faults import Fault, Kind
-from sprag.service.formats import FORMATS, REPORT_FORMATS, Format, ReportFormat, format_of
+from sprag.service.formats import REPORT_FORMATS, Format, ReportFormat, format_of
 from sprag.worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
 from sprag.worker.states import TERMINAL, StudyState
 
@@ -53,18 +52,8 @@ PriorityOption = Annotated[
 ]
 
 
-class TableFormat(StrEnum):
-    """Formats of a whole study: case rows (`sprag.service.results.exports`) and documents (`...results.report`)."""
-
-    CSV = "csv"
-    JSON = "json"
-    JSONL = "jsonl"
-    PARQUET = "parquet"
-    ARROW = "arrow"
-    XLSX = "xlsx"
-    NETCDF = "netcdf"
-    HTML = "html"
-    PDF = "pdf"
+#: Formats of a whole study: case rows (`sprag.service.results.exports`) and documents (`sprag.service.results.report`).
+TableFormat = Literal[Format, ReportFormat]
 
 
 @contextmanager
@@ -333,7 +322,7 @@ def export(
 def table_format(form: TableFormat | None, file: str | None, as_json: bool) -> Format | ReportFormat:
     """The format that was asked for: by name, by the ending of the file's name, or by ``--json``; csv otherwise."""
     if form is not None:
-        return next(known for known in (*FORMATS, *REPORT_FORMATS) if known == form.value)
+        return form
     ending = (file or "").rpartition(".")[2].lower()
     told = next((known for known in REPORT_FORMATS if known == ending), None) or format_of(file or "")
     return told or ("json" if as_json else "csv")
