@@ -81,7 +81,7 @@ def form_of(path: Path) -> str:
     ending = path.suffix[1:].lower()
     form = ending if ending in ("html", "pdf") else format_of(path.name)
     if form is None:
-        raise ValueError(f"the ending of {path.name!r} tells no format; name it as `form`")
+        raise ValueError(f"cannot tell the format from the name {path.name!r}; pass it as `form`")
     return form
 
 

@@ -127,7 +127,7 @@ def test_a_browser_is_led_to_the_login_and_back(office: Office) -> None:
     assert (far.status_code, 'value="/"' in far.text) == (200, True)
     wrong = browser.post("/login", data={"token": "wrong", "next": "/new"})
     assert wrong.status_code == 401
-    assert "no valid token" in wrong.text
+    assert "is not valid" in wrong.text
     assert "set-cookie" not in wrong.headers
     done = browser.post("/login", data={"token": office.write, "next": "/new?mode=text"})
     assert (done.status_code, done.headers["location"]) == (303, "/new?mode=text")

@@ -84,7 +84,7 @@ def test_a_backup_that_fails_is_said_and_tried_again(
     maintenance = Maintenance(store, MaintenancePlan(folder))
     maintenance.look()
     maintenance.look()
-    assert len([text for text in caplog.messages if "failed and is tried again" in text]) == 1
+    assert len([text for text in caplog.messages if "failed and is retried" in text]) == 1
     folder.unlink()
     clock.seconds = 601.0
     maintenance.look()
@@ -101,7 +101,7 @@ def test_what_else_lies_in_the_folder_and_cannot_be_removed_multiplies_no_backup
         clock.seconds = minute * 60.0
         maintenance.look()
     assert made(tmp_path) == ["01 00:00", "01 00:00"]
-    assert "The nightly backup failed and is tried again in 10 minutes: [Errno 21] Is a directory" in caplog.text
+    assert "The nightly backup failed and is retried in 10 minutes: [Errno 21] Is a directory" in caplog.text
 
 
 def test_a_fault_of_one_task_leaves_the_others_and_the_nights_to_come(

@@ -131,7 +131,7 @@ def test_the_command_deletes_nothing_on_the_word_of_a_clock_that_jumped(
     store.note_clock(clock.now())  # in January 2026: the clock of the command is months ahead
     command = ["db", "prune", "--older-than", "1", "--db", settings.database]
     assert execute(command) == ExitCode.TROUBLE
-    assert "nothing is deleted by age until it is set right" in capsys.readouterr().err
+    assert "nothing is deleted by age until it is corrected" in capsys.readouterr().err
     assert store.get_study(study).id == study
     assert execute(["db", "clock", "--db", settings.database]) == 0
     assert execute(command) == 0

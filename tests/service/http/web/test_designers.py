@@ -323,7 +323,7 @@ def test_everything_works_without_javascript(visitor: Visitor, office: Office, e
     expect(page.locator(".axis")).to_have_count(1)
     named(page, "/base/shaft/inertia").fill("2 mm")
     page.get_by_role("button", name="Submit the study").click()
-    expect(wrong(page, "/base/shaft/inertia")).to_contain_text("no unit of this field")
+    expect(wrong(page, "/base/shaft/inertia")).to_contain_text("not a unit of this field")
     named(page, "/base/shaft/inertia").fill("2e-3")
     named(page, "/axes/0/values").fill("0; 0.1; 0.2")
     page.get_by_role("button", name="Look over").last.click()

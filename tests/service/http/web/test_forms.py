@@ -89,14 +89,14 @@ def filled(**changes: str) -> dict[str, str]:
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("/base/excitation/frequency", "25 mm", "no unit of this field"),
+        ("/base/excitation/frequency", "25 mm", "not a unit of this field"),
         ("/base/excitation/frequency", "", "is required"),
         ("/base/pendulums/0/mass", "-1", "out of range"),
         ("/base/clutch/coefficients", "0; -200", "negative"),
         ("/base/clutch/coefficients", "", "is required"),
         ("/base/gravity", "much", "must begin with a number"),
         ("/axes/0/count", "0", "out of range"),
-        ("/axes/0/from", "16 mm", "no unit of this field"),
+        ("/axes/0/from", "16 mm", "not a unit of this field"),
         ("/axes/1/values", "1,5 mm", "decimal point"),
         ("/axes/2/path", "shaft.lod", "shaft.load"),
         ("/run/tolerance", "1", "out of range"),
