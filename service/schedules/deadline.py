@@ -44,7 +44,7 @@ def finish_at(text: str, now: datetime) -> datetime:
         return now + timedelta(seconds=_seconds(text))
     if moment.tzinfo is None:
         # A sign that was not encoded comes out of an address as a blank.
-        raise FinishError("missing-unit", "has no offset from UTC; write Z, or +01:00 (in an address %2B01:00)")
+        raise FinishError("invalid-time", "has no offset from UTC; write Z, or +01:00 (in an address %2B01:00)")
     try:
         ahead = (moment - now).total_seconds()
         moment = moment.astimezone(UTC)

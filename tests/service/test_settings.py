@@ -107,23 +107,16 @@ def test_a_file_sets_them_and_the_environment_goes_before_it(
 
 
 @pytest.mark.parametrize(
-    ("text", "why"),
-    [
-        ("prot = 81", "unknown field 'prot'"),
-        ("port = ", "no TOML"),
-        (None, "cannot be read"),
-        ("port = 99999", "invalid setting"),
-        ('token = "short"', "invalid setting"),
-        ('zone = "Mars"', "invalid setting"),
-        ('nightly_at = "25:00"', "invalid setting"),
-    ],
+    "text",
+    ["prot = 81", "port = ", None, "port = 99999", 'token = "short"', 'zone = "Mars"', 'nightly_at = "25:00"'],
 )
 def test_a_wrong_file_is_told(
-    settings: Settings, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, text: str | None, why: str
+    settings: Settings, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, text: str | None
 ) -> None:
     file = tmp_path / "sprag.toml"
     if text is not None:
         file.write_text(text)
     monkeypatch.setenv("SPRAG_SETTINGS", str(file))
-    with pytest.raises(WrongInputError, match=why):
+    with pytest.raises(WrongInputError) as caught:
         read_settings()
+    assert caught.value.code == "invalid-settings"

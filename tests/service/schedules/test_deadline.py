@@ -20,6 +20,7 @@ from sprag.worker.dispatcher import POLL_SECONDS, Dispatcher
 from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.models import study_results
 from sprag.worker.states import StudyState
+from tests.faults import refused
 from tests.service.shapes import fits
 from tests.service.timed_spec import SPEC
 from tests.worker import fakes
@@ -95,32 +96,32 @@ def test_a_time_with_its_offset_or_a_duration_is_a_deadline(text: str, expected:
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "code"),
     [
-        ("2026-03-02T06:00", "no offset"),
-        ("2026-03-02T06:00 01:00", "neither a time nor a duration"),
-        ("2026-03-01T12:00Z", "is in the past; it is 2026-03-01T12:00:00\\+00:00 now"),
-        ("2027-03-03T00:00Z", "too far away"),
-        ("9999-12-31T23:59-23:59", "too far away"),
-        ("0.5 s", "too soon"),
-        ("-8 h", "no time to come"),
-        ("0 h", "no time to come"),
-        ("367 h", ""),
-        ("9000 h", "too far away"),
-        ("1e999 h", "neither|too far"),
-        ("8", "neither"),
-        ("8 kg", "neither"),
-        ("", "neither"),
-        ("tomorrow", "neither"),
-        ("\ud800", "neither"),
+        ("2026-03-02T06:00", "invalid-time"),
+        ("2026-03-02T06:00 01:00", "invalid-time"),
+        ("2026-03-01T12:00Z", "out-of-range"),
+        ("2027-03-03T00:00Z", "out-of-range"),
+        ("9999-12-31T23:59-23:59", "out-of-range"),
+        ("0.5 s", "out-of-range"),
+        ("-8 h", "out-of-range"),
+        ("0 h", "out-of-range"),
+        ("9000 h", "out-of-range"),
+        ("1e999 h", "invalid-time"),
+        ("8", "invalid-time"),
+        ("8 kg", "invalid-time"),
+        ("", "invalid-time"),
+        ("tomorrow", "invalid-time"),
+        ("\ud800", "invalid-time"),
     ],
 )
-def test_what_is_no_deadline_is_refused_with_its_reason(text: str, message: str) -> None:
-    if not message:
-        assert finish_at(text, NOW) == NOW + timedelta(hours=367)
-        return
-    with pytest.raises(FinishError, match=message):
+def test_what_is_no_deadline_is_refused(text: str, code: str) -> None:
+    with refused(FinishError, code):
         finish_at(text, NOW)
+
+
+def test_a_deadline_may_be_weeks_ahead() -> None:
+    assert finish_at("367 h", NOW) == NOW + timedelta(hours=367)
 
 
 def test_a_run_of_a_schedule_ends_at_the_next_such_time_of_day() -> None:

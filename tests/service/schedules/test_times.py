@@ -15,6 +15,7 @@ from sprag.service.schedules.times import (
     read_moment,
     read_time_of_day,
 )
+from tests.faults import refused
 
 BERLIN = "Europe/Berlin"
 
@@ -99,16 +100,16 @@ def test_a_moment_is_read_on_the_clock_of_the_zone(text: str, zone: str, moment:
 
 
 @pytest.mark.parametrize(
-    ("text", "why"),
+    ("text", "code"),
     [
-        ("2027-03-28T02:30", "no such time in Europe/Berlin"),
-        ("tomorrow", "no time"),
-        ("0001-01-01T00:00", "too far"),
-        ("9999-12-31T23:59-12:00", "too far"),
+        ("2027-03-28T02:30", "invalid-time"),
+        ("tomorrow", "invalid-time"),
+        ("0001-01-01T00:00", "out-of-range"),
+        ("9999-12-31T23:59-12:00", "out-of-range"),
     ],
 )
-def test_a_moment_that_there_is_not_is_refused(text: str, why: str) -> None:
-    with pytest.raises(TimingError, match=why):
+def test_a_moment_that_there_is_not_is_refused(text: str, code: str) -> None:
+    with refused(TimingError, code):
         read_moment(text, BERLIN)
 
 
