@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
-from sprag.service.spec.report import Report, join
+from sprag.service.spec.report import Report, did_you_mean, join
 from sprag.service.spec.units import QuantityError, example, parse_exact, to_float
 from sprag.worker.models import Parameter
 
@@ -64,6 +64,21 @@ def read_flag(report: Report, pointer: str, value: object) -> bool | None:
     if isinstance(value, bool):
         return value
     report.fault(pointer, "wrong-type", "must be true or false", value, allowed="true or false")
+    return None
+
+
+def read_choice(
+    report: Report, pointer: str, value: object, choices: Sequence[str], *, given: bool = False
+) -> str | None:
+    """One of ``choices``; None, and a problem noted, when it is none of them. Unless ``given``, None is one missing."""
+    if isinstance(value, str) and value in choices:
+        return value
+    allowed = ", ".join(f"'{choice}'" for choice in choices)
+    if value is None and not given:
+        report.fault(pointer, "required", "is required", allowed=allowed)
+    else:
+        hint = did_you_mean(value, choices) if isinstance(value, str) else ""
+        report.fault(pointer, "invalid-choice", f"is not a valid choice{hint}", value, allowed=allowed)
     return None
 
 

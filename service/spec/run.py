@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.spec.described import ANY_RUN, SETTLED_RUN, Described
-from sprag.service.spec.fields import read_object, read_whole
-from sprag.service.spec.report import Report, did_you_mean, join
+from sprag.service.spec.fields import read_choice, read_object, read_whole
+from sprag.service.spec.report import Report, join
 from sprag.service.spec.units import PERIOD_NAMES, QuantityError, exact_number, parse_exact, split_quantity, to_float
 from sprag.worker.limits import MAX_ORBIT_PERIODS, MAX_RUN_PERIODS, MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
 from sprag.worker.models import MEANS_FROM_PERIODS, SETTLED
@@ -49,7 +49,7 @@ def read_run(report: Report, data: object, frequencies: NDArray[np.float64]) -> 
     if "tolerance" in found:
         run["tolerance"] = _read_plain(report, ANY_RUN["tolerance"], found["tolerance"])
     if "reset" in found:
-        run["reset"] = _read_reset(report, found["reset"])
+        run["reset"] = read_choice(report, "/run/reset", found["reset"], RESETS, given=True)
     if settled:
         _read_settled(report, found, run)
         return run
@@ -81,8 +81,8 @@ def refuse_run(report: Report, data: object, why: str = "is not used: this model
 
 def _read_settled(report: Report, found: Mapping[str, Any], run: dict[str, Any]) -> None:
     """Put what is given of a run until it is settled into ``run``."""
-    if "until" in found and found["until"] != SETTLED:
-        report.fault("/run/until", "invalid-choice", "is not a valid choice", found["until"], allowed=f"'{SETTLED}'")
+    if "until" in found:
+        read_choice(report, "/run/until", found["until"], (SETTLED,), given=True)
     if "at_most" in found:
         run["at_most"] = _read_periods(report, found["at_most"])
     if "settled" in found:
@@ -181,20 +181,6 @@ def _read_plain(report: Report, field: Described, value: object) -> float | None
         report.fault(pointer, "out-of-range", "is out of range", value, allowed=allowed)
         return None
     return float(value)
-
-
-def _read_reset(report: Report, value: object) -> str | None:
-    if isinstance(value, str) and value in RESETS:
-        return value
-    hint = did_you_mean(value, RESETS) if isinstance(value, str) else ""
-    report.fault(
-        "/run/reset",
-        "invalid-choice",
-        f"must be one of the two readings{hint}",
-        value,
-        allowed="'contact' or 'literal'",
-    )
-    return None
 
 
 def _check_times(

@@ -12,8 +12,8 @@ import numpy as np
 
 from sprag.service.spec.axes.axes import read_paths
 from sprag.service.spec.axes.blocks import Block
-from sprag.service.spec.fields import read_number, read_object, read_whole
-from sprag.service.spec.report import Report, did_you_mean, join
+from sprag.service.spec.fields import read_choice, read_number, read_object, read_whole
+from sprag.service.spec.report import Report, join
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def read_sample(report: Report, pointer: str, data: Mapping[str, Any], machine: 
     """The block of a sample; None, and problems noted, when something is wrong with it."""
     before = report.found
     found = read_object(report, pointer, data, FIELDS) or {}
-    method = _choice(report, join(pointer, "sample"), found.get("sample"), METHODS)
+    method = read_choice(report, join(pointer, "sample"), found.get("sample"), METHODS)
     count = read_whole(report, join(pointer, "count"), found.get("count"), 1, MAX_AXIS_VALUES)
     seed = read_whole(report, join(pointer, "seed"), found.get("seed", 0), 0, LARGEST_SEED)
     items = found.get("ranges")
@@ -86,7 +86,7 @@ def _read_range(report: Report, pointer: str, data: object, machine: Machine) ->
     if found is None:
         return None
     paths = read_paths(report, join(pointer, "path"), found.get("path"), machine)
-    scale = _choice(report, join(pointer, "scale"), found.get("scale", "linear"), SCALES)
+    scale = read_choice(report, join(pointer, "scale"), found.get("scale", "linear"), SCALES)
     if paths is None:
         return None
     ends = []
@@ -108,21 +108,6 @@ def _read_range(report: Report, pointer: str, data: object, machine: Machine) ->
                        [found.get("from"), found.get("to")], unit=unit)  # fmt: skip
         return None
     return None if scale is None else SampleRange(paths, low, high, "log" if scale == "log" else "linear")
-
-
-def _choice(report: Report, pointer: str, value: object, known: tuple[str, ...]) -> str | None:
-    if isinstance(value, str) and value in known:
-        return value
-    hint = did_you_mean(value, known) if isinstance(value, str) else ""
-    message = "is required" if value is None else f"is not a valid choice{hint}"
-    report.fault(
-        pointer,
-        "required" if value is None else "invalid-choice",
-        message,
-        value,
-        allowed=", ".join(f"'{name}'" for name in known),
-    )
-    return None
 
 
 def draw(method: str, count: int, seed: int, ranges: tuple[SampleRange, ...]) -> dict[str, NDArray[np.float64]]:

@@ -11,12 +11,11 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from sprag.service.spec.catalogue import general_path
-from sprag.service.spec.fields import read_object
+from sprag.service.spec.fields import read_choice, read_object
 from sprag.service.spec.machine.machine import Machine, read_numbers
 from sprag.service.spec.machine.shaft_check import check_machine
 from sprag.service.spec.machine.shaft_parts import (
     read_balance,
-    read_choice,
     read_constants,
     read_cycle,
     read_drive,
@@ -95,7 +94,7 @@ def _read_structure(report: Report, found: Mapping[str, Any], places: dict[str, 
     cycle = read_cycle(report, found.get("cycle", 1))
     constants = read_constants(report, found.get("constants", {}))
     balance = read_balance(report, found, drive)
-    mean = read_choice(report, "/base", found, "mean_speed_is", MEAN_SPEEDS, MEAN_SPEEDS[0])
+    mean = read_choice(report, "/base/mean_speed_is", found.get("mean_speed_is", MEAN_SPEEDS[0]), MEAN_SPEEDS)
     before = report.found
     phi_c = read_phi_c(report, found.get("phi_c"))
     parts = (drive, mechanism, operation, cycle, constants, balance, mean)

@@ -7,8 +7,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from sprag.service.spec.fields import read_number, read_object, read_whole
-from sprag.service.spec.report import Report, did_you_mean, join
+from sprag.service.spec.fields import read_choice, read_number, read_object, read_whole
+from sprag.service.spec.report import Report, join
 from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker import models
 from sprag.worker.models import Parameter, machine_shaft
@@ -48,25 +48,6 @@ def number_fields(prefix: str) -> tuple[str, ...]:
     return tuple(name for name in names if "." not in name)
 
 
-def read_choice(
-    report: Report, pointer: str, found: Mapping[str, Any], name: str, choices: Sequence[str], default: str | None
-) -> str | None:
-    """The choice in field ``name``; None, and a problem noted, when it is none of ``choices``."""
-    value = found.get(name, default)
-    if isinstance(value, str) and value in choices:
-        return value
-    hint = did_you_mean(value, choices) if isinstance(value, str) else ""
-    message = "is required" if value is None else f"is not a valid choice{hint}"
-    report.fault(
-        join(pointer, name),
-        "required" if value is None else "invalid-choice",
-        message,
-        value,
-        allowed=", ".join(f"'{choice}'" for choice in choices),
-    )
-    return None
-
-
 def read_cycle(report: Report, value: object) -> int | None:
     """Revolutions of a cycle."""
     most = max(machine_shaft.REVOLUTIONS)
@@ -97,7 +78,7 @@ def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, A
     motor = drive is not None and drive["motor"] is not None
     given = isinstance(found.get("drive"), Mapping) and "torque" in found["drive"]
     default = "motor" if motor else "refuse" if given else "constant"
-    balance = read_choice(report, "/base", found, "balance", BALANCES, default)
+    balance = read_choice(report, "/base/balance", found.get("balance", default), BALANCES)
     if balance is None or drive is None:
         return balance
     if balance == "motor" and not motor:
@@ -164,7 +145,7 @@ def _read_motor(report: Report, data: object, drive: dict[str, Any]) -> dict[str
     found = read_object(report, "/base/drive/motor", data, ("kind", *number_fields("drive.motor.")))
     if found is None:
         return None
-    kind = read_choice(report, "/base/drive/motor", found, "kind", MOTORS, None)
+    kind = read_choice(report, "/base/drive/motor/kind", found.get("kind"), MOTORS)
     if kind is None:
         return None
     own = _numbers_of({"balance": "motor", "drive": {"motor": kind}}, "drive.motor.")
@@ -214,7 +195,9 @@ def read_mechanism(report: Report, data: object, places: dict[str, str]) -> dict
     made: dict[str, Any] = {"kind": kind}
     for name, allowed in choices.items():
         # A quick return is the one or the other; the laws of cams have a usual one.
-        choice = read_choice(report, pointer, own, name, allowed, None if name == "kind" else allowed[0])
+        choice = read_choice(
+            report, join(pointer, name), own.get(name, None if name == "kind" else allowed[0]), allowed
+        )
         if choice is None:
             return None
         made["quick_return" if name == "kind" else name] = choice
@@ -242,7 +225,7 @@ def read_operation(report: Report, data: object, places: dict[str, str]) -> dict
         **{name: choices[0] for name, choices in OPERATION_CHOICES.items() if name != "quantity"},
     }
     chosen = {
-        name: read_choice(report, "/base/operation", found, name, choices, defaults[name])
+        name: read_choice(report, join("/base/operation", name), found.get(name, defaults[name]), choices)
         for name, choices in OPERATION_CHOICES.items()
     }
     if None in chosen.values():
@@ -305,7 +288,9 @@ def _diagram(
         return _formula(report, pointer, found)
     before = report.found
     rows = _rows(report, join(pointer, "table"), found["table"], place, value)
-    interpolation = read_choice(report, pointer, found, "interpolation", INTERPOLATIONS, "smooth")
+    interpolation = read_choice(
+        report, join(pointer, "interpolation"), found.get("interpolation", "smooth"), INTERPOLATIONS
+    )
     if report.found > before:
         return None
     return {"form": "table", "table": {"rows": rows, "interpolation": interpolation}, "formula": None}
