@@ -1,113 +1,195 @@
-"""Where the engine's time goes: stepping, the scalar look for events, and the statistics of the window.
+"""Where the engine's time goes, by readings of the processor's counter inside the kernel, between its stages.
 
-The stepping is timed by itself: the kernel's ``step`` and ``advance`` are called in a loop on the workspace of a batch
-that was stopped in the middle of its cases. Neither has branches, so their time does not depend on what they find. The
-statistics are the difference between a run with the whole window and one whose window is next to nothing.
+The kernel is compiled once more with these readings (a share of a few percent). A run is repeated; each repetition
+gives the share of each stage, and printed are the medians, scaled to add up to 100, with the 95 % intervals of the
+medians. Other work on the machine lengthens whatever stage it interrupts, all of them alike.
+
+    python -m benchmarks.breakdown [--repeats 15] [--settled]
 """
 
 from __future__ import annotations
 
-import inspect
+import argparse
+import importlib.util
+import sys
+import tempfile
 import time
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-import numba
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+from scipy.stats import binom
 
-from benchmarks.workloads import CASES, PERIODS, Timing, Workload, take_turns
-from sprag.engine.compile.ways import GROUP
-from sprag.engine.run import Run, Span
-from sprag.engine.vibration_drive import simulate as module
+from benchmarks.workloads import CASES, PERIODS, W1, W2, Workload, cores, pin
+from sprag.engine.compile.jit import inlined
+from sprag.engine.run import Run, SettledRun
+from sprag.engine.vibration_drive import settle as settle_module
+from sprag.engine.vibration_drive import simulate as simulate_module
+from sprag.engine.vibration_drive.kernel import source
+from sprag.engine.vibration_drive.layout import make_layout
+from sprag.engine.vibration_drive.results import result_infos
 
-_LOOPS = 2000
-_MID_RUN = 700
+Ints = NDArray[np.int64]
+
+REFILL, STEP, EVENTS, STATISTICS, ADVANCE, SETTLE = range(6)
+STAGES = {
+    STEP: "series, step size, bounds (vector loop)",
+    ADVANCE: "states and sums at the end of the step (vector loop)",
+    EVENTS: "second look for events",
+    STATISTICS: "second look for extrema",
+    SETTLE: "transitions, stops, ends of periods",
+    REFILL: "lanes filled again, and the reading itself",
+}
+#: Behind the stages: the last reading, lanes computed, lanes of these that had a case.
+_LAST, _COMPUTED, _BUSY = len(STAGES), len(STAGES) + 1, len(STAGES) + 2
+_TICKS = len(STAGES) + 3
+
+#: What is put where in the text of a kernel: each anchor stands there once.
+_READINGS = (
+    ("from sprag.engine.vibration_drive.window import", "from benchmarks.breakdown import read\n{anchor}"),
+    ("since, pieces,\n):", "since, pieces, ticks,\n):"),
+    ("    busy = 0  # bit k", "    read(ticks, 0)\n{anchor}"),
+    (
+        "        step(W, tolerance, log2_tolerance, groups)\n",
+        f"        read(ticks, {REFILL})\n{{anchor}}        read(ticks, {STEP})\n"
+        f"        ticks[{_COMPUTED}] += groups*8\n"
+        f"        left = busy\n        while left != 0:\n"
+        f"            ticks[{_BUSY}] += 1\n            left &= left - 1\n"
+        f"        read(ticks, {REFILL})\n",
+    ),
+    ("        used = 0\n        # A state that is left", f"        read(ticks, {EVENTS})\n{{anchor}}"),
+    ("        if recorded < times", f"        read(ticks, {STATISTICS})\n{{anchor}}"),
+    ("        advance(W, float(most_steps), 0.0, groups)\n", f"{{anchor}}        read(ticks, {ADVANCE})\n"),
+    ("        if busy != before and queue", f"        read(ticks, {SETTLE})\n{{anchor}}"),
+)
 
 
-class _Spy:
-    """A kernel that remembers the arguments of its last ``integrate``."""
+@intrinsic
+def _counter(typing_context: Any) -> Any:  # noqa: ARG001
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ARG001
+        kind = ir.FunctionType(ir.IntType(64), [])
+        return builder.call(builder.module.declare_intrinsic("llvm.readcyclecounter", fnty=kind), [])
 
-    def __init__(self, kernel: Any) -> None:
-        self.kernel = kernel
-        self.arguments: dict[str, Any] = {}
+    return types.int64(), generate
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.kernel, name)
+
+def _read(ticks: Ints, stage: int) -> None:
+    now = _counter()
+    if ticks[_LAST] != 0:
+        ticks[stage] += now - ticks[_LAST]
+    ticks[_LAST] = now
+
+
+read = inlined(_read)
+
+
+class Readings:
+    """A kernel with readings, and what they have come to."""
+
+    def __init__(self, pendulums: int, coefficients: int, order: int, lanes: int) -> None:
+        text = source(make_layout(pendulums, coefficients, order, lanes))
+        for anchor, replacement in _READINGS:
+            assert text.count(anchor) == 1, anchor
+            text = text.replace(anchor, replacement.format(anchor=anchor))
+        path = Path(tempfile.mkdtemp()) / f"readings_{pendulums}.py"
+        path.write_text(text, encoding="utf-8")
+        spec = importlib.util.spec_from_file_location(path.stem, path)
+        assert spec is not None
+        assert spec.loader is not None
+        self.module = importlib.util.module_from_spec(spec)
+        sys.modules[path.stem] = self.module
+        spec.loader.exec_module(self.module)
+        self.LAYOUT, self.RECORD = self.module.LAYOUT, self.module.RECORD
+        self.ticks = np.zeros(_TICKS, dtype=np.int64)
 
     def integrate(self, *arguments: Any) -> Any:
-        self.arguments = inspect.signature(self.kernel.integrate.py_func).bind(*arguments).arguments
-        return self.kernel.integrate(*arguments)
+        self.ticks[_LAST] = 0
+        return self.module.integrate(*arguments, self.ticks)
 
 
-@numba.njit
-def _restore(W: Any, saved: Any, times: int) -> None:
-    for _ in range(times):
-        W[:] = saved
+@contextmanager
+def with_readings() -> Iterator[dict[Any, Readings]]:
+    """The engine computes by kernels with readings; they are in the dictionary by their shapes."""
+    kernels: dict[Any, Readings] = {}
+
+    def kernel(*shape: Any) -> Readings:
+        if shape not in kernels:
+            kernels[shape] = Readings(*shape)
+        return kernels[shape]
+
+    with patch.object(simulate_module, "kernel", kernel), patch.object(settle_module, "kernel", kernel):
+        yield kernels
 
 
-def _stepper(step: Any, advance: Any, groups: int) -> Any:
-    """A compiled loop over the lane loops of one kernel, which can only be called from compiled code."""
-
-    @numba.njit
-    def step_and_advance(W: Any, saved: Any, times: int, tolerance: float, log2_tolerance: float) -> None:
-        for _ in range(times):
-            W[:] = saved
-            step(W, tolerance, log2_tolerance, groups)
-            advance(W, 1e9, 0.0, groups)
-
-    return step_and_advance
+def median(values: NDArray[np.float64]) -> tuple[float, float, float]:
+    """Median of some values, and the order statistics between which it lies at 95 %."""
+    ordered = np.sort(values)
+    outside = max(int(binom.ppf(0.025, len(values), 0.5)) - 1, 0)
+    return float(np.median(ordered)), float(ordered[outside]), float(ordered[-1 - outside])
 
 
-def _seconds(function: Any, *arguments: Any) -> float:
-    """Processor time of one of a loop's turns."""
-    function(*arguments)
-    best = np.inf
-    for _ in range(5):
-        start = time.process_time()
-        function(*arguments)
-        best = min(best, time.process_time() - start)
-    return float(best) / _LOOPS
+def print_breakdown(name: str, run: Callable[[], float], repeats: int) -> None:
+    """Print the shares of a run that returns how many case-steps it took."""
+    shares, times, full = [], [], []
+    with with_readings() as kernels:
+        run()
+        for _ in range(repeats):
+            for kernel in kernels.values():
+                kernel.ticks[:] = 0
+            begin = time.process_time()
+            steps = run()
+            times.append((time.process_time() - begin) / steps * 1e9)
+            ticks = np.sum([kernel.ticks for kernel in kernels.values()], axis=0)
+            shares.append(ticks[: len(STAGES)] / ticks[: len(STAGES)].sum())
+            full.append(ticks[_BUSY] / ticks[_COMPUTED])
+    mid, low, high = median(np.array(times))
+    print(f"{name}: {mid:.1f} ns a case-step ({low:.1f} to {high:.1f}); {np.median(full):.1%} of the lanes had a case")
+    columns = np.array(shares).T
+    total = sum(median(columns[stage])[0] for stage in STAGES)
+    for stage, what in STAGES.items():
+        mid, low, high = (100.0 * value / total for value in median(columns[stage]))
+        print(f"  {mid:5.1f} %  ({low:4.1f} to {high:4.1f})  {what}")
 
 
-def stepping(workload: Workload, tolerance: float) -> tuple[float, int, int]:
-    """Seconds of ``step`` and ``advance`` together for one case-step; order and lanes of the kernel."""
-    spies: list[_Spy] = []
-    original = module.kernel
-
-    def spying(*key: Any) -> _Spy:
-        spies.append(_Spy(original(*key)))
-        return spies[-1]
-
-    with patch.object(module, "kernel", spying):
-        cases = np.arange(0, CASES, CASES // 64)  # more than lanes
-        module.simulate(workload.columns(cases), Run(tolerance=tolerance, max_steps=_MID_RUN), cases=len(cases))
-    spy = spies[-1]
-    W, saved = spy.arguments["W"], spy.arguments["W"].copy()
-    limits = (spy.arguments["tolerance"], spy.arguments["log2_tolerance"])
-    stepped = _seconds(_stepper(spy.step, spy.advance, spy.LAYOUT.lanes // GROUP), W, saved, _LOOPS, *limits)
-    lanes = spy.LAYOUT.lanes
-    return (stepped - _seconds(_restore, W, saved, _LOOPS)) / lanes, spy.LAYOUT.order, lanes
-
-
-def print_breakdown(workload: Workload, tolerance: float, timing: Timing, steps: float, repeats: int) -> None:
-    """Print steps, time per case-step and shares of a run of the whole workload that took ``timing``."""
-    step, order, lanes = stepping(workload, tolerance)
+def runs(workload: Workload, tolerance: float) -> tuple[Callable[[], float], Callable[[], float]]:
+    """All cases of a workload for 60 periods, and until they are settled; each returns the case-steps it took."""
     columns = workload.columns(np.arange(CASES))
-    whole = Run(tolerance=tolerance)
-    tiny = replace(whole, window=(Span(PERIODS - 1e-6), Span(PERIODS)))
-    runs = {
-        name: lambda run=run: module.simulate(columns, run, cases=CASES)
-        for name, run in (("whole", whole), ("tiny", tiny))
-    }
-    timings = {name: timing.cpu for name, (timing, _) in take_turns(runs, repeats).items()}
-    statistics = max(0.0, 1.0 - timings["tiny"] / timings["whole"])
-    stepping_share = step * steps / timing.cpu
-    print(
-        f"  order {order}, {lanes} lanes; {steps / CASES / PERIODS:.1f} steps a period; "
-        f"{timing.cpu / steps * 1e9:.0f} ns a case-step, {step * 1e9:.0f} of them stepping"
-    )
-    print(
-        f"  share of time: stepping {stepping_share:.0%}, statistics of the window {statistics:.0%}, "
-        f"events and the rest {1.0 - stepping_share - statistics:.0%}"
-    )
+    steps = [info.name for info in result_infos(workload.pendulums)].index("run.steps")
+    rate = 0.0
+
+    def timed() -> float:
+        nonlocal rate
+        total = float(simulate_module.simulate(columns, Run(tolerance=tolerance), cases=CASES).values[:, steps].sum())
+        rate = total / (CASES * PERIODS)
+        return total
+
+    def settled() -> float:
+        spent = settle_module.settle(columns, SettledRun(tolerance=tolerance), cases=CASES).spent.sum()
+        return float(spent) * (rate or timed() / (CASES * PERIODS))
+
+    return timed, settled
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--repeats", type=int, default=15)
+    parser.add_argument("--settled", action="store_true", help="runs until the motion is settled, too")
+    options = parser.parse_args()
+    pin(cores()[-1])
+    for workload in (W1, W2):
+        timed, settled = runs(workload, 1e-9)
+        print_breakdown(f"{workload.name}, {PERIODS:.0f} periods", timed, options.repeats)
+        if options.settled:
+            print_breakdown(f"{workload.name}, settled", settled, max(5, options.repeats // 3))
+
+
+if __name__ == "__main__":
+    main()

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import scaling, start
-from benchmarks.breakdown import print_breakdown
+from benchmarks.breakdown import print_breakdown, runs
 from benchmarks.peers.scipy_drive import ScipyDrive
 from benchmarks.peers.sprag_drive import SpragDrive
 from benchmarks.workloads import (
@@ -43,6 +43,8 @@ from benchmarks.workloads import (
 )
 
 TOLERANCE = 1e-9
+#: Repetitions from which shares of time are told.
+_READ = 11
 
 
 def _row(name: str, timing: Timing, outcome: Outcome, rates: dict[str, float], reference: list[dict[str, Any]]) -> None:
@@ -83,8 +85,7 @@ def compare(workload: Workload, options: argparse.Namespace) -> None:
     print("".join(f" {name:^23} " for name in COMPARED) + " events equal")
     for name, (timing, outcome) in found.items():
         _row(name, timing, outcome, rates, reference)
-    timing, outcome = found["sprag"]
-    print_breakdown(workload, TOLERANCE, timing, outcome.steps, options.repeats)
+    print_breakdown(workload.name, runs(workload, TOLERANCE)[0], max(options.repeats, _READ))
 
 
 def main() -> None:

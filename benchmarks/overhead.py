@@ -2,7 +2,7 @@
 
 Both run on the same number of warm processes, in turn, in one run of this program; what counts is the ratio.
 
-    python -m benchmarks.overhead [--cases 20000] [--periods 20] [--processes N] [--repeats 3]
+    python -m benchmarks.overhead [--cases 20000] [--periods 20 | --settled] [--processes N] [--repeats 3]
 """
 
 from __future__ import annotations
@@ -40,15 +40,18 @@ def timed(study: Study, duration: list[Any]) -> dict[str, Any]:
     return {"duration": duration, "window": None, **{name: study.run[name] for name in ("tolerance", "reset")}}
 
 
-def example(cases: int, periods: float) -> Study:
-    """The one-pendulum example, with the load and the frequency drawn finely enough for that many cases."""
+def example(cases: int, periods: float | None) -> Study:
+    """The one-pendulum example, with the load and the frequency drawn finely enough for that many cases.
+
+    Without a number of periods the cases are run until they are settled.
+    """
     study = parse_spec(load_spec(preset_text("one_pendulum")[1], "json")).study
     loads = max(cases // 50, 1)
     axes = (
         Axis(("excitation.frequency",), tuple(20.0 + 15.0 * i / 49 for i in range(50))),
         Axis(("shaft.load",), tuple(0.5 * i / loads for i in range(loads))),
     )
-    return replace(study, axes=axes, run=timed(study, [periods, "periods"]))
+    return replace(study, axes=axes, run=study.run if periods is None else timed(study, [periods, "periods"]))
 
 
 def _compute(task: tuple[Study, int, int]) -> int:
@@ -86,11 +89,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=int, default=20_000)
     parser.add_argument("--periods", type=float, default=20.0)
+    parser.add_argument("--settled", action="store_true", help="run cases until they are settled instead")
     parser.add_argument("--processes", type=int, default=available_cores())
     parser.add_argument("--repeats", type=int, default=3)
     options = parser.parse_args()
     single_threaded_children()
-    study = example(options.cases, options.periods)
+    study = example(options.cases, None if options.settled else options.periods)
     models.warm_up(study)
     with tempfile.TemporaryDirectory() as folder:
         url = f"sqlite:///{Path(folder) / 'overhead.sqlite3'}"

@@ -82,7 +82,7 @@ def long_run(columns: dict[str, Any], cases: int, periods: int) -> tuple[Ints, F
         starts = np.ascontiguousarray(strobes[:, -1])
     last = np.ascontiguousarray(strobes[:, -kept:])
     units = np.empty((cases, last.shape[2]))
-    orbits.find_units(last, 40, matrix[:, 0].copy(), False, units)
+    orbits.find_units(last, np.arange(cases), kept, 40, matrix[:, 0].copy(), False, units)
     orders, speeds = np.zeros(cases, dtype=np.int64), np.full(cases, np.nan)
     for case in range(cases):
         for order in range(1, 65):

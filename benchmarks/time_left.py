@@ -16,16 +16,21 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.overhead import timed
+from benchmarks.workloads import W1
+from sprag.engine.run import SettledRun
+from sprag.engine.vibration_drive.settle import settle
 from sprag.service.jobs.local import run_here
 from sprag.service.presets import preset_text
 from sprag.service.spec.document import load_spec, parse_spec
 from sprag.service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
 from sprag.service.storage.records import Progress
+from sprag.worker.chunking import work_of
 from sprag.worker.order import order_of
 from sprag.worker.study import Axis, Study
 
@@ -33,6 +38,8 @@ Costs = NDArray[np.float64]
 
 #: Looks at each study, and where a look counts as early, in the middle, or late (share of the time that is over).
 _LOOKS = 40
+#: Cases of a chunk of settled motions.
+_CHUNK_CASES = (16, 64, 256)
 _PARTS = (("early", 0.0, 1 / 3), ("middle", 1 / 3, 2 / 3), ("late", 2 / 3, 1.0))
 
 
@@ -101,8 +108,58 @@ def refined(rng: np.random.Generator, count: int) -> Costs:
     return cost(rng, count)[order_of(study).cases(np.arange(count))]
 
 
+@cache
+def _settled_periods() -> Costs:
+    """Periods that W1's cases take until they are settled, on a finer grid: frequencies, amplitudes, loads."""
+    shape = 48, 4, 40
+    axes = np.linspace(100.0, 220.0, shape[0]), np.linspace(0.001, 0.003, 4), np.linspace(0.02, 0.3, shape[2])
+    nu, amplitude, load = (axis.ravel() for axis in np.meshgrid(*axes, indexing="ij"))
+    varied = {"excitation.frequency": nu / (2.0 * np.pi), "shaft.load": load}
+    varied |= {f"excitation.amplitude_{direction}": amplitude for direction in "xy"}
+    found: Costs = settle({**W1.columns(np.zeros(1, dtype=int)), **varied}, SettledRun(), cases=nu.size).spent
+    return found.reshape(shape)
+
+
+def _settled_cases(rng: np.random.Generator, cases: int) -> Costs:
+    """Periods of the cases of a study of W1's machine, its axes in any order."""
+    known = _settled_periods()
+    inner = max(1, int(np.sqrt(cases / 4)))
+    # Neighbours on a finer grid differ as those that are known do.
+    order = rng.permutation(3)
+    lengths = np.array([-(-cases // (4 * inner)), 4, inner])[order]
+    places = np.stack(np.unravel_index(np.arange(cases), lengths), axis=1)[:, np.argsort(order)]
+    whole = np.array([-(-cases // (4 * inner)), 4, inner])
+    at = (places + 0.5) / whole * known.shape + rng.normal(0.0, 0.4, (cases, 3)) * (1.0, 0.0, 1.0)
+    index = np.clip(at.astype(int), 0, np.array(known.shape) - 1)
+    found: Costs = known[tuple(index.T)]
+    return found
+
+
+def _together(periods: Costs) -> Costs:
+    """Cost of each chunk (a row of cases): a few cases that are left cost nearly as much as a set of them."""
+    ordered = np.sort(periods, axis=1)
+    steps = np.diff(ordered, axis=1, prepend=0.0)
+    work = np.array([work_of(left) for left in range(periods.shape[1], 0, -1)])
+    return steps @ work / 1e4
+
+
+def settled(rng: np.random.Generator, count: int) -> Costs:
+    """Cases that are run until they are settled, for 30 to 1,000 periods, neighbours often alike."""
+    cases = int(rng.choice(_CHUNK_CASES))
+    return _together(_settled_cases(rng, count * cases).reshape(count, cases))
+
+
+def settled_refined(rng: np.random.Generator, count: int) -> Costs:
+    """The same in the order of a study with a deadline."""
+    cases = int(rng.choice(_CHUNK_CASES))
+    periods = _settled_cases(rng, count * cases)
+    axis = Axis(("shaft.load",), tuple(map(float, range(len(periods)))))
+    study = Study("vibration-drive", "", {"shaft.load": 0.0}, {}, (axis,))
+    return _together(periods[order_of(study).cases(np.arange(len(periods)))].reshape(count, cases))
+
+
 STRUCTURES: dict[str, Callable[[np.random.Generator, int], Costs]] = {
-    f.__name__: f for f in (even, noisy, rising, stepped, waves, rare, interrupted, refined)
+    f.__name__: f for f in (even, noisy, rising, stepped, waves, rare, interrupted, refined, settled, settled_refined)
 }
 
 
@@ -147,8 +204,10 @@ def real_studies() -> Iterator[tuple[str, Study]]:
     loads = tuple(np.linspace(0.0, 0.5, 150).tolist())
     frequencies = tuple(np.linspace(12.0, 40.0, 150).tolist())
     by_load = (Axis(("shaft.load",), loads), Axis(("excitation.frequency",), frequencies))
-    yield "loads outside", replace(example, axes=by_load)
-    yield "frequencies outside", replace(example, axes=by_load[::-1])
+    yield "settled, loads outside", replace(example, axes=by_load)
+    periods = timed(example, [60.0, "periods"])
+    yield "loads outside", replace(example, axes=by_load, run=periods)
+    yield "frequencies outside", replace(example, axes=by_load[::-1], run=periods)
     fixed = timed(example, [2.0, "s"])
     yield "fixed time, frequencies outside", replace(example, axes=by_load[::-1], run=fixed)
 
@@ -182,7 +241,7 @@ def main() -> None:
     for name, cost in STRUCTURES.items():
         for _ in range(options.studies):
             count, processes = int(np.exp(rng.uniform(np.log(20), np.log(2000)))), int(rng.choice([1, 2, 8, 32]))
-            every[name] += simulate(cost(rng, count), processes, name.startswith("refined"))
+            every[name] += simulate(cost(rng, count), processes, name.endswith("refined"))
         told(name, every[name])
     told("all made-up ones", [look for looks in every.values() for look in looks])
     if options.real:

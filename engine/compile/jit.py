@@ -3,6 +3,7 @@
 import numba
 
 from sprag.engine.compile.cache import cache_folder
+from sprag.engine.compile.vectors import use_full_vectors
 from sprag.engine.compile.ways import PLAIN, WAY
 
 if WAY == PLAIN:
@@ -21,5 +22,6 @@ else:
     from sprag.engine.compile.lowering import constant_record, lane_loops, lane_mask, lowest
 
 setattr(numba.config, "CACHE_DIR", str(cache_folder()))  # noqa: B010  (numba does not declare it)
+use_full_vectors()
 
 __all__ = ["compiled", "constant_record", "inlined", "lane_loops", "lane_mask", "lowest", "part", "unmanaged"]

@@ -6,7 +6,8 @@ numba function that calls the loops (measured in benchmarks/start.py; docs/adr/0
 
 The language is a subset of Python: ``for lane in range(N)``, of which the call runs as many groups as it is told,
 around assignments to names and to ``W[k + lane]``; ``+ - * /``, comparisons, ``or``, ``a if c else b``, ``abs``, and
-the two views of a double's bits of ``straight.log2`` and ``exp2``.
+the two views of a double's bits of ``straight.log2`` and ``exp2``. Nothing is contracted or reordered: which products
+are fused with sums is decided in ``fused``.
 """
 
 import ast
@@ -17,12 +18,11 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
+from sprag.engine.compile.fused import fused
 from sprag.engine.compile.ways import GROUP
 
 _DOUBLE = ir.DoubleType()
 _INT = ir.IntType(64)
-#: Products and sums may become fused multiply-adds; nothing is reordered.
-_FLAGS = ("contract",)
 #: Bytes: the largest vector, a cache line.
 _STACK_ALIGNMENT = 64
 _ARITHMETIC = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"}
@@ -77,7 +77,7 @@ class _Lane:
 
     def _bin_op(self, node: ast.BinOp) -> Any:
         operation = getattr(self.builder, _ARITHMETIC[type(node.op)])
-        return operation(self.value(node.left), self.value(node.right), flags=_FLAGS)
+        return operation(self.value(node.left), self.value(node.right))
 
     def _unary_op(self, node: ast.UnaryOp) -> Any:
         assert isinstance(node.op, ast.USub)
@@ -96,7 +96,9 @@ class _Lane:
 
     def _call(self, node: ast.Call) -> Any:
         assert isinstance(node.func, ast.Name)
-        argument = self.value(node.args[0])
+        argument, *more = (self.value(given) for given in node.args)
+        if node.func.id == "fma":
+            return self.builder.fma(argument, *more)
         if node.func.id == "abs":
             return self.builder.call(self.builder.module.declare_intrinsic("llvm.fabs", [_DOUBLE]), [argument])
         if node.func.id == "bits_of":
@@ -112,7 +114,7 @@ def lane_loops(text: str, first: str, second: str) -> Callable[[Any, float, floa
     ``first`` and ``second`` are the names under which the loops know the numbers a and b. The function can only be
     called from a numba function; it is compiled as part of that one.
     """
-    tree = ast.parse(text)
+    tree = fused(text)
 
     @intrinsic
     def run(typing_context: Any, W: Any, a: Any, b: Any, groups: Any) -> Any:  # noqa: ARG001

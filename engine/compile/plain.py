@@ -1,8 +1,7 @@
 """The plain way: everything by ``numba.njit`` and ``numba.extending``, nothing by numba's inside.
 
-The lane loops are compiled as the Python they are. Three things keep the bits those of ``lowering``: products and sums
-may be contracted in the loops and nowhere else, selections are instructions instead of branches (a product and a sum
-in different branches could not be contracted), and so are the views of a double's bits.
+The lane loops are compiled as the Python they are, with the same fused multiply-adds as in ``lowering``; these,
+selections and the views of a double's bits are instructions.
 """
 
 import ast
@@ -15,6 +14,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
+from sprag.engine.compile.fused import fused
 from sprag.engine.compile.ways import GROUP
 
 P = ParamSpec("P")
@@ -45,6 +45,14 @@ def _select(typing_context: Any, condition: Any, yes: Any, no: Any) -> Any:  # n
         return builder.select(*arguments)
 
     return types.float64(types.boolean, types.float64, types.float64), generate
+
+
+@intrinsic
+def _fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:  # noqa: ARG001
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ARG001
+        return builder.fma(*arguments)
+
+    return types.float64(types.float64, types.float64, types.float64), generate
 
 
 @intrinsic
@@ -83,16 +91,13 @@ class _Straight(ast.NodeTransformer):
 
 def lane_loops(text: str, first: str, second: str) -> Callable[[Any, float, float, int], None]:
     """A function ``(W, a, b, groups)`` for compiled code, as that of ``lowering``."""
-    loops = _Straight().visit(ast.parse(text))
+    loops = _Straight().visit(fused(text))
     function = ast.parse(f"def run(W, {first}, {second}, groups):\n    pass")
     assert isinstance(function.body[0], ast.FunctionDef)
     function.body[0].body = loops.body
-    names = {"select": _select, "bits_of": _bits_of, "of_bits": _of_bits}
+    names = {"select": _select, "bits_of": _bits_of, "of_bits": _of_bits, "fma": _fma}
     exec(compile(ast.fix_missing_locations(function), "<lane loops>", "exec"), names)  # noqa: S102
-    return cast(
-        Callable[[Any, float, float, int], None],
-        numba.njit(error_model="numpy", fastmath={"contract"})(names["run"]),
-    )
+    return cast(Callable[[Any, float, float, int], None], numba.njit(error_model="numpy")(names["run"]))
 
 
 def lane_mask(sign: str, row: int, lanes: int) -> Callable[[Any], int]:

@@ -82,9 +82,14 @@ def integral(coefficients: Names, x: str) -> str:
     return f"{x}*({horner(terms, x)})"
 
 
+def same_everywhere(value: float) -> float:
+    """A number from a function of the C library, which on another processor may differ in the last bit, without it."""
+    return float(f"{value:.14g}")
+
+
 def chord_constant(k: int) -> float:
     """Largest distance of ``x^k`` from its chord ``x`` on [0, 1]."""
-    return float(k ** (-1.0 / (k - 1)) - k ** (-k / (k - 1)))
+    return same_everywhere(k ** (-1.0 / (k - 1)) - k ** (-k / (k - 1)))
 
 
 class Span(NamedTuple):
@@ -169,10 +174,10 @@ def larger(a: str, b: str) -> str:
 
 
 # Cody-Waite splitting of pi/2: the first two parts have 33 bits, so that a multiple below 2^20 of them is exact.
-_HALF_PI = ("1.57079632673412561417e+00", "6.07710050630396597660e-11", "2.02226624879595063154e-21")
-_ROUND = "6755399441055744.0"  # 1.5 * 2^52: adding and subtracting it rounds to the nearest integer
+HALF_PI = ("1.57079632673412561417e+00", "6.07710050630396597660e-11", "2.02226624879595063154e-21")
+ROUND = "6755399441055744.0"  # 1.5 * 2^52: adding and subtracting it rounds to the nearest integer
 # Minimax coefficients of sin and cos on [-pi/4, pi/4] (the classic ones of fdlibm's kernels, error below 2^-58).
-_SIN = (
+SINE = (
     "-1.66666666666666324348e-01",
     "8.33333333332248946124e-03",
     "-1.98412698298579493134e-04",
@@ -180,7 +185,7 @@ _SIN = (
     "-2.50507602534068634195e-08",
     "1.58969099521155010221e-10",
 )
-_COS = (
+COSINE = (
     "4.16666666666666019037e-02",
     "-1.38888888888741095749e-03",
     "2.48015872894767294178e-05",
@@ -192,13 +197,13 @@ _COS = (
 
 def sincos(code: LaneCode, x: str, tag: str) -> tuple[str, str]:
     """Sine and cosine of ``|x|`` up to 1e6 within an ulp or so, without calls or branches."""
-    q = code.let(f"q_{tag}", f"({x}*0.6366197723675814 + {_ROUND}) - {_ROUND}")
-    r = code.let(f"r_{tag}", f"(({x} - {q}*{_HALF_PI[0]}) - {q}*{_HALF_PI[1]}) - {q}*{_HALF_PI[2]}")
+    q = code.let(f"q_{tag}", f"({x}*0.6366197723675814 + {ROUND}) - {ROUND}")
+    r = code.let(f"r_{tag}", f"(({x} - {q}*{HALF_PI[0]}) - {q}*{HALF_PI[1]}) - {q}*{HALF_PI[2]}")
     z = code.let(f"z_{tag}", f"{r}*{r}")
-    s = code.let(f"sk_{tag}", f"{r} + {r}*({z}*({horner(_SIN, z)}))")
-    c = code.let(f"ck_{tag}", f"1.0 - (0.5*{z} - {z}*{z}*({horner(_COS, z)}))")
+    s = code.let(f"sk_{tag}", f"{r} + {r}*({z}*({horner(SINE, z)}))")
+    c = code.let(f"ck_{tag}", f"1.0 - (0.5*{z} - {z}*{z}*({horner(COSINE, z)}))")
     # The quadrant, -2..2.
-    j = code.let(f"j_{tag}", f"{q} - 4.0*(({q}*0.25 + {_ROUND}) - {_ROUND})")
+    j = code.let(f"j_{tag}", f"{q} - 4.0*(({q}*0.25 + {ROUND}) - {ROUND})")
     a = code.let(f"ja_{tag}", f"abs({j})")
     sine = code.let(f"sv_{tag}", f"{c} if {a} == 1.0 else {s}")
     cosine = code.let(f"cv_{tag}", f"{s} if {a} == 1.0 else {c}")

@@ -187,9 +187,8 @@ def with_lengths(matrix: Floats, begin: Floats, periods: Floats, *, windowed: bo
     """
     changed = matrix.copy()
     end = periods + begin
-    start = np.where(windowed, begin, end)
-    for k, time in enumerate((start, start, end, end)):
-        whole, fraction = _stop(time)
+    first, last = _stop(np.where(windowed, begin, end)), _stop(end)
+    for k, (whole, fraction) in enumerate((first, first, last, last)):
         changed[:, stop_column(k)] = whole
         changed[:, stop_column(k) + 1] = fraction
     return changed

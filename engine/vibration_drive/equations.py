@@ -18,6 +18,7 @@ from sprag.engine.taylor.straight import (
     exp2,
     log2,
     product,
+    same_everywhere,
     sincos,
     smaller,
     square,
@@ -224,7 +225,7 @@ def _step_size(code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft
     code.let("h_free", f"{STEP_SAFETY}*({exp2(exponent)})")
     code.load("period", layout.period)
     rest = code.let("rest", f"({code.row(layout.f_stop)} - f)*period")
-    neglected = math.log2(math.factorial(order + 1))
+    neglected = same_everywhere(math.log2(math.factorial(order + 1)))
     followed = exp2(f"(log2_tolerance + {neglected!r})*{1.0 / (order + 1)!r}")
     code.let("followed", f"{0.5 / math.pi!r}*({followed})")
     longest = code.let("longest", f"({smaller('followed', repr(LONGEST_STEP))})*period")

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from sprag.engine.run import Run
 from sprag.engine.taylor.batch import aligned_zeros, blocks_for
 from sprag.engine.taylor.roots import MAX_DEGREE, work_stack
+from sprag.engine.taylor.straight import same_everywhere
 from sprag.engine.vibration_drive.cases import STOPS, stop_column
 from sprag.engine.vibration_drive.characteristics import sum_columns
 from sprag.engine.vibration_drive.kernel import Kernel
@@ -79,7 +80,7 @@ def integrate(
     listed = lay.lanes * (5 + 8 * n)
     done = kernel.integrate(
         kernel.RECORD, matrix, from_rest(cases, n) if starts is None else starts, recorded,
-        run.tolerance, math.log2(run.tolerance), int(run.reset == "literal"),
+        run.tolerance, same_everywhere(math.log2(run.tolerance)), int(run.reset == "literal"),
         run.step_budget, run.max_events_per_period,
         aligned_zeros(lay.rows * lay.lanes), np.zeros((lay.lanes, LANE_INTEGERS), dtype=np.int64),
         np.zeros(MAX_DEGREE + 1), work_stack(),

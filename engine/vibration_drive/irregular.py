@@ -93,7 +93,8 @@ class Batches:
         total = with_lengths(search.matrix[active], begin, self.count * periods, windowed=True)
         values = characteristics(lay, total, combined(lay, parts))
         one = with_lengths(search.matrix[active], begin, periods, windowed=True)
-        batches = np.array([characteristics(lay, one, part)[:, places] for part in parts])
+        each = characteristics(lay, np.tile(one, (len(parts), 1)), np.concatenate(parts))[:, places]
+        batches = each.reshape(len(parts), len(active), len(places))
         if self.count < BATCHES:
             nothing = np.full((len(active), len(places)), np.nan)
             regimes = np.full(len(active), Regime.UNSETTLED, dtype=np.int8)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from sprag.engine.compile.jit import part
 from sprag.engine.compile.ways import GROUP
 from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.taylor.elementary import cosine, sine
 from sprag.engine.taylor.roots import evaluate
 from sprag.engine.vibration_drive import states as ev
 from sprag.engine.vibration_drive.advance import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR
@@ -71,8 +72,8 @@ def load_case(
     W[lay.period * lanes + lane] = row[_PERIOD]
     W[lay.acc_x * lanes + lane] = row[_ACC_X]
     W[lay.acc_y * lanes + lane] = row[_ACC_Y]
-    W[lay.cos_chi * lanes + lane] = math.cos(row[_CHI])
-    W[lay.sin_chi * lanes + lane] = math.sin(row[_CHI])
+    W[lay.cos_chi * lanes + lane] = cosine(row[_CHI])
+    W[lay.sin_chi * lanes + lane] = sine(row[_CHI])
     W[lay.gravity * lanes + lane] = row[_GRAVITY]
     W[lay.load * lanes + lane] = row[_LOAD]
     W[lay.inertia * lanes + lane] = row[_INERTIA]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine.compile.jit import part
+from sprag.engine.taylor.elementary import cosine, sine
 from sprag.engine.vibration_drive.automaton import Band
 from sprag.engine.vibration_drive.layout import Layout
 from sprag.engine.vibration_drive.states import (
@@ -52,11 +53,11 @@ def acceleration(W: Floats, lay: Layout, lane: int, i: int) -> float:
     base = lay.pendulums + i * lay.stride
     phi = W[(base + lay.p_phi) * lanes + lane]
     theta = 2.0 * math.pi * W[lay.f * lanes + lane]
-    x = -W[lay.acc_x * lanes + lane] * math.cos(theta)
+    x = -W[lay.acc_x * lanes + lane] * cosine(theta)
     y = -W[lay.acc_y * lanes + lane] * (
-        math.sin(theta) * W[lay.cos_chi * lanes + lane] + math.cos(theta) * W[lay.sin_chi * lanes + lane]
+        sine(theta) * W[lay.cos_chi * lanes + lane] + cosine(theta) * W[lay.sin_chi * lanes + lane]
     )
-    push = x * math.cos(phi) + (y + W[lay.gravity * lanes + lane]) * math.sin(phi)
+    push = x * cosine(phi) + (y + W[lay.gravity * lanes + lane]) * sine(phi)
     return float(
         W[(base + lay.p_ml) * lanes + lane] * push
         - W[(base + lay.p_spring) * lanes + lane] * phi
@@ -74,12 +75,12 @@ def _jerk(W: Floats, lay: Layout, lane: int, i: int, rate: float) -> float:
     theta = 2.0 * math.pi * W[lay.f * lanes + lane]
     nu = W[lay.nu * lanes + lane]
     cos_chi, sin_chi = W[lay.cos_chi * lanes + lane], W[lay.sin_chi * lanes + lane]
-    x = -W[lay.acc_x * lanes + lane] * math.cos(theta)
-    y = -W[lay.acc_y * lanes + lane] * (math.sin(theta) * cos_chi + math.cos(theta) * sin_chi)
-    x_rate = nu * W[lay.acc_x * lanes + lane] * math.sin(theta)
-    y_rate = -nu * W[lay.acc_y * lanes + lane] * (math.cos(theta) * cos_chi - math.sin(theta) * sin_chi)
+    x = -W[lay.acc_x * lanes + lane] * cosine(theta)
+    y = -W[lay.acc_y * lanes + lane] * (sine(theta) * cos_chi + cosine(theta) * sin_chi)
+    x_rate = nu * W[lay.acc_x * lanes + lane] * sine(theta)
+    y_rate = -nu * W[lay.acc_y * lanes + lane] * (cosine(theta) * cos_chi - sine(theta) * sin_chi)
     along = x_rate + (y + W[lay.gravity * lanes + lane]) * speed
-    push = along * math.cos(phi) + (y_rate - x * speed) * math.sin(phi)
+    push = along * cosine(phi) + (y_rate - x * speed) * sine(phi)
     return float(
         W[(base + lay.p_ml) * lanes + lane] * push
         - W[(base + lay.p_spring) * lanes + lane] * speed

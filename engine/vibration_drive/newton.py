@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine.compile.jit import compiled, part
+from sprag.engine.taylor.elementary import exponential, logarithm
 from sprag.engine.vibration_drive.orbits import list_free, same_states, tie
 from sprag.engine.vibration_drive.strobes import ANGLE, PENDULUM_WIDTH, SHAFT_WIDTH, WINDUP
 
@@ -107,7 +108,7 @@ def spectral_radius(a: Floats, n: int) -> float:
             norm = max(norm, total)
         if norm == 0.0:
             return 0.0
-        log_norm += share * math.log(norm)
+        log_norm += share * logarithm(norm)
         for i in range(n):
             for j in range(n):
                 power[i, j] /= norm
@@ -119,7 +120,7 @@ def spectral_radius(a: Floats, n: int) -> float:
                 square[i, j] = total
         power, square = square, power
         share *= 0.5
-    return math.exp(log_norm)
+    return exponential(log_norm)
 
 
 @part

@@ -65,10 +65,20 @@ def _largest(times: Floats, speed: Floats, acceleration: Floats) -> float:
     for left in (k - 1, k):
         if 0 <= left < len(times) - 1:
             a, b, c, d = _hermite(times, speed, acceleration, left)
-            for x in np.roots([3.0 * d, 2.0 * c, b]):
-                if abs(x.imag) < 1e-12 and 0.0 < x.real < 1.0:
-                    best = max(best, a + x.real * (b + x.real * (c + x.real * d)))
+            for x in _level(b, c, d):
+                if 0.0 < x < 1.0:
+                    best = max(best, a + x * (b + x * (c + x * d)))
     return best
+
+
+def _level(b: float, c: float, d: float) -> list[float]:
+    """Where the slope ``b + 2 c x + 3 d x^2`` of a cubic is 0."""
+    square = c * c - 3.0 * b * d
+    if square < 0.0:
+        return []
+    # The larger root of the two first: the difference of the other would cancel.
+    q = -(c + math.copysign(math.sqrt(square), c))
+    return [top / bottom for top, bottom in ((q, 3.0 * d), (b, q)) if bottom != 0.0]
 
 
 def _crossing(times: Floats, speed: Floats, acceleration: Floats, k: int, w: float) -> float:

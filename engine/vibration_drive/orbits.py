@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine.compile.jit import compiled, part
+from sprag.engine.taylor.elementary import logarithm
 from sprag.engine.vibration_drive.automaton import Clutch, Shaft
 from sprag.engine.vibration_drive.strobes import (
     ANGLE,
@@ -84,23 +85,47 @@ def _apart(strobes: Floats, last: int, length: int, order: int, unit: Floats, en
 
 
 @compiled
-def find_units(strobes: Floats, recent: int, nu: Floats, steady_shaft: bool, units: Floats) -> None:
-    """Write the scale of every column of the strobes of every case.
+def keep_strobes(history: Floats, cases: Ints, count: int, strobes: Floats) -> None:
+    """Put new strobes of some cases behind the ``count`` that are there, whose oldest go if need be.
 
     Parameters
     ----------
-    strobes : array, shape (cases, kept, columns)
-    recent : int
-        How many of the last ones count.
+    history : array, shape (all cases, kept, columns)
+    cases : array, shape (cases,)
+        Rows of ``history``.
+    strobes : array, shape (cases, new, columns)
+    """
+    kept, new = history.shape[1], strobes.shape[1]
+    for k in range(cases.shape[0]):
+        own = history[cases[k]]
+        for row in range(max(0, kept - count - new), kept):
+            for column in range(history.shape[2]):
+                later = row + new
+                own[row, column] = own[later, column] if later < kept else strobes[k, later - kept, column]
+
+
+@compiled
+def find_units(
+    strobes: Floats, cases: Ints, count: int, recent: int, nu: Floats, steady_shaft: bool, units: Floats
+) -> None:
+    """Write the scale of every column of the strobes of some cases.
+
+    Parameters
+    ----------
+    strobes : array, shape (all cases, kept, columns)
+    cases : array, shape (cases,)
+        Rows of ``strobes``.
+    count, recent : int
+        How many of the kept strobes there are (the last ones), and how many of them count at most.
     nu : array, shape (cases,)
     steady_shaft : bool
         Whether the shaft's speed is left out.
     units : array, shape (cases, columns)
     """
-    for case in range(strobes.shape[0]):
+    for case in range(cases.shape[0]):
         speed = 1e-300
-        for k in range(max(0, strobes.shape[1] - recent), strobes.shape[1]):
-            row = strobes[case, k]
+        for k in range(strobes.shape[1] - min(count, recent), strobes.shape[1]):
+            row = strobes[cases[case], k]
             if not steady_shaft:
                 speed = max(speed, abs(row[SHAFT_SPEED]))
             for column in range(SHAFT_WIDTH, row.shape[0], PENDULUM_WIDTH):
@@ -114,24 +139,36 @@ def find_units(strobes: Floats, recent: int, nu: Floats, steady_shaft: bool, uni
 
 
 @compiled
-def find_candidates(strobes: Floats, units: Floats, near: float, window: int, max_order: int, found: Ints) -> None:
+def find_candidates(
+    strobes: Floats,
+    cases: Ints,
+    count: int,
+    units: Floats,
+    near: float,
+    shared: float,
+    window: int,
+    max_order: int,
+    found: Ints,
+) -> None:
     """Write the least order of an orbit that each case seems to approach, or 0.
 
-    A run approaches an orbit of order q if its last strobes (q of them, at least ``window``) are within ``near`` of
-    those q periods before, and nearer than the strobes before them were: a run that leaves an unstable orbit moves ever
-    faster.
+    A run approaches an orbit of order q if its last strobes (q of them, at least ``window``) are within ``near`` and
+    ``shared``/q of those q periods before, and nearer than the strobes before them were: a run that leaves an unstable
+    orbit moves ever faster. ``strobes``, ``cases`` and ``count`` are as of `find_units`.
     """
-    for case in range(strobes.shape[0]):
+    last = strobes.shape[1] - 1
+    for case in range(cases.shape[0]):
         found[case] = 0
-        last = strobes.shape[1] - 1
+        own = strobes[cases[case]]
         for order in range(1, max_order + 1):
             length = max(order, window)
-            if last + 1 < 2 * length + order:
+            if count < 2 * length + order:
                 break
-            now = _apart(strobes[case], last, length, order, units[case], near)
-            if now > near:
+            enough = min(near, shared / order)
+            now = _apart(own, last, length, order, units[case], enough)
+            if now > enough:
                 continue
-            if now < _apart(strobes[case], last - length, length, order, units[case], now) or now < _ARRIVED:
+            if now < _apart(own, last - length, length, order, units[case], now) or now < _ARRIVED:
                 found[case] = order
                 break
 
@@ -223,11 +260,23 @@ def growth(
             apart = _spread(base[case, k], other[case, k], units[case])
             if not 0.0 < apart < most:
                 break
-            grown[case] = math.log(apart / start)
+            grown[case] = logarithm(apart / start)
             periods[case] = k + 1
             for column in range(base.shape[2]):
                 difference = other[case, k, column] - base[case, k, column]
                 direction[case, column] = difference / units[case, column] / apart
+
+
+@compiled
+def settling_periods(apart: Floats, orders: Ints, multipliers: Floats, settled: float, found: Floats) -> None:
+    """Write in how many periods runs ``apart`` (scaled) from their orbits come within ``settled`` of them.
+
+    Each turn, of ``orders`` periods, multiplies the distance by the multiplier. All arrays have shape (orbits,).
+    """
+    for k in range(apart.shape[0]):
+        found[k] = 0.0
+        if apart[k] > settled and 0.0 < multipliers[k] < 1.0:
+            found[k] = orders[k] * logarithm(apart[k] / settled) / -logarithm(multipliers[k])
 
 
 @compiled

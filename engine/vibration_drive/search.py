@@ -40,6 +40,8 @@ FIRST_ROUNDS = (12, 8, 10, 10, 15, 15, 20, 20, 30, 30, 30)
 ROUND = 40
 #: Strobes that near to those one orbit earlier, and coming nearer, make an orbit worth Newton's method.
 NEAR = 0.01
+#: The same, shared among the periods of an orbit: irregular motions return by chance, and to try a long orbit is dear.
+_SHARED = 0.05
 #: Strobes over which a run must have come nearer.
 WINDOW = 6
 #: Distance of an orbit from the run beyond which nothing says that the run goes to it.
@@ -130,13 +132,9 @@ class Search:
         """Scales of the strobes' columns."""
         units = np.empty((len(active), self.history.shape[2]))
         orbits.find_units(
-            self._newest(active), self.settings.max_period, self.matrix[active, 0], self.steady_shaft, units,
-        )  # fmt: skip
+            self.history, active, self.count, self.settings.max_period, self.matrix[active, 0], self.steady_shaft, units
+        )
         return units
-
-    def _newest(self, active: Ints) -> Floats:
-        """Strobes of cases, oldest first."""
-        return self.history[active, self.history.shape[1] - self.count :]
 
     def advance(self, active: Ints, periods: int, *, windowed: bool) -> Floats:
         """Run cases on by the same number of periods; the kernel's sums of each.
@@ -157,10 +155,8 @@ class Search:
         self.spent[active] += periods
         self.steps[active] += done.sums[:, OUT_STEPS]
         self.events[active] += done.sums[:, OUT_EVENTS]
-        kept = min(periods, self.history.shape[1])
-        older = self.history[active, kept:]
-        self.history[active] = np.concatenate([older, done.strobes[:, periods - kept :]], axis=1)
-        self.count = min(self.count + kept, self.history.shape[1])
+        orbits.keep_strobes(self.history, active, self.count, done.strobes)
+        self.count = min(self.count + periods, self.history.shape[1])
         self.starts[active] = done.strobes[:, -1]
         self.starts[active, TURN] = 0.0
         return done.sums
@@ -169,9 +165,13 @@ class Search:
         """Orbits to which cases go, of those that seem to approach one."""
         units = self.units(active)
         found = np.zeros(len(active), dtype=np.int64)
-        orbits.find_candidates(self._newest(active), units, NEAR, WINDOW, self.settings.max_period, found)
+        orbits.find_candidates(
+            self.history, active, self.count, units, NEAR, _SHARED, WINDOW, self.settings.max_period, found
+        )
         found[self.periods[active] < self.wait[active]] = 0
         rows = np.flatnonzero(found)
+        # The longest runs first: what is last leaves lanes idle.
+        rows = rows[np.argsort(-found[rows], kind="stable")]
         certified = self.certify(active[rows], self.starts[active[rows]], found[rows], units[rows])
         return self._of_least_order(certified)
 

@@ -15,7 +15,7 @@ from sprag.engine.vibration_drive.irregular import BATCHES, Batches
 from sprag.engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
 from sprag.engine.vibration_drive.lanes import OUT_EVENTS, OUT_STEPS, RUNUP_SHARE
 from sprag.engine.vibration_drive.no_load import limit_of
-from sprag.engine.vibration_drive.orbits import distances
+from sprag.engine.vibration_drive.orbits import distances, settling_periods
 from sprag.engine.vibration_drive.regimes import Regime, means, settled_infos
 from sprag.engine.vibration_drive.results import result_infos
 from sprag.engine.vibration_drive.search import ROUND, Orbits, Search, transient_rounds
@@ -185,26 +185,24 @@ def _write(search: Search, found: Orbits, results: _Results) -> None:
 def _settled_after(search: Search, found: Orbits) -> Floats:
     """Periods from the start until a run is within the settled distance of its orbit, by the orbit's multiplier."""
     cases = found.cases
-    apart = np.empty(len(cases))
+    apart, periods = np.empty(len(cases)), np.empty(len(cases))
     distances(search.starts[cases], found.points, search.units(cases), apart)
-    periods = search.periods[cases].astype(float)
-    for k, (distance, multiplier) in enumerate(zip(apart.tolist(), found.multipliers.tolist(), strict=True)):
-        if distance > search.settings.settled and 0.0 < multiplier < 1.0:
-            periods[k] += found.orders[k] * math.log(distance / search.settings.settled) / -math.log(multiplier)
-    return periods
+    settling_periods(apart, found.orders, found.multipliers, search.settings.settled, periods)
+    return search.periods[cases] + periods
 
 
 def _whole_run(search: Search, cases: Ints, results: _Results) -> None:
     """Write what belongs to the whole run from its start: steps, events, run-up."""
     results.put(cases, "run.steps", search.steps[cases])
     results.put(cases, "run.events", search.events[cases])
-    speed = results.values[cases, results.column("shaft.speed.mean")]
-    for case, mean in zip(cases.tolist(), speed.tolist(), strict=True):
-        period = search.matrix[case, 1]
-        turns = search.turns[case, : search.periods[case]]
-        started = search.matrix[case, _SPEED] == 0.0
-        value = period * _runup(turns, RUNUP_SHARE * mean * period) if started else math.nan
-        results.put(np.array([case]), "runup.time", value)
+    period = search.matrix[cases, 1]
+    wanted = RUNUP_SHARE * results.values[cases, results.column("shaft.speed.mean")] * period
+    runup = [
+        _runup(search.turns[case, : search.periods[case]], turn)
+        for case, turn in zip(cases.tolist(), wanted.tolist(), strict=True)
+    ]
+    started = search.matrix[cases, _SPEED] == 0.0
+    results.put(cases, "runup.time", np.where(started, period * np.array(runup), math.nan))
 
 
 def _runup(turns: Floats, wanted: float) -> float:

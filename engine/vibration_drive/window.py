@@ -1,12 +1,11 @@
 """What is taken from a run besides its end: extrema and energies over the window, samples of a trajectory."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine.compile.jit import inlined, part
 from sprag.engine.taylor.batch import HARD, KNOWN, RESULT, SLOTS, STATUS, slot_start, take
+from sprag.engine.taylor.elementary import cosine
 from sprag.engine.taylor.roots import RECIPROCAL, evaluate, largest
 from sprag.engine.vibration_drive.automaton import Clutch
 from sprag.engine.vibration_drive.layout import Layout
@@ -187,7 +186,7 @@ def energy(W: Floats, Z: Ints, lay: Layout, lane: int) -> float:
         base = lay.pendulums + i * lay.stride
         phi = W[(base + lay.p_phi) * lanes + lane]
         w = W[(base + lay.p_speed) * lanes + lane]
-        weight = W[(base + lay.p_ml) * lanes + lane] * W[lay.gravity * lanes + lane] * math.cos(phi)
+        weight = W[(base + lay.p_ml) * lanes + lane] * W[lay.gravity * lanes + lane] * cosine(phi)
         spring = 0.5 * W[(base + lay.p_spring) * lanes + lane] * phi * phi
         total += W[(base + lay.p_inertia) * lanes + lane] * (0.5 * w * w + weight + spring)
         if Z[lane, i] == _ENGAGED or Z[lane, i] == _BEYOND:

@@ -99,7 +99,8 @@ def test_settled_motions_equal_those_after_20000_periods(group: str, pendulums: 
                 assert row[name] == pytest.approx(value, rel=1e-9, abs=1e-12), (case["case"], name)
     assert missed <= 1
     assert missed <= 0.05 * wanted
-    assert inside >= 0.8 * irregular
+    # One in twenty may miss its interval; which, any change of rounding decides.
+    assert irregular - inside <= 1 + 0.1 * irregular
 
 
 def test_without_a_load_the_speed_is_the_limit_of_a_vanishing_one() -> None:
