@@ -211,3 +211,27 @@ class EngagementTables(TypedDict):
     engagements: list[EngagementRow]
     periods: Annotated[list[PeriodRow], Doc("whole excitation periods")]
     ending: str
+
+
+class TimedValues(TypedDict):
+    """Values of one case at some times."""
+
+    times: Annotated[list[float], Doc("s")]
+    variables: Annotated[dict[str, dict[str, str]], Doc("unit of each variable")]
+    values: Annotated[dict[str, list[Number]], Doc("values at the times, by variable")]
+    states: Annotated[dict[str, list[str]], Doc("states of shaft and clutches at the times")]
+
+
+class Portrait(TypedDict):
+    """How one case comes to its motion: its state once in each excitation period, and the orbit it comes to."""
+
+    case: int
+    parameters: dict[str, float]
+    regime: Annotated[str | None, Doc("regime of the settled motion; null for a run of a given time")]
+    order: Annotated[int | None, Doc("excitation periods in one turn of the orbit; null where there is none")]
+    strobes: Annotated[TimedValues, Doc("at the ends of the excitation periods, from the start of the run")]
+    orbit: Annotated[
+        TimedValues | None,
+        Doc("one whole turn of the settled motion, from the start of an excitation period; null where there is none"),
+    ]
+    ending: str

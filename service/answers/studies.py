@@ -91,6 +91,7 @@ class StudyDetail(_Study):
     axes: list[AxisInfo]
     physics_hash: Annotated[str, Doc("SHA-256 of what decides the numbers: equal for equal studies")]
     regimes: Annotated[dict[str, int], Doc("number of cases of each regime; empty where cases have none")]
+    flags: Annotated[dict[str, int], Doc("number of cases that have each flag; only flags that some case has")]
     spec: Annotated[dict[str, Any], Doc("the spec as it was submitted")]
 
 

@@ -49,13 +49,18 @@ def extend(
 
 def longer(
     study_id: StudyId,
-    regime: Annotated[str, typer.Option("--regime", metavar="REGIME", help="Regime of the cases.")] = "unsettled",
+    regime: Annotated[
+        str | None,
+        typer.Option(
+            "--regime", metavar="REGIME", help="Regime of the cases of a settled study.", show_default="unsettled"
+        ),
+    ] = None,
     at_most: Annotated[
         int | None,
         typer.Option(
             min=MIN_SETTLED_PERIODS,
             max=MAX_SETTLED_PERIODS,
-            help="Excitation periods of each search; default: four times as many as before.",
+            help="Excitation periods of each search or run; default: four times as many as before.",
         ),
     ] = None,
     wait: Annotated[bool, typer.Option("--wait", help="Wait until the new study has ended.")] = False,

@@ -21,6 +21,7 @@ from sprag.service.client.queries import (
     extension,
     finish_text,
     form_of,
+    longer_query,
     reporting,
     result_query,
     spec_of,
@@ -39,6 +40,7 @@ from sprag.service.client.wire import (
     reason,
     refusal,
     require_finite,
+    strobes_path,
     study_path,
     within,
 )
@@ -221,6 +223,10 @@ class AsyncStudy:
         """Every engagement of the clutches of one case, as `Study.engagements` gives them."""
         return await self._client.request("GET", engagements_path(self.id, case))
 
+    async def strobes(self, case: int) -> dict[str, Any]:
+        """The state of one case once in each excitation period, and its orbit, as `Study.strobes` gives them."""
+        return await self._client.request("GET", strobes_path(self.id, case))
+
     async def table(self) -> pd.DataFrame:
         """All rows as a pandas table."""
         return table_of(await self.download("parquet"))
@@ -275,10 +281,13 @@ class AsyncStudy:
         return AsyncStudy(self._client, made["id"])
 
     async def run_longer(
-        self, regime: str = "unsettled", at_most: int | None = None, *, key: str | None = None
+        self, regime: str | None = None, at_most: int | None = None, *, key: str | None = None
     ) -> AsyncStudy:
-        """Submit a study of this one's cases of a regime, with more excitation periods for each search."""
-        query = [("regime", regime), *([] if at_most is None else [("at_most", str(at_most))])]
+        """Submit a study of this one's cases that are not settled, with more excitation periods for each.
+
+        Of a settled study those of a regime, by default the unsettled ones; else those with the flag ``not_settled``.
+        """
+        query = longer_query(regime, at_most)
         headers = {"Idempotency-Key": key or uuid.uuid4().hex}
         made = await self._client.request("POST", f"{self._path}:longer", params=query, headers=headers)
         return AsyncStudy(self._client, made["id"])

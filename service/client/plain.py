@@ -10,6 +10,7 @@ from typing import Any
 import httpx
 
 from sprag.service.client.errors import UnreachableError
+from sprag.service.client.queries import longer_query
 from sprag.service.client.wire import (
     API,
     EVENTS_TIMEOUT,
@@ -23,6 +24,7 @@ from sprag.service.client.wire import (
     refusal,
     require_finite,
     schedule_path,
+    strobes_path,
     study_path,
     within,
 )
@@ -82,13 +84,13 @@ class ServiceClient:
         return self._json("POST", f"{study_path(study_id)}:extend", json=addition, headers=_once(key))
 
     def run_longer(
-        self, study_id: str, regime: str = "unsettled", at_most: int | None = None, key: str | None = None
+        self, study_id: str, regime: str | None = None, at_most: int | None = None, key: str | None = None
     ) -> dict[str, Any]:
-        """Submit a study of the cases of a settled study that have that regime, with more time for each search.
+        """Submit a study of the cases of another that are not settled, with more time for each.
 
         The same ``key`` submits it once, however often it is sent.
         """
-        query = [("regime", regime), *([] if at_most is None else [("at_most", str(at_most))])]
+        query = longer_query(regime, at_most)
         return self._json("POST", f"{study_path(study_id)}:longer", params=query, headers=_once(key))
 
     def preview(self, spec: object) -> dict[str, Any]:
@@ -118,6 +120,10 @@ class ServiceClient:
     def engagements(self, study_id: str, case: int) -> dict[str, Any]:
         """The engagements of the clutches of one case, and the means of its excitation periods."""
         return self._json("GET", engagements_path(study_id, case))
+
+    def strobes(self, study_id: str, case: int) -> dict[str, Any]:
+        """The state of one case once in each excitation period, and its orbit."""
+        return self._json("GET", strobes_path(study_id, case))
 
     def download(self, path: str, query: Query = ()) -> Iterator[bytes]:
         """The bytes of a document under the API, such as ``/studies/ID/results`` with ``format=csv``, as they come."""

@@ -56,6 +56,12 @@ def curve_query(
     return query + [("at", f"{path}={value}") for path, value in (at or {}).items()]
 
 
+def longer_query(regime: str | None, at_most: int | None) -> list[tuple[str, str]]:
+    """Query of a study that is to be run longer; what is None is left to the service."""
+    given = (("regime", regime), ("at_most", at_most))
+    return [(name, str(value)) for name, value in given if value is not None]
+
+
 def result_query(y: str | Sequence[str]) -> list[tuple[str, str]]:
     """Query of results by their names."""
     return [("y", name) for name in _listed(y)]

@@ -161,6 +161,10 @@ class Study:
         """Every engagement of the clutches of one case ("engagements"), and the means of its "periods"."""
         return self._client.plain.engagements(self.id, case)
 
+    def strobes(self, case: int) -> dict[str, Any]:
+        """The state of one case once in each excitation period ("strobes"), and its "orbit" if it has one."""
+        return self._client.plain.strobes(self.id, case)
+
     def table(self) -> pd.DataFrame:
         """All rows with all results as a pandas table, NaN for what could not be computed."""
         return table_of(self.download("parquet"))
@@ -217,8 +221,11 @@ class Study:
         """
         return Study(self._client, self._client.plain.extend(self.id, extension(axes, cases, name), key)["id"])
 
-    def run_longer(self, regime: str = "unsettled", at_most: int | None = None, *, key: str | None = None) -> Study:
-        """Submit a study of this one's cases of a regime, with more excitation periods for each search."""
+    def run_longer(self, regime: str | None = None, at_most: int | None = None, *, key: str | None = None) -> Study:
+        """Submit a study of this one's cases that are not settled, with more excitation periods for each.
+
+        Of a settled study those of a regime, by default the unsettled ones; else those with the flag ``not_settled``.
+        """
         return Study(self._client, self._client.plain.run_longer(self.id, regime, at_most, key)["id"])
 
     def act(self, verb: str) -> StudySummary:

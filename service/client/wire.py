@@ -89,6 +89,11 @@ def engagements_path(study_id: str, case: int) -> str:
     return f"{study_path(study_id)}/cases/{case:d}/engagements"
 
 
+def strobes_path(study_id: str, case: int) -> str:
+    """Address of the strobes of a case under the API."""
+    return f"{study_path(study_id)}/cases/{case:d}/strobes"
+
+
 def schedule_path(schedule_id: str) -> str:
     """Address of a schedule under the API."""
     return f"/schedules/{quote(schedule_id, safe='')}"

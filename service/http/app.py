@@ -25,6 +25,7 @@ from sprag.service.http.api import (
     engagements,
     events,
     health,
+    portraits,
     schedules,
     sensitivity,
     studies,
@@ -39,6 +40,7 @@ from sprag.service.http.shares import Shares
 from sprag.service.http.views import API_PREFIX
 from sprag.service.http.web import case, compare, laboratory, login, pages, results, study, table
 from sprag.service.http.web import engagements as engagement_pages
+from sprag.service.http.web import portrait as portrait_pages
 from sprag.service.http.web import schedules as schedule_pages
 from sprag.service.http.web.form import page as form
 from sprag.service.jobs import checks
@@ -193,7 +195,18 @@ def _routes() -> APIRouter:
     """All routes, which know no application: what they take is worked out once in a process, by the first request."""
     routes = APIRouter(generate_unique_id_function=_operation_id)
     api = APIRouter(prefix=API_PREFIX)
-    for module in (studies, events, curves, sensitivity, cases, engagements, clutch_fits, schedules, catalogues):
+    for module in (
+        studies,
+        events,
+        curves,
+        sensitivity,
+        cases,
+        engagements,
+        portraits,
+        clutch_fits,
+        schedules,
+        catalogues,
+    ):
         api.include_router(module.router)
     routes.include_router(api)
     routes.include_router(health.router)
@@ -205,6 +218,7 @@ def _routes() -> APIRouter:
         table,
         case,
         engagement_pages,
+        portrait_pages,
         compare,
         laboratory,
         schedule_pages,

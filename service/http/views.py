@@ -14,7 +14,7 @@ from sprag.service.spec.catalogue import axes_json
 from sprag.service.spec.document import format_of, load_spec, parse_spec
 
 if TYPE_CHECKING:
-    from sprag.service.storage.records import Progress, StudyRecord
+    from sprag.service.storage.records import Kinds, Progress, StudyRecord
     from sprag.worker.study import Study
 
 API_PREFIX: Final = "/api/v1"
@@ -54,9 +54,7 @@ def progress_json(progress: Progress) -> FullProgress:
     )
 
 
-def detail(
-    record: StudyRecord, progress: Progress, study: Study, spec: dict[str, Any], regimes: dict[str, int]
-) -> StudyDetail:
+def detail(record: StudyRecord, progress: Progress, study: Study, spec: dict[str, Any], kinds: Kinds) -> StudyDetail:
     """A study with everything; ``record`` and ``progress`` are of one moment (`Store.look`)."""
     return {
         **summary(record),
@@ -64,7 +62,8 @@ def detail(
         "combine": study.combine,
         "axes": axes_json(study),
         "physics_hash": record.physics_hash,
-        "regimes": regimes,
+        "regimes": kinds.regimes,
+        "flags": kinds.flags,
         "spec": spec,
     }
 

@@ -106,17 +106,18 @@ def extended_study(
 def longer_study(
     library: Library,
     study_id: str,
-    regime: str,
+    kind: str,
     at_most: int | None,
     now: datetime,
     given: Mapping[str, object],
 ) -> Submission:
-    """The cases of a study that have that regime, with more time to settle.
+    """The cases of a study that have that regime, or that flag where there are no regimes, with more time to settle.
 
     There must be one. Raises SpecError and StudyNotFound.
     """
     store = library.store
-    cases = store.cases_of_regime(study_id, regime)
+    named = {"regime" if models.is_settled(store.study(study_id).run) else "flag": kind}
+    cases = store.cases_of_kind(study_id, **named)
     parsed = parse_spec(longer_spec(store.spec(study_id), store.study(study_id), cases, at_most))
     return submission(parsed, store.chunking, store.reusable, now, given=given)
 

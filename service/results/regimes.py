@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from sprag.worker.models import ResultInfo
 
 #: Regime of points that no line leads to: they are not of the settled machine.
 UNSETTLED: Final = "unsettled"
@@ -58,6 +62,25 @@ def stretches(regimes: Sequence[str | None] | None, points: int) -> list[NDArray
         else:
             found.append([place])
     return [np.array(stretch, dtype=np.int64) for stretch in found]
+
+
+def kind_columns(regime: ResultInfo | None) -> list[str]:
+    """Names of the results that tell what kind of motion a case has: its regime, and the order of its orbit."""
+    return [] if regime is None else [regime.name, f"{regime.name}.order"]
+
+
+def kinds_of(
+    columns: Mapping[str, NDArray[np.float64]], regime: ResultInfo | None
+) -> tuple[list[str | None] | None, list[int | None] | None]:
+    """Name of the regime and order of the orbit of each case; None for cases without, and where there are no regimes.
+
+    ``columns`` has the results of `kind_columns`.
+    """
+    if regime is None:
+        return None, None
+    name, order = kind_columns(regime)
+    names = [None if cell is None else str(cell) for cell in map(regime.cell, columns[name].tolist())]
+    return names, [None if math.isnan(value) else int(value) for value in columns[order].tolist()]
 
 
 def regimes_of(lists: Iterable[Sequence[str | None] | None]) -> list[str]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ import numpy as np
 from sprag.service.faults import Fault, ParameterFault
 from sprag.service.json_text import numbers
 from sprag.service.results.curves import Fetch
+from sprag.service.results.regimes import UNSETTLED, counted, kind_columns, kinds_of
 from sprag.service.results.selection import SelectionError, axis_name, listed
 from sprag.service.results.sensitivity_design import (
     factorial_table,
@@ -146,10 +148,15 @@ def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fet
         )
     if faults:
         raise SelectionError(faults)
-    columns = fetch(np.arange(study.cases, dtype=np.int64), list(names))
+    regime = models.regime_info(infos)
+    kinds = kind_columns(regime)
+    columns = fetch(np.arange(study.cases, dtype=np.int64), list(dict.fromkeys([*names, *kinds])))
+    regimes, _ = kinds_of(columns.values, regime)
     base = _saltelli_base(study, spec)
     found = (result_of(infos, name) for name in names)
-    return [_of_result(study, varying, info, columns.values[info.name], base) for info in found if info is not None]
+    return [
+        _of_result(study, varying, info, columns.values[info.name], regimes, base) for info in found if info is not None
+    ]
 
 
 def _saltelli_base(study: Study, spec: Mapping[str, Any]) -> int | None:
@@ -163,7 +170,32 @@ def _saltelli_base(study: Study, spec: Mapping[str, Any]) -> int | None:
     return int(sample["count"])
 
 
-def _of_result(study: Study, varying: list[Axis], info: ResultInfo, y: Numbers, base: int | None) -> Sensitivity:
+def _settled_only(y: Numbers, regimes: list[str | None] | None, notes: list[str]) -> Numbers:
+    """The result without that of unsettled cases; what there is to note about regimes goes to ``notes``."""
+    if regimes is None:
+        return y
+    names = np.array([name or "" for name in regimes])
+    unsettled = (names == UNSETTLED) & np.isfinite(y)
+    if unsettled.any():
+        notes.append(f"{int(unsettled.sum())} unsettled cases are left out: their results are not of a settled motion")
+    y = np.where(unsettled, np.nan, y)
+    counts = Counter(names[np.isfinite(y)].tolist())
+    if len(counts) > 1:
+        told = counted(dict(counts.most_common()))
+        notes.append(f"cases of different regimes are taken together ({told}): part of the variance is between these")
+    return y
+
+
+def _of_result(
+    study: Study,
+    varying: list[Axis],
+    info: ResultInfo,
+    y: Numbers,
+    regimes: list[str | None] | None,
+    base: int | None,
+) -> Sensitivity:
+    kinds: list[str] = []
+    y = _settled_only(y, regimes, kinds)
     known = np.isfinite(y)
     cases, missing = int(known.sum()), int((~known).sum())
     values = y[known]
@@ -201,7 +233,7 @@ def _of_result(study: Study, varying: list[Axis], info: ResultInfo, y: Numbers, 
         Effect(axis.paths, unit_of(study, axis.paths[0]), *_main_effect(axis, column[known], values), *numbers_)
         for axis, column, numbers_ in zip(varying, columns.T, indices, strict=True)
     )
-    return Sensitivity(info, method, cases, missing, mean, variance, effects, tuple(notes))
+    return Sensitivity(info, method, cases, missing, mean, variance, effects, (*kinds, *notes))
 
 
 Indices = tuple[float | None, float | None, float | None, float | None]

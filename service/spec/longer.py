@@ -1,12 +1,12 @@
-"""A study of cases of another whose motion was not settled, with more time for the search."""
+"""A study of cases of another whose motion was not settled, with more time for each."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.spec.run import TIMED_FIELDS
-from sprag.worker.limits import MAX_NAME_LENGTH, MAX_SETTLED_PERIODS
-from sprag.worker.models import SETTLED
+from sprag.service.spec.run import SETTLED_FIELDS, TIMED_FIELDS
+from sprag.worker.limits import MAX_NAME_LENGTH, MAX_RUN_PERIODS, MAX_SETTLED_PERIODS
+from sprag.worker.models import SETTLED, is_settled
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from sprag.worker.study import Study
 
-#: How many times as long a search may take by default.
+#: How many times as long a search may take, or a run takes, by default.
 TIMES: Final = 4
 _SUFFIX: Final = ", longer"
 
@@ -24,7 +24,7 @@ _SUFFIX: Final = ", longer"
 def longer_spec(
     spec: Mapping[str, Any], study: Study, cases: NDArray[np.int64], at_most: int | None = None
 ) -> dict[str, Any]:
-    """The spec of a study of just these cases of a settled study, each run for at most ``at_most`` excitation periods.
+    """The spec of a study of just these cases, each run for at most, or for, ``at_most`` excitation periods.
 
     Parameters
     ----------
@@ -33,15 +33,34 @@ def longer_spec(
     cases : numbers of cases, at least one
     at_most : by default `TIMES` as many as the study allows
     """
-    most = min(TIMES * study.run["at_most"], MAX_SETTLED_PERIODS) if at_most is None else at_most
     kept = {key: value for key, value in spec.items() if key not in {"axes", "combine", "exclude"}}
-    run = {key: value for key, value in spec.get("run", {}).items() if key not in TIMED_FIELDS}
+    if is_settled(study.run):
+        most = min(TIMES * study.run["at_most"], MAX_SETTLED_PERIODS) if at_most is None else at_most
+        run = {key: value for key, value in spec.get("run", {}).items() if key not in TIMED_FIELDS}
+        run |= {"until": SETTLED, "at_most": f"{most} periods"}
+    else:
+        times = (*SETTLED_FIELDS, *TIMED_FIELDS)
+        run = {key: value for key, value in spec.get("run", {}).items() if key not in times}
+        run |= _longer_run(study, at_most)
     columns = study.columns(cases)
     axes = [{"path": list(axis.paths), "values": columns[axis.paths[0]].tolist()} for axis in study.axes]
     return {
         **kept,
         "name": study.name[: MAX_NAME_LENGTH - len(_SUFFIX)] + _SUFFIX,
-        "run": {**run, "until": SETTLED, "at_most": f"{most} periods"},
+        "run": run,
         "combine": "zip",
         "axes": axes,
     }
+
+
+def _longer_run(study: Study, periods: int | None) -> dict[str, Any]:
+    """A longer run of a given time, evaluated at its end: over as much of it as before, or its last third."""
+    (number, unit), window = study.run["duration"], study.run["window"]
+    if periods is not None:
+        number, unit = float(periods), "periods"
+    else:
+        number = min(TIMES * number, MAX_RUN_PERIODS) if unit == "periods" else TIMES * number
+    run: dict[str, Any] = {"duration": f"{number!r} {unit}"}
+    if window and window[0][1] == window[1][1] == unit and (length := window[1][0] - window[0][0]) < number:
+        run["window"] = [f"{number - length!r} {unit}", f"{number!r} {unit}"]
+    return run

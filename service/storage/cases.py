@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,14 +12,14 @@ import sqlalchemy as sa
 
 from sprag.service.storage.order import Orders
 from sprag.service.storage.part import MAX_INTEGER
-from sprag.service.storage.records import CaseColumns, CaseRow, RowBlock
+from sprag.service.storage.records import CaseColumns, CaseRow, Kinds, RowBlock
 from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
 from sprag.worker import models
 from sprag.worker.models import WorkerEnding, regime_info
 from sprag.worker.states import ChunkState, StudyState
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -66,46 +67,49 @@ class Cases(Orders):
         limit: int = BLOCK_ROWS,
         ending: str | None = None,
         regime: str | None = None,
+        flag: str | None = None,
     ) -> RowBlock:
         """The same, and the cases that a cancelled study never ran in their places among them.
 
-        With ``ending`` only the cases that ended so, with ``regime`` only those of that regime.
+        With ``ending`` only the cases that ended so, with ``regime`` only those of that regime, with ``flag`` only
+        those that have it.
         """
         cancelled: str = WorkerEnding.CANCELLED.value
         with self.session.read() as connection:
             rows = self._rows(connection, study_id)
-            found = [] if ending == cancelled else _read(connection, rows, after_case, limit, ending, regime)
-            if rows.cancelled and ending in {None, cancelled} and regime is None:
+            found = [] if ending == cancelled else _read(connection, rows, after_case, limit, ending, regime, flag)
+            if rows.cancelled and ending in {None, cancelled} and regime is None and flag is None:
                 nothing = [None] * len(rows.infos)
                 left = itertools.islice(self._never_run(connection, rows, after_case), limit)
                 found = [*found, *((case, cancelled, "", *nothing) for case in left)]
                 found = sorted(found, key=lambda row: int(row[0]))[:limit]
         return _block(rows.infos, found)
 
-    def regimes(self, study_id: str) -> dict[str, int]:
-        """How many finished cases have which regime, the most frequent first; empty where there are no regimes.
-
-        Raises StudyNotFound.
-        """
-        with self.session.read() as connection:
-            rows = self._rows(connection, study_id)
-            info = regime_info(rows.infos)
-            if info is None:
-                return {}
-            column, count = rows.table.c[info.column], sa.func.count()
-            query = sa.select(column, count).where(rows.table.c.study == rows.number, column.is_not(None))
-            found = connection.execute(query.group_by(column).order_by(count.desc(), column)).all()
-        return {info.categories[code]: cases for code, cases in found}
-
-    def cases_of_regime(self, study_id: str, regime: str) -> NDArray[np.int64]:
-        """Numbers of the cases of a regime, ascending; raises StudyNotFound."""
+    def kinds(self, study_id: str) -> Kinds:
+        """How many finished cases have which regime and which flag; raises StudyNotFound."""
         with self.session.read() as connection:
             rows = self._rows(connection, study_id)
             info, c = regime_info(rows.infos), rows.table.c
-            if info is None:
+            keys = [c.flags] if info is None else [c.flags, c[info.column]]
+            query = sa.select(sa.func.count(), *keys).where(c.study == rows.number).group_by(*keys)
+            found = connection.execute(query).all()
+        regimes, flags = Counter[str](), Counter[str]()
+        for cases, joined, *code in found:
+            flags.update(dict.fromkeys(filter(None, joined.split(",")), cases))
+            if info is not None and code[0] is not None:
+                regimes[info.categories[code[0]]] += cases
+        order = {} if info is None else {name: place for place, name in enumerate(info.categories)}
+        return Kinds(_by_frequency(regimes, order), _by_frequency(flags, {}))
+
+    def cases_of_kind(self, study_id: str, regime: str | None = None, flag: str | None = None) -> NDArray[np.int64]:
+        """Numbers of the cases of a regime, or that have a flag, ascending; raises StudyNotFound."""
+        with self.session.read() as connection:
+            rows = self._rows(connection, study_id)
+            kind = _of_kind(rows, regime, flag)
+            if kind is None:
                 return np.empty(0, dtype=np.int64)
-            code = info.categories.index(regime)
-            query = sa.select(c.case_number).where(c.study == rows.number, c[info.column] == code)
+            c = rows.table.c
+            query = sa.select(c.case_number).where(c.study == rows.number, *kind)
             found = connection.execute(query.order_by(c.case_number)).scalars()
             return np.fromiter(found, dtype=np.int64)
 
@@ -183,17 +187,17 @@ def _read(
     limit: int,
     ending: str | None = None,
     regime: str | None = None,
+    flag: str | None = None,
 ) -> Sequence[Sequence[Any]]:
     """Rows of the database: number, ending, flags, results."""
     c = rows.table.c
     query = sa.select(c.case_number, c.ending, c.flags, *(c[info.column] for info in rows.infos)).where(
         c.study == rows.number, c.case_number > min(after_case, MAX_INTEGER)
     )
-    if regime is not None:
-        info = regime_info(rows.infos)
-        if info is None or regime not in info.categories:
-            return []
-        query = query.where(c[info.column] == info.categories.index(regime))
+    kind = _of_kind(rows, regime, flag)
+    if kind is None:
+        return []
+    query = query.where(*kind)
     if ending is not None:
         ended = connection.execute(
             sa.select(ENDINGS.c.cases).where(ENDINGS.c.study == rows.number, ENDINGS.c.ending == ending)
@@ -203,6 +207,25 @@ def _read(
             return []
         query, limit = query.where(c.ending == ending), min(limit, ended)
     return connection.execute(query.order_by(c.case_number).limit(limit)).all()
+
+
+def _of_kind(rows: _Rows, regime: str | None, flag: str | None) -> list[sa.ColumnElement[bool]] | None:
+    """Conditions that select the rows of a regime that have a flag; None where there can be none."""
+    found: list[sa.ColumnElement[bool]] = []
+    if regime is not None:
+        info = regime_info(rows.infos)
+        if info is None or regime not in info.categories:
+            return None
+        found.append(rows.table.c[info.column] == info.categories.index(regime))
+    if flag is not None:
+        joined: sa.ColumnElement[str] = sa.literal(",") + rows.table.c.flags + sa.literal(",")
+        found.append(joined.contains(f",{flag},", autoescape=True))
+    return found
+
+
+def _by_frequency(counts: Counter[str], order: Mapping[str, int]) -> dict[str, int]:
+    """The same counts, the largest first, then in that order, then by name."""
+    return dict(sorted(counts.items(), key=lambda item: (-item[1], order.get(item[0], 0), item[0])))
 
 
 def conditions(column: sa.ColumnElement[Any], cases: NDArray[np.int64]) -> Iterator[sa.ColumnElement[bool]]:

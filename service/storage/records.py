@@ -194,6 +194,14 @@ class CaseColumns:
 
 
 @dataclass(frozen=True, slots=True)
+class Kinds:
+    """How many finished cases of a study have which regime and which flag, each the most frequent first."""
+
+    regimes: dict[str, int]
+    flags: dict[str, int]
+
+
+@dataclass(frozen=True, slots=True)
 class DispatcherRecord:
     """The dispatcher that took over last, and when it was last heard of."""
 

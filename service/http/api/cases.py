@@ -20,7 +20,7 @@ from sprag.service.results import trajectories
 from sprag.service.results.exports import MEDIA_TYPES, Format, row_json, rows_json
 from sprag.service.storage.records import CaseRow
 from sprag.worker import models
-from sprag.worker.codes import PENDING
+from sprag.worker.codes import FLAG_MASKS, PENDING
 from sprag.worker.limits import MAX_PAGE_SIZE, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 
 if TYPE_CHECKING:
@@ -56,6 +56,12 @@ def list_cases(
             json_schema_extra=one_of(models.REGIME_SENTENCES),
         ),
     ] = None,
+    flag: Annotated[
+        str | None,
+        Query(
+            description="only cases that have this flag", examples=["not_settled"], json_schema_extra=one_of(FLAG_MASKS)
+        ),
+    ] = None,
 ) -> Response:
     """Finished cases, in order of their numbers; of a cancelled study also those that were never run."""
     if ending is not None and ending not in models.ENDING_SENTENCES:
@@ -66,9 +72,11 @@ def list_cases(
         raise parameter_error(
             "regime", "invalid-choice", "unknown regime", shown(regime), ", ".join(models.REGIME_SENTENCES)
         )
+    if flag is not None and flag not in FLAG_MASKS:
+        raise parameter_error("flag", "invalid-choice", "unknown flag", shown(flag), ", ".join(FLAG_MASKS))
     after = _after(page_token)
     # One more than the page, which tells whether there is another.
-    block = context.store.case_page(study_id, after_case=after, limit=page_size + 1, ending=ending, regime=regime)
+    block = context.store.case_page(study_id, after, page_size + 1, ending, regime, flag)
     rows = list(rows_json(context.store.study(study_id), block))
     token = str(rows[page_size - 1]["case"]) if len(rows) > page_size else None
     return json_response({"cases": rows[:page_size], "next_page_token": token})
@@ -97,6 +105,8 @@ def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
     links = {"self": own, "study": study_address(study_id), "trajectory": f"{own}/trajectory"}
     if models.has_clutches(study):
         links["engagements"] = f"{own}/engagements"
+    if models.has_strobes(study):
+        links["strobes"] = f"{own}/strobes"
     return json_response(
         {
             **row_json(row, parameters),

@@ -22,9 +22,10 @@ from sprag.service.http.respond import JSON, entity_tag, json_response, not_modi
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import Submission, take_in
+from sprag.service.results.regimes import UNSETTLED
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
 from sprag.worker.limits import MAX_PAGE_SIZE, MAX_PRIORITY, MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
-from sprag.worker.models import ENDING_SENTENCES, OK, REGIME_SENTENCES, WorkerEnding
+from sprag.worker.models import ENDING_SENTENCES, NOT_SETTLED, OK, REGIME_SENTENCES, WorkerEnding, is_settled
 from sprag.worker.states import StudyState
 
 router = APIRouter(tags=["studies"], dependencies=[Depends(strict_query)])
@@ -151,7 +152,7 @@ def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
     if record.state.terminal and (unchanged := not_modified(request, tag)):
         return unchanged
     study = context.store.study(study_id)
-    data = views.detail(record, progress, study, context.store.spec(study_id), context.store.regimes(study_id))
+    data = views.detail(record, progress, study, context.store.spec(study_id), context.store.kinds(study_id))
     data["warnings"] += context.unaffected.of(context.store, record)
     response = json_response(data)
     # While it runs, the time left changes with no change of the study.
@@ -266,28 +267,45 @@ async def run_longer(
     work: Attended,
     study_id: StudyId,
     regime: Annotated[
-        str, Query(description="regime of the cases", json_schema_extra=one_of(REGIME_SENTENCES))
-    ] = "unsettled",
+        str | None,
+        Query(
+            description="regime of the cases of a settled study, by default `unsettled`; of a run of a given time the "
+            "cases with the flag `not_settled` are meant",
+            json_schema_extra=one_of(REGIME_SENTENCES),
+        ),
+    ] = None,
     at_most: Annotated[
         int | None,
         Query(
             ge=MIN_SETTLED_PERIODS,
             le=MAX_SETTLED_PERIODS,
-            description="excitation periods of each search; by default four times as many as before",
+            description="excitation periods of each search, or run; by default four times as many as before",
         ),
     ] = None,
     idempotency_key: ExtensionKey = None,
 ) -> Response:
-    """Submit a study of the cases of a settled study that are not settled, with more time for each."""
-    there = await run_in_threadpool(context.store.regimes, study_id)
-    if regime not in there:
-        raise parameter_error(
-            "regime", "unknown-name", "no case of this study has it", regime, ", ".join(there) or "none: not settled"
-        )
+    """Submit a study of the cases of a study that are not settled, with more time for each."""
+    kind = await run_in_threadpool(_to_run_longer, context, study_id, regime)
     given = _given(regime=regime, at_most=at_most)
     now = context.store.clock.now()
-    made = await work.check(checks.longer_study, context.library, study_id, regime, at_most, now, given)
+    made = await work.check(checks.longer_study, context.library, study_id, kind, at_most, now, given)
     return await run_in_threadpool(_take_in, context, made, idempotency_key, 0)
+
+
+def _to_run_longer(context: Context, study_id: str, regime: str | None) -> str:
+    """The regime or the flag of the cases that are to be run longer; FaultError where no case has it."""
+    study, kinds = context.store.study(study_id), context.store.kinds(study_id)
+    if is_settled(study.run):
+        if (wanted := regime or UNSETTLED) in kinds.regimes:
+            return wanted
+        raise parameter_error(
+            "regime", "unknown-name", "no case of this study has it", wanted, ", ".join(kinds.regimes)
+        )
+    if regime is not None:
+        raise parameter_error("regime", "unknown-name", "a run of a given time has none", regime, "no `regime`")
+    if NOT_SETTLED in kinds.flags:
+        return NOT_SETTLED
+    raise parameter_error("regime", "unknown-name", "no case of this study has the flag `not_settled`")
 
 
 @router.post(

@@ -95,6 +95,8 @@ def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = 
         picture=f"{own}/motion.svg?{query}",
         file=f"/api/v1{own}/trajectory?{query}&points={SAMPLES}&format=csv",
         clutches=f"{own}/engagements" if models.has_clutches(study) else "",
+        strobes=f"{own}/strobes" if models.has_strobes(study) else "",
+        settled=models.is_settled(study.run),
         last=study.cases - 1,
     )
 

@@ -32,6 +32,7 @@ from sprag.service.results.regimes import DOUBTFUL
 from sprag.service.results.selection import SelectionError
 from sprag.service.spec.catalogue import parameter_of, unit_of
 from sprag.service.spec.numbers import parse_number
+from sprag.service.storage.records import Kinds
 from sprag.worker import models
 from sprag.worker.states import TRANSITIONS, StudyEvent, StudyState
 
@@ -60,8 +61,8 @@ _EVENTS: Final = {
 def study_frame(context: Context, study_id: str) -> dict[str, Any]:
     """What every page about a study shows: the study as the interface tells it, its verbs, the pages beside it."""
     (record, progress), study = context.store.look(study_id), context.store.study(study_id)
-    # Counting regimes takes as long as there are rows: the one page that tells them does it by itself.
-    shown = views.detail(record, progress, study, context.store.spec(study_id), regimes={})
+    # Counting kinds takes as long as there are rows: the one page that tells them does it by itself.
+    shown = views.detail(record, progress, study, context.store.spec(study_id), Kinds({}, {}))
     varies = any(len(axis) > 1 for axis in study.axes)
     mapped = study.combine == "grid" and sum(len(axis) > 1 for axis in study.axes) > 1
     tabs = [("", "Overview"), *([("/curves", "Curves")] if varies else []), *([("/map", "Map")] if mapped else [])]
@@ -97,6 +98,7 @@ def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[Clutch
     too_many = query is not None and drawn_numbers(study, query) > pictures.MAX_PICTURE_POINTS
     address = views.study_address(study_id)
     pairs = [] if query is None else pairs_of(query)
+    kinds = context.store.kinds(study_id)
     return page(
         "study.html",
         **frame,
@@ -111,9 +113,12 @@ def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[Clutch
         inputs=inputs(study, frame["study"]["spec"]),
         run=run_inputs(study, frame["study"]["spec"]),
         fits=fits,
-        regimes=context.store.regimes(study_id),
+        regimes=kinds.regimes,
         regime_meanings=models.REGIME_SENTENCES,
-        to_run_longer=DOUBTFUL,
+        # The flags of regimes are told with these.
+        flags={flag: count for flag, count in kinds.flags.items() if flag not in models.REGIME_SENTENCES},
+        flag_meanings=models.flags_of(study.model),
+        to_run_longer=(*DOUBTFUL, models.NOT_SETTLED),
     )
 
 
@@ -158,16 +163,26 @@ def delete(context: Ctx, study_id: StudyId) -> Response:
     return RedirectResponse("/", status_code=303)
 
 
-@router.post("/studies/{study_id:study}/longer/{regime}")
-async def run_longer(context: Ctx, work: Attended, study_id: StudyId, regime: str) -> Response:
-    """The button beside the count of a regime: a study of its cases, with more time to settle."""
-    counts = await run_in_threadpool(context.store.regimes, study_id)
-    if regime not in counts:
-        raise ApiError("not-found", "No case of this study has this regime.")
+def _not_settled(flags: Mapping[str, int]) -> dict[str, int]:
+    """The flags whose cases a longer run helps."""
+    return {flag: count for flag, count in flags.items() if flag == models.NOT_SETTLED}
+
+
+@router.post("/studies/{study_id:study}/longer/{kind}")
+async def run_longer(context: Ctx, work: Attended, study_id: StudyId, kind: str) -> Response:
+    """The button beside the count of a regime, or of a flag: a study of its cases, with more time to settle."""
+
+    def find() -> Mapping[str, int]:
+        study, kinds = context.store.study(study_id), context.store.kinds(study_id)
+        return kinds.regimes if models.is_settled(study.run) else _not_settled(kinds.flags)
+
+    counts = await run_in_threadpool(find)
+    if kind not in counts:
+        raise ApiError("not-found", "No case of this study is of this kind.")
     now = context.store.clock.now()
-    made = await work.check(checks.longer_study, context.library, study_id, regime, None, now, {})
-    # Pressed twice it is one study, unless more cases have come to have the regime.
-    key = f"longer-{study_id}-{regime}-{counts[regime]}"
+    made = await work.check(checks.longer_study, context.library, study_id, kind, None, now, {})
+    # Pressed twice it is one study, unless more cases have come to be of the kind.
+    key = f"longer-{study_id}-{kind}-{counts[kind]}"
     record = await run_in_threadpool(take_in, context.store, made, key)
     return RedirectResponse(f"/studies/{record.id}", status_code=303)
 

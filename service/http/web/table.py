@@ -14,7 +14,7 @@ from sprag.service.faults import ParameterFault
 from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.web.study import fixed_choices, study_frame
 from sprag.service.http.web.templates import page
-from sprag.service.results.selection import SelectionError, locate_axes
+from sprag.service.results.selection import SelectionError, listed, locate_axes
 from sprag.service.spec.catalogue import result_of, unit_of
 from sprag.worker import models
 
@@ -50,6 +50,7 @@ def cases_page(
     sort: Annotated[str, Query(max_length=80)] = "",
     ending: Annotated[str, Query(max_length=40)] = "",
     regime: Annotated[str, Query(max_length=40)] = "",
+    flag: Annotated[str, Query(max_length=40)] = "",
     after: Annotated[int, Query(ge=0, le=10**12)] = 0,
 ) -> Response:
     """Cases with the results that were chosen, sorted and filtered."""
@@ -67,12 +68,13 @@ def cases_page(
     faults: tuple[Any, ...] = ()
     found = TablePage([], None, 0)
     try:
-        found = _page(context, study_id, study, _Wanted(sort, ending, regime, at, after))
+        found = _page(context, study_id, study, _Wanted(sort, ending, regime, flag, at, after))
     except SelectionError as error:
         faults = error.faults
     kept = [
         ("ending", ending),
         ("regime", regime),
+        ("flag", flag),
         *(("at", f"{path}={value}") for path, value in at),
         *(("col", n) for n in names),
     ]
@@ -91,6 +93,7 @@ def cases_page(
         sort=sort,
         ending=ending,
         regime=regime,
+        flag=flag,
         regimes=list(models.REGIME_SENTENCES)[1:] if models.regime_info(infos) else [],
         flags=models.flags_of(study.model),
         sortable=study.cases <= MOST_SORTED or bool(at),
@@ -108,18 +111,22 @@ class _Wanted:
     sort: str
     ending: str
     regime: str
+    flag: str
     at: tuple[tuple[str, str], ...]
     after: int
 
 
 def _page(context: Context, study_id: str, study: Study, wanted: _Wanted) -> TablePage:
-    ending, regime, after = wanted.ending, wanted.regime, wanted.after
+    ending, regime, flag, after = wanted.ending, wanted.regime, wanted.flag, wanted.after
     if ending and ending not in models.ENDING_SENTENCES:
         raise SelectionError([ParameterFault("ending", "invalid-choice", "unknown ending", value=ending)])
     if regime and regime not in models.REGIME_SENTENCES:
         raise SelectionError([ParameterFault("regime", "invalid-choice", "unknown regime", value=regime)])
+    if flag and flag not in (known := models.flags_of(study.model)):
+        fault = ParameterFault("flag", "invalid-choice", "unknown flag", value=flag, allowed=listed(known))
+        raise SelectionError([fault])
     if not wanted.sort and not wanted.at:
-        block = context.store.case_page(study_id, after - 1, _ROWS + 1, ending or None, regime or None)
+        block = context.store.case_page(study_id, after - 1, _ROWS + 1, ending or None, regime or None, flag or None)
         rows = list(block.rows())
         more = rows[_ROWS].case if len(rows) > _ROWS else None
         return TablePage(rows[:_ROWS], more, None)
@@ -140,12 +147,11 @@ def _ordered(context: Context, study_id: str, study: Study, wanted: _Wanted) -> 
         raise SelectionError([ParameterFault("sort", "too-many", message, allowed=f"<= {MOST_SORTED:,} cases")])
     name = sort.removeprefix("-")
     infos = models.study_results(study)
-    by_result, info = result_of(infos, name) is not None, models.regime_info(infos) if wanted.regime else None
-    read = dict.fromkeys([*([name] if by_result else []), *([info.name] if info else [])])
-    columns = context.store.rows_for_cases(study_id, cases, list(read))
+    by_result = result_of(infos, name) is not None
+    columns = context.store.rows_for_cases(study_id, cases, [name] if by_result else [])
     finished = np.array([bool(found) and (not ending or found == ending) for found in columns.endings], dtype=np.bool_)
-    if wanted.regime:
-        finished &= False if info is None else columns.values[info.name] == info.categories.index(wanted.regime)
+    if wanted.regime or wanted.flag:
+        finished &= np.isin(cases, context.store.cases_of_kind(study_id, wanted.regime or None, wanted.flag or None))
     if by_result:
         keys = columns.values[name]
     elif study.axis_of(name) is not None:

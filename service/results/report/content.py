@@ -83,7 +83,7 @@ def report_of(store: Store, study_id: str) -> Report:
         store.iter_rows(study_id),
         partial(store.rows_for_cases, study_id),
         store.spec(study_id),
-        store.regimes(study_id),
+        store.kinds(study_id).regimes,
     )
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Data = dict[str, Any]
 
 #: Markers and dashes say the same as the colours, for those who print in grey.
-_SYMBOLS: Final = ("circle", "square", "diamond", "triangle-up", "x", "triangle-down", "star", "cross")
+SYMBOLS: Final = ("circle", "square", "diamond", "triangle-up", "x", "triangle-down", "star", "cross")
 _DASHES: Final = ("solid", "dash", "dot", "dashdot")
 #: Lines with more points are drawn without markers.
 _MARKED: Final = 60
@@ -150,7 +150,7 @@ def _line_trace(line: Line, panel: Panel, figure: Figure, headings: set[str]) ->
     told = ", ".join(text for text in (heading, name) if text) or _escaped(words(panel.y.name))
     return trace | {
         "customdata": [None if place is None else int(line.cases[place]) for place in places],
-        "marker": {"color": line.colour, "symbol": _SYMBOLS[int(line.key) % len(_SYMBOLS)], "size": 6},
+        "marker": {"color": line.colour, "symbol": SYMBOLS[int(line.key) % len(SYMBOLS)], "size": 6},
         "hovertemplate": _hover(panel.y, told),
     }
 

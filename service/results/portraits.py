@@ -1,0 +1,57 @@
+"""How one case comes to its motion, strobe by strobe, and the orbit: the document, and its tables as CSV."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, Literal
+
+from sprag.service.answers.results import Portrait as PortraitData
+from sprag.service.answers.results import TimedValues
+from sprag.service.faults import FaultError
+from sprag.service.json_text import numbers, to_bytes
+from sprag.service.results.trajectories import trajectory_csv
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from sprag.service.results.exports import Format
+    from sprag.worker.models import Portrait, Trajectory
+    from sprag.worker.study import Study
+
+Table = Literal["strobes", "orbit"]
+TABLES: Final[tuple[Table, ...]] = ("strobes", "orbit")
+
+
+def require_strobes(study: Study) -> None:
+    """Raise FaultError where the study's machine has no strobes."""
+    if not models.has_strobes(study):
+        message = f"A machine of model {study.model} has no excitation, so that there are no strobes of it."
+        raise FaultError("not-found", message)
+
+
+def portrait_file(study: Study, case: int, table: Table, form: Format) -> bytes:
+    """The case run again and written down. For the computing process."""
+    made = models.run_portrait(study, case)
+    if form == "csv":
+        return trajectory_csv(made.strobes if table == "strobes" else made.orbit)
+    return to_bytes(portrait_json(made, case, study.case_parameters(case)))
+
+
+def portrait_json(made: Portrait, case: int, parameters: dict[str, float]) -> PortraitData:
+    """Strobes and orbit as JSON data; ``parameters`` are the axis parameters of the case, SI."""
+    return {
+        "case": case,
+        "parameters": parameters,
+        "regime": made.regime or None,
+        "order": made.order or None,
+        "strobes": _values(made.strobes),
+        "orbit": _values(made.orbit) if made.orbit.times.size else None,
+        "ending": made.ending,
+    }
+
+
+def _values(made: Trajectory) -> TimedValues:
+    return {
+        "times": made.times.tolist(),
+        "variables": {name: {"unit": unit} for name, unit in zip(made.names, made.units, strict=True)},
+        "values": {name: numbers(made.values[:, column]) for column, name in enumerate(made.names)},
+        "states": {name: list(states) for name, states in made.states.items()},
+    }
