@@ -10,10 +10,10 @@ contact-free orbit a pendulum with backlash delta then drives a shaft of the spe
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from sprag.engine.vibration_drive.cases import Column, PendulumColumn, pendulum_column, with_lengths
 from sprag.engine.vibration_drive.integration import PENDULUM_SAMPLES, SHAFT_SAMPLES, integrate
@@ -48,7 +48,15 @@ def limit_speed(times: Floats, angle: Floats, speed: Floats, acceleration: Float
 
     if not (top > 0.0 and short_of(0.0) >= 0.0):
         return math.nan
-    return float(brentq(short_of, 0.0, top, xtol=1e-14 * top, rtol=1e-14))
+    return _root(short_of, top, xtol=1e-14 * top, rtol=1e-14)
+
+
+def _root(function: Callable[[float], float], high: float, xtol: float, rtol: float = 2.0**-50) -> float:
+    """Where a function that changes its sign between 0 and ``high`` is 0."""
+    # It takes most of a second to load, and few studies have cases without a load.
+    from scipy.optimize import brentq
+
+    return float(brentq(function, 0.0, high, xtol=xtol, rtol=rtol))
 
 
 def _hermite(times: Floats, speed: Floats, acceleration: Floats, k: int) -> tuple[float, float, float, float]:
@@ -87,7 +95,7 @@ def _crossing(times: Floats, speed: Floats, acceleration: Floats, k: int, w: flo
     def above(x: float) -> float:
         return a + x * (b + x * (c + x * d)) - w
 
-    x = 0.0 if above(0.0) == 0.0 else (1.0 if above(1.0) == 0.0 else brentq(above, 0.0, 1.0, xtol=1e-15))
+    x = 0.0 if above(0.0) == 0.0 else (1.0 if above(1.0) == 0.0 else _root(above, 1.0, xtol=1e-15))
     return float(times[k] + x * (times[k + 1] - times[k]))
 
 
