@@ -25,6 +25,32 @@ settings.load_profile("sprag")
 ROOT = Path(__file__).resolve().parents[1]
 
 
+#: Files that take long, in the order in which they are begun: several run side by side, and none of these may be last.
+#: The first one compiles the kernel of most others, which the next two do not need.
+LONG = (
+    "acceptance/test_readme.py",
+    "service/http/test_fuzzing.py",
+    "engine/compile/test_ways.py",
+    "acceptance/test_faults.py",
+    "engine/vibration_drive/test_against_scipy.py",
+    "service/http/web/test_designers.py",
+    "service/storage/test_postgres.py",
+    "worker/executors/test_dask.py",
+    "acceptance/test_cut_link.py",
+    "acceptance/test_same_rows.py",
+    "acceptance/test_commands.py",
+    "engine/test_odd_drives.py",
+    "service/http/web/test_nights.py",
+    "worker/executors/test_executors.py",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the files that take long."""
+    places = {ROOT / "tests" / name: place for place, name in enumerate(LONG)}
+    items.sort(key=lambda item: places.get(item.path, len(LONG)))
+
+
 @dataclass(frozen=True)
 class Finished:
     """How a command ended."""
