@@ -1,70 +1,82 @@
-"""Kernels compiled by plain ``numba.njit`` give the bits of those compiled as programs."""
+"""Code compiled by plain ``numba.njit`` gives the bits of that compiled as programs.
+
+A whole kernel takes the plain way a minute: ``python -m benchmarks.compilers``.
+"""
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[3]
-#: A series of low order compiles fastest.
+from benchmarks.compilers import WAYS, output
+
+#: The lane loops of a small kernel, on numbers by chance, and the roots and peaks of polynomials by the functions that
+#: a kernel calls.
 _PROGRAM = """
 import sys
+import numba
 import numpy as np
-from sprag.engine.vibration_drive.simulate import simulate
-from tests.engine.vibration_drive.drive import batch_of, drive, periods
+from sprag.engine.compile.jit import constant_record, lane_loops, lane_mask
+from sprag.engine.taylor.batch import ROWS, SLOTS, aligned_zeros, peaks_loop, roots_loop
+from sprag.engine.taylor.roots import work_stack
+from sprag.engine.vibration_drive.advance import advance_loop
+from sprag.engine.vibration_drive.bounds import bounds_loop
+from sprag.engine.vibration_drive.equations import series_loop
+from sprag.engine.vibration_drive.layout import as_record, make_layout
+from tests.engine.taylor.polynomials import first_root, largest
 
-loads = np.linspace(0.0, 0.4, 40)
-run = periods(12.0, 8.0, 12.0, tolerance=1e-4)
-batch = simulate(batch_of([drive(1, shaft__load=load) for load in loads]), run, cases=40)
+LAYOUT = make_layout(1, 4, 6, 8)
+fixed = constant_record(as_record(LAYOUT))
+step = lane_loops(series_loop(LAYOUT) + "\\n" + bounds_loop(LAYOUT), "tolerance", "log2_tolerance")
+advance = lane_loops(advance_loop(LAYOUT), "most_steps", "unused")
+find_roots = lane_loops(roots_loop(6), "unused", "unused_too")
+find_peaks = lane_loops(peaks_loop(6), "unused", "unused_too")
+exceeding = lane_mask(">", LAYOUT.excess, 8)
+
+@numba.njit(error_model="numpy")
+def run(lay, W, blocks):
+    lay = fixed(lay)
+    step(W, 1e-4, -13.0, 1)
+    mask = exceeding(W)
+    find_roots(blocks, 0.0, 0.0, 1)
+    find_peaks(blocks, 0.0, 0.0, 1)
+    advance(W, 100.0, 0.0, 1)
+    return mask + lay.rows
+
+rng = np.random.default_rng(1)
+found = []
+for _ in range(50):
+    W, blocks = aligned_zeros(LAYOUT.rows * 8), aligned_zeros(SLOTS * (6 + ROWS))
+    W[:], blocks[:] = rng.uniform(0.01, 1.0, W.shape), rng.normal(size=blocks.shape)
+    found += [np.array([run(as_record(LAYOUT), W, blocks)], dtype=float), W, blocks]
+    g = rng.normal(size=7)
+    g[0] = abs(g[0])
+    found.append(np.array([first_root(g, 6, work_stack()), largest(g, 6, 0.1, work_stack())]))
 inside = [name for name in ("decorators", "lowering", "program") if f"sprag.engine.compile.{name}" in sys.modules]
-sys.stdout.write(f"{inside} {batch.values.tobytes().hex()}")
+values = np.concatenate(found)
+values[np.isnan(values)] = 7.0  # which NaN it is has no meaning
+sys.stdout.write(f"{inside} {np.isfinite(values).mean() > 0.9} {values.tobytes().hex()}")
 """
 
 
-def results(**more: str) -> str:
-    """Which modules that use numba's inside were loaded, and every bit of the results of forty cases."""
-    done = subprocess.run(
-        [sys.executable, "-c", _PROGRAM],
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT), **more},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return done.stdout
-
-
 def test_plain_njit_gives_the_same_bits(tmp_path: Path) -> None:
-    plain = results(SPRAG_COMPILER="plain", SPRAG_KERNEL_CACHE=str(tmp_path))
-    programs = results(SPRAG_COMPILER="programs")
-    assert plain.startswith("[] ")
-    assert programs.startswith("['decorators', 'lowering', 'program'] ")
-    assert len(plain) > 40 * 40 * 16
+    programs, plain = (output(_PROGRAM, SPRAG_COMPILER=way, SPRAG_KERNEL_CACHE=str(tmp_path)) for way in WAYS)
+    assert plain.startswith("[] True ")
+    assert programs.startswith("['decorators', 'lowering', 'program'] True ")
+    assert len(plain) > 50 * 500 * 16
     assert plain.split()[-1] == programs.split()[-1]
 
 
 def test_an_unknown_way_is_refused_by_name() -> None:
     with pytest.raises(subprocess.CalledProcessError) as refused:
-        results(SPRAG_COMPILER="fast")
+        output(_PROGRAM, SPRAG_COMPILER="fast")
     assert "SPRAG_COMPILER is 'fast'; allowed: programs, plain" in refused.value.stderr
 
 
 def test_the_ways_share_no_cache(tmp_path: Path) -> None:
     """numba would load code of one way into a process of the other."""
     ask = "from sprag.engine.compile.cache import cache_folder; print(cache_folder())"
-    folders = {
-        subprocess.run(
-            [sys.executable, "-c", ask],
-            cwd=ROOT,
-            env={**os.environ, "SPRAG_COMPILER": way, "SPRAG_KERNEL_CACHE": str(tmp_path)},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
-        for way in ("plain", "programs")
-    }
+    folders = {output(ask, SPRAG_COMPILER=way, SPRAG_KERNEL_CACHE=str(tmp_path)) for way in WAYS}
     assert len(folders) == 2
