@@ -95,7 +95,7 @@ class Settings(BaseSettings):
         default=60.0,
         gt=0.0,
         le=3_600.0,
-        description="seconds after which the instantaneous values of a case are given up",
+        description="seconds of processor time after which the instantaneous values of a case are given up",
     )
     check_processes: int = Field(
         default=2,
@@ -107,7 +107,10 @@ class Settings(BaseSettings):
         default=20.0,
         gt=0.0,
         le=3_600.0,
-        description="seconds after which the check of a spec, a fit or a picture is given up; loading is not counted",
+        description=(
+            "seconds of processor time after which the check of a spec, a fit or a picture is given up; loading is not "
+            "counted"
+        ),
     )
     check_memory: int = Field(
         default=512, ge=64, le=1_048_576, description="MiB that the check of a spec, a fit or a picture may take"

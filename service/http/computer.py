@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,10 +14,10 @@ from typing import Protocol, TypeVar, TypeVarTuple
 from sprag.service.faults import Kind
 from sprag.service.http.problems import ApiError
 from sprag.worker import models
-from sprag.worker.limits import LOAD_SECONDS
+from sprag.worker.limits import LOAD_SECONDS, WALL_TIMES
 from sprag.worker.pool.child_pool import ChildPool, Job, JobStoppedError
 from sprag.worker.pool.child_process import ProcessDiedError, ProcessStartError
-from sprag.worker.pool.processes import limit_memory, single_threaded_children
+from sprag.worker.pool.processes import limit_memory, single_threaded_children, within_processor_time
 
 Args = TypeVarTuple("Args")
 R = TypeVar("R")
@@ -47,7 +48,8 @@ class Limits:
     Attributes
     ----------
     seconds : float
-        Time after which it is killed.
+        Processor time after which it is killed, and after `WALL_TIMES` as much on the wall: on a crowded machine a
+        small computation takes long.
     memory : int
         Bytes that it may take beyond what its process has at the start.
     waiting : int
@@ -119,8 +121,9 @@ class ProcessComputer:
 
     async def run(self, function: Callable[[*Args], R], *args: *Args) -> R:
         """The function's value. Function, arguments and value must be picklable."""
-        with self._turn(self._limits.seconds):
-            job = self._schedule(self._limits.seconds, function, *args)
+        wall = WALL_TIMES * self._limits.seconds
+        with self._turn(wall):
+            job = self._schedule(wall, within_processor_time, self._limits.seconds, function, *args)
             future = asyncio.wrap_future(job.future)
             try:
                 return await asyncio.shield(future)
@@ -161,12 +164,15 @@ class ProcessComputer:
         try:
             yield
         except TimeoutError as error:
-            detail = f"The computation did not end within {timeout:g} s{named}."
+            detail = f"The computation did not end within {timeout:g} s by the clock."
             raise ApiError(self._limits.problem, detail) from error
         except MemoryError as error:
             detail = f"The computation needs more memory than the {self._limits.memory // 2**20} MiB that it may take."
             raise ApiError(self._limits.problem, detail) from error
         except ProcessDiedError as error:
+            if error.exitcode == -signal.SIGPROF:
+                detail = f"The computation did not end within {self._limits.seconds:g} s of processor time{named}."
+                raise ApiError(self._limits.problem, detail) from error
             raise ApiError("not-computed", "The process that ran the computation died.") from error
         except ProcessStartError as error:
             raise ApiError("unavailable", "The process for computations cannot be started.", headers=_LATER) from error

@@ -9,12 +9,12 @@ import sys
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeVar, TypeVarTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-_A = TypeVar("_A")
+_A = TypeVarTuple("_A")
 _R = TypeVar("_R")
 
 #: Libraries that would start threads of their own; the pool has a process for each core already.
@@ -90,13 +90,13 @@ def limit_memory(more: int) -> None:
     resource.setrlimit(resource.RLIMIT_DATA, (taken + more, taken + more))
 
 
-def within_processor_time(seconds: float, function: Callable[[_A], _R], argument: _A) -> _R:
-    """The value of ``function(argument)``; the process ends by SIGPROF where that takes more processor time (s).
+def within_processor_time(seconds: float, function: Callable[[*_A], _R], *args: *_A) -> _R:
+    """The value of ``function(*args)``; the process ends by SIGPROF where that takes more processor time (s).
 
     The kernel counts and ends it, also in compiled code that never comes back. No limit where ``seconds`` is infinite.
     """
     signal.setitimer(signal.ITIMER_PROF, seconds if math.isfinite(seconds) else 0.0)
     try:
-        return function(argument)
+        return function(*args)
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)

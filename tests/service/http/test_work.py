@@ -50,14 +50,18 @@ def test_memory_is_limited_and_the_process_lives_on(checker: ProcessComputer, po
     assert portal.call(checker.run, os.getpid) == before
 
 
-def test_time_is_limited_and_the_limit_is_named(portal: BlockingPortal) -> None:
+def test_time_is_limited_and_the_limit_is_named(portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch) -> None:
     checker = ProcessComputer(
         Limits(0.05, 2**30, 8, "too-costly", "SPRAG_CHECK_TIMEOUT"), prepare=fakes.prepare_nothing
     )
     try:
-        with pytest.raises(ApiError, match=r"within 0\.05 s, the limit of SPRAG_CHECK_TIMEOUT") as refused:
+        with pytest.raises(ApiError, match=r"within 0\.5 s by the clock") as hung:
             portal.call(checker.run, signal.pause)
-        assert refused.value.type.status == 422
+        monkeypatch.setattr("sprag.service.http.computer.WALL_TIMES", 1e4)
+        named = r"within 0\.05 s of processor time, the limit of SPRAG_CHECK_TIMEOUT"
+        with pytest.raises(ApiError, match=named) as busy:
+            portal.call(checker.run, sum, range(10**12))
+        assert hung.value.type.status == busy.value.type.status == 422
     finally:
         checker.close()
 
