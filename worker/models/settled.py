@@ -22,8 +22,9 @@ REGIME_SENTENCES: Final[dict[str, str]] = {regime.name.lower(): regime.sentence 
 REGIME_FLAGS: Final[dict[str, str]] = {
     regime.name.lower(): regime.sentence for regime in (Regime.IRREGULAR, Regime.UNSETTLED)
 }
-#: Periods that a periodic case takes on average, and the share of cases that take all they may (docs/performance.md).
-_PERIODIC_PERIODS, _IRREGULAR_SHARE = 150.0, 0.12
+#: Periods that a periodic case takes on average, the share of cases that take all they may, and what these take in
+#: parts of that, with disturbed runs (docs/performance.md).
+_PERIODIC_PERIODS, _IRREGULAR_SHARE, _IRREGULAR_COST = 135.0, 0.15, 1.3
 #: Periods that a run of a given time is followed on, on average: so many times its own, at most so many.
 _FOLLOWED_TIMES, _FOLLOWED_PERIODS = 2.0, 120.0
 
@@ -63,4 +64,4 @@ def followed_periods(periods: float) -> float:
 def mean_periods(run: Mapping[str, Any]) -> float:
     """About the periods that are computed for a case on average, those of disturbed runs included."""
     most = float(run["at_most"])
-    return (1.0 - _IRREGULAR_SHARE) * min(_PERIODIC_PERIODS, most) + 1.1 * _IRREGULAR_SHARE * most
+    return (1.0 - _IRREGULAR_SHARE) * min(_PERIODIC_PERIODS, most) + _IRREGULAR_COST * _IRREGULAR_SHARE * most

@@ -237,8 +237,8 @@ class VibrationDrive(Model):
         return estimate_seconds(*_key_of(self.shape_of(study)), _mean_periods(study))
 
     def estimate_compile_seconds(self, shape: KernelShape) -> float:
-        """On one core: 7 s for one pendulum, 13 s for eight."""
-        return 7.0 + 0.9 * (_key_of(shape).pendulums - 1)
+        """On one core: 7 s for the kernel of one pendulum, 13 s for eight; 3.7 s for the search of settled motions."""
+        return 10.7 + 0.9 * (_key_of(shape).pendulums - 1)
 
     def prepare(self) -> None:
         import sprag.engine.vibration_drive.simulate  # noqa: F401
