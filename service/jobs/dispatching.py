@@ -12,11 +12,14 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sqlalchemy.engine import make_url
+
 from sprag.service import logs
 from sprag.service.jobs.housekeeping import Housekeeping
 from sprag.service.jobs.maintenance import Maintenance, MaintenancePlan
 from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.logs import LogFormat
+from sprag.service.storage.errors import DatabaseError
 from sprag.service.storage.part import SILENT_SECONDS, SystemClock
 from sprag.service.storage.readiness import LOCKED_SECONDS
 from sprag.service.storage.session import lock_of
@@ -226,12 +229,20 @@ def start_dispatcher_process(settings: WorkerSettings) -> SpawnProcess:
     return process
 
 
+def require_file(url: str) -> None:
+    """Raise DatabaseError where the file of the service's database is gone: a worker must not make an empty one."""
+    place = make_url(url)
+    if place.get_backend_name() == "sqlite" and not Path(place.database or "").exists():
+        raise DatabaseError(f"the database file {place.database} was deleted or moved", "database-replaced")
+
+
 def _child(settings: WorkerSettings, parent: int) -> None:
     flag = stop_on_signals()
     ignore_interrupts()
     end_with_parent(parent, signal.SIGTERM)
     logs.configure(settings.log_format, requests=False)
     try:
+        require_file(settings.database_url)
         run_dispatcher(settings, flag)
     except (EpochLostError, StoreError, ExecutorError) as error:
         _LOG.error("the worker ends: %s", error)

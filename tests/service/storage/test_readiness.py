@@ -17,7 +17,7 @@ import sqlalchemy as sa
 
 from sprag.service.http.app import create_app
 from sprag.service.jobs import dispatching
-from sprag.service.jobs.dispatching import WorkerSettings, run_dispatcher
+from sprag.service.jobs.dispatching import WorkerSettings, require_file, run_dispatcher
 from sprag.service.settings import Settings
 from sprag.service.storage.errors import DatabaseError, DatabaseFullError
 from sprag.service.storage.lock import DispatcherLock
@@ -100,6 +100,15 @@ def test_a_silent_worker_is_told_by_readyz_and_by_studies(
     clock.seconds += 10.0
     assert http.get("/readyz").status_code == 200
     assert store.get_study(study.id).reason is None
+
+
+def test_a_worker_beside_the_service_makes_no_database_in_the_place_of_one_that_is_gone(tmp_path: Path) -> None:
+    path = tmp_path / "gone.sqlite3"
+    with pytest.raises(DatabaseError, match="was deleted or moved"):
+        require_file(f"sqlite:///{path}")
+    path.touch()
+    require_file(f"sqlite:///{path}")
+    require_file("postgresql+psycopg://nobody@localhost/sprag")
 
 
 def test_a_write_lock_that_is_never_free_is_told(store: Store, clock: fakes.HandClock) -> None:
