@@ -31,7 +31,7 @@ def test_a_dispatcher_that_was_stopped_commits_nothing_and_gives_up(tmp_path: Pa
 
 
 def test_bad_cases_are_named_and_the_others_ok_until_a_retry_mends_them(tmp_path: Path) -> None:
-    badcases(tmp_path, cases=8, crashing=1, hanging=1, seed=1, periods=4.0, chunk=2, timeout=2.0, timed=False)
+    badcases(tmp_path, cases=16, crashing=1, hanging=1, seed=1, periods=4.0, chunk=2, timeout=2.0, timed=False)
 
 
 def test_files_that_may_not_grow_hold_the_studies_until_they_may(tmp_path: Path) -> None:
