@@ -181,12 +181,15 @@ def warm_up(pendulums: int, coefficients: int, tolerance: float) -> None:
     simulate(columns, Run(tolerance=tolerance), cases=1)
 
 
-def estimate_seconds(pendulums: int, coefficients: int, tolerance: float, periods: float) -> float:
-    """Rough time of one case among many on one core, in s: about 25 steps a period, events and extrema included.
+def estimate_seconds(pendulums: int, coefficients: int, tolerance: float, periods: float, period: float) -> float:
+    """Rough time of one case among many on one core, in s; ``period`` of the excitation in s.
+
+    A period takes about 25 steps, events and extrema included, and under slow excitation 31 a second, for the motion of
+    the pendulum itself (338 at 0.1 Hz, 1,547 at 0.02 Hz).
 
     Measured at 0.077 us a step for one pendulum, 0.12 for two and 0.51 for eight (benchmarks/engine.py), with half as
     much again for slower machines.
     """
     order = order_for(tolerance)
     step = (2.1e-8 + 9.4e-8 * pendulums) * (0.6 + 0.4 * (order / 12.0) ** 2) * (0.8 + 0.05 * max(4, coefficients))
-    return 1e-5 + periods * 25.0 * step
+    return 1e-5 + periods * (25.0 + 31.0 * period) * step

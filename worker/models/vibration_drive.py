@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -125,15 +124,16 @@ def _mean_periods(study: Study) -> float:
     """Excitation periods that are computed for a case, averaged over the cases of the study."""
     if is_settled(study.run):
         return mean_periods(study.run)
-    duration = run_of(study.run).duration
+    periods = run_of(study.run).duration.in_periods(float(np.mean(_frequencies(study))))
+    return periods + followed_periods(periods)
+
+
+def _frequencies(study: Study) -> NDArray[np.float64]:
+    """Excitation frequencies of the study, Hz."""
     for axis in study.axes:
         if "excitation.frequency" in axis.paths:
-            frequency = math.fsum(axis.values) / len(axis.values)
-            break
-    else:
-        frequency = study.base["excitation.frequency"]
-    periods = duration.in_periods(frequency)
-    return periods + followed_periods(periods)
+            return axis.array
+    return np.array([study.base["excitation.frequency"]])
 
 
 def kernel_source(pendulums: int, coefficients: int, tolerance: float) -> str:
@@ -234,7 +234,8 @@ class VibrationDrive(Model):
     def estimate_seconds_per_case(self, study: Study) -> float:
         from sprag.engine.vibration_drive.simulate import estimate_seconds
 
-        return estimate_seconds(*_key_of(self.shape_of(study)), _mean_periods(study))
+        period = float(np.mean(1.0 / _frequencies(study)))
+        return estimate_seconds(*_key_of(self.shape_of(study)), _mean_periods(study), period)
 
     def estimate_compile_seconds(self, shape: KernelShape) -> float:
         """On one core: 7 s for the kernel of one pendulum, 13 s for eight; 3.7 s for the search of settled motions."""
