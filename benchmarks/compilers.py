@@ -17,7 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 WAYS = ("programs", "plain")
 #: A series of low order compiles fastest.
-_DRIVE = """
+DRIVE = """
 import sys
 import numpy as np
 from sprag.engine.vibration_drive.simulate import simulate
@@ -50,7 +50,7 @@ def main() -> None:
     for way in WAYS:
         with tempfile.TemporaryDirectory() as folder:
             before = os.times()
-            found.append(output(_DRIVE, SPRAG_COMPILER=way, SPRAG_KERNEL_CACHE=folder))
+            found.append(output(DRIVE, SPRAG_COMPILER=way, SPRAG_KERNEL_CACHE=folder))
             after = os.times()
         seconds = after.children_user + after.children_system - before.children_user - before.children_system
         print(f"{way}: {len(found[-1]) // 16} results, {seconds:.0f} s of processor time")

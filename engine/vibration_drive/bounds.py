@@ -9,6 +9,8 @@ from sprag.engine.vibration_drive.layout import Layout
 
 #: Margin that says the step itself is too long, not that a guard is near.
 TOO_LONG = -1e308
+#: Share of a torque that is rounding: of one that is constant, no step is short enough for less.
+_TORQUE_ROUNDING = 1e-14
 
 
 class _Watch:
@@ -99,7 +101,8 @@ class _Watch:
         code = self.code
         end = code.let("torque_end", " + ".join(torque))
         defect = code.let("defect", f"abs({horner(force, u_end)} - {end})*(1.0 - {code.row(locked)})")
-        self.margin = code.let("margin", f"{self.margin} if {defect} <= {code.row(allowed)} else {TOO_LONG!r}")
+        least = code.let("least", f"{code.row(allowed)} + {_TORQUE_ROUNDING!r}*abs({end})")
+        self.margin = code.let("margin", f"{self.margin} if {defect} <= {least} else {TOO_LONG!r}")
 
     def shaft(self) -> None:
         """Watch the shaft and what all clutches do together."""

@@ -180,7 +180,7 @@ def test_a_worker_alone_runs_what_a_service_was_given(tmp_path: Path, sprag: Spr
     )
     assert worker.stderr is not None
     with worker, worker.stderr as said:
-        assert b"at work" in said.readline()
+        assert b"is working on" in said.readline()
         # This process finds the database's lock taken, and leaves the study to the worker.
         done = sprag("run", SMALL, "--db", database, "--json")
         worker.send_signal(signal.SIGTERM)

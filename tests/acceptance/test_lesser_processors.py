@@ -8,8 +8,8 @@ from pathlib import Path
 import llvmlite.binding as llvm
 import pytest
 
+from benchmarks.compilers import DRIVE, output
 from benchmarks.processors import codes
-from tests.engine.compile.test_ways import results
 
 
 @pytest.mark.skipif(platform.machine() not in {"x86_64", "AMD64"}, reason="these are of x86-64 processors")
@@ -18,6 +18,6 @@ def test_a_lesser_processor_gives_the_same_bits(tmp_path: Path, code: str) -> No
     """SSE has no fused multiply-add: a function computes it."""
     if code not in codes(plain=False):
         pytest.skip(f"{llvm.get_host_cpu_name()} has no {code}")
-    found = results(**codes(plain=False)[code], SPRAG_KERNEL_CACHE=str(tmp_path))
+    found = output(DRIVE, **codes(plain=False)[code], SPRAG_KERNEL_CACHE=str(tmp_path))
     assert len(found) > 40 * 40 * 16
-    assert found == results()
+    assert found == output(DRIVE)

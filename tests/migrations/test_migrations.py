@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,8 @@ from tests.service.spec_sample import changed
 from tests.worker import fakes
 
 FROZEN = sorted(FOLDER.glob("*.sql"))
+#: What made-up studies have since the databases were frozen.
+_LATER = {"clutch.coefficients.2", "clutch.coefficients.3"}
 
 
 @pytest.fixture
@@ -84,7 +87,9 @@ def test_a_frozen_database_is_upgraded_and_then_used(
         np.testing.assert_array_equal(block.values[:4], fakes.values(0, 4))
         assert np.isnan(block.values[4]).all()
         assert running.warnings == ("odd",)
-        assert store.study(running.id) == fakes.study(5, "running")
+        expected = fakes.study(5, "running")
+        base = {path: value for path, value in expected.base.items() if path not in _LATER}
+        assert store.study(running.id) == replace(expected, base=base)
         assert store.create_study({}, fakes.study(5), idempotency_key="key", body_hash="hash").id == finished.id
         epoch = store.take_over("test")
         chunks = store.open_chunks(running.number)

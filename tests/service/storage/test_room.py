@@ -55,7 +55,7 @@ def test_the_disk_is_asked(store: Store, world: Callable[..., None]) -> None:
     assert store.shortage() is None
     world(free=0)
     shortage = store.shortage() or ""
-    assert shortage.startswith(f"no room: the disk that holds {store.session.path} has 0 MB left; the study goes on")
+    assert shortage.startswith(f"no room: the disk that holds {store.session.path} has 0 MB left; the study continues")
 
 
 def test_the_largest_file_allowed_counts_too(store: Store, world: Callable[..., None]) -> None:
