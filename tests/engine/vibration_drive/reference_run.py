@@ -154,7 +154,9 @@ class Drive(Automaton):
             k = int(np.argmax(q))
             known = self.out.largest.get(name, -math.inf)
             low, high = max(0, k - 1), min(len(q) - 1, k + 1)
-            if q[k] + (q[k] - min(q[low], q[high])) > known:
+            # At the edge of a step the peak may lie between two samples that are alike: look at the next one too.
+            lowest = np.min(q[max(0, k - 2) : k + 3])
+            if q[k] + (q[k] - lowest) > known:
                 best = minimize_scalar(
                     lambda s, name=name: -float(self.watched(s, dense(s))[name]),
                     bounds=(times[low], times[high]),
