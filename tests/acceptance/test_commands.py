@@ -180,11 +180,14 @@ def test_a_worker_alone_runs_what_a_service_was_given(tmp_path: Path, sprag: Spr
     )
     assert worker.stderr is not None
     with worker, worker.stderr as said:
-        assert b"is working on" in said.readline()
-        # This process finds the database's lock taken, and leaves the study to the worker.
-        done = sprag("run", SMALL, "--db", database, "--json")
-        worker.send_signal(signal.SIGTERM)
-        assert worker.wait(SECONDS) == 0
+        try:
+            assert b"is working on" in said.readline()
+            # This process finds the database's lock taken, and leaves the study to the worker.
+            done = sprag("run", SMALL, "--db", database, "--json")
+            worker.send_signal(signal.SIGTERM)
+            assert worker.wait(SECONDS) == 0
+        finally:
+            worker.kill()  # one that goes on would be waited for without end
     assert done.code == 0
     assert len(done.data["rows"]) == 17
 
