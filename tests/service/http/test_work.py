@@ -122,13 +122,14 @@ def test_what_ends_soon_after_its_client_left_costs_no_process(portal: BlockingP
         await asyncio.to_thread(begun.read_text)
         queued = asyncio.ensure_future(checker.run(signal.pause))  # would keep the process for ever
         await anyio.wait_all_tasks_blocked()
-        running.cancel()
-        queued.cancel()
+        for task in (queued, running):
+            task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await queued  # before the process is free for it
         await asyncio.to_thread(told.write_text, "now")
+        with pytest.raises(asyncio.CancelledError):
+            await running
         assert await checker.run(os.getpid) == process
-        for task in (running, queued):
-            with pytest.raises(asyncio.CancelledError):
-                await task
 
     try:
         portal.call(leave)
