@@ -1,8 +1,8 @@
 """Where the engine's time goes, by readings of the processor's counter inside the kernel, between its stages.
 
 The kernel is compiled once more with these readings (a share of a few percent). A run is repeated; each repetition
-gives the share of each stage, and printed are the medians, scaled to add up to 100, with the 95 % intervals of the
-medians. Other work on the machine lengthens whatever stage it interrupts, all of them alike.
+gives the share of each stage. The medians, scaled to add up to 100, are printed with their 95 % intervals. Other work
+on the machine lengthens all stages alike.
 
     python -m benchmarks.breakdown [--repeats 15] [--settled]
 """

@@ -43,7 +43,7 @@ from benchmarks.workloads import (
 )
 
 TOLERANCE = 1e-9
-#: Repetitions from which shares of time are told.
+#: Repetitions from which the time of each stage is derived.
 _READ = 11
 
 

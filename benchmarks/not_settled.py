@@ -1,10 +1,10 @@
-"""The flag `not_settled` of runs of a given time: how many windows that are off it finds, how many it tells wrongly.
+"""The flag `not_settled` of runs of a given time: windows it detects, misses and flags wrongly.
 
     python -m benchmarks.not_settled [--drives COUNT] [--periods PERIODS]
 
-Every case runs for the given time, by default 60 periods, with the last third as its window. The truth is its settled
-mean speed: of the reference cases after 20,000 periods, of random drives by ``settle``. Cases without a periodic motion
-or without a load do not count.
+Every case runs for the given time, by default 60 periods, with the last third as its window. Its mean speed is compared
+with the settled one, which for reference cases is that after 20,000 periods and for random drives comes from
+``settle``. Cases without a periodic motion or without a load do not count.
 """
 
 from __future__ import annotations
