@@ -16,7 +16,7 @@ from typing import Any
 import httpx
 
 from benchmarks.faults import harness
-from sprag.service.storage.session import sqlite_driver
+from sprag.service.storage.sqlite_files import sqlite_driver
 
 #: What is killed, and how often in relation.
 TARGETS = {"pool process": 12, "dispatcher": 5, "service": 3}

@@ -124,7 +124,7 @@ def _versions() -> tuple[bool, str]:
 
 
 def _sqlite() -> tuple[bool, str]:
-    from sprag.service.storage.session import sqlite_version, sqlite_warning
+    from sprag.service.storage.sqlite_files import sqlite_version, sqlite_warning
 
     warning = sqlite_warning()
     return warning is None, warning or ".".join(map(str, sqlite_version()))

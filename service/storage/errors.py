@@ -18,6 +18,7 @@ __all__ = [
     "StudyNotFound",
     "TokenNotFound",
     "TooManySchedules",
+    "busy",
 ]
 
 
@@ -40,6 +41,11 @@ class DatabaseBusyError(DatabaseError):
     """Another process kept the database for longer than the busy timeout."""
 
     code = "database-busy"
+
+
+def busy(where: str) -> DatabaseBusyError:
+    """The error of a writer that waited in vain for the database at ``where``."""
+    return DatabaseBusyError(f"another process kept the database {where} busy for too long; try again")
 
 
 class EndingError(DatabaseError):

@@ -16,7 +16,7 @@ from sprag.service.stale_files import mark, sweep
 from sprag.service.storage.errors import DatabaseError, SchemaError
 from sprag.service.storage.private_files import create_private, sync_folder
 from sprag.service.storage.records import CheckReport
-from sprag.service.storage.session import damaged, sqlite_version, sqlite_warning
+from sprag.service.storage.sqlite_files import sqlite_version, sqlite_warning
 from sprag.service.storage.tables import HEAD_REVISION
 
 if TYPE_CHECKING:
@@ -107,8 +107,7 @@ def require_sound(session: Session) -> None:
         return
     with session.read() as connection:
         if connection.exec_driver_sql("PRAGMA quick_check(1)").scalar_one() != "ok":
-            session.damage = damaged(session.path)
-            raise DatabaseError(session.damage, "database-damaged")
+            raise session.file.damaged()
 
 
 def check(session: Session) -> CheckReport:

@@ -14,7 +14,7 @@ import psycopg
 import sqlalchemy as sa
 from sqlalchemy.engine import URL
 
-from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError
+from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError, busy
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -142,7 +142,7 @@ def explained(error: BaseException, where: str) -> DatabaseError | None:
     """One sentence for an error of the driver whose cause is outside the program; None for the others."""
     state = getattr(error, "sqlstate", None) or ""
     if state in {"55P03", "40001", "40P01"}:
-        return DatabaseBusyError(f"another process kept the database {where} busy for too long; try again")
+        return busy(where)
     if state == "53100":
         return DatabaseFullError(f"the disk of the server that holds {where} is full")
     if state.startswith(("53", "58")):

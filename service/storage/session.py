@@ -1,14 +1,11 @@
-"""Opening the database: driver, pragmas, transactions, and one sentence for whatever fails.
-
-What is particular to a PostgreSQL server is in `sprag.service.storage.postgres`; here are SQLite's files.
+"""Opening the database: connections and transactions, in a file of SQLite (`sqlite_files`) or on a PostgreSQL server
+(`postgres`).
 """
 
 from __future__ import annotations
 
-import os
 import re
-from contextlib import contextmanager, suppress
-from pathlib import Path
+from contextlib import contextmanager
 from threading import Condition
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -16,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 from sqlalchemy.engine import URL, make_url
 
-from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError, EndingError
+from sprag.service.storage import sqlite_files
+from sprag.service.storage.errors import DatabaseError, EndingError, busy
 from sprag.service.storage.lock import DispatcherLock
-from sprag.service.storage.private_files import PRIVATE_FOLDER_MODE, create_private
-from sprag.worker.ports import StoreError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
     from types import ModuleType
 
     from sprag.service.storage.lock import OneHolder
@@ -30,57 +27,9 @@ if TYPE_CHECKING:
 
 #: Seconds a connection waits for another writer before it gives up.
 BUSY_SECONDS = 30.0
-#: Older libraries can corrupt a write-ahead log that several connections share.
-SAFE_SQLITE = (3, 51, 3)
-#: Rows have some 45 to 150 numbers; larger pages than SQLite's 4 KiB hold several of them and keep the trees flat.
-PAGE_BYTES = 16_384
 POOL_CONNECTIONS = 8
-NETWORK_FILE_SYSTEMS = frozenset({"afs", "ceph", "cifs", "fuse.sshfs", "glusterfs", "nfs", "nfs4", "smb3", "smbfs"})
 
 _BEGIN = "sprag_begin"
-_BUSY = "another process kept the database {} busy for too long; try again"
-
-
-def sqlite_driver() -> Any:
-    """The DB-API module for SQLite: pysqlite3, which brings its own library, else Python's own."""
-    try:
-        from pysqlite3 import dbapi2
-    except ImportError:
-        from sqlite3 import dbapi2
-    return dbapi2
-
-
-def sqlite_version() -> tuple[int, ...]:
-    """Version of the SQLite library in use."""
-    version: tuple[int, ...] = tuple(sqlite_driver().sqlite_version_info)
-    return version
-
-
-def sqlite_warning() -> str | None:
-    """A sentence when the SQLite library is older than the one that is safe, else None."""
-    version = sqlite_version()
-    if version >= SAFE_SQLITE:
-        return None
-    found, wanted = (".".join(map(str, numbers)) for numbers in (version, SAFE_SQLITE))
-    return f"SQLite {found} is in use; versions before {wanted} can corrupt a database under load: install pysqlite3."
-
-
-def file_system_of(path: Path, mounts: str | None = None) -> str:
-    """Type of the file system that holds ``path``, as Linux's table of mounts names it; "" where that is not known."""
-    if mounts is None:
-        try:
-            mounts = Path("/proc/self/mounts").read_text(encoding="utf-8", errors="surrogateescape")
-        except OSError:
-            return ""
-    target, best, kind = str(path), -1, ""
-    for line in mounts.splitlines():
-        fields = line.split(" ")
-        if len(fields) < 3:
-            continue
-        mount = fields[1].replace("\\040", " ").rstrip("/")
-        if (target == mount or target.startswith(mount + "/")) and len(mount) >= best:
-            best, kind = len(mount), fields[2]
-    return kind
 
 
 def _without_password(url: str) -> str:
@@ -110,19 +59,21 @@ class Session:
                 "in a name or password write @ as %40 and / as %2F",
                 "invalid-database-url",
             )
-        self._path: Path | None = None
-        #: Device and number of the file that was opened first.
-        self._file: tuple[int, int] | None = None
-        #: Why the database cannot be trusted any more; None where nothing wrong was met.
-        self.damage: str | None = None
+        #: None where the database is on a server.
+        self._file: sqlite_files.DatabaseFile | None = None
         match self.url.get_backend_name():
             case "sqlite":
-                self._engine = self._open_file()
+                self._file = sqlite_files.DatabaseFile(self.url, BUSY_SECONDS)
+                self.location = str(self._file.path)
+                self._engine = self._file.make_engine(POOL_CONNECTIONS)
                 begin = {"read": "BEGIN", "write": "BEGIN IMMEDIATE"}
                 reading: dict[str, Any] = {}
             case "postgresql":
-                self._engine = self._open_server()
-                begin = {"read": "", "write": _postgres().TAKE_WRITER}
+                postgres = _postgres()
+                self.url = postgres.checked(self.url)
+                self.location = postgres.location(self.url)
+                self._engine = postgres.make_engine(self.url, lock_seconds=BUSY_SECONDS, connections=POOL_CONNECTIONS)
+                begin = {"read": "", "write": postgres.TAKE_WRITER}
                 reading = {"isolation_level": "REPEATABLE READ", "postgresql_readonly": True}
             case other:
                 raise DatabaseError(
@@ -136,122 +87,38 @@ class Session:
         self._reader = self._engine.execution_options(**{_BEGIN: begin["read"]}, **reading)
         self._writer = self._engine.execution_options(**{_BEGIN: begin["write"]})
 
-    def _open_file(self) -> sa.Engine:
-        if self.url.query:
-            raise DatabaseError(
-                f"a database URL takes no options here ({', '.join(sorted(self.url.query))})", "invalid-database-url"
-            )
-        if self.url.database in (None, "", ":memory:"):
-            raise DatabaseError("the database must be a file: several processes work on it", "invalid-database-url")
-        self._path = Path(str(self.url.database)).absolute()
-        self.location = str(self._path)
-        self._check_place()
-        engine = sa.create_engine(
-            self.url,
-            module=sqlite_driver(),
-            connect_args={"timeout": BUSY_SECONDS, "isolation_level": None},
-            pool_size=POOL_CONNECTIONS,
-            max_overflow=64,
-        )
-        sa.event.listen(engine, "do_connect", self._create_file)
-        sa.event.listen(engine, "connect", _set_pragmas)
-        sa.event.listen(engine, "connect", self._note_file)
-        return engine
-
-    def _create_file(self, *_: object) -> None:
-        """Create the database file before SQLite would, which lets others read it; the log beside it follows suit.
-
-        Raises DatabaseError where the file that was opened first is gone: it is never replaced by an empty one.
-        """
-        self.require_same_file()
-        with suppress(OSError):  # it exists, or SQLite tells what is wrong
-            os.close(create_private(self.path))
-
-    def _open_server(self) -> sa.Engine:
-        postgres = _postgres()
-        self.url = postgres.checked(self.url)
-        self.location = postgres.location(self.url)
-        engine: sa.Engine = postgres.make_engine(self.url, lock_seconds=BUSY_SECONDS, connections=POOL_CONNECTIONS)
-        return engine
-
     @property
     def on_server(self) -> bool:
         """Whether the database is on a PostgreSQL server and not in a file here."""
-        return self._path is None
+        return self._file is None
+
+    @property
+    def file(self) -> sqlite_files.DatabaseFile:
+        """The file of an SQLite database; only for code that has asked `on_server`."""
+        assert self._file is not None
+        return self._file
 
     @property
     def path(self) -> Path:
-        """The file of an SQLite database; only for code that has asked `on_server`."""
-        assert self._path is not None
-        return self._path
+        """Where that file is."""
+        return self.file.path
 
-    def _check_place(self) -> None:
-        folder = self.path.parent
-        try:
-            folder.mkdir(PRIVATE_FOLDER_MODE, parents=True, exist_ok=True)
-        except OSError as error:
-            raise DatabaseError(f"the folder {folder} cannot be made: {error.strerror}", "write-failed") from None
-        if self.path.is_dir():
-            raise DatabaseError(f"{self.path} is a folder, not a database file", "not-a-database")
-        if not os.access(folder, os.W_OK):
-            raise DatabaseError(
-                f"the folder {folder} is read-only, and the database needs to write beside its file: "
-                f"`chmod u+w {folder}`, or name another place with --db",
-                "database-read-only",
-            )
-        kind = file_system_of(self.path.resolve())
-        if kind in NETWORK_FILE_SYSTEMS:
-            raise DatabaseError(
-                f"{self.path} lies on a network file system ({kind}), which cannot hold a database safely: "
-                "name a file on a local disk with --db",
-                "unsupported-database",
-            )
-
-    def _note_file(self, _connection: Any, _record: object) -> None:
-        if self._file is None:
-            found = self.path.stat()
-            self._file = found.st_dev, found.st_ino
+    @property
+    def damage(self) -> str | None:
+        """Why the database cannot be trusted any more; None where nothing wrong was met."""
+        return None if self._file is None else self._file.damage
 
     def require_same_file(self) -> None:
         """Raise DatabaseError when the file is not the one that was opened: what is written would be lost with it."""
-        if self._file is None:
-            return
-        try:
-            found = self.path.stat()
-        except OSError:
-            raise DatabaseError(
-                f"the database file {self.path} was deleted or moved while it was in use: stop Sprag, put the file or "
-                "a backup in its place, and start again",
-                "database-replaced",
-            ) from None
-        if self._file != (found.st_dev, found.st_ino):
-            raise DatabaseError(
-                f"the database file {self.path} was replaced while it was in use: stop Sprag, delete the files beside "
-                "it that end in -wal and -shm if it is a backup, and start again",
-                "database-replaced",
-            )
+        if self._file is not None:
+            self._file.require_same()
 
     def can_write(self, seconds: float) -> bool:
         """Whether a write transaction could begin within ``seconds``. Raises DatabaseError."""
-        if self.on_server:
-            with self.plain() as connection:
-                return bool(_postgres().writer_is_free(connection, seconds))
-        driver = sqlite_driver()
-        try:
-            connection = driver.connect(
-                f"{self.path.as_uri()}?mode=rw", uri=True, timeout=seconds, isolation_level=None
-            )
-            try:
-                connection.execute("BEGIN IMMEDIATE")
-                connection.execute("ROLLBACK")
-            finally:
-                connection.close()
-        except driver.Error as error:
-            found = self._explained(sa.exc.DBAPIError("", None, error))
-            if isinstance(found, DatabaseBusyError):
-                return False
-            raise (found if isinstance(found, StoreError) else DatabaseError(str(error))) from error
-        return True
+        if self._file is not None:
+            return self._file.can_write(seconds)
+        with self.plain() as connection:
+            return bool(_postgres().writer_is_free(connection, seconds))
 
     @property
     def dialect(self) -> sa.engine.Dialect:
@@ -272,7 +139,7 @@ class Session:
         self.require_same_file()
         with self._turn:
             if not self._turn.wait_for(lambda: self._refusing or not self._writing, BUSY_SECONDS):
-                raise DatabaseBusyError(_BUSY.format(self.location))
+                raise busy(self.location)
             if self._refusing:
                 raise EndingError("the service is shutting down; nothing was written")
             self._writing = True
@@ -304,11 +171,8 @@ class Session:
         self, connection: sa.Connection, table: str, columns: Sequence[str], rows: Sequence[tuple[Any, ...]]
     ) -> None:
         """Insert rows into one of our own tables; they go past SQLAlchemy for speed."""
-        if self.on_server:
-            _postgres().copy_in(connection, table, columns, rows)
-            return
-        marks = ", ".join("?" * len(columns))
-        connection.exec_driver_sql(f"INSERT INTO {table} ({', '.join(columns)}) VALUES ({marks})", list(rows))  # noqa: S608
+        insert = _postgres().copy_in if self.on_server else sqlite_files.insert_rows
+        insert(connection, table, columns, rows)
 
     @contextmanager
     def plain(self) -> Iterator[sa.Connection]:
@@ -331,28 +195,13 @@ class Session:
         return news
 
     def _explained(self, error: sa.exc.DBAPIError) -> Exception:
-        if self.on_server:
-            return (_postgres().explained(error.orig, self.location) if error.orig else None) or error
-        # SQLite reports all kinds of errors when the file and its log no longer belong together.
-        try:
-            self.require_same_file()
-        except DatabaseError as moved:
-            return moved
-        if "malformed" in str(error.orig):
-            self.damage = damaged(self.path)
-        return explained(error, self.path)
+        if self._file is not None:
+            return self._file.explained(error)
+        return (_postgres().explained(error.orig, self.location) if error.orig else None) or error
 
     def close(self) -> None:
         """Close every connection."""
         self._engine.dispose()
-
-
-def damaged(path: Path) -> str:
-    """What is to be said of a damaged database."""
-    return (
-        f"the database {path} is damaged; `sprag db check` tells where: put the latest copy that `sprag db backup` "
-        "wrote in its place"
-    )
 
 
 def _postgres() -> ModuleType:
@@ -364,40 +213,6 @@ def _postgres() -> ModuleType:
             "PostgreSQL needs a driver that is not installed: pip install 'sprag[postgres]'", "missing-extra"
         ) from None
     return postgres
-
-
-def explained(error: sa.exc.DBAPIError, path: Path) -> Exception:
-    """The error with one sentence for a user where its cause is outside the program, else the error itself."""
-    text = str(error.orig)
-    known = {
-        "database is locked": DatabaseBusyError(_BUSY.format(path)),
-        "database or disk is full": DatabaseFullError(f"the disk that holds {path} is full"),
-        "disk I/O error": DatabaseFullError(f"the disk that holds {path} reports an error on reading or writing"),
-        "readonly database": DatabaseError(
-            f"the database {path} is read-only: `chmod u+w {path}`, and its folder too", "database-read-only"
-        ),
-        "unable to open database": DatabaseError(
-            f"the database {path} cannot be opened; check the folder's rights", "database-unreachable"
-        ),
-        "file is not a database": DatabaseError(
-            f"{path} is not a Sprag database; name another file with --db", "not-a-database"
-        ),
-        "malformed": DatabaseError(damaged(path), "database-damaged"),
-    }
-    return next((explanation for phrase, explanation in known.items() if phrase in text), error)
-
-
-def _set_pragmas(connection: Any, _record: object) -> None:
-    cursor = connection.cursor()
-    for pragma in (
-        f"busy_timeout = {int(BUSY_SECONDS * 1000)}",
-        f"page_size = {PAGE_BYTES}",
-        "journal_mode = WAL",
-        "synchronous = FULL",
-        "foreign_keys = ON",
-    ):
-        cursor.execute(f"PRAGMA {pragma}")
-    cursor.close()
 
 
 def _begin(connection: sa.Connection) -> None:

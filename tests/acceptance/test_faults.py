@@ -17,7 +17,7 @@ from benchmarks.faults.disk import file_limit
 from benchmarks.faults.kills import kills
 from benchmarks.faults.powercut import powercut
 from benchmarks.faults.stopped import stopped
-from sprag.service.storage.session import sqlite_driver
+from sprag.service.storage.sqlite_files import sqlite_driver
 from tests.conftest import Finished
 
 

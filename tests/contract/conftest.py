@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from sprag.service.storage import session
+from sprag.service.storage import sqlite_files
 from sprag.service.storage.store import Store
 from sprag.worker.chunking import Chunking
 from tests.worker import fakes
@@ -19,7 +19,7 @@ def url(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
         url: str = request.getfixturevalue("postgres_url")
         return url
     if request.param == "sqlite3":
-        monkeypatch.setattr(session, "sqlite_driver", lambda: sqlite3)
+        monkeypatch.setattr(sqlite_files, "sqlite_driver", lambda: sqlite3)
     ready: str = request.getfixturevalue("sqlite_url")
     return ready
 

@@ -7,7 +7,7 @@ from functools import partial
 
 import pytest
 
-from sprag.service.storage import session
+from sprag.service.storage import sqlite_files
 from sprag.service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyNotFound
 from sprag.service.storage.store import Store
 from sprag.worker import models
@@ -129,5 +129,5 @@ def test_only_ended_studies_are_deleted_and_then_wholly(store: Store) -> None:
     assert [study.id for study in store.list_studies().studies] == [other.id]
     assert len(store.case_rows(other.id)) == 25
     assert create(store, idempotency_key="k", body_hash="b").id != record.id
-    warning = None if store.session.on_server else session.sqlite_warning()
+    warning = None if store.session.on_server else sqlite_files.sqlite_warning()
     assert store.check().problems == ((warning,) if warning else ())

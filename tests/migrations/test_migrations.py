@@ -19,7 +19,8 @@ import sprag.migrations as migrations
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage import maintenance
 from sprag.service.storage.errors import DatabaseError, SchemaError
-from sprag.service.storage.session import Session, sqlite_driver
+from sprag.service.storage.session import Session
+from sprag.service.storage.sqlite_files import sqlite_driver
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import HEAD_REVISION, all_tables
 from sprag.worker.states import StudyState

@@ -22,7 +22,7 @@ from sprag.service.settings import Settings
 from sprag.service.storage.errors import DatabaseError, DatabaseFullError
 from sprag.service.storage.lock import DispatcherLock
 from sprag.service.storage.readiness import Readiness
-from sprag.service.storage.session import sqlite_driver
+from sprag.service.storage.sqlite_files import sqlite_driver
 from sprag.service.storage.store import Store
 from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.pool.process_table import processor_seconds, start_time

@@ -12,10 +12,12 @@ import pytest
 import sqlalchemy as sa
 
 from sprag.service.storage import session as session_module
+from sprag.service.storage import sqlite_files
 from sprag.service.storage.errors import DatabaseBusyError, DatabaseError
 from sprag.service.storage.lock import DispatcherLock
 from sprag.service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
-from sprag.service.storage.session import Session, file_system_of, sqlite_warning
+from sprag.service.storage.session import Session
+from sprag.service.storage.sqlite_files import file_system_of, sqlite_warning
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import STUDIES
 from tests.faults import refused
@@ -61,7 +63,7 @@ def test_a_folder_is_no_database(tmp_path: Path) -> None:
 
 
 def test_network_file_systems_are_refused(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(session_module, "file_system_of", lambda _: "nfs4")
+    monkeypatch.setattr(sqlite_files, "file_system_of", lambda _: "nfs4")
     with refused(DatabaseError, "unsupported-database"):
         Session(url)
 
@@ -70,7 +72,7 @@ def test_a_read_only_folder_is_refused_with_the_command_that_mends_it(
     url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Root may write everywhere, so the system's answer is made up.
-    monkeypatch.setattr(session_module.os, "access", lambda *_: False)
+    monkeypatch.setattr(sqlite_files.os, "access", lambda *_: False)
     with refused(DatabaseError, "database-read-only") as caught:
         Session(url)
     assert "`chmod u+w " in str(caught.value)
@@ -115,9 +117,9 @@ def test_the_innermost_mount_counts(path: str, kind: str) -> None:
 
 
 def test_an_old_library_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(session_module, "sqlite_version", lambda: (3, 40, 1))
+    monkeypatch.setattr(sqlite_files, "sqlite_version", lambda: (3, 40, 1))
     assert "3.40.1" in (sqlite_warning() or "")
-    monkeypatch.setattr(session_module, "sqlite_version", lambda: (3, 51, 3))
+    monkeypatch.setattr(sqlite_files, "sqlite_version", lambda: (3, 51, 3))
     assert sqlite_warning() is None
 
 

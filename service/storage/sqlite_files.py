@@ -1,0 +1,239 @@
+"""The file of an SQLite database: its library, its place, its pragmas, and one sentence for whatever fails."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import sqlalchemy as sa
+
+from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError, busy
+from sprag.service.storage.private_files import PRIVATE_FOLDER_MODE, create_private
+from sprag.worker.ports import StoreError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sqlalchemy.engine import URL
+
+#: Older libraries can corrupt a write-ahead log that several connections share.
+SAFE_SQLITE: Final = (3, 51, 3)
+#: Rows have some 45 to 150 numbers; larger pages than SQLite's 4 KiB hold several of them and keep the trees flat.
+PAGE_BYTES: Final = 16_384
+NETWORK_FILE_SYSTEMS: Final = frozenset(
+    {"afs", "ceph", "cifs", "fuse.sshfs", "glusterfs", "nfs", "nfs4", "smb3", "smbfs"}
+)
+
+
+def sqlite_driver() -> Any:
+    """The DB-API module for SQLite: pysqlite3, which brings its own library, else Python's own."""
+    try:
+        from pysqlite3 import dbapi2
+    except ImportError:
+        from sqlite3 import dbapi2
+    return dbapi2
+
+
+def sqlite_version() -> tuple[int, ...]:
+    """Version of the SQLite library in use."""
+    version: tuple[int, ...] = tuple(sqlite_driver().sqlite_version_info)
+    return version
+
+
+def sqlite_warning() -> str | None:
+    """A sentence when the SQLite library is older than the one that is safe, else None."""
+    version = sqlite_version()
+    if version >= SAFE_SQLITE:
+        return None
+    found, wanted = (".".join(map(str, numbers)) for numbers in (version, SAFE_SQLITE))
+    return f"SQLite {found} is in use; versions before {wanted} can corrupt a database under load: install pysqlite3."
+
+
+def file_system_of(path: Path, mounts: str | None = None) -> str:
+    """Type of the file system that holds ``path``, as Linux's table of mounts names it; "" where that is not known."""
+    if mounts is None:
+        try:
+            mounts = Path("/proc/self/mounts").read_text(encoding="utf-8", errors="surrogateescape")
+        except OSError:
+            return ""
+    target, best, kind = str(path), -1, ""
+    for line in mounts.splitlines():
+        fields = line.split(" ")
+        if len(fields) < 3:
+            continue
+        mount = fields[1].replace("\\040", " ").rstrip("/")
+        if (target == mount or target.startswith(mount + "/")) and len(mount) >= best:
+            best, kind = len(mount), fields[2]
+    return kind
+
+
+def _path_of(url: URL) -> Path:
+    if url.query:
+        raise DatabaseError(
+            f"a database URL takes no options here ({', '.join(sorted(url.query))})", "invalid-database-url"
+        )
+    if url.database in (None, "", ":memory:"):
+        raise DatabaseError("the database must be a file: several processes work on it", "invalid-database-url")
+    return Path(str(url.database)).absolute()
+
+
+class DatabaseFile:
+    """One database file, which is never another one than the file that was opened first.
+
+    Raises DatabaseError for a URL that is not understood, and where the place cannot hold a database.
+    """
+
+    def __init__(self, url: URL, busy_seconds: float) -> None:
+        self._url = url
+        self.path = _path_of(url)
+        self._busy_seconds = busy_seconds
+        #: Device and number of the file that was opened first.
+        self._first: tuple[int, int] | None = None
+        #: Why the database cannot be trusted any more; None where nothing wrong was met.
+        self.damage: str | None = None
+        self._check_place()
+
+    def make_engine(self, connections: int) -> sa.Engine:
+        """Connections to the file, which is created at the first of them."""
+        engine = sa.create_engine(
+            self._url,
+            module=sqlite_driver(),
+            connect_args={"timeout": self._busy_seconds, "isolation_level": None},
+            pool_size=connections,
+            max_overflow=64,
+        )
+        sa.event.listen(engine, "do_connect", self._create)
+        sa.event.listen(engine, "connect", self._set_pragmas)
+        sa.event.listen(engine, "connect", self._note)
+        return engine
+
+    def _check_place(self) -> None:
+        folder = self.path.parent
+        try:
+            folder.mkdir(PRIVATE_FOLDER_MODE, parents=True, exist_ok=True)
+        except OSError as error:
+            raise DatabaseError(f"the folder {folder} cannot be made: {error.strerror}", "write-failed") from None
+        if self.path.is_dir():
+            raise DatabaseError(f"{self.path} is a folder, not a database file", "not-a-database")
+        if not os.access(folder, os.W_OK):
+            raise DatabaseError(
+                f"the folder {folder} is read-only, and the database needs to write beside its file: "
+                f"`chmod u+w {folder}`, or name another place with --db",
+                "database-read-only",
+            )
+        kind = file_system_of(self.path.resolve())
+        if kind in NETWORK_FILE_SYSTEMS:
+            raise DatabaseError(
+                f"{self.path} lies on a network file system ({kind}), which cannot hold a database safely: "
+                "name a file on a local disk with --db",
+                "unsupported-database",
+            )
+
+    def _create(self, *_: object) -> None:
+        """Create the database file before SQLite would, which lets others read it; the log beside it follows suit.
+
+        Raises DatabaseError where the file that was opened first is gone: it is never replaced by an empty one.
+        """
+        self.require_same()
+        with suppress(OSError):  # it exists, or SQLite tells what is wrong
+            os.close(create_private(self.path))
+
+    def _set_pragmas(self, connection: Any, _record: object) -> None:
+        cursor = connection.cursor()
+        for pragma in (
+            f"busy_timeout = {int(self._busy_seconds * 1000)}",
+            f"page_size = {PAGE_BYTES}",
+            "journal_mode = WAL",
+            "synchronous = FULL",
+            "foreign_keys = ON",
+        ):
+            cursor.execute(f"PRAGMA {pragma}")
+        cursor.close()
+
+    def _note(self, _connection: Any, _record: object) -> None:
+        if self._first is None:
+            found = self.path.stat()
+            self._first = found.st_dev, found.st_ino
+
+    def require_same(self) -> None:
+        """Raise DatabaseError when the file is not the one that was opened: what is written would be lost with it."""
+        if self._first is None:
+            return
+        try:
+            found = self.path.stat()
+        except OSError:
+            raise DatabaseError(
+                f"the database file {self.path} was deleted or moved while it was in use: stop Sprag, put the file or "
+                "a backup in its place, and start again",
+                "database-replaced",
+            ) from None
+        if self._first != (found.st_dev, found.st_ino):
+            raise DatabaseError(
+                f"the database file {self.path} was replaced while it was in use: stop Sprag, delete the files beside "
+                "it that end in -wal and -shm if it is a backup, and start again",
+                "database-replaced",
+            )
+
+    def can_write(self, seconds: float) -> bool:
+        """Whether a write transaction could begin within ``seconds``. Raises DatabaseError."""
+        driver = sqlite_driver()
+        try:
+            connection = driver.connect(
+                f"{self.path.as_uri()}?mode=rw", uri=True, timeout=seconds, isolation_level=None
+            )
+            try:
+                connection.execute("BEGIN IMMEDIATE")
+                connection.execute("ROLLBACK")
+            finally:
+                connection.close()
+        except driver.Error as error:
+            found = self.explained(sa.exc.DBAPIError("", None, error))
+            if isinstance(found, DatabaseBusyError):
+                return False
+            raise (found if isinstance(found, StoreError) else DatabaseError(str(error))) from error
+        return True
+
+    def explained(self, error: sa.exc.DBAPIError) -> Exception:
+        """The error with one sentence for a user where its cause is outside the program, else the error itself."""
+        # SQLite reports all kinds of errors when the file and its log no longer belong together.
+        try:
+            self.require_same()
+        except DatabaseError as moved:
+            return moved
+        text = str(error.orig)
+        known = {
+            "database is locked": busy(str(self.path)),
+            "database or disk is full": DatabaseFullError(f"the disk that holds {self.path} is full"),
+            "disk I/O error": DatabaseFullError(
+                f"the disk that holds {self.path} reports an error on reading or writing"
+            ),
+            "readonly database": DatabaseError(
+                f"the database {self.path} is read-only: `chmod u+w {self.path}`, and its folder too",
+                "database-read-only",
+            ),
+            "unable to open database": DatabaseError(
+                f"the database {self.path} cannot be opened; check the folder's rights", "database-unreachable"
+            ),
+            "file is not a database": DatabaseError(
+                f"{self.path} is not a Sprag database; name another file with --db", "not-a-database"
+            ),
+        }
+        if "malformed" in text:
+            return self.damaged()
+        return next((explanation for phrase, explanation in known.items() if phrase in text), error)
+
+    def damaged(self) -> DatabaseError:
+        """The error of a database that is damaged, which is not trusted any more from now on."""
+        self.damage = (
+            f"the database {self.path} is damaged; `sprag db check` tells where: put the latest copy that "
+            "`sprag db backup` wrote in its place"
+        )
+        return DatabaseError(self.damage, "database-damaged")
+
+
+def insert_rows(connection: sa.Connection, table: str, columns: Sequence[str], rows: Sequence[tuple[Any, ...]]) -> None:
+    """Insert rows into one of our own tables; they go past SQLAlchemy for speed."""
+    marks = ", ".join("?" * len(columns))
+    connection.exec_driver_sql(f"INSERT INTO {table} ({', '.join(columns)}) VALUES ({marks})", list(rows))  # noqa: S608
