@@ -1,1 +1,1 @@
-"""The study spec: its text, quantities and report of problems; `document` reads the whole."""
+"""The study spec: its text, its quantities, the report of faults; `document` reads the whole."""

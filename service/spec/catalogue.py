@@ -1,4 +1,4 @@
-"""What a path or a result name of a study means: its unit and its sentence, from the engine's catalogues."""
+"""Meaning of paths and result names: units and descriptions, from the engine's catalogues."""
 
 from __future__ import annotations
 
@@ -24,37 +24,37 @@ def general_path(path: str) -> str:
 
 
 def model_parameter(model: str, path: str) -> Parameter | None:
-    """The entry of a flat path in a spec in the catalogue of ``model``; None when it has no such parameter."""
+    """The entry of ``model``'s catalogue for a flat path of a spec; None when there is no such parameter."""
     general = general_path(path)
-    # A clutch of one pendulum has the parameters of the common one.
+    # The clutch of one pendulum has the parameters of a common clutch.
     wanted = {general, general.removeprefix("pendulums.N.")} if ".clutch." in general else {general}
     return next((entry for entry in models.parameter_catalogue(model) if entry.path in wanted), None)
 
 
 def parameter_of(study: Study, path: str) -> Parameter | None:
-    """The parameter at a flat path in a spec of the machine of ``study``; None when it has none there."""
+    """The parameter at a flat path of a spec, for the machine of ``study``; None when there is none."""
     own = models.parameters_of(study)
     return own.get(path) if own else model_parameter(study.model, path)
 
 
 def unit_of(study: Study, path: str) -> str:
-    """SI unit of a flat path in a spec, "1" where it has none."""
+    """SI unit of a flat path of a spec; "1" where it has none."""
     entry = parameter_of(study, path)
     return "1" if entry is None else placed(entry, path).unit
 
 
 def result_of(infos: Iterable[ResultInfo], name: str) -> ResultInfo | None:
-    """The entry of a result name; None for an unknown name."""
+    """The entry of a result by its name; None for an unknown name."""
     return next((info for info in infos if info.name == name), None)
 
 
 def unknown_result(infos: Iterable[ResultInfo], name: str) -> str:
-    """Message about a result name that does not exist, with the nearest one."""
+    """Message about an unknown result name, with the closest known one."""
     return f"unknown result{did_you_mean(name, [info.name for info in infos])}"
 
 
 def axes_json(study: Study) -> list[AxisInfo]:
-    """The axes of a study as JSON data, without all their values."""
+    """The axes of a study as JSON data, without the full lists of values."""
     return [
         {
             "paths": list(axis.paths),

@@ -1,4 +1,4 @@
-"""Fields of a spec that are no parameters of a model, each described once for reader, JSON Schema and form."""
+"""Fields of a spec that are not model parameters, each described once for reader, JSON Schema and form."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class Described:
 
     Attributes
     ----------
-    name, label, help : its name, what the form calls it, and what it means
-    kind : "whole" and "number", from ``low`` to ``high``; "periods", a text with a whole number of them; "time", a
-        number of seconds or a text; "flag"; "choice", one of ``choices``: values and the form's words for them
-    default : what stands for a field that is not given
+    name, label, help : its name, its label in the form, and its meaning
+    kind : "whole" and "number", from ``low`` to ``high``; "periods", a text with a whole number of periods; "time", a
+        number of seconds or a text; "flag"; "choice", one of ``choices``: values and their labels in the form
+    default : value of a field that is not given
     """
 
     name: str
@@ -40,7 +40,7 @@ class Described:
 
     @property
     def default_text(self) -> str:
-        """The default as people write it."""
+        """The default as a user would write it."""
         text = f"{self.default:g}".replace("e-0", "e-") if isinstance(self.default, float) else str(self.default)
         return f"{text} periods" if self.kind == "periods" else text
 
@@ -75,16 +75,16 @@ _READINGS: Final = (
 )  # fmt: skip
 _UNTIL: Final = "run each case until its motion is settled, unless the run has a duration or a window"
 _AT_MOST: Final = "excitation periods after which the search for the settled motion ends"
-_MAX_PERIOD: Final = "largest number of excitation periods after which a settled motion may repeat itself"
+_MAX_PERIOD: Final = "largest number of excitation periods after which a settled motion may repeat"
 _SETTLED: Final = "scaled distance from its orbit below which a run counts as settled"
 _DURATION: Final = (
     "end of the run, which then lasts for a given time: a number is seconds, a text says periods or a unit of time"
 )
 _TOLERANCE: Final = "local relative error of the integration"
 _RESET: Final = "whether an upward crossing while torque is transmitted restarts the windup (literal)"
-_BACKLASH: Final = "the angles count from the first contact, so that the backlash is taken off them"
+_BACKLASH: Final = "whether the angles include the backlash, which is then subtracted"
 
-#: Of a run until it is settled alone.
+#: Fields of a run until it is settled.
 SETTLED_RUN: Final = _named(
     Described("until", "Each case runs", _UNTIL, "choice", 0, 0, SETTLED, ((SETTLED, "until its motion is settled"),)),
     Described("at_most", "At most", _AT_MOST, "periods", MIN_SETTLED_PERIODS, MAX_SETTLED_PERIODS, 1000),
@@ -92,12 +92,12 @@ SETTLED_RUN: Final = _named(
     Described("max_period", "Largest order", _MAX_PERIOD, "whole", 1, MAX_ORBIT_PERIODS, 32),
 )
 DURATION: Final = Described("duration", "Duration", _DURATION, "time", default="60 periods")
-#: Of every run.
+#: Fields of every run.
 ANY_RUN: Final = _named(
     Described("tolerance", "Tolerance", _TOLERANCE, "number", MIN_TOLERANCE, MAX_TOLERANCE, 1e-9),
     Described("reset", "Reading of (5)", _RESET, "choice", default="contact", choices=_READINGS),
 )
-#: How measured data of a clutch are fitted, beside the accuracy.
+#: Options of the fit of measured clutch data, besides the accuracy.
 FIT: Final = _named(
     Described("max_degree", "Highest degree", "highest degree that is tried", "whole", 1, MAX_COEFFICIENTS - 1, 7),
     Described("through_origin", "", "no torque at zero windup (c_1 = 0)", "flag", default=True),

@@ -1,7 +1,7 @@
-"""The study spec, version 1: raw JSON or TOML data in, a study in SI numbers out, or all that is wrong with it.
+"""The study spec, version 1: turns JSON or TOML data into a study in SI numbers, or reports all its faults.
 
-The parts stand in the modules beside it (`text`, `units`, `run`, `warnings`, the `report` of problems) and in three
-packages: `machine` (drive, clutch, shaft), `axes` (values, points, samples, combinations), `schema`.
+Its parts are the modules beside it (`text`, `units`, `run`, `warnings`, the `report` of faults) and three packages:
+`machine` (drive, clutch, shaft), `axes` (values, points, samples, combinations), `schema`.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 __all__ = ["VERSION", "ParsedSpec", "SpecError", "format_of", "load_spec", "parse_spec"]
 
-#: The version of the spec that this program reads.
+#: The supported version of the spec.
 VERSION: Final = 1
-#: What a study without a name is called.
+#: Name of a study that gives none.
 UNNAMED: Final = "untitled"
 
 FIELDS: Final = ("sprag", "model", "name", "base", "run", "axes", "combine", "exclude")
@@ -41,13 +41,13 @@ class ParsedSpec:
     Attributes
     ----------
     study : Study
-        The same in SI numbers, clutch data fitted, axes expanded.
+        The study in SI numbers, with fitted clutch data and expanded axes.
     warnings : tuple of str
-        What is allowed but probably not meant, each a sentence with its numbers.
+        One sentence, with its numbers, for each thing that is allowed but probably unintended.
     fits : dict
         JSON Pointer of a clutch given as measured data -> its fit.
     spec : dict
-        The user's own spec, as it was given.
+        The user's spec, unchanged.
     """
 
     study: Study
@@ -57,7 +57,7 @@ class ParsedSpec:
 
 
 def format_of(name: str) -> Format:
-    """The format of a spec's file by its name: TOML when it ends in ``.toml``, else JSON."""
+    """The format of a spec file by its name: TOML when it ends in ``.toml``, otherwise JSON."""
     return "toml" if PurePath(name).suffix.lower() == ".toml" else "json"
 
 
@@ -67,7 +67,7 @@ def parse_spec(data: object) -> ParsedSpec:
     Raises
     ------
     SpecError
-        With everything that is wrong with it: each problem has its JSON Pointer, the value, and what is allowed.
+        With all faults, each with its JSON Pointer, the value, and what is allowed.
     """
     report = Report(data)
     found = read_object(report, "", data, FIELDS)
@@ -75,7 +75,7 @@ def parse_spec(data: object) -> ParsedSpec:
         raise report.error()
     _read_version(report, found)
     name = _read_name(report, found.get("name", UNNAMED))
-    # A spec of an unknown model cannot be read any further.
+    # The spec of an unknown model cannot be read further.
     model = _read_model(report, found)
     if model is None:
         raise report.error()
@@ -129,5 +129,5 @@ def _read_model(report: Report, found: Mapping[str, Any]) -> str | None:
 
 
 def _in_order(machine: Machine) -> dict[str, float]:
-    """The base with its paths sorted, so that equal machines are stored alike however they were written."""
+    """The base with sorted paths, so that equal machines are stored identically."""
     return {path: machine.values[path] + 0.0 for path in sorted(machine.values)}

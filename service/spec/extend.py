@@ -1,6 +1,6 @@
-"""A study with more in it: further values on its axes, further axes, further cases.
+"""Extension of a study: further values on its axes, further axes, further cases.
 
-The cases that the study has already are the same cases in the new one, so that only what is new has to be run.
+The cases of the old study are the same cases in the new one, so only new cases are run.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ FIELDS: Final = ("axes", "cases", "name")
 
 
 def parse_extended(spec: Mapping[str, Any], study: Study, addition: object) -> ParsedSpec:
-    """The study of `extended_spec`, checked; pointers of problems are into ``addition`` where they are about it."""
+    """Check and return the study of `extended_spec`; pointers of faults in ``addition`` refer to ``addition``."""
     try:
         return parse_spec(extended_spec(spec, study, addition))
     except SpecError as error:
         if not (isinstance(addition, Mapping) and "cases" in addition):
             raise
-        # The study itself is the first of the axes, what was added follows.
+        # The study itself is the first axis; additions follow.
         before = 1 if study.axes else 0
         raise SpecError([_moved(fault, before) for fault in error.faults]) from error
 
@@ -44,19 +44,19 @@ def _moved(fault: Fault, before: int) -> Fault:
 
 
 def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> dict[str, Any]:
-    """The spec of the study that has the cases of ``study`` and those that ``addition`` asks for.
+    """The spec of a study with the cases of ``study`` and those of ``addition``.
 
     Parameters
     ----------
     spec : the study's own spec
     study : the same in SI numbers
-    addition : plain JSON data: ``axes``, values for axes of a grid, old or new; or ``cases``, axes, samples, points and
+    addition : plain JSON data: ``axes``, values for old or new axes of a grid; or ``cases``, axes, samples, points and
         groups as in a spec, whose cases come after those of the study; and a ``name``
 
     Raises
     ------
     SpecError
-        With everything that is wrong with ``addition``; pointers are into it.
+        With every fault of ``addition``; pointers refer to it.
     """
     report = Report(addition)
     found = dict(read_object(report, "", addition, FIELDS) or {})
@@ -90,7 +90,7 @@ def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> di
 def _add(
     report: Report, pointer: str, item: object, study: Study, axes: list[dict[str, Any]], machine: Machine
 ) -> None:
-    """Put the values of one item on the axis of its paths, which is made where there is none."""
+    """Add the values of one item to the axis of its paths; create the axis where it is missing."""
     read = axis_values(report, pointer, item, machine)
     if read is None:
         return

@@ -18,13 +18,13 @@ def coefficient_unit(index: int) -> str:
 
 
 def placed(parameter: Parameter, path: str) -> Parameter:
-    """The catalogue's ``parameter`` as it stands at the flat ``path``, indices filled in, its unit too."""
+    """The catalogue's ``parameter`` at the flat ``path``, with indices filled in, also in its unit."""
     unit = coefficient_unit(int(path.rsplit(".", 1)[-1])) if parameter.unit.endswith("^K") else parameter.unit
     return replace(parameter, path=path, unit=unit)
 
 
 def exact(value: object, parameter: Parameter) -> Fraction:
-    """The exact SI number that ``value`` means; QuantityError when it is none, or out of ``parameter``'s range."""
+    """Convert ``value`` to an exact SI number; QuantityError when it is not one or out of ``parameter``'s range."""
     number = parse_exact(value, parameter.unit)
     if not parameter.accepts(to_float(number)):
         raise QuantityError("out-of-range", "is out of range")
@@ -32,7 +32,7 @@ def exact(value: object, parameter: Parameter) -> Fraction:
 
 
 def read_exact(report: Report, pointer: str, value: object, parameter: Parameter) -> Fraction | None:
-    """The exact SI number of one field, in ``parameter``'s range; None, and a problem noted, when it is not one."""
+    """Read the exact SI number of one field; None, with a fault recorded, unless it is in ``parameter``'s range."""
     if report.full:
         return None
     try:
@@ -49,7 +49,7 @@ def read_number(report: Report, pointer: str, value: object, parameter: Paramete
 
 
 def read_whole(report: Report, pointer: str, value: object, low: int, high: int) -> int | None:
-    """A whole number from ``low`` to ``high``; None, and a problem noted, when it is not one."""
+    """Read an integer from ``low`` to ``high``; None, with a fault recorded, for anything else."""
     if isinstance(value, bool) or not isinstance(value, int):
         report.fault(pointer, "wrong-type", "must be a whole number", value, allowed=f"{low} to {high:,}")
         return None
@@ -60,7 +60,7 @@ def read_whole(report: Report, pointer: str, value: object, low: int, high: int)
 
 
 def read_flag(report: Report, pointer: str, value: object) -> bool | None:
-    """true or false; None, and a problem noted, when it is neither."""
+    """Read true or false; None, with a fault recorded, for anything else."""
     if isinstance(value, bool):
         return value
     report.fault(pointer, "wrong-type", "must be true or false", value, allowed="true or false")
@@ -70,7 +70,7 @@ def read_flag(report: Report, pointer: str, value: object) -> bool | None:
 def read_choice(
     report: Report, pointer: str, value: object, choices: Sequence[str], *, given: bool = False
 ) -> str | None:
-    """One of ``choices``; None, and a problem noted, when it is none of them. Unless ``given``, None is one missing."""
+    """Read one of ``choices``; None, with a fault recorded, for anything else. Unless ``given``, None means missing."""
     if isinstance(value, str) and value in choices:
         return value
     allowed = ", ".join(f"'{choice}'" for choice in choices)
@@ -83,7 +83,7 @@ def read_choice(
 
 
 def read_object(report: Report, pointer: str, value: object, known: Iterable[str]) -> Mapping[str, Any] | None:
-    """An object with ``known`` fields only (others are noted); None, and a fault noted, when it is not an object."""
+    """Read an object; None, with a fault recorded, for anything else. Fields that are not ``known`` are faults too."""
     known = tuple(known)
     if not isinstance(value, Mapping):
         message = "is required" if value is None else "must be an object"
@@ -102,7 +102,7 @@ def read_object(report: Report, pointer: str, value: object, known: Iterable[str
 def read_parameters(
     report: Report, pointer: str, data: Mapping[str, Any], parameters: Mapping[str, Parameter]
 ) -> dict[str, float]:
-    """Numbers of an object's fields by the path of their parameter, defaults filled in; what is wrong is left out.
+    """Read the numbers of an object by the path of their parameter, with defaults; invalid ones are left out.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def read_parameters(
 
 
 def missing(report: Report, pointer: str, parameter: Parameter) -> None:
-    """Notes that a required number is missing."""
+    """Record that a required number is missing."""
     report.fault(
         pointer,
         "required",

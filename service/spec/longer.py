@@ -1,4 +1,4 @@
-"""A study of cases of another whose motion was not settled, with more time for each."""
+"""A study of the unsettled cases of another study, with more time for each."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from sprag.worker.study import Study
 
-#: How many times as long a search may take, or a run takes, by default.
+#: Default factor on the periods of a search or the duration of a run.
 TIMES: Final = 4
 _SUFFIX: Final = ", longer"
 
@@ -24,14 +24,14 @@ _SUFFIX: Final = ", longer"
 def longer_spec(
     spec: Mapping[str, Any], study: Study, cases: NDArray[np.int64], at_most: int | None = None
 ) -> dict[str, Any]:
-    """The spec of a study of just these cases, each run for at most, or for, ``at_most`` excitation periods.
+    """The spec of a study of these cases only, run for (settled motion: at most) ``at_most`` excitation periods each.
 
     Parameters
     ----------
     spec : the study's own spec
     study : the same in SI numbers
     cases : numbers of cases, at least one
-    at_most : by default `TIMES` as many as the study allows
+    at_most : by default `TIMES` times as many as the study allows
     """
     kept = {key: value for key, value in spec.items() if key not in {"axes", "combine", "exclude"}}
     if is_settled(study.run):
@@ -54,7 +54,7 @@ def longer_spec(
 
 
 def _longer_run(study: Study, periods: int | None) -> dict[str, Any]:
-    """A longer run of a given time, evaluated at its end: over as much of it as before, or its last third."""
+    """A longer run of a given time, evaluated at its end: over the same length as before, or over its last third."""
     (number, unit), window = study.run["duration"], study.run["window"]
     if periods is not None:
         number, unit = float(periods), "periods"

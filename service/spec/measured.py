@@ -1,9 +1,9 @@
-"""Measured data of a clutch as test benches write them: two columns, angle and torque, in a text file.
+"""Measured data of a clutch from a test bench: a text file with two columns, angle and torque.
 
-Columns stand apart by comma, semicolon or tab (then a decimal comma is understood), or blanks. A header is optional and
-may name the units: ``angle_deg, torque_Nmm`` or ``angle [mrad]; torque [N*m]``. Without units the numbers are rad
-and N*m, which is said; a header of other words is refused. Cells may stand in quotation marks. Empty lines and lines
-that begin with ``#`` are passed over.
+Columns are separated by commas, semicolons, tabs or blanks; with semicolons or tabs a decimal comma is allowed. A
+header is optional and may name the units: ``angle_deg, torque_Nmm`` or ``angle [mrad]; torque [N*m]``. Without units
+the numbers are taken as rad and N*m, with a warning; other headers are refused. Cells may be quoted. Empty lines and
+lines that begin with ``#`` are skipped.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from sprag.service.faults import Fault, FaultError
 from sprag.service.spec.numbers import parse_number
 from sprag.worker.limits import MAX_CLUTCH_ROWS
 
-#: Problems told of one file; a file of another kind has one in every line.
+#: Most faults reported for one file; a file of another kind would have one in every line.
 _MAX_PROBLEMS = 20
 _QUANTITIES = (("angle", "rad"), ("torque", "N*m"))
-#: Headings that are understood although they name no unit, by column.
+#: Accepted headings without a unit, by column.
 _WORDS = (
     frozenset({"angle", "windup", "twist", "rotation", "phi", "xi", "u"}),
     frozenset({"torque", "moment", "m", "t"}),
 )
-#: Larger angles, taken as rad because no unit is named, are rather degrees.
+#: Larger angles without a unit are probably degrees, not rad.
 _LARGEST_PLAUSIBLE = 0.5
 _UNIT_IN_HEADER = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]$|^[A-Za-z]+_(\S+)$")
 
@@ -42,7 +42,7 @@ class MeasuredData:
     rows : float64 array, shape (m, 2)
         Angle in rad and torque in N*m.
     lines : tuple of int, length m
-        Number of the line of the file each row stands in, from 1.
+        Line number of each row in the file, from 1.
     warnings : tuple of str
         Units that were assumed because the file names none.
     """
@@ -53,7 +53,7 @@ class MeasuredData:
 
 
 class MeasuredDataError(FaultError):
-    """The text is not measured data; ``faults`` name the lines of the text."""
+    """The text is not measured data; ``faults`` name its lines."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         faults = tuple(faults)
@@ -68,12 +68,12 @@ def parse_measured(text: str, convert: Callable[[str, str], float]) -> MeasuredD
     text : str
         The file's text.
     convert : function of (quantity, SI unit)
-        The number in SI of a quantity such as "1 deg"; raises ValueError for a wrong unit.
+        Converts a quantity such as "1 deg" to an SI number; raises ValueError for a wrong unit.
 
     Raises
     ------
     MeasuredDataError
-        With every problem found, up to a bound.
+        With all faults, up to a limit.
     """
     lines = [
         (number, stripped)
@@ -109,7 +109,7 @@ def _is_header(cells: list[str]) -> bool:
 
 
 def _factors(number: int, line: str, convert: Callable[[str, str], float]) -> tuple[float | None, float | None]:
-    """Factors of the two columns to SI, from the header's units; None for a column that names none."""
+    """Factors of the two columns to SI from the units in the header; None for a column without a unit."""
     cells = _cells(line)
     if len(cells) != 2 and not any(separator in line for separator in ";,\t"):
         cells = [cell.strip() for cell in re.split(r"(?<=[\])])\s+|\s{2,}", line) if cell.strip()]
@@ -148,7 +148,7 @@ def _factor(heading: str, unit: str, words: frozenset[str], convert: Callable[[s
 
 
 def _assumed(factors: tuple[float | None, float | None], rows: NDArray[np.float64]) -> Iterator[str]:
-    """What was assumed where the file names no units."""
+    """Warnings about assumptions where the file names no units."""
     bare = [
         f"{name}s are taken in {unit}"
         for factor, (name, unit) in zip(factors, _QUANTITIES, strict=True)

@@ -1,13 +1,13 @@
-"""Numbers in texts that people and programs write: in cells of tables and on command lines."""
+"""Numbers in text input: cells of tables and arguments of commands."""
 
 from __future__ import annotations
 
 
 def parse_number(text: str) -> float | None:
-    """The number that ``text`` is, blanks around it or not; None when it is none.
+    """Parse ``text`` as a number, ignoring surrounding blanks; None when it is not a number.
 
-    "nan" and "inf" are read, for the caller to refuse by their name. What only Python takes for numbers is none: digits
-    of other scripts, and underscores between digits.
+    "nan" and "inf" are accepted, so that the caller can refuse them by name. Python's own extensions are not: digits of
+    other scripts, and underscores between digits.
     """
     if not text.strip().isascii() or "_" in text:
         return None

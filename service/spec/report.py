@@ -15,7 +15,7 @@ _LONGEST_LIST = 6
 
 
 class SpecError(FaultError):
-    """A spec that cannot be run, with everything wrong in it. ``str()`` gives a line for each fault."""
+    """A spec that cannot be run, with all its faults. ``str()`` gives one line per fault."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         faults = tuple(faults)
@@ -28,7 +28,7 @@ class Report:
     def __init__(self, source: object = None) -> None:
         self._source = source
         self.faults: list[Fault] = []
-        #: Number of faults, those included that are not noted any more.
+        #: Number of faults, including those beyond the limit.
         self.found = 0
         self.warnings: list[str] = []
 
@@ -42,7 +42,7 @@ class Report:
         allowed: str | None = None,
         unit: str | None = None,
     ) -> None:
-        """Note a fault, unless there are `MAX_PROBLEMS` already; numbers that the user wrote stand as written."""
+        """Record a fault, unless there are `MAX_PROBLEMS` already; numbers appear as the user wrote them."""
         self.found += 1
         if not self.full:
             shown = _as_written(value, _at(self._source, pointer))
@@ -50,16 +50,16 @@ class Report:
 
     @property
     def full(self) -> bool:
-        """Whether there are so many faults that looking for more would only take time."""
+        """Whether the limit of faults is reached, so that further checks are useless."""
         return len(self.faults) >= MAX_PROBLEMS
 
     def warn(self, message: str) -> None:
-        """Note something that is allowed but probably not meant; the same sentence only once."""
+        """Record a warning about something allowed but probably unintended; each sentence only once."""
         if message not in self.warnings:
             self.warnings.append(message)
 
     def unknown_fields(self, pointer: str, found: Mapping[str, object], known: Iterable[str]) -> None:
-        """Note every key of ``found`` that is not ``known``, with the nearest known one."""
+        """Record a fault for every key of ``found`` that is not ``known``, with the nearest known one."""
         known = tuple(known)
         for key in found:
             if key not in known and not self.full:
@@ -72,18 +72,18 @@ class Report:
                 )
 
     def raise_if_any(self) -> None:
-        """Raise `SpecError` with everything noted so far, if anything was."""
+        """Raise `SpecError` with the faults recorded so far, if any."""
         if self.faults:
             raise self.error()
 
     def error(self) -> SpecError:
-        """The error with everything noted so far."""
+        """The error with all faults recorded so far."""
         more = [Fault("", "too-many-faults", f"only the first {MAX_PROBLEMS} faults are listed")] if self.full else []
         return SpecError([*self.faults, *more])
 
 
 def _at(source: object, pointer: str) -> object:
-    """What stands at a JSON Pointer; None where nothing does."""
+    """The value at a JSON Pointer; None where there is none."""
     for part in pointer.split("/")[1:]:
         key = part.replace("~1", "/").replace("~0", "~")
         if isinstance(source, Mapping):
@@ -96,7 +96,7 @@ def _at(source: object, pointer: str) -> object:
 
 
 def _as_written(value: object, written: object) -> object:
-    """``written`` in the place of the SI number, or numbers, that were made of it."""
+    """``written`` instead of the SI number or numbers derived from it."""
     if isinstance(value, list | tuple) and isinstance(written, list) and 0 < len(value) == len(written):
         pairs = list(zip(value, written, strict=True))
         return [_as_written(*pair) for pair in pairs]
@@ -110,13 +110,13 @@ def quantity_text(number: float, unit: str) -> str:
 
 
 def join(pointer: str, *keys: str | int) -> str:
-    """``pointer`` extended by object keys and list positions, escaped as RFC 6901 says; long keys are cut short."""
+    """``pointer`` extended by object keys and list positions, escaped as in RFC 6901; long keys are truncated."""
     parts = (shorten_text(str(key)).replace("~", "~0").replace("/", "~1") for key in keys)
     return pointer + "".join(f"/{part}" for part in parts)
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """ "; did you mean 'x'?" for the known word nearest to ``word``, or "" where none is near."""
+    """ "; did you mean 'x'?" for the known word closest to ``word``, or "" where none is close."""
     if len(word) > 2 * _LONGEST_TEXT:
         return ""
     by_lower = {name.lower(): name for name in known}
@@ -125,7 +125,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def shorten_text(text: str) -> str:
-    """``text`` cut to what fits into a message, without characters that cannot be sent (lone surrogates)."""
+    """``text`` truncated for a message, without characters that cannot be sent (lone surrogates)."""
     text = text.encode("utf-8", "replace").decode("utf-8")
     return text if len(text) <= _LONGEST_TEXT else text[: _LONGEST_TEXT - 1] + "…"
 
@@ -135,7 +135,7 @@ def shorten(value: object, depth: int = 2) -> object:
     if value is None or isinstance(value, bool):
         return value
     if isinstance(value, int):
-        # Python refuses to print very long integers; a length says more than a million digits do.
+        # Python refuses to print very long integers, and a million digits would not help anybody.
         return (
             value
             if abs(value) < 10**40

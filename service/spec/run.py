@@ -1,4 +1,4 @@
-"""The run of a spec: until it is settled or for a time, tolerance, reading of equation (5)."""
+"""The run of a spec: until settled or for a given time, tolerance, interpretation of equation (5)."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-#: Fields of a run until it is settled alone, and of a run for a time alone.
+#: Fields of settled runs only, and of timed runs only.
 SETTLED_FIELDS: Final = tuple(SETTLED_RUN)
 TIMED_FIELDS: Final = ("duration", "window")
 FIELDS: Final = (*SETTLED_FIELDS, *TIMED_FIELDS, *ANY_RUN)
 RESETS: Final = tuple(value for value, _ in ANY_RUN["reset"].choices)
 _ANY_DEFAULTS: Final[dict[str, Any]] = {name: field.default for name, field in ANY_RUN.items()}
-#: What stands for the fields that are not given. A run without a field of `TIMED_FIELDS` lasts until it is settled.
+#: Defaults of missing fields. A run without a field of `TIMED_FIELDS` lasts until it is settled.
 SETTLED_DEFAULTS: Final[dict[str, Any]] = {name: field.default for name, field in SETTLED_RUN.items()} | _ANY_DEFAULTS
 TIMED_DEFAULTS: Final[dict[str, Any]] = {"duration": [60.0, "periods"], "window": None, **_ANY_DEFAULTS}
 _TIME: Final = 'seconds (2.0 or "2 s") or excitation periods ("60 periods")'
@@ -30,11 +30,11 @@ _MAX_SECONDS: Final = 1e9
 #: Ends that are equal but for the rounding of a conversion between seconds and periods count as equal.
 _ROUNDING: Final = 1e-9
 
-Time = list[Any]  # [number, "periods" | "s"], as a study keeps it
+Time = list[Any]  # [number, "periods" | "s"], as stored in a study
 
 
 def read_run(report: Report, data: object, frequencies: NDArray[np.float64]) -> dict[str, Any]:
-    """The run as a study keeps it (see `Study.run`), everything wrong with it noted in ``report``.
+    """Read the run as stored in a study (see `Study.run`); faults are recorded in ``report``.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def read_run(report: Report, data: object, frequencies: NDArray[np.float64]) -> 
 
 
 def refuse_run(report: Report, data: object, why: str = "is not used: this model has no run") -> dict[str, Any]:
-    """The empty run of a model that has none; every field of one that was given is noted in ``report``."""
+    """The empty run of a model without a run; every given field is recorded as a fault."""
     if not isinstance(data, Mapping):
         report.fault(
             "/run",
@@ -80,7 +80,7 @@ def refuse_run(report: Report, data: object, why: str = "is not used: this model
 
 
 def _read_settled(report: Report, found: Mapping[str, Any], run: dict[str, Any]) -> None:
-    """Put what is given of a run until it is settled into ``run``."""
+    """Read the fields of a settled run into ``run``."""
     if "until" in found:
         read_choice(report, "/run/until", found["until"], (SETTLED,), given=True)
     if "at_most" in found:
@@ -97,7 +97,7 @@ def _read_settled(report: Report, found: Mapping[str, Any], run: dict[str, Any])
 
 
 def _refuse_settled(report: Report, found: Mapping[str, Any]) -> None:
-    """Note the fields that contradict a duration or a window."""
+    """Record the fields that contradict a duration or a window."""
     timed = " and ".join(f"`{name}`" for name in TIMED_FIELDS if name in found)
     for name in SETTLED_FIELDS:
         if name in found:
@@ -129,7 +129,7 @@ def in_periods(time: Time, frequency: float) -> float:
 
 
 def time_text(time: Time) -> str:
-    """A time of a run as people write it."""
+    """A time of a run as a user would write it."""
     return f"{time[0]:g} {time[1]}"
 
 
@@ -186,7 +186,7 @@ def _read_plain(report: Report, field: Described, value: object) -> float | None
 def _check_times(
     report: Report, run: Mapping[str, Any], given: Mapping[str, Any], frequencies: NDArray[np.float64]
 ) -> None:
-    """Compares duration and window at the lowest and the highest frequency; in between all goes straight."""
+    """Compare duration and window at the lowest and the highest frequency; in between both are linear."""
     for frequency in dict.fromkeys((float(frequencies.min()), float(frequencies.max()))):
         at = "" if _one_unit(run) else f" at {frequency:.6g} Hz"
         duration = in_periods(run["duration"], frequency)
@@ -203,7 +203,7 @@ def _check_times(
             if duration / 3.0 < 1.0 - _ROUNDING:
                 report.warn(
                     f"/run/duration: the window, its last third, is shorter than one excitation period at "
-                    f"{frequency:.6g} Hz ({duration / 3.0:.3g} periods), so means over it depend on where it lies"
+                    f"{frequency:.6g} Hz ({duration / 3.0:.3g} periods), so means over it depend on its position"
                 )
             continue
         start, end = (in_periods(time, frequency) for time in run["window"])
@@ -225,7 +225,7 @@ def _check_times(
         if end - start < 1.0 - _ROUNDING:
             report.warn(
                 f"/run/window: shorter than one excitation period at {frequency:.6g} Hz ({end - start:.3g} periods), "
-                "so means over it depend on where it lies"
+                "so means over it depend on its position"
             )
 
 

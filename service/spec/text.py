@@ -1,4 +1,4 @@
-"""The text of a spec, JSON or TOML, to plain data: strictly, with bounded work, every fault with its place."""
+"""Parses the text of a spec, JSON or TOML, strictly and with bounded work; every fault has its place."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _LONGEST_BITS: Final = math.ceil(MAX_INTEGER_DIGITS * math.log2(10))
 
 Format = Literal["json", "toml"]
 
-# Both patterns step over a whole string, closed or not, so that a scan looks at each character once.
+# Both patterns consume a whole string, closed or not, so that a scan visits each character once.
 _JSON_TOKEN: Final = re.compile(r'"(?:[^"\\]|\\.)*+"?|[\[{]|[\]}]', re.DOTALL)
 _TOML_TOKEN: Final = re.compile(
     r'"""(?:[^"\\]|\\.|"(?!""))*+(?:""")?'
@@ -29,7 +29,7 @@ _TOML_TOKEN: Final = re.compile(
 
 
 class _Repeated(dict[str, Any]):
-    """An object some of whose keys stood in it more than once."""
+    """An object with repeated keys."""
 
     def __init__(self, pairs: list[tuple[str, Any]], repeated: list[str]) -> None:
         super().__init__(pairs)
@@ -37,14 +37,14 @@ class _Repeated(dict[str, Any]):
 
 
 class _LongInteger:
-    """An integer with more digits than are worth converting."""
+    """An integer with too many digits to convert."""
 
     def __init__(self, digits: int) -> None:
         self.digits = digits
 
 
 def load_spec(text: str | bytes, format: Format) -> object:
-    """The plain data of a spec's text.
+    """Parse the text of a spec into plain data.
 
     Parameters
     ----------
@@ -60,8 +60,8 @@ def load_spec(text: str | bytes, format: Format) -> object:
     Raises
     ------
     SpecError
-        Too large, not UTF-8, not well-formed, too deep, a key twice in one object, a number that is not finite or far
-        beyond a double's range, a date, or a text with half a character (a lone surrogate).
+        If the text is too large, not UTF-8, not well-formed or too deep, or contains a repeated key, a number that is
+        not finite or far outside the range of doubles, a date, or a lone surrogate.
     """
     source = _decode(text)
     data = _json(source) if format == "json" else _toml(source)
@@ -110,7 +110,7 @@ def _pairs(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _integer(digits: str) -> int | _LongInteger:
-    # Conversion takes quadratic time, and Python itself refuses more than some thousand digits.
+    # Conversion takes quadratic time, and Python refuses more than a few thousand digits.
     return int(digits) if len(digits) <= MAX_INTEGER_DIGITS else _LongInteger(len(digits.lstrip("-")))
 
 
@@ -121,14 +121,14 @@ def _toml(source: str) -> object:
     except tomllib.TOMLDecodeError as error:
         raise _fault(f"not TOML: {str(error)[:200]}") from None
     except ValueError:
-        # What the TOML grammar accepts but Python's numbers or dates do not.
+        # The TOML grammar accepts numbers and dates that Python does not.
         raise _fault("not TOML that can be read: a number or a date is out of range") from None
     except RecursionError:
         raise _too_deep() from None
 
 
 def _check_toml_depth(source: str) -> None:
-    """Refuses deep brackets and long dotted keys, whose time in the parser grows with the square of their parts."""
+    """Refuse deep brackets and long dotted keys, for which the parser takes quadratic time."""
     depth = dots = 0
     after_dot = False
     for match in _TOML_TOKEN.finditer(source):
@@ -148,14 +148,14 @@ def _check_toml_depth(source: str) -> None:
 
 
 def _plain(data: object, pointer: str, depth: int, report: Report) -> object:
-    """``data`` itself when it is plain; notes what is not."""
+    """``data`` as plain data; anything else is recorded as a fault."""
     if isinstance(data, dict | list):
         if depth >= MAX_DEPTH:
             raise _too_deep()
         return _plain_container(data, pointer, depth, report)
     if isinstance(data, str):
         if _halved(data):
-            report.fault(pointer, "invalid-text", "the text holds half a character (a lone surrogate)", data)
+            report.fault(pointer, "invalid-text", "the text contains half a character (a lone surrogate)", data)
     elif isinstance(data, int):
         if data.bit_length() > _LONGEST_BITS:
             report.fault(pointer, "out-of-range", "is too large for a number", data)
@@ -163,9 +163,7 @@ def _plain(data: object, pointer: str, depth: int, report: Report) -> object:
         report.fault(pointer, "out-of-range", "is too large for a number", f"an integer of {data.digits} digits")
     elif isinstance(data, float):
         if not math.isfinite(data):
-            report.fault(
-                pointer, "not-finite", "must be a finite number (NaN, Infinity and what overflows are none)", data
-            )
+            report.fault(pointer, "not-finite", "must be a finite number (not NaN, Infinity or an overflow)", data)
     elif data is not None:
         report.fault(pointer, "wrong-type", "is a date or a time; no field of a spec takes one", str(data))
     return data
@@ -180,7 +178,7 @@ def _plain_container(data: dict[str, Any] | list[Any], pointer: str, depth: int,
     for key in data:
         if _halved(key):
             report.fault(
-                join(pointer, key), "invalid-text", "the field's name holds half a character (a lone surrogate)"
+                join(pointer, key), "invalid-text", "the field's name contains half a character (a lone surrogate)"
             )
     return {key: _plain(item, join(pointer, key), depth + 1, report) for key, item in data.items()}
 

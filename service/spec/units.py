@@ -1,11 +1,11 @@
-"""Quantities with units at the edge: "157 rad/s", "2 mm", "0.01 N*m*s/rad" -> exact SI numbers.
+"""Conversion of quantities with units to exact SI numbers: "157 rad/s", "2 mm", "0.01 N*m*s/rad".
 
-A strict grammar reads the number and the unit's text; pint converts the units, with a small registry of its own in
-which the angle is a dimension like length or mass (in pint's usual registry a radian is a plain 1 and a hertz is
-2 pi of nothing, so "1500 rpm" asked in Hz comes out 2 pi wrong). A revolution is one period: angular speeds become
-frequencies by division by 2 pi, and only where a frequency is asked for.
+A strict grammar reads the number and the unit; pint converts the unit, with a small registry of its own in which angle
+is a dimension like length or mass. (In pint's default registry the radian is dimensionless, so "1500 rpm" converted to
+Hz is off by the factor 2 pi.) One revolution is one period: angular speeds are divided by 2 pi where a frequency is
+expected, and only there.
 
-Numbers are carried as fractions, so "1.1 mm" is the double nearest to 0.0011 and "1500 rpm" is 25 Hz exactly.
+Numbers are kept as fractions, so "1.1 mm" is the double nearest to 0.0011 and "1500 rpm" is exactly 25 Hz.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from sprag.worker.limits import MAX_QUANTITY_LENGTH
 if TYPE_CHECKING:
     import pint
 
-#: Words that mean the period of the excitation, for times of a run.
+#: Words for the excitation period in times of a run.
 PERIOD_NAMES: Final = frozenset({"period", "periods", "cycle", "cycles"})
 
-#: The circle constant to 50 digits, so that its rounding never shows in a double.
+#: Twice pi to 50 digits, so that its rounding never affects a double.
 _TWO_PI: Final = "6.2831853071795864769252867665590057683943387987502"
 
 _DEFINITIONS: Final = (
@@ -41,7 +41,7 @@ _DEFINITIONS: Final = (
         "pound = 453.59237 * gram = lb",
     ),
     *("minute = 60 * second = min", "hour = 3600 * second = h = hr"),
-    f"turn = {_TWO_PI} * radian = _ = revolution = rev = cycle = r",  # r: as IEC writes r/min on motors' plates
+    f"turn = {_TWO_PI} * radian = _ = revolution = rev = cycle = r",  # r: IEC nameplates of motors use r/min
     *("degree = turn / 360 = deg = °", "arcminute = degree / 60 = arcmin", "arcsecond = degree / 3600 = arcsec"),
     *("revolution_per_minute = turn / minute = rpm", "revolution_per_second = turn / second = rps"),
     *("hertz = 1 / second = Hz", "newton = 1000 * gram * meter / second**2 = N", "joule = newton * meter = J"),
@@ -49,7 +49,7 @@ _DEFINITIONS: Final = (
     *("watt = joule / second = W", "kilogram_force = 9.80665 * newton = kgf = kp"),
     "pound_force = 4.4482216152605 * newton = lbf",
     "standard_gravity = 9.80665 * meter / second**2 = g_0 = g0",
-    # Torques are often written without the sign of multiplication.
+    # Torques are often written without the multiplication sign.
     *("newton_meter = newton * meter = Nm", "newton_centimeter = newton_meter / 100 = Ncm"),
     *("newton_millimeter = newton_meter / 1000 = Nmm", "newton_meter_second = newton_meter * second = Nms"),
 )
@@ -97,8 +97,9 @@ _SIGNS: Final = str.maketrans(
 
 
 class QuantityError(ValueError):
-    """A value that is not a quantity of the unit asked for. ``str()`` is a plain sentence without the
-    value, ``code`` is stable."""
+    """A value that is not a quantity of the expected unit. ``str()`` is a sentence without the value, ``code`` is
+    stable.
+    """
 
     def __init__(self, code: Code, message: str) -> None:
         super().__init__(message)
@@ -106,19 +107,19 @@ class QuantityError(ValueError):
 
 
 def example(unit: str) -> str:
-    """A quantity in ``unit`` as a user would write it, in quotation marks."""
+    """A quoted example of a quantity in ``unit``."""
     return _EXAMPLES.get(unit, f'"200 {unit}"')
 
 
 def parse_quantity(value: object, unit: str) -> float:
-    """The SI number that ``value`` means.
+    """Convert ``value`` to an SI number.
 
     Parameters
     ----------
     value : int, float or str
-        A plain number is already in ``unit``; a string carries its own unit.
+        A plain number is in ``unit``; a string has its own unit.
     unit : str
-        SI unit wanted, for instance "Hz", "N*m*s/rad", "N*m/rad^3".
+        Expected SI unit, for instance "Hz", "N*m*s/rad", "N*m/rad^3".
 
     Returns
     -------
@@ -128,13 +129,13 @@ def parse_quantity(value: object, unit: str) -> float:
     Raises
     ------
     QuantityError
-        Not a number, not finite, no unit, an unknown unit or one of another kind.
+        If it is not a number, not finite, or has no unit, an unknown unit or one of another dimension.
     """
     return to_float(parse_exact(value, unit))
 
 
 def parse_exact(value: object, unit: str) -> Fraction:
-    """As `parse_quantity`, but exact: the decimal number as it was written, times the exact factor of its unit."""
+    """As `parse_quantity`, but exact: the decimal number as written, times the exact factor of its unit."""
     if isinstance(value, str) and unit == "1":
         raise QuantityError("wrong-type", "must be a plain number, without a unit or quotation marks")
     if isinstance(value, str):
@@ -148,7 +149,7 @@ def parse_exact(value: object, unit: str) -> Fraction:
 
 
 def exact_number(value: object, unit: str) -> Fraction:
-    """A plain JSON number as the decimal it was written as; QuantityError when it is none (a bool is none)."""
+    """A plain JSON number as the decimal that was written; QuantityError for anything else, including a bool."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         if unit == "1":
             raise QuantityError("wrong-type", "must be a plain number")
@@ -165,9 +166,9 @@ def exact_number(value: object, unit: str) -> Fraction:
 
 
 def split_quantity(text: str) -> tuple[Fraction, str]:
-    """Number and unit's text of "2 mm"; the unit may be empty. QuantityError when there is no number in front."""
+    """Split "2 mm" into number and unit; the unit may be empty. QuantityError when it does not begin with a number."""
     if len(text) > MAX_QUANTITY_LENGTH:
-        raise QuantityError("too-long", f"is longer than the {MAX_QUANTITY_LENGTH} characters of any quantity")
+        raise QuantityError("too-long", f"is longer than {MAX_QUANTITY_LENGTH} characters")
     match = _QUANTITY.fullmatch(text.translate(_SIGNS).strip())
     if match is None:
         raise QuantityError(
@@ -181,7 +182,7 @@ def split_quantity(text: str) -> tuple[Fraction, str]:
 
 
 def to_float(number: Fraction) -> float:
-    """The double nearest to ``number``; QuantityError when it is beyond the range of doubles."""
+    """The double nearest to ``number``; QuantityError when it is outside the range of doubles."""
     try:
         value = number.numerator / number.denominator
     except OverflowError:
@@ -192,7 +193,7 @@ def to_float(number: Fraction) -> float:
 
 
 def load() -> None:
-    """Load pint now, which takes half a second; otherwise the first quantity with a unit does."""
+    """Load pint now, which takes half a second; otherwise the first quantity with a unit loads it."""
     _registry()
 
 
@@ -208,7 +209,7 @@ def _registry() -> pint.UnitRegistry[Fraction]:
 
 @lru_cache(maxsize=1)
 def _names() -> dict[str, str]:
-    """Unit names that a misspelled one is compared with, by their lower case."""
+    """Unit names to compare a misspelled one with, by their lower-case form."""
     names = ["kg", "mm", "cm", "km", "kN"]
     for line in _DEFINITIONS:
         name, _definition, *aliases = (part.strip() for part in line.split("="))
@@ -218,7 +219,7 @@ def _names() -> dict[str, str]:
 
 @lru_cache(maxsize=1024)
 def _factor(text: str, unit: str) -> Fraction:
-    """What a number in ``text`` is multiplied by to be in ``unit``; QuantityError when they are of different kinds."""
+    """Factor from ``text`` to ``unit``; QuantityError when their dimensions differ."""
     expected = f"expected {unit}, for example {example(unit)}"
     try:
         factor, dimensions = _measure(text)
@@ -232,15 +233,15 @@ def _factor(text: str, unit: str) -> Fraction:
         if unit == "Hz" and angle == 1:
             return factor / wanted_factor / Fraction(_TWO_PI)
         if unit == "N*m*s/rad" and angle == 0:
-            return factor / wanted_factor  # N*m*s, as most books write it
+            return factor / wanted_factor  # N*m*s, the usual notation in textbooks
     raise QuantityError("wrong-unit", f"is in '{text}', which is not a unit of this field; {expected}")
 
 
 def _measure(text: str) -> tuple[Fraction, dict[str, int]]:
-    """Factor to the registry's root units (g, m, s, rad) and the powers of those in a unit like "N*m*s/rad".
+    """Factor of a unit like "N*m*s/rad" to the registry's root units (g, m, s, rad), and their powers.
 
-    Products, quotients, brackets and whole powers of names are worked out here, and pint is asked about names alone, so
-    that no text reaches it that could mean a computation.
+    Products, quotients, brackets and integer powers are evaluated here; pint only looks up names, so no text can make
+    it compute anything.
     """
     if len(text) > _LONGEST_UNIT:
         raise QuantityError("wrong-unit", f"has a unit longer than {_LONGEST_UNIT} characters")
@@ -263,7 +264,7 @@ def _measure(text: str) -> tuple[Fraction, dict[str, int]]:
 
 
 def _power_hint(text: str, position: int) -> str:
-    """What to write for "m2", when ``position`` is that of the digit; "" otherwise."""
+    """A hint such as "m^2" for "m2", where ``position`` is that of the digit; "" otherwise."""
     name = re.search(r"[A-Za-zµ°]+$", text[:position])
     power = re.match(r"-?[0-9](?![0-9.])", text[position:])
     return f" (did you mean '{name[0]}^{power[0]}'?)" if name and power else ""
@@ -275,7 +276,7 @@ def _wanted(unit: str) -> tuple[Fraction, dict[str, int]]:
 
 
 def _product(tokens: list[str], text: str) -> tuple[Fraction, Counter[str]]:
-    """The product at the end of ``tokens`` (last one first), up to a closing bracket; takes its tokens away."""
+    """Evaluate the product at the end of ``tokens`` (reversed), up to a closing bracket; consumes its tokens."""
     factor, powers, sign = Fraction(1), Counter[str](), 1
     while True:
         part, part_powers = _operand(tokens, text)
@@ -284,7 +285,7 @@ def _product(tokens: list[str], text: str) -> tuple[Fraction, Counter[str]]:
             powers[name] += sign * power
         if not tokens or tokens[-1] == ")":
             return factor, powers
-        # Two units side by side are multiplied, with the precedence of a written sign.
+        # Two adjacent units are multiplied, with the precedence of an explicit sign.
         sign = -1 if tokens[-1] == "/" else 1
         if tokens[-1] in {"*", "/"}:
             tokens.pop()
@@ -307,7 +308,7 @@ def _operand(tokens: list[str], text: str) -> tuple[Fraction, Counter[str]]:
 
 @lru_cache(maxsize=1024)
 def _named(name: str) -> tuple[Fraction, tuple[tuple[str, int], ...]]:
-    """Factor and powers of the root units of one unit's name, from pint."""
+    """Factor and powers of the root units for the name of one unit, from pint."""
     import pint
 
     registry = _registry()

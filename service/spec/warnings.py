@@ -1,4 +1,4 @@
-"""What a spec may say but probably does not mean: unstable pendulums, impossible inertias, slips of units."""
+"""Warnings about specs that are valid but probably unintended: unstable pendulums, impossible inertias, wrong units."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from sprag.service.spec.report import Report
 from sprag.worker.models import machine_shaft
 from sprag.worker.study import Axis, Study
 
-#: Combinations of the axes involved that are looked at one by one; of more, only the ends of the axes.
+#: Up to this number all combinations of the axes involved are checked; beyond it, only the ends of the axes.
 _MOST_COMBINATIONS: Final = 100_000
 
-#: Last part of a path -> (largest plausible magnitude, its unit, what else may have been meant).
+#: Last part of a path -> (largest plausible magnitude, its unit, the likely mistake).
 _PLAUSIBLE: Final[dict[str, tuple[float, str, str]]] = {
     "excitation.frequency": (1e3, "Hz", "was it in rpm or rad/s?"),
     "excitation.amplitude_x": (0.1, "m", "was it in mm?"),
@@ -38,7 +38,7 @@ _PLAUSIBLE: Final[dict[str, tuple[float, str, str]]] = {
 
 
 def warn_vibration_drive(report: Report, study: Study) -> None:
-    """Note what is implausible about a vibration drive anywhere on the axes of ``study``."""
+    """Warn of implausible values of a vibration drive anywhere on the axes of ``study``."""
     for path in dict.fromkeys((*study.base, *study.axis_paths)):
         _plausible(report, study, path)
     if not any(_values(study, f"excitation.amplitude_{axis}").any() for axis in "xy"):
@@ -66,7 +66,7 @@ _PLAUSIBLE_SHAFT: Final[dict[str, tuple[float, str, str]]] = {
 
 
 def warn_machine_shaft(report: Report, study: Study) -> None:
-    """Note what is implausible about a machine shaft anywhere on the axes of ``study``."""
+    """Warn of implausible values of a machine shaft anywhere on the axes of ``study``."""
     for path in dict.fromkeys((*study.base, *study.axis_paths)):
         _plausible(report, study, path, _PLAUSIBLE_SHAFT)
     structure = study.structure or {}
@@ -74,18 +74,18 @@ def warn_machine_shaft(report: Report, study: Study) -> None:
         structure["drive"]["form"] != "constant" or _values(study, "drive.torque").any()
     ):
         report.warn(
-            '/base/drive/torque: is not used: the balance "constant" puts the mean resistance in its place; choose '
-            '"scale" or "refuse" to keep its course'
+            '/base/drive/torque: is not used: the balance "constant" replaces it by the mean resistance; choose '
+            '"scale" or "refuse" to keep its shape'
         )
     if structure["balance"] == "motor" and _values(study, "wanted_irregularity").size:
         report.warn("/base/wanted_irregularity: is not used: with a motor no required inertia is computed")
     if structure["operation"]["quantity"] == "none" and structure["mechanism"]["kind"] == "none":
-        report.warn("/base: neither mechanism nor operation, so that the shaft turns evenly")
+        report.warn("/base: has neither a mechanism nor an operation, so the shaft turns evenly")
     _shaft_relations(report, study)
 
 
 def _shaft_relations(report: Report, study: Study) -> None:
-    """Notes cases whose numbers do not go together, which the base alone would be refused for."""
+    """Warn of cases whose numbers are inconsistent; a base with such numbers is refused."""
     operation = (study.structure or {})["operation"]
     if operation["quantity"] == "gas":
         _discharge(report, study)
@@ -103,11 +103,11 @@ def _discharge(report: Report, study: Study) -> None:
     beyond, below = high > most, high < low
     if beyond.any():
         report.warn(
-            f"{where}: the compressor comes to {most[beyond].min():.6g} Pa at most, and discharges nothing at a higher "
+            f"{where}: the compressor reaches {most[beyond].min():.6g} Pa at most and discharges nothing at a higher "
             "pressure: its valves stay shut" + _share(beyond, weight)
         )
     if below.any():
-        report.warn(f"{where}: is below the pressure of suction: nothing is compressed" + _share(below, weight))
+        report.warn(f"{where}: is below the suction pressure: nothing is compressed" + _share(below, weight))
 
 
 def _turned_step(report: Report, study: Study, index: int, *, wraps: bool) -> None:
@@ -118,24 +118,24 @@ def _turned_step(report: Report, study: Study, index: int, *, wraps: bool) -> No
     if not varied or not turned.any() or (wraps and turned.all()):
         return
     what = (
-        "where `from` passes `to` the step goes on over the end of the cycle, and acts in nearly all of it"
+        "where `from` exceeds `to` the step continues past the end of the cycle and acts in nearly all of it"
         if wraps
-        else "where `from` passes `to` the step over the stroke never acts"
+        else "where `from` exceeds `to` the step over the stroke never acts"
     )
     report.warn(f"{_pointer(study, varied[0])}: {what}" + _share(turned, weight))
 
 
 def _chosen_angle(report: Report, study: Study) -> None:
-    """The base machine tells how many angles with the mean energy there are to choose from."""
+    """Warn where phi_c exceeds the number of angles with T = T_mean, which the base machine determines."""
     structure = study.structure or {}
     chosen = structure["phi_c"]
     if chosen is None:
         return
     count = machine_shaft.base_results(structure, study.base)["phi_c.count"]
-    # Where there is none at all, works are counted from the angle 0 whatever was chosen.
+    # Without any such angle, works count from the angle 0 whatever was chosen.
     if 0 < count <= chosen:
         report.warn(
-            f"/base/phi_c: {chosen} is out of reach: the machine of base has {count:.0f} angles with T = T_mean, "
+            f"/base/phi_c: {chosen} is out of range: the machine of base has {count:.0f} angles with T = T_mean, "
             f"numbered 0 to {count - 1:.0f}; phi_c and the results of s3 and s4 stay empty"
         )
 
@@ -156,7 +156,7 @@ def _plausible(report: Report, study: Study, path: str, known: dict[str, tuple[f
 
 
 def _pointer(study: Study, path: str) -> str:
-    """Where the values of ``path`` stand in the spec: its axis, which is told with the path, or the base."""
+    """Where the spec gives the values of ``path``: its axis (shown with the path) or the base."""
     for position, axis in enumerate(study.axes):
         if path in axis.paths:
             return f"/axes/{position} ({path})"
@@ -164,7 +164,7 @@ def _pointer(study: Study, path: str) -> str:
 
 
 def _upright(report: Report, study: Study, pendulums: int) -> None:
-    """Vibration along y alone has no torque on a pendulum at rest in the upright position."""
+    """Vibration along y alone exerts no torque on a pendulum at rest in the upright position."""
     starts = [f"pendulums.{index}.initial_{name}" for index in range(pendulums) for name in ("angle", "speed")]
     across, along, *starts_at, weight = _columns(study, ["excitation.amplitude_x", "excitation.amplitude_y", *starts])
     across, along, *starts_at = np.broadcast_arrays(across, along, *starts_at)
@@ -172,7 +172,7 @@ def _upright(report: Report, study: Study, pendulums: int) -> None:
     if still.any():
         report.warn(
             "/base/pendulums: with vibration along y alone a pendulum that starts upright without speed stays upright, "
-            "even at parametric resonance: nothing would move; give an initial_angle (say 0.01 rad) or an amplitude_x"
+            "even at parametric resonance, and nothing moves; give an initial_angle such as 0.01 rad or an amplitude_x"
             + _share(still, weight)
         )
 
@@ -208,7 +208,7 @@ def _inertia(report: Report, study: Study, index: int) -> None:
 
 
 def _share(found: NDArray[np.bool_], weight: NDArray[np.float64]) -> str:
-    """How many cases it concerns, where every combination was looked at."""
+    """The number of cases concerned, where every combination was checked."""
     cases = float(weight)
     if found.size == 1 or not cases:
         return "" if found.size == 1 else " (in the worst case of the axes)"
@@ -218,7 +218,7 @@ def _share(found: NDArray[np.bool_], weight: NDArray[np.float64]) -> str:
 def _columns(study: Study, paths: Sequence[str]) -> list[NDArray[np.float64]]:
     """Values of ``paths`` in every combination of the axes that vary any of them, broadcastable against each other.
 
-    The last array is the number of cases that share a combination; 0 when only the axes' ends were combined.
+    The last array holds the number of cases that share a combination; 0 when only the ends of the axes were combined.
     """
     axes = tuple(axis for axis in study.axes if set(axis.paths) & set(paths))
     involved = replace(study, axes=axes)

@@ -25,9 +25,9 @@ FIELDS = ("path", *PLANS)
 
 
 def read_axes(report: Report, data: object, combine: Combine, machine: Machine) -> tuple[Axis, ...] | None:
-    """The axes with their values in SI numbers; None when something is wrong with any, which is noted.
+    """Read the axes with their values in SI numbers; None when any axis is invalid; the faults are recorded.
 
-    Counts are compared with the limits before a value is computed, so that no spec can ask for much memory.
+    Counts are compared with the limits before values are computed, so no spec can allocate much memory.
     """
     if not isinstance(data, list) or len(data) > MAX_AXES:
         report.fault("/axes", "wrong-type", "must be a list of axes", data, allowed=f"a list of 0 to {MAX_AXES} axes")
@@ -54,7 +54,7 @@ def read_axes(report: Report, data: object, combine: Combine, machine: Machine) 
 def axis_values(
     report: Report, pointer: str, data: object, machine: Machine
 ) -> tuple[tuple[str, ...], NDArray[np.float64]] | None:
-    """Paths and values (SI) of one axis alone; None when something is wrong with it, which is noted."""
+    """Paths and values (SI) of a single axis; None when it is invalid; the faults are recorded."""
     paths, plan = read_axis(report, pointer, data, machine)
     if paths is None or plan is None or not _sizes_fit(report, [plan], "grid"):
         return None
@@ -65,7 +65,7 @@ def axis_values(
 def read_axis(
     report: Report, pointer: str, data: object, machine: Machine
 ) -> tuple[tuple[str, ...] | None, Plan | None]:
-    """The paths of one axis, and its values counted but not there yet; None for what could not be read."""
+    """The paths of one axis and the plan of its values; None for what could not be read."""
     found = read_object(report, pointer, data, FIELDS)
     if found is None:
         return None, None
@@ -87,7 +87,7 @@ def read_axis(
 
 
 def read_paths(report: Report, pointer: str, data: object, machine: Machine) -> tuple[str, ...] | None:
-    """The paths of one axis, all known and of one unit; None, and problems noted, otherwise."""
+    """The paths of one axis; None, with the faults recorded, unless all are known and share one unit."""
     items = data if isinstance(data, list) else [data]
     if data is None or not 1 <= len(items) <= MAX_TIED_PATHS:
         report.fault(
@@ -123,7 +123,7 @@ def read_paths(report: Report, pointer: str, data: object, machine: Machine) -> 
 
 
 def check_paths(report: Report, axes: Sequence[tuple[str, ...]], pointer: str = "/axes") -> None:
-    """Note every path that stands twice, in one axis or on two; ``pointer`` is that of the list of axes."""
+    """Record every path that occurs twice, on one axis or on two; ``pointer`` is that of the list of axes."""
     taken: dict[str, int] = {}
     for index, paths in enumerate(axes):
         for path, times in Counter(paths).items():
@@ -173,7 +173,7 @@ def _sizes_fit(report: Report, plans: list[Plan], combine: Combine) -> bool:
 
 
 def expand(report: Report, plan: Plan, parameters: list[Parameter], combine: Combine) -> NDArray[np.float64] | None:
-    """The values of a plan, in range for every parameter, each once on an axis of a grid; None, and a problem noted.
+    """Expand a plan; None, with a fault recorded, where a value is out of range or repeated on an axis of a grid.
 
     Returns
     -------
@@ -204,13 +204,13 @@ def expand(report: Report, plan: Plan, parameters: list[Parameter], combine: Com
 
 
 def _first(mask: NDArray[np.bool_]) -> int:
-    """Position of the first that is true; the length when none is."""
+    """Position of the first true item; the length when there is none."""
     at = int(mask.argmax()) if mask.size else 0
     return at if mask.any() else int(mask.size)
 
 
 def _first_repeated(values: NDArray[np.float64]) -> int:
-    """Position of the first value that has come before; the length when each stands once."""
+    """Position of the first repeated value; the length when all differ."""
     if np.unique(values).size == values.size:
         return int(values.size)
     again = np.ones(values.size, dtype=np.bool_)
@@ -219,7 +219,7 @@ def _first_repeated(values: NDArray[np.float64]) -> int:
 
 
 def _shown(plan: Plan, value: float, parameter: Parameter) -> float | str:
-    """A value for a message: where the user wrote it, it is shown as written; else it needs its unit."""
+    """A value for a message: as the user wrote it, or the computed number with its unit."""
     return value if plan.listed else quantity_text(value, parameter.unit)
 
 
@@ -241,7 +241,7 @@ def _rows_differ(report: Report, axes: list[Axis], machine: Machine) -> bool:
 
 
 def varied_values(path: str, axes: tuple[Axis, ...] | None, base: Mapping[str, Any]) -> NDArray[np.float64]:
-    """Every value (SI) that ``path`` takes in the study: those of its axis, else the base's; empty when unknown."""
+    """Every value (SI) of ``path`` in the study: those of its axis, otherwise the base's; empty when unknown."""
     for axis in axes or ():
         if path in axis.paths:
             return axis.array

@@ -1,4 +1,4 @@
-"""Tables of cases that are counted first and made only then: the pieces that a study's cases are put together from."""
+"""Tables of cases that are counted before they are built: the parts of which a study's cases are composed."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Block:
-    """Some cases that a spec asks for.
+    """Some of the cases that a spec requests.
 
     Attributes
     ----------
     pointer : str
-        JSON Pointer of what asks for them.
+        JSON Pointer of the field that requests them.
     paths : tuple of str
         Parameters that vary in them.
     count : int
-        How many cases; may be huge.
+        Number of cases; may be huge.
     make : callable
-        Gives their columns: path -> values (SI), shape (count,). Tied paths share one array. None when something is
-        wrong with a value, which is noted.
+        Returns their columns: path -> values (SI), shape (count,). Tied paths share one array. None when a value is
+        invalid; the fault is recorded.
     lines : tuple of int
-        Lines of the user's text in which the cases stand one by one; () where they do not stand in one.
+        Line of the user's text for each case; () where the cases do not come from a text.
     """
 
     pointer: str
@@ -43,13 +43,13 @@ class Block:
 
 
 def made(blocks: Iterable[Block]) -> list[dict[str, Column]] | None:
-    """The columns of every block; None when any has a problem."""
+    """The columns of every block; None when any block is invalid."""
     found = [block.make() for block in blocks]
     return None if None in found else [columns for columns in found if columns is not None]
 
 
 def each(columns: Mapping[str, Column], change: Callable[[Column], Column]) -> dict[str, Column]:
-    """Every column changed; tied paths go on sharing one array."""
+    """Apply ``change`` to every column; tied paths still share one array."""
     done: dict[int, Column] = {}
     return {path: done.setdefault(id(column), change(column)) for path, column in columns.items()}
 
@@ -75,13 +75,13 @@ def side_by_side(tables: Sequence[dict[str, Column]]) -> dict[str, Column]:
 def one_after_another(
     tables: Sequence[dict[str, Column]], counts: Sequence[int], base: Mapping[str, float]
 ) -> dict[str, Column]:
-    """All rows of all tables, each row once; a parameter that varies elsewhere has its value of ``base``."""
+    """All rows of all tables, each row once; parameters that a table does not vary take their value from ``base``."""
     paths = list(dict.fromkeys(path for columns in tables for path in columns))
     joined: dict[tuple[object, ...], Column] = {}
     found: dict[str, Column] = {}
     for path in paths:
         parts = [columns.get(path) for columns in tables]
-        # Tied in every part, and of one value elsewhere: tied in the whole.
+        # Tied in every part, and equal elsewhere: tied in the whole.
         key = tuple(base[path] if part is None else id(part) for part in parts)
         if key not in joined:
             filled = [
@@ -93,9 +93,9 @@ def one_after_another(
 
 
 def first_rows(columns: Mapping[str, Column]) -> NDArray[np.int64]:
-    """Positions of the rows that have not come before, ascending."""
+    """Positions of the first occurrence of each row, ascending."""
     distinct = list({id(column): column for column in columns.values()}.values())
-    order = np.lexsort(distinct)  # equal rows stay in order, side by side
+    order = np.lexsort(distinct)  # the sort is stable: equal rows stay in order
     again = np.ones(order.size, dtype=np.bool_)
     again[:1] = False
     for column in distinct:
@@ -104,7 +104,7 @@ def first_rows(columns: Mapping[str, Column]) -> NDArray[np.int64]:
 
 
 def chosen(columns: Mapping[str, Column], rows: NDArray[Any]) -> dict[str, Column]:
-    """The rows at positions, or where a mask is true."""
+    """Select rows by position or by mask."""
     return each(columns, lambda column: column[rows])
 
 

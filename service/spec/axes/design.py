@@ -1,7 +1,7 @@
-"""What varies in a study: axes as a grid or side by side, and whatever has to be written out case by case.
+"""What varies in a study: axes as a grid or side by side, and combinations that are expanded case by case.
 
-A plain grid or zip of axes stays what it is. Samples, points, groups, unions and exclusions are put together here and
-become one table, a zip of as many axes as parameters vary.
+A plain grid or zip of axes is kept. Samples, points, groups, unions and exclusions are combined here into one table, a
+zip with one axis for each varied parameter.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ _ALLOWED: Final = "'grid' (every combination), 'zip' (side by side) or 'union' (
 
 
 def read_design(report: Report, found: Mapping[str, Any], machine: Machine) -> tuple[tuple[Axis, ...] | None, Combine]:
-    """The axes of the study and how they go together, from the spec's fields `axes`, `combine` and `exclude`.
+    """Read the axes of the study and their combination from the spec's fields `axes`, `combine` and `exclude`.
 
-    The axes are None when something is wrong, which is noted.
+    The axes are None when they are invalid; the faults are recorded.
     """
     combine = _read_combine(report, "/combine", found.get("combine", "grid"))
     items = found.get("axes", [])
@@ -102,7 +102,7 @@ def _length(columns: Mapping[str, NDArray[np.float64]]) -> int:
 
 
 def _kind(item: object) -> str:
-    """What an item of `axes` is, by the field that no other kind has."""
+    """The kind of an item of `axes`, recognised by the field that only this kind has."""
     if isinstance(item, Mapping):
         for kind, mark in (("sample", "sample"), ("points", "points"), ("group", "axes")):
             if mark in item:
@@ -161,7 +161,7 @@ def _make(
         return None
     if combine == "zip":
         return side_by_side(tables)
-    # A limit that is not given is no number that the cases of other axes could have.
+    # A missing limit is infinite, which cannot be stored as the value of the other cases.
     lacking = [path for path in dict.fromkeys(path for columns in tables for path in columns)
                if path not in machine.values and any(path not in columns for columns in tables)]  # fmt: skip
     for path in lacking:
@@ -208,7 +208,7 @@ def _axis(report: Report, pointer: str, data: object, combine: Combine, machine:
 
 
 def _fits(report: Report, block: Block) -> bool:
-    """Whether the table may be made: every number of it is kept with the study."""
+    """Whether the table is small enough: all its numbers are stored with the study."""
     if len(block.paths) > MAX_COLUMNS:
         report.fault(
             "/axes", "too-many", f"{len(block.paths)} parameters vary", allowed=f"at most {MAX_COLUMNS} parameters"
@@ -220,7 +220,7 @@ def _fits(report: Report, block: Block) -> bool:
     report.fault(
         "/axes",
         "too-many",
-        f"{count_text(block.count)} cases of {len(block.paths)} parameters are to be written out one by one",
+        f"needs a table of {count_text(block.count)} cases with {len(block.paths)} parameters each",
         allowed=f"at most {MAX_AXIS_VALUES:,} numbers, here {most:,} cases; a plain grid may have more",
     )
     return False

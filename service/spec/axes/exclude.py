@@ -1,4 +1,4 @@
-"""Conditions that take cases out of a study: ranges of parameters that are not to be run together."""
+"""Conditions that exclude cases: combinations of parameter ranges that are not run."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Condition = dict[str, list[tuple[str, float]]]
 
 
 def read_exclude(report: Report, data: object, machine: Machine) -> list[Condition]:
-    """The conditions: a case is excluded when all parts of any one hold. Problems are noted."""
+    """Read the conditions; a case is excluded when all parts of any one condition hold. Faults are recorded."""
     if not isinstance(data, list):
         report.fault(
             "/exclude",
@@ -82,20 +82,20 @@ def _parts(report: Report, pointer: str, path: str, data: object, machine: Machi
 def kept(
     conditions: list[Condition], columns: Mapping[str, NDArray[np.float64]], base: Mapping[str, float], count: int
 ) -> NDArray[np.bool_]:
-    """Which of ``count`` cases no condition excludes."""
+    """Mask of the ``count`` cases that no condition excludes."""
     keep = np.ones(count, dtype=np.bool_)
     for condition in conditions:
         held = np.ones(count, dtype=np.bool_)
         for path, parts in condition.items():
             column = columns.get(path)
-            # Only limits may be missing from the base: they are then infinite.
+            # Only limits may be missing from the base; they are infinite then.
             held &= _held(np.full(count, base.get(path, np.inf)) if column is None else column, parts)
         keep &= ~held
     return keep
 
 
 def _held(column: NDArray[np.float64], parts: list[tuple[str, float]]) -> NDArray[np.bool_]:
-    """Limits hold together; of several values under ``is``, any will do."""
+    """All limits must hold, and any one of the values under ``is``."""
     held = np.ones(column.shape, dtype=np.bool_)
     equal = [value for name, value in parts if name == "is"]
     if equal:

@@ -30,7 +30,7 @@ _HEADING: Final = re.compile(r"\s*([^\s\[\(]+)\s*(?:[\[\(]\s*([^\]\)]+?)\s*[\]\)
 
 
 def read_points(report: Report, pointer: str, data: Mapping[str, Any], machine: Machine) -> Block | None:
-    """The block of cases in a CSV text; None, and problems noted, when something is wrong with it."""
+    """Read the block of cases of a CSV text; None, with the faults recorded, when it is invalid."""
     found = read_object(report, pointer, data, FIELDS) or {}
     where, text = join(pointer, "points"), found.get("points")
     if not isinstance(text, str):
@@ -65,14 +65,14 @@ def read_points(report: Report, pointer: str, data: Mapping[str, Any], machine: 
 
 
 class _Row(NamedTuple):
-    """The cells of a row and the line of the text that it ends in, from 1."""
+    """The cells of a row, and the number of the line in which it ends, from 1."""
 
     line: int
     cells: list[str]
 
 
 class _Heading(NamedTuple):
-    """What a column holds; ``unit`` is "" where its header gives none."""
+    """The heading of a column; ``unit`` is "" where it gives none."""
 
     parameter: Parameter
     unit: str
@@ -82,9 +82,9 @@ class _Heading(NamedTuple):
 
 
 def _rows(text: str) -> list[_Row]:
-    """Rows that are not empty. What the header is parted by, parts all of it: commas, or semicolons, or tabs.
+    """The non-empty rows. The header's separator (comma, semicolon or tab) applies to the whole text.
 
-    Lines may end as any system ends them, old ones with a carriage return alone.
+    Lines may end with LF, CRLF or CR.
     """
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     header = text.lstrip().partition("\n")[0]
@@ -130,7 +130,7 @@ def _read_cells(
 
 
 def _read_cell(cell: str, heading: _Heading) -> float:
-    """A cell: a number in the unit of its column (SI where there is none), or a text with a unit of its own."""
+    """Read a cell: a number in the unit of its column (SI where there is none), or a text with its own unit."""
     if not cell:
         raise QuantityError("empty", "is empty")
     if not _is_number(cell):

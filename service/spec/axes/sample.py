@@ -30,7 +30,7 @@ LARGEST_SEED: Final = 2**32 - 1
 
 @dataclass(frozen=True)
 class SampleRange:
-    """Tied paths and the range (SI) that they are drawn from; on a log scale, even in the logarithm."""
+    """Tied paths and the range (SI) they are drawn from; on a log scale the logarithm is uniform."""
 
     paths: tuple[str, ...]
     low: float
@@ -38,7 +38,7 @@ class SampleRange:
     scale: Literal["linear", "log"]
 
     def place(self, unit: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Numbers between 0 and 1 as values of the range."""
+        """Map numbers between 0 and 1 to values of the range."""
         if self.scale == "log":
             values = self.low * (self.high / self.low) ** unit
         else:
@@ -47,7 +47,7 @@ class SampleRange:
 
 
 def read_sample(report: Report, pointer: str, data: Mapping[str, Any], machine: Machine) -> Block | None:
-    """The block of a sample; None, and problems noted, when something is wrong with it."""
+    """Read the block of a sample; None, with the faults recorded, when it is invalid."""
     before = report.found
     found = read_object(report, pointer, data, FIELDS) or {}
     method = read_choice(report, join(pointer, "sample"), found.get("sample"), METHODS)
@@ -111,7 +111,7 @@ def _read_range(report: Report, pointer: str, data: object, machine: Machine) ->
 
 
 def draw(method: str, count: int, seed: int, ranges: tuple[SampleRange, ...]) -> dict[str, NDArray[np.float64]]:
-    """The sample: the same for the same arguments, on every machine."""
+    """Draw the sample; equal arguments give equal samples on every machine."""
     unit = unit_sample(method, count, seed, len(ranges))
     found: dict[str, NDArray[np.float64]] = {}
     for index, item in enumerate(ranges):
@@ -120,7 +120,7 @@ def draw(method: str, count: int, seed: int, ranges: tuple[SampleRange, ...]) ->
 
 
 def unit_sample(method: str, count: int, seed: int, dimensions: int) -> NDArray[np.float64]:
-    """Points in the unit cube, shape (cases, dimensions); of the Saltelli design count*(dimensions + 2)."""
+    """Points in the unit cube, shape (cases, dimensions); the Saltelli design has count*(dimensions + 2) of them."""
     from scipy.stats import qmc
 
     if method == "latin_hypercube":

@@ -1,4 +1,4 @@
-"""The values of an axis: a list, an even or a geometric division, or steps. Counted first, expanded only then."""
+"""The values of an axis: a list, linear or geometric spacing, or steps. They are counted before they are expanded."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ if TYPE_CHECKING:
 
     Values = NDArray[np.float64]
 
-#: How far beyond its end a step range may reach, in steps: rounding of ends that were computed.
+#: How far a step range may exceed its end, in steps, to allow for the rounding of computed ends.
 _STEP_ROUNDING: Final = Fraction(1, 10**9)
-#: Whole numbers up to this are doubles.
+#: Integers up to this are exact as doubles.
 _EXACT: Final = 2**53
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Values of an axis that are counted but not yet there.
+    """Values of an axis that are counted but not yet expanded.
 
     Attributes
     ----------
     pointer : str
-        JSON Pointer of what gives them; for a list, each value stands under its index.
+        JSON Pointer of the field that gives them; the values of a list lie below it, by index.
     count : int
-        How many there will be; may be huge.
+        Number of values; may be huge.
     expand : callable
-        Gives them, SI, in order: float64 array, shape (count,).
+        Returns them in SI units and in order: float64 array, shape (count,).
     listed : bool
-        Whether the user wrote every value.
+        Whether the user listed every value.
     """
 
     pointer: str
@@ -68,13 +68,13 @@ def plan_values(report: Report, pointer: str, data: object, parameter: Parameter
 
 
 def in_range(values: Values, parameter: Parameter) -> NDArray[np.bool_]:
-    """Which values (SI) are finite and in the range of ``parameter``, as `Parameter.accepts` tells of one."""
+    """Which values (SI) are finite and in the range of ``parameter``; the vector form of `Parameter.accepts`."""
     above = values > parameter.low if parameter.low_open else values >= parameter.low
     return np.isfinite(values) & above & (values <= parameter.high)
 
 
 def _plain_numbers(data: list[Any]) -> Values | None:
-    """The numbers of a list without texts, each the double nearest to what was written; None where it has others."""
+    """The numbers of a list, each the nearest double; None where the list has other items."""
     if not set(map(type, data)) <= {int, float}:
         return None
     try:
@@ -84,7 +84,7 @@ def _plain_numbers(data: list[Any]) -> Values | None:
 
 
 def plan_linspace(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
-    """The plan of ``[from, to, count]``, both ends included, evenly divided."""
+    """The plan of ``[from, to, count]``, evenly spaced, both ends included."""
     division = _division(report, pointer, data, parameter)
     if division is None:
         return None
@@ -94,7 +94,7 @@ def plan_linspace(report: Report, pointer: str, data: object, parameter: Paramet
 
 
 def plan_geomspace(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
-    """The plan of ``[from, to, count]``, both ends included, each value the same multiple of the one before."""
+    """The plan of ``[from, to, count]``, geometrically spaced, both ends included."""
     division = _division(report, pointer, data, parameter)
     if division is None:
         return None
@@ -106,7 +106,7 @@ def plan_geomspace(report: Report, pointer: str, data: object, parameter: Parame
 
 
 def plan_range(report: Report, pointer: str, data: object, parameter: Parameter) -> Plan | None:
-    """The plan of ``[from, to, step]``; ``to`` is among the values when a whole number of steps leads there."""
+    """The plan of ``[from, to, step]``; ``to`` is included when a whole number of steps reaches it."""
     items = _three(report, pointer, data, "[from, to, step]")
     if items is None:
         return None
@@ -139,7 +139,7 @@ PLANS: Final[dict[str, Callable[[Report, str, object, Parameter], Plan | None]]]
 
 
 def count_text(count: int) -> str:
-    """A count for a message, however large."""
+    """A count of any size for a message."""
     return f"{count:,}" if count < 10**15 else f"about 10^{round(count.bit_length() * math.log10(2))}"
 
 
@@ -174,12 +174,12 @@ def _division(
 
 
 def _steps(start: Fraction, step: Fraction, count: int) -> Values:
-    """start + i*step, each correctly rounded: whole numbers over one denominator, divided once."""
+    """start + i*step, each correctly rounded: integers over a common denominator, divided once."""
     common = math.lcm(start.denominator, step.denominator)
     first = start.numerator * (common // start.denominator)
     by = step.numerator * (common // step.denominator)
     if max(abs(first), abs(first + (count - 1) * by), abs(by), common) <= _EXACT:
-        # The quotient of two whole numbers that are doubles is the nearest double.
+        # The quotient of two integers that are exact as doubles is correctly rounded.
         return (first + by * np.arange(count)) / np.float64(common)
     return np.array([(first + index * by) / common for index in range(count)])
 

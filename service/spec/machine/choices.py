@@ -1,4 +1,4 @@
-"""Fields of a machine that are not numbers, as shown in a table of inputs: a text for each choice, with defaults."""
+"""Non-numeric fields of a machine for a table of inputs: a text for each choice, defaults included."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 _MEANINGS: Final = {
     "cycle": "revolutions of a cycle",
     "mean_speed_is": "mean that mean_speed and the irregularity refer to",
-    "balance": "what makes the work over a cycle zero",
+    "balance": "how the work over a cycle is made zero",
     "phi_c": "angle with T = T_mean from which S3 and S4 count, from 0",
     "drive.motor.kind": "kind of the motor",
     "drive.torque.interpolation": "between the rows of the torque's table",
@@ -24,8 +24,8 @@ _MEANINGS: Final = {
     "mechanism.cam.fall": "law of the fall",
     "mechanism.interpolation": "between the rows of the mechanism's table",
     "operation": "how the resistance is given",
-    "operation.quantity": "what the diagram is of",
-    "operation.over": "what the diagram goes over",
+    "operation.quantity": "quantity of the diagram",
+    "operation.over": "variable of the diagram",
     "operation.during": "strokes in which the diagram holds",
     "operation.sense": "direction of the force",
     "operation.interpolation": "between the rows of the operation's table",
@@ -33,7 +33,7 @@ _MEANINGS: Final = {
 
 
 class Choice(NamedTuple):
-    """One choice: its path in the base, what was chosen, and what it decides."""
+    """One choice: its path in the base, the chosen value, and its meaning."""
 
     path: str
     text: str
@@ -41,7 +41,7 @@ class Choice(NamedTuple):
 
 
 def drive_choices(study: Study, spec: Mapping[str, Any]) -> Iterator[Choice]:
-    """How the clutch laws of a vibration drive are fitted, and which have no limit."""
+    """How the clutch laws of a vibration drive are fitted, and which of them have no limit."""
     base = spec.get("base") or {}
     places = [("clutch", base)] if "clutch" in base else []
     places += [(f"pendulums.{index}.clutch", item) for index, item in enumerate(base.get("pendulums") or ())]
@@ -83,7 +83,7 @@ def _chosen(structure: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _operation_choices(operation: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    form = operation.get("form", operation["quantity"])  # a gas has no form, nothing that resists has neither
+    form = operation.get("form", operation["quantity"])  # a gas has no form; without an operation there is neither
     yield "operation", "value" if form == "constant" else form
     if "form" not in operation:
         return

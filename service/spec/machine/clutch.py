@@ -1,4 +1,4 @@
-"""The clutch of a spec: coefficients, or measured data that are fitted here; and the check of every law of a study."""
+"""The clutch of a spec: coefficients, or measured data that are fitted here; and the check of all laws of a study."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ class Clutch:
     pointer : str
         JSON Pointer of its object.
     prefix : str
-        What its flat paths begin with: "clutch." or "pendulums.N.clutch.".
+        Beginning of its flat paths: "clutch." or "pendulums.N.clutch.".
     coefficients : tuple of float
         c_1 first, N*m/rad^(k-1).
     windup_limit : float
-        End of the law's range, rad; infinite when there is none.
+        End of the law's range, rad; infinite when none is given.
     fit : ClutchFit or None
-        Where the coefficients come from measured data.
+        The fit, where the coefficients come from measured data.
     """
 
     pointer: str
@@ -55,13 +55,13 @@ class Clutch:
 
     @property
     def values(self) -> dict[str, float]:
-        """Its flat paths and SI numbers; without the windup limit when there is none."""
+        """Flat path -> SI number; without the windup limit when there is none."""
         limit = {} if math.isinf(self.windup_limit) else {f"{self.prefix}windup_limit": self.windup_limit}
         return {f"{self.prefix}coefficients.{k}": value for k, value in enumerate(self.coefficients)} | limit
 
     @property
     def parameters(self) -> dict[str, Parameter]:
-        """Flat paths that an axis can vary; none when the law comes from data."""
+        """The parameters that an axis can vary, by flat path; none when the law comes from data."""
         if self.fit is not None:
             return {}
         paths = [(f"{self.prefix}coefficients.{k}", CLUTCH_COEFFICIENT) for k in range(len(self.coefficients))]
@@ -71,7 +71,7 @@ class Clutch:
 
 
 def read_clutch(report: Report, pointer: str, data: object, prefix: str, backlashes: Sequence[float]) -> Clutch | None:
-    """The clutch at ``pointer``; None when it cannot be read, everything wrong with it noted.
+    """Read the clutch at ``pointer``; None, with the faults recorded, when it is invalid.
 
     Parameters
     ----------
@@ -138,14 +138,14 @@ def _measured(
             report.fault(
                 join(pointer, "angles_include_backlash"),
                 "conflict",
-                "one clutch for all pendulums needs one backlash for all of them to be taken off the angles; give the "
+                "the backlash can be subtracted only if all pendulums of a common clutch have the same one; give the "
                 "clutch in each pendulum instead",
                 [quantity_text(backlash, "rad") for backlash in backlashes],
             )
         elif backlashes:
             options["backlash"] = backlashes[0]
         else:
-            return None  # the backlash itself could not be read, which is noted already
+            return None  # the backlash could not be read, which is recorded already
     if accuracy is None or report.found > before:
         return None
     try:
@@ -188,10 +188,10 @@ def _shown(value: object) -> object:
 
 
 def check_laws(report: Report, clutches: Iterable[Clutch], axes: Sequence[Axis], combine: Combine) -> None:
-    """Note every clutch whose law is negative in its range, or zero everywhere, in some case of the study.
+    """Record every clutch whose law is negative in its range, or zero everywhere, in some case of the study.
 
-    The torque rises with each coefficient, and a wider range only adds windups, so of a grid's laws the one with the
-    smallest coefficients and the widest range is the worst, and the only one to look at.
+    The torque rises with each coefficient, and a wider range only adds windups. So the worst law of a grid is the one
+    with the smallest coefficients and the widest range, and only that one is checked.
     """
     for clutch in clutches:
         if clutch.fit is not None:

@@ -22,12 +22,12 @@ _CLUTCH_PATH = re.compile(r"(?:pendulums\.[0-9]{1,9}\.)?clutch\.(.+)")
 
 @dataclass
 class Drive(Machine):
-    """What the base of a vibration drive says, as far as it could be read.
+    """The base of a vibration drive, as far as it could be read.
 
     Attributes
     ----------
-    pendulums : number of pendulums; None when they could not be read
-    clutches : the one clutch of all pendulums, or one for each; those that could be read
+    pendulums : number of pendulums; None when it could not be read
+    clutches : the common clutch of all pendulums, or one for each; only those that could be read
     """
 
     pendulums: int | None = None
@@ -35,15 +35,15 @@ class Drive(Machine):
 
     @property
     def fits(self) -> dict[str, ClutchFit]:
-        """JSON Pointer of each clutch that was fitted here -> its fit."""
+        """JSON Pointer of each fitted clutch -> its fit."""
         return {clutch.pointer: clutch.fit for clutch in self.clutches if clutch.fit is not None}
 
     def assumed(self, path: str) -> bool:
-        """Whether ``path`` could be a number of a part of the base that could not be read."""
+        """Whether ``path`` may belong to a part of the base that could not be read."""
         return not self.clutches and assumed_clutch(path)
 
     def why_not(self, path: str) -> str:
-        """Why an axis cannot vary ``path``: a sentence that says what it can."""
+        """A sentence that explains why an axis cannot vary ``path``, and what it can vary."""
         inside = _PENDULUM_PATH.fullmatch(path)
         if inside and self.pendulums is not None and int(inside[1]) >= self.pendulums:
             return f"there is no pendulum {inside[1]}: pendulums are numbered from 0 to {self.pendulums - 1}"
@@ -68,7 +68,7 @@ class Drive(Machine):
 
 
 def read_drive(report: Report, data: object) -> Drive:
-    """The machine in ``data`` (the spec's `base`), everything wrong with it noted in ``report``."""
+    """Read the machine in ``data`` (the spec's `base`); faults are recorded in ``report``."""
     machine = Drive()
     catalogue = [entry for entry in parameter_catalogue(VIBRATION_DRIVE) if not entry.path.startswith("clutch.")]
     sections = list(dict.fromkeys(entry.path.split(".")[0] for entry in catalogue))
@@ -123,7 +123,7 @@ def _read_pendulums(report: Report, pointer: str, data: object, entries: list[Pa
         return
     machine.pendulums = len(data)
     for index, pendulum in enumerate(data):
-        # A null in the list is no missing section but a wrong pendulum.
+        # A null in the list is an invalid pendulum, not a missing section.
         item = "null" if pendulum is None else pendulum
         _read_section(report, join(pointer, index), item, f"pendulums.{index}", entries, machine)
 
@@ -139,7 +139,7 @@ def _read_clutches(report: Report, base: Mapping[str, Any], machine: Drive) -> N
             report.fault(
                 "/base/clutch",
                 "conflict",
-                f"is common to all pendulums, yet pendulums {', '.join(map(str, own))} also have their own",
+                f"is common to all pendulums, but pendulums {', '.join(map(str, own))} also have their own",
                 allowed="one clutch in `base`, or one in each pendulum",
             )
         _add(machine, read_clutch(report, "/base/clutch", base["clutch"], "clutch.", known))
@@ -174,7 +174,7 @@ def _add(machine: Drive, clutch: Clutch | None) -> None:
 
 
 def _assume_everything(catalogue: list[Parameter], machine: Drive) -> None:
-    """Lets axes name whatever a machine could have, so that an unreadable base brings no second problem there."""
+    """Let axes name any parameter a machine could have, so that an unreadable base causes no further faults there."""
     for entry in catalogue:
         for index in range(MAX_PENDULUMS if ".N." in entry.path else 1):
             path = entry.path.replace(".N.", f".{index}.")
@@ -182,7 +182,7 @@ def _assume_everything(catalogue: list[Parameter], machine: Drive) -> None:
 
 
 def assumed_clutch(path: str) -> bool:
-    """Whether ``path`` could be one of a clutch that could not be read."""
+    """Whether ``path`` may belong to a clutch that could not be read."""
     match = _CLUTCH_PATH.fullmatch(path)
     if match is None:
         return False

@@ -1,6 +1,6 @@
-"""The machine of a spec (`base`), whichever model it is of: numbers by flat path, and the paths that axes can vary.
+"""The machine of a spec (`base`) of any model: numbers by flat path, and the paths that axes can vary.
 
-Fields are nested as the paths are: the number at ``mechanism.slider_crank.crank`` stands at
+Fields are nested like the paths: the number at ``mechanism.slider_crank.crank`` is the one at
 ``/base/mechanism/slider_crank/crank``.
 """
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 @dataclass
 class Machine:
-    """What the base of a spec says, as far as it could be read.
+    """The base of a spec, as far as it could be read.
 
     Attributes
     ----------
-    values : flat path -> SI number; incomplete when problems were noted
+    values : flat path -> SI number; incomplete when faults were recorded
     parameters : flat path -> parameter, for every number that an axis can vary
-    structure : what of it is no number, as a study keeps it; None where its model has no such, or it could not be read
+    structure : its non-numeric part as stored in a study; None where the model has none or it could not be read
     """
 
     values: dict[str, float] = field(default_factory=dict)
@@ -34,21 +34,21 @@ class Machine:
 
     @property
     def fits(self) -> dict[str, ClutchFit]:
-        """JSON Pointer of each clutch that was fitted here -> its fit."""
+        """JSON Pointer of each fitted clutch -> its fit."""
         return {}
 
     def assumed(self, path: str) -> bool:  # noqa: ARG002 - some models need it
-        """Whether ``path`` could be a number of a part of the base that could not be read."""
+        """Whether ``path`` may belong to a part of the base that could not be read."""
         return False
 
     def why_not(self, path: str) -> str:
-        """Why an axis cannot vary ``path``: a sentence that says what it can."""
+        """A sentence that explains why an axis cannot vary ``path``, and what it can vary."""
         known = tuple(self.parameters)
         return "names no numeric parameter of the base" + did_you_mean(path.removeprefix("base."), known)
 
 
 def read_plain(report: Report, data: object, catalogue: tuple[Parameter, ...]) -> Machine:
-    """The machine in ``data`` of a model whose ``catalogue`` says all: nothing is counted, nothing is a choice."""
+    """Read the machine of a model that is fully described by ``catalogue``: plain numbers, no lists, no choices."""
     machine = Machine(parameters={entry.path: entry for entry in catalogue})
     if not isinstance(data, Mapping):
         message = "is required" if data is None else "must be an object"
@@ -66,7 +66,7 @@ def read_plain(report: Report, data: object, catalogue: tuple[Parameter, ...]) -
 
 
 def read_numbers(report: Report, data: Mapping[str, Any], machine: Machine) -> None:
-    """Put the numbers of the machine's parameters into its values; what is missing or wrong is noted."""
+    """Read the numbers of the machine's parameters into its values; faults are recorded."""
     for path, entry in machine.parameters.items():
         number = _read(report, data, path, entry)
         if number is not None:
@@ -74,13 +74,13 @@ def read_numbers(report: Report, data: Mapping[str, Any], machine: Machine) -> N
 
 
 def _fields(prefix: str, machine: Machine) -> list[str]:
-    """The fields of the object at a path."""
+    """Names of the fields of the object at a path."""
     rests = (path.removeprefix(prefix) for path in machine.parameters if path.startswith(prefix))
     return list(dict.fromkeys(rest.split(".")[0] for rest in rests))
 
 
 def _unknown_fields(report: Report, prefix: str, data: Mapping[str, Any], machine: Machine) -> None:
-    """Note every field that no parameter is in, and every part that is not an object."""
+    """Record every field that leads to no parameter, and every part that is not an object."""
     pointer = join("/base", *prefix.split(".")[:-1])
     fields = _fields(prefix, machine)
     report.unknown_fields(pointer, data, tuple(fields))
@@ -95,7 +95,7 @@ def _unknown_fields(report: Report, prefix: str, data: Mapping[str, Any], machin
 
 
 def _read(report: Report, found: Mapping[str, Any], path: str, entry: Parameter) -> float | None:
-    """The number at a flat path of the base; None, and a problem noted, when it is missing or wrong."""
+    """The number at a flat path of the base; None, with a fault recorded, when it is missing or invalid."""
     place: Any = found
     keys: list[str | int] = []
     for key in path.split("."):
@@ -110,5 +110,5 @@ def _read(report: Report, found: Mapping[str, Any], path: str, entry: Parameter)
     if entry.default is None:
         missing(report, join("/base", *path.split(".")), entry)
         return None
-    # No end of a range is a number that could be stored.
+    # An open end of a range is not a number that could be stored.
     return entry.default if entry.accepts(entry.default) else None

@@ -1,6 +1,6 @@
-"""The part of the spec that each model has to itself: how base and run are read, what a schema says of them.
+"""The part of the spec that depends on the model: how base and run are read, and their JSON Schemas.
 
-A model that is not registered has what its catalogue of parameters says: plain numbers, and no run.
+A model that is not registered is described by its catalogue of parameters: plain numbers and no run.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def _no_run_schema() -> Schema:
 
 
 def _nothing(*_: object) -> None:
-    """No more to check, nothing to warn of."""
+    """Check nothing, warn of nothing."""
 
 
 def _no_choices(*_: object) -> tuple[Choice, ...]:
@@ -52,16 +52,16 @@ def _no_choices(*_: object) -> tuple[Choice, ...]:
 
 @dataclass(frozen=True, slots=True)
 class SpecPart:
-    """The part of one model; every function notes what is wrong in the report that it is given.
+    """The part of one model; every function records faults in the report that it is given.
 
     Attributes
     ----------
     read_base : reads `base`
     base_schema, run_schema : their JSON Schemas
-    read_run : reads `run` of a machine with its axes (None where they could not be read) as a study keeps it
-    check : looks at what takes machine and axes together
-    warn : warns of what is allowed, and implausible
-    choices : what of the machine of a study is no number; takes the user's own spec too
+    read_run : reads `run` as stored in a study, for a machine with its axes (None where they could not be read)
+    check : checks what depends on both machine and axes
+    warn : warns of what is allowed but implausible
+    choices : the non-numeric fields of a study's machine; also takes the user's spec
     """
 
     read_base: Callable[[Report, object], Machine]
@@ -113,7 +113,7 @@ _PARTS = {
 
 
 def part_of(model: str) -> SpecPart:
-    """The part of ``model``; ValueError where there is no such model."""
+    """The part of ``model``; ValueError for an unknown model."""
     if model in _PARTS:
         return _PARTS[model]
     catalogue = models.parameter_catalogue(model)

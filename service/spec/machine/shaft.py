@@ -1,6 +1,6 @@
 """The machine shaft of a spec (`base`): its structure, every number by its flat path, and the paths that axes can vary.
 
-What is wrong with the machine as a whole (`shaft_check`) is looked for once its parts could be read.
+The machine as a whole is checked (`shaft_check`) once its parts could be read.
 """
 
 from __future__ import annotations
@@ -37,24 +37,24 @@ _INDEXED = re.compile(r"operation\.steps\.([0-9]{1,9})\.")
 
 @dataclass
 class ShaftMachine(Machine):
-    """What the base of a machine shaft says, as far as it could be read.
+    """The base of a machine shaft, as far as it could be read.
 
     Attributes
     ----------
-    places : "drive", "mechanism", "operation" -> JSON Pointer of its formula, its table, or all of it
+    places : "drive", "mechanism", "operation" -> JSON Pointer of its formula, its table, or the whole part
     """
 
     places: dict[str, str] = field(default_factory=dict)
 
     def assumed(self, path: str) -> bool:
-        """Whether ``path`` could be a number of a machine whose structure could not be read."""
+        """Whether ``path`` may belong to a machine whose structure could not be read."""
         return self.structure is None and any(
             entry.path in {general_path(path), re.sub(r"^constants\..*", "constants.NAME", path)}
             for entry in models.parameter_catalogue(models.MACHINE_SHAFT)
         )
 
     def why_not(self, path: str) -> str:
-        """Why an axis cannot vary ``path``: a sentence that says what it can."""
+        """A sentence that explains why an axis cannot vary ``path``, and what it can vary."""
         steps = 0 if self.structure is None else int(self.structure["operation"]["steps"])
         step = _INDEXED.match(path)
         if step and steps:
@@ -68,7 +68,7 @@ class ShaftMachine(Machine):
 
 
 def read_shaft(report: Report, data: object) -> ShaftMachine:
-    """The machine in ``data`` (the spec's `base`), everything wrong with it noted in ``report``."""
+    """Read the machine in ``data`` (the spec's `base`); faults are recorded in ``report``."""
     machine = ShaftMachine()
     found = read_object(report, "/base", data, FIELDS)
     if found is None:
@@ -87,7 +87,7 @@ def read_shaft(report: Report, data: object) -> ShaftMachine:
 
 
 def _read_structure(report: Report, found: Mapping[str, Any], places: dict[str, str]) -> dict[str, Any] | None:
-    """The structure as plain data; None, and problems noted, when some part of it could not be read."""
+    """Read the structure as plain data; None, with the faults recorded, when some part could not be read."""
     drive = read_drive(report, found.get("drive"), places)
     mechanism = read_mechanism(report, found.get("mechanism"), places)
     operation = read_operation(report, found.get("operation"), places)
@@ -107,19 +107,19 @@ def _read_structure(report: Report, found: Mapping[str, Any], places: dict[str, 
 
 
 def _unused(report: Report, found: Mapping[str, Any], structure: Mapping[str, Any]) -> None:
-    """Notes numbers that this machine has no use for, which a user surely means otherwise."""
+    """Record numbers that this machine does not use; they are certainly a mistake."""
     if structure["balance"] == "motor" and "mean_speed" in found:
-        report.fault("/base/mean_speed", "not-used", "is not required of a machine with a motor: the speed is a result",
+        report.fault("/base/mean_speed", "not-used", "is not used with a motor: the speed is a result",
                        found["mean_speed"], allowed='no mean_speed, or another balance than "motor"')  # fmt: skip
     drive = found.get("drive")
     if isinstance(drive, Mapping) and "scale" in drive and "drive.scale" not in machine_shaft.parameters_of(structure):
         report.fault(
             "/base/drive/scale",
             "not-used",
-            "is the factor on a table or formula of the driving torque, and there is none",
+            "scales a table or formula of the driving torque, but none is given",
             drive["scale"],
         )
     operation = found.get("operation")
     if isinstance(operation, Mapping) and structure["operation"]["over"] == "angle" and "during" in operation:
-        report.fault("/base/operation/during", "not-used", "selects strokes, and this diagram is over the angle",
+        report.fault("/base/operation/during", "not-used", "selects strokes, but this diagram is over the angle",
                        operation["during"], allowed='with `over` "stroke" only')  # fmt: skip

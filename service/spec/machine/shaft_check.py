@@ -1,4 +1,4 @@
-"""What is wrong with a machine shaft as a whole: parts that make no machine, and machines without a steady cycle."""
+"""Checks of a machine shaft as a whole: parts that do not fit together, and machines without a steady cycle."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from sprag.worker.models import (
 )
 from sprag.worker.pool.child_process import uncounted
 
-#: Where the fault of a machine that ends so is told.
+#: Pointer of the fault for each ending.
 _POINTERS: Final[dict[Ending | None, str]] = {
     Ending.UNBALANCED_WORK: "/base/balance",
     Ending.NEGATIVE_INERTIA: "/base/drive/inertia",
@@ -33,7 +33,7 @@ _NEUTRAL: Final[dict[str, dict[str, Any]]] = {"drive": {}, "mechanism": {"kind":
 
 
 class NotCompiledError(Exception):
-    """The kernel of ``shape`` is needed, and is compiled elsewhere: see `compile_elsewhere`."""
+    """The kernel of ``shape`` is needed and must be compiled elsewhere: see `compile_elsewhere`."""
 
     def __init__(self, shape: KernelShape) -> None:
         super().__init__(shape)
@@ -44,14 +44,14 @@ _compiles_here = True
 
 
 def compile_elsewhere() -> None:
-    """From now on checks in this process raise NotCompiledError rather than compile, which can take a minute."""
+    """From now on checks in this process raise NotCompiledError instead of compiling, which can take a minute."""
     global _compiles_here  # noqa: PLW0603 - a habit of the whole process
     _compiles_here = False
 
 
 @cache
 def _load(shape: KernelShape) -> None:
-    """Take the kernels from the cache on disk, once in a process: no spec is to be blamed for the time of that."""
+    """Load the kernels from the cache on disk, once per process, outside the time limit of any spec."""
     with uncounted():
         load(shape)
 
@@ -59,13 +59,13 @@ def _load(shape: KernelShape) -> None:
 def check_machine(
     report: Report, structure: Mapping[str, Any], values: Mapping[str, float], places: Mapping[str, str]
 ) -> None:
-    """Note what is wrong with a machine whose numbers are all in range.
+    """Record the faults of a machine whose numbers are all in range.
 
     Parameters
     ----------
-    structure : as a study keeps it
-    values : flat path -> SI number, all that the structure needs
-    places : part -> JSON Pointer of its formula, its table, or all of it
+    structure : as stored in a study
+    values : flat path -> SI number, complete for the structure
+    places : part -> JSON Pointer of its formula, its table, or the whole part
     """
     shape = machine_shaft.SHAPE
     if not _compiles_here:
@@ -74,7 +74,7 @@ def check_machine(
         _load(shape)
     before = report.found
     for part in _PARTS:
-        # Alone but for the mechanism, which an operation needs, so that a fault is told where it is.
+        # Each part alone (an operation with its mechanism), so that a fault is reported at its place.
         alone = {name: structure[name] if name in {part, "mechanism"} else _NEUTRAL[name] for name in _PARTS}
         own = {**structure, **alone}
         if part != "drive" and structure["balance"] == "motor":
@@ -113,7 +113,7 @@ def code_of(error: MachineError) -> Code:
         return "invalid-formula"
     if isinstance(error, TableError):
         return "invalid-table"
-    # Where one case of a grid would end so, the code is the name of that ending.
+    # The code is the name of the ending that a case of a grid would have.
     return "invalid-machine" if error.ending is None else cast("Code", error.ending.value.replace("_", "-"))
 
 

@@ -17,7 +17,7 @@ BALANCES: Final = ("constant", "scale", "refuse", "motor")
 LAWS: Final = ("cycloidal", "polynomial_345")
 INTERPOLATIONS: Final = ("smooth", "linear")
 MOTORS: Final = ("linear", "kloss")
-#: What of a mechanism is no number: field -> its choices.
+#: Non-numeric fields of a mechanism and their choices.
 MECHANISM_CHOICES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
     "slider_crank": {},
     "four_bar": {},
@@ -25,7 +25,7 @@ MECHANISM_CHOICES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
     "cam": {"rise": LAWS, "fall": LAWS},
 }
 MECHANISMS: Final = ("table", "formula", *MECHANISM_CHOICES)
-#: Ways to give an operation's diagram.
+#: Ways to give the diagram of an operation.
 FORMS: Final = ("value", "steps", "table", "formula")
 OPERATION_CHOICES: Final[dict[str, tuple[str, ...]]] = {
     "quantity": ("force", "torque"),
@@ -49,7 +49,7 @@ def number_fields(prefix: str) -> tuple[str, ...]:
 
 
 def read_cycle(report: Report, value: object) -> int | None:
-    """Revolutions of a cycle."""
+    """Read the revolutions of a cycle."""
     most = max(machine_shaft.REVOLUTIONS)
     turns: float | None = None
     if isinstance(value, str):
@@ -69,12 +69,12 @@ def read_cycle(report: Report, value: object) -> int | None:
 
 
 def read_phi_c(report: Report, value: object) -> int | None:
-    """Which of the angles with T = T_mean is taken; None for the first at which T rises."""
+    """Read the choice among the angles with T = T_mean; None means the first at which T rises."""
     return None if value is None else read_whole(report, "/base/phi_c", value, 0, 1000)
 
 
 def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, Any] | None) -> str | None:
-    """What makes the work over a cycle zero; a motor balances by itself, and a torque that is given is kept."""
+    """Read how the work over a cycle is made zero; by default a motor does it, and a given torque is kept."""
     motor = drive is not None and drive["motor"] is not None
     given = isinstance(found.get("drive"), Mapping) and "torque" in found["drive"]
     default = "motor" if motor else "refuse" if given else "constant"
@@ -103,7 +103,7 @@ def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, A
 
 
 def read_constants(report: Report, data: object) -> list[str] | None:
-    """Names of the constants of formulas."""
+    """Read the names of the constants of formulas."""
     if not isinstance(data, Mapping) or len(data) > machine_shaft.MAX_CONSTANTS:
         allowed = f"an object of at most {machine_shaft.MAX_CONSTANTS} names with their numbers"
         report.fault(
@@ -118,7 +118,7 @@ def read_constants(report: Report, data: object) -> list[str] | None:
 
 
 def read_drive(report: Report, data: object, places: dict[str, str]) -> dict[str, Any] | None:
-    """The drive: its torque's form, or its motor."""
+    """Read the drive: the form of its torque, or its motor."""
     places["drive"] = "/base/drive"
     found = read_object(report, "/base/drive", data, ("inertia", "torque", "scale", "motor"))
     if found is None:
@@ -166,7 +166,7 @@ def _refuse_foreign(report: Report, pointer: str, found: Mapping[str, Any], own:
 
 
 def read_mechanism(report: Report, data: object, places: dict[str, str]) -> dict[str, Any] | None:
-    """The mechanism: which one, and those of its fields that are not numbers."""
+    """Read the mechanism: its kind and its non-numeric fields."""
     places["mechanism"] = "/base/mechanism"
     if data is None:
         return {"kind": "none"}
@@ -194,7 +194,7 @@ def read_mechanism(report: Report, data: object, places: dict[str, str]) -> dict
         return None
     made: dict[str, Any] = {"kind": kind}
     for name, allowed in choices.items():
-        # A quick return is the one or the other; the laws of cams have a usual one.
+        # A quick return has no default kind; the laws of cams have one.
         choice = read_choice(
             report, join(pointer, name), own.get(name, None if name == "kind" else allowed[0]), allowed
         )
@@ -205,7 +205,7 @@ def read_mechanism(report: Report, data: object, places: dict[str, str]) -> dict
 
 
 def read_operation(report: Report, data: object, places: dict[str, str]) -> dict[str, Any] | None:
-    """The operation: what resists, how it is given, over what."""
+    """Read the operation: the resistance, its form and its variable."""
     places["operation"] = "/base/operation"
     if data is None:
         return {"quantity": "none", "over": "angle", "steps": 0}
@@ -277,7 +277,7 @@ def _unit(unit: str) -> Parameter:
 def _diagram(
     report: Report, pointer: str, found: Mapping[str, Any], place: Parameter, value: Parameter
 ) -> dict[str, Any] | None:
-    """Form, table and formula of what is given as one of both."""
+    """Form, table and formula of a diagram that is given either as a table or as a formula."""
     given = [form for form in ("table", "formula") if form in found]
     if len(given) != 1:
         report.fault(

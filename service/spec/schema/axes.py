@@ -41,8 +41,8 @@ def axis_schema() -> Schema:
             "description": "the values themselves",
         },
         "linspace": three(count, "[from, to, count], evenly divided, both ends included"),
-        "geomspace": three(count, "[from, to, count], each value the same multiple of the one before"),
-        "range": three(end, "[from, to, step], the end included when a whole number of steps leads there"),
+        "geomspace": three(count, "[from, to, count], each value the same multiple of the previous one"),
+        "range": three(end, "[from, to, step], including the end when a whole number of steps reaches it"),
     }
     return {
         **object_schema(
@@ -95,7 +95,7 @@ def points_schema() -> Schema:
 
 
 def group_schema() -> Schema:
-    """Schema of axes that are put together before they meet the others."""
+    """Schema of axes that are combined with each other before the rest."""
     inner = {"anyOf": [axis_schema(), sample_schema(), points_schema()]}
     axes = {"type": "array", "minItems": 1, "maxItems": MAX_AXES, "items": inner}
     combine = {"enum": list(COMBINE), "default": "grid", "description": COMBINE_HELP}
@@ -103,7 +103,7 @@ def group_schema() -> Schema:
 
 
 def exclude_schema() -> Schema:
-    """Schema of the conditions that take cases out."""
+    """Schema of the conditions that exclude cases."""
     limits: Schema = {name: _QUANTITY for name in EXCLUDE_FIELDS if name != "is"}
     limits["is"] = {"anyOf": [_QUANTITY, {"type": "array", "minItems": 1, "items": _QUANTITY}]}
     part = {**object_schema(limits), "minProperties": 1}
@@ -134,7 +134,7 @@ def extension_schema() -> Schema:
                 "description": "further cases, which come after those of the study; what they do not vary is as in "
                 "the base",
             },
-            "name": {"type": "string", "description": "name of the new study; that of the old one unless given"},
+            "name": {"type": "string", "description": "name of the new study; by default that of the old one"},
         },
         description="what is added to a study: either axes or cases",
     )

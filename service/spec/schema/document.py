@@ -1,7 +1,7 @@
 """The spec as a JSON Schema (2020-12), made from the engine's catalogue: for the API's description and for forms.
 
-The schema says what a field is called, its unit, range, default and meaning. What depends on several fields (windows
-inside the run, sizes of grids, clutch laws) only `sprag.service.spec.document.parse_spec` checks.
+The schema gives each field's name, unit, range, default and meaning. Rules that involve several fields (windows inside
+the run, sizes of grids, clutch laws) are checked by `sprag.service.spec.document.parse_spec` only.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def spec_schema() -> Schema:
                 "minLength": 1,
                 "maxLength": MAX_NAME_LENGTH,
                 "default": UNNAMED,
-                "description": "what people call the study",
+                "description": "name of the study",
             },
             "base": {"type": "object", "description": "the machine that every case begins from"},
             "run": {"type": "object"},
@@ -55,7 +55,7 @@ def spec_schema() -> Schema:
         required=("sprag", "model", "base"),
         description="a study: a machine, a run, and what varies",
     )
-    # Base and run are those of the model.
+    # Base and run depend on the model.
     return {**schema, "allOf": [_of_model(model) for model in models.model_names()]}
 
 

@@ -1,4 +1,4 @@
-"""Parts of JSON Schemas that every model has: quantities with their units."""
+"""Parts of JSON Schemas that all models share: quantities with their units."""
 
 from __future__ import annotations
 

@@ -40,13 +40,13 @@ def shaft_schema() -> Schema:
             },
             "balance": {
                 "enum": list(BALANCES),
-                "description": "what makes the work over a cycle zero; by default constant, refuse where a torque is "
+                "description": "how the work over a cycle is made zero; by default constant, refuse where a torque is "
                 "given, motor where there is one",
             },
             "phi_c": {
                 "type": "integer",
                 "minimum": 0,
-                "description": "which of the angles with T = T_mean S3 and S4 count from; by default the first where T "
+                "description": "the angle with T = T_mean from which S3 and S4 count; by default the first where T "
                 "rises",
             },
             "constants": {
@@ -91,7 +91,7 @@ def _table(description: str) -> Schema:
 _INTERPOLATION: Final[Schema] = {
     "enum": list(INTERPOLATIONS),
     "default": INTERPOLATIONS[0],
-    "description": "how rows of the table are joined: without overshoot, or by straight lines",
+    "description": "interpolation between the rows: without overshoot, or by straight lines",
 }
 
 

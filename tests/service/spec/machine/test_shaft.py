@@ -288,7 +288,7 @@ def test_what_is_odd_is_warned_of() -> None:
     assert warnings({}) == ""
     assert "is not used" in warnings({"/base/drive/torque": 50})
     assert "was it in mm?" in warnings({"/axes/1": {"path": "mechanism.slider_crank.rod", "values": [0.4, 400]}})
-    assert "/base/phi_c: 7 is out of reach: the machine of base has 2 angles" in warnings({"/base/phi_c": 7})
+    assert "/base/phi_c: 7 is out of range: the machine of base has 2 angles" in warnings({"/base/phi_c": 7})
     assert warnings({"/base/phi_c": 1}) == ""
     motor = {"/base/drive/motor": LINEAR, "/base/balance": ..., "/base/mean_speed": ..., "/axes": []}
     assert "wanted_irregularity: is not used" in warnings(motor)
@@ -301,15 +301,15 @@ def test_axes_that_lead_beyond_what_goes_together_are_warned_of() -> None:
 
     gas = {"gas": GAS | {"clearance": 0.25}}
     above = warnings(gas, "gas.discharge_pressure", ["7 bar", "9 bar", "10 bar"])
-    assert "/axes/0 (operation.gas.discharge_pressure): the compressor comes to 810328 Pa at most" in above
+    assert "/axes/0 (operation.gas.discharge_pressure): the compressor reaches 810328 Pa at most" in above
     assert "in 2 of 3 cases" in above
-    assert "below the pressure of suction" in warnings(gas, "gas.suction_pressure", ["1 bar", "8 bar"])
+    assert "below the suction pressure" in warnings(gas, "gas.suction_pressure", ["1 bar", "8 bar"])
     assert warnings(gas, "gas.discharge_pressure", ["7 bar", "8 bar"]) == ""
 
     step = {"quantity": "force", "over": "stroke", "steps": [{"from": 0.2, "to": 0.8, "value": 100}]}
     assert "never acts (in 1 of 2 cases)" in warnings(step, "steps.0.from", [0.5, 0.9])
     over_angle = {"quantity": "torque", "steps": [{"from": 1, "to": 2, "value": 100}]}
-    assert "goes on over the end of the cycle" in warnings(over_angle, "steps.0.to", [0.5, 2, 3])
+    assert "continues past the end of the cycle" in warnings(over_angle, "steps.0.to", [0.5, 2, 3])
     assert warnings(over_angle, "steps.0.to", [1.5, 2, 3]) == ""
     assert warnings(over_angle, "steps.0.value", [10, 20]) == ""
     over_angle["steps"][0]["from"] = 6  # type: ignore[index]
