@@ -66,7 +66,7 @@ _READINGS = (
     ),
     ("        used = 0\n        # A state that is left", f"        read(ticks, {EVENTS})\n{{anchor}}"),
     ("        if recorded < times", f"        read(ticks, {STATISTICS})\n{{anchor}}"),
-    ("        advance(W, float(most_steps), 0.0, groups)\n", f"{{anchor}}        read(ticks, {ADVANCE})\n"),
+    ("        advance(W, 0.0, 0.0, groups)\n", f"{{anchor}}        read(ticks, {ADVANCE})\n"),
     ("        if busy != before and queue", f"        read(ticks, {SETTLE})\n{{anchor}}"),
 )
 

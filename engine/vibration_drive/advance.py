@@ -85,7 +85,7 @@ class _Advance:
         code.store(layout.steps, steps)
         self.require(f"abs({speed_end}) < {SPEED_BOUND!r}")
         self.require(f"{code.row(layout.h_free)} > {STEP_FLOOR!r}*{code.row(layout.period)}")
-        self.require(f"{steps} < most_steps")
+        self.require(f"{steps} < {code.row(layout.most_steps)}")
         # An event is looked for, and found, only where the margin is gone.
         self.require(f"{code.row(layout.margin)} > 0.0")
         code.store(layout.attention, self.attention)

@@ -26,6 +26,7 @@ class Column(IntEnum):
     INERTIA = auto()
     INVERSE_RATE = auto()
     SPEED = auto()
+    MOST_STEPS = auto()
 
 
 class PendulumColumn(IntEnum):
@@ -50,6 +51,9 @@ PENDULUM_COLUMNS = len(PendulumColumn)
 MIN_COEFFICIENTS = 2
 #: A stop this near a whole period is meant to be one.
 _WHOLE = 1e-12
+#: Motions of a machine of its own that the step budget allows for, at most, in rad/s: faster ones are mistakes more
+#: often than machines, and a case of them is to end while it still costs little.
+_FASTEST_OWN = 2.0 * math.pi * 1000.0
 
 _DEFAULTS = {parameter.path: parameter.default for parameter in PARAMETERS}
 
@@ -98,7 +102,8 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     Returns
     -------
     array, shape (cases, columns)
-        `Column`: nu, period, d nu^2, b nu^2, chi, g, M_c, J_e, 1/rate, initial speed; four stops; per pendulum
+        `Column`: nu, period, d nu^2, b nu^2, chi, g, M_c, J_e, 1/rate, initial speed, step budget; four stops; per
+        pendulum
         `PendulumColumn`: M l/J, c a^2/J, lambda/J, 1/J, J, delta, u_end, initial angle, initial speed; its clutch
         coefficients.
     """
@@ -119,6 +124,9 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     # The fastest of excitation, pendulums on their springs, and pendulums against the shaft through their clutches: it
     # turns accelerations into speeds when a step's error is weighed.
     rate = nu
+    acc_x, acc_y = (parameter(f"excitation.amplitude_{direction}") * nu**2 for direction in "xy")
+    gravity = parameter("gravity")
+    swing = np.zeros(cases)  # the fastest of the pendulums on what accelerates them
     pendulums: list[Floats] = []
     for i in range(n):
         own = {
@@ -131,12 +139,14 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
         inertia = own["inertia"]
         spring = own["spring_rate"] * own["spring_arm"] ** 2 / inertia
         rate = np.maximum(rate, np.sqrt(spring))
+        moment = own["mass"] * own["arm"] / inertia
+        swing = np.maximum(swing, np.sqrt(np.abs(moment) * (gravity + acc_x + acc_y)))
         law = _law_prefix(columns, i)
         stiffness = np.maximum(column(f"{law}coefficients.1", 0.0), 0.0)
         rate = np.maximum(rate, np.sqrt(stiffness * (1.0 / inertia + 1.0 / shaft_inertia)))
         P = PendulumColumn
         values = {
-            P.ML: own["mass"] * own["arm"] / inertia, P.SPRING: spring, P.DAMPING: own["damping"] / inertia,
+            P.ML: moment, P.SPRING: spring, P.DAMPING: own["damping"] / inertia,
             P.INVERSE_INERTIA: 1.0 / inertia, P.INERTIA: inertia, P.BACKLASH: own["backlash"],
             P.LIMIT: column(f"{law}windup_limit", math.inf), P.ANGLE: own["initial_angle"],
             P.SPEED: own["initial_speed"],
@@ -150,12 +160,13 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     whole = np.floor(end - start + 1e-9)
     # Without a whole period in the window its "start of whole periods" is its end, and there is no efficiency.
     times = (start, np.where(whole > 0, np.maximum(start, end - whole), end), end, end_of_run)
+    cycles = end_of_run * np.maximum(1.0, np.minimum(np.maximum(rate, swing), _FASTEST_OWN) / nu)
     C = Column
     shaft = {
-        C.NU: nu, C.PERIOD: 1.0 / frequency, C.ACC_X: parameter("excitation.amplitude_x") * nu**2,
-        C.ACC_Y: parameter("excitation.amplitude_y") * nu**2, C.CHI: parameter("excitation.phase"),
-        C.GRAVITY: parameter("gravity"), C.LOAD: parameter("shaft.load"), C.INERTIA: shaft_inertia,
-        C.INVERSE_RATE: 1.0 / rate, C.SPEED: parameter("shaft.initial_speed"),
+        C.NU: nu, C.PERIOD: 1.0 / frequency, C.ACC_X: acc_x, C.ACC_Y: acc_y,
+        C.CHI: parameter("excitation.phase"), C.GRAVITY: gravity, C.LOAD: parameter("shaft.load"),
+        C.INERTIA: shaft_inertia, C.INVERSE_RATE: 1.0 / rate, C.SPEED: parameter("shaft.initial_speed"),
+        C.MOST_STEPS: np.array([run.step_budget(count) for count in cycles]),
     }  # fmt: skip
     stops = [part for time in times for part in _stop(time)]
     return np.ascontiguousarray(np.column_stack([*(shaft[place] for place in C), *stops, *pendulums]))

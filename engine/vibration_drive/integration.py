@@ -63,9 +63,9 @@ def integrate(
 ) -> Integration:
     """Run the cases of ``matrix`` (from ``cases.case_matrix``) from rest or from ``starts``.
 
-    ``run`` gives tolerance, reset and budgets; the lengths of the runs stand in the matrix. ``strobes`` is the number
-    of strobes recorded of each case, ``times`` (in excitation periods) where case 0 is sampled, ``pieces`` the most
-    steps of case 0 that are kept, from the time ``since`` (in excitation periods) on.
+    ``run`` gives tolerance, reset and event budget; the lengths and step budgets of the runs stand in the matrix.
+    ``strobes`` is the number of strobes recorded of each case, ``times`` (in excitation periods) where case 0 is
+    sampled, ``pieces`` the most steps of case 0 that are kept, from the time ``since`` (in excitation periods) on.
     """
     lay = kernel.LAYOUT
     cases, n = len(matrix), lay.n
@@ -81,8 +81,8 @@ def integrate(
     done = kernel.integrate(
         kernel.RECORD, matrix, from_rest(cases, n) if starts is None else starts, recorded,
         run.tolerance, same_everywhere(math.log2(run.tolerance)), int(run.reset == "literal"),
-        run.step_budget, run.max_events_per_period,
-        aligned_zeros(lay.rows * lay.lanes), np.zeros((lay.lanes, LANE_INTEGERS), dtype=np.int64),
+        run.max_events_per_period, aligned_zeros(lay.rows * lay.lanes),
+        np.zeros((lay.lanes, LANE_INTEGERS), dtype=np.int64),
         np.zeros(MAX_DEGREE + 1), work_stack(),
         blocks_for(listed, lay.order), np.zeros((listed, 3), dtype=np.int64),
         np.zeros((lay.lanes, int(np.max(end, initial=0.0)) + 3)), sums, asked, samples, states,

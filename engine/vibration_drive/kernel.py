@@ -54,7 +54,7 @@ step = lane_loops("""
 # State and sums of every lane at the end of the part x of its step.
 advance = lane_loops("""
 {advance}
-""", "most_steps", "unused")
+""", "unused", "unused_too")
 
 # First roots of listed guards, and largest values of listed quantities.
 find_roots = lane_loops("""
@@ -73,8 +73,8 @@ noted = lane_mask("!=", LAYOUT.attention, LAYOUT.lanes)
 
 @compiled
 def integrate(
-    lay, cases, starts, strobes, tolerance, log2_tolerance, literal, most_steps, most_events, W, Z, g, stack, blocks,
-    meta, turns, sums, times, samples, states, since, pieces,
+    lay, cases, starts, strobes, tolerance, log2_tolerance, literal, most_events, W, Z, g, stack, blocks, meta,
+    turns, sums, times, samples, states, since, pieces,
 ):
     """Run every case, filling a lane again the moment its case ends; the number of samples recorded (of case 0)."""
     lay = fixed(lay)
@@ -122,13 +122,13 @@ def integrate(
             recorded = record(W, Z, lay, 0, times, recorded, g, samples, states)
         if kept < pieces.shape[0]:
             kept = keep(W, Z, lay, 0, since, kept, pieces)
-        advance(W, float(most_steps), 0.0, groups)
+        advance(W, 0.0, 0.0, groups)
         left = busy & noted(W)
         before = busy
         while left != 0:
             lane = lowest(left)
             left &= left - 1
-            if not settle(W, Z, lay, lane, cases, starts, strobes, turns, sums, most_steps, most_events):
+            if not settle(W, Z, lay, lane, cases, starts, strobes, turns, sums, most_events):
                 busy &= ~(1 << lane)
         if busy != before and queue == cases.shape[0]:
             busy = pack(W, Z, lay, turns, busy, groups)
@@ -144,7 +144,7 @@ class Kernel(Protocol):
 
     def integrate(
         self, lay: Layout, cases: Floats, starts: Floats, strobes: Floats, tolerance: float, log2_tolerance: float,
-        literal: int, most_steps: int, most_events: int, W: Floats, Z: Ints, g: Floats, stack: Floats, blocks: Floats,
+        literal: int, most_events: int, W: Floats, Z: Ints, g: Floats, stack: Floats, blocks: Floats,
         meta: Ints, turns: Floats, sums: Floats, times: Floats, samples: Floats, states: Ints,
         since: float, pieces: Floats,
     ) -> int: ...  # fmt: skip

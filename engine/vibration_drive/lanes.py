@@ -42,7 +42,7 @@ _RUNNING = -1
 
 _NU, _PERIOD, _ACC_X, _ACC_Y = int(Column.NU), int(Column.PERIOD), int(Column.ACC_X), int(Column.ACC_Y)
 _CHI, _GRAVITY, _LOAD, _INERTIA = int(Column.CHI), int(Column.GRAVITY), int(Column.LOAD), int(Column.INERTIA)
-_INVERSE_RATE, _SPEED = int(Column.INVERSE_RATE), int(Column.SPEED)
+_INVERSE_RATE, _SPEED, _MOST_STEPS = int(Column.INVERSE_RATE), int(Column.SPEED), int(Column.MOST_STEPS)
 _STOPS, _FIRST_PENDULUM = stop_column(0), stop_column(STOPS)
 _P_COPIED = int(PendulumColumn.LIMIT) + 1
 _P_ANGLE, _P_SPEED = int(PendulumColumn.ANGLE), int(PendulumColumn.SPEED)
@@ -78,6 +78,7 @@ def load_case(
     W[lay.load * lanes + lane] = row[_LOAD]
     W[lay.inertia * lanes + lane] = row[_INERTIA]
     W[lay.inverse_rate * lanes + lane] = row[_INVERSE_RATE]
+    W[lay.most_steps * lanes + lane] = row[_MOST_STEPS]
     W[lay.speed * lanes + lane] = row[_SPEED]
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
@@ -229,7 +230,7 @@ def _take_event(W: Floats, Z: Ints, lay: Layout, lane: int, h: float, most_event
 
 
 @part
-def _lost(W: Floats, lay: Layout, lane: int, most_steps: int) -> int:
+def _lost(W: Floats, lay: Layout, lane: int) -> int:
     """The abnormal ending a lane has reached after a step, or ``_RUNNING``."""
     lanes = lay.lanes
     if not abs(W[lay.speed * lanes + lane]) < SPEED_BOUND:
@@ -243,7 +244,7 @@ def _lost(W: Floats, lay: Layout, lane: int, most_steps: int) -> int:
             return _DIVERGED
     if W[lay.h_free * lanes + lane] < STEP_FLOOR * W[lay.period * lanes + lane]:
         return _ACCURACY
-    return _STEP_BUDGET if W[lay.steps * lanes + lane] >= most_steps else _RUNNING
+    return _STEP_BUDGET if W[lay.steps * lanes + lane] >= W[lay.most_steps * lanes + lane] else _RUNNING
 
 
 @part
@@ -257,13 +258,12 @@ def settle(
     strobes: Floats,
     turns: Floats,
     sums: Floats,
-    most_steps: int,
     most_events: int,
 ) -> bool:
     """After ``advance``: events, stops, budgets of a lane that needs attention. True while its case goes on."""
     lanes = lay.lanes
     h = W[lay.x * lanes + lane] * W[lay.h * lanes + lane]
-    ending = _lost(W, lay, lane, most_steps)
+    ending = _lost(W, lay, lane)
     event = Z[lane, ev.EVENT_PENDULUM] != ev.NO_EVENT
     at_stop = W[lay.at_stop * lanes + lane] == 1.0
     if at_stop and h > 0.0:

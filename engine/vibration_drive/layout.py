@@ -34,6 +34,7 @@ class Layout(NamedTuple):
     load: int
     inertia: int
     inverse_rate: int
+    most_steps: int
     # mode: 1/(inertia that turns with the shaft), 0 where it is held; flags; bands of the guards
     mobility: int
     rotating: int

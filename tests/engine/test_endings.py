@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from sprag.engine.endings import ENDING_CODES, Ending
 from sprag.engine.run import Run, Span
+from sprag.engine.vibration_drive.cases import Column, case_matrix
 from sprag.engine.vibration_drive.parameters import PARAMETERS
 from sprag.engine.vibration_drive.simulate import trajectory
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, clutch, drive, one, pendulum, periods
@@ -132,12 +133,29 @@ def test_extreme_machines_end(pendulums: int, reset: Any, data: st.DataObject) -
             assert row["shaft.speed.max"] + rounding >= row["shaft.speed.mean"] >= row["shaft.speed.min"] - rounding
 
 
-def test_the_step_budget_follows_the_duration() -> None:
-    assert periods(60.0, 0.0, 60.0).step_budget == 5_000_000
-    assert periods(300_000.0, 0.0, 1.0).step_budget == 30_000_000
-    assert periods(1e6, 0.0, 1.0).step_budget == 100_000_000
-    assert Run(duration=Span(100.0, "s")).step_budget == 100_000_000
-    assert periods(1e6, 0.0, 1.0, max_steps=7).step_budget == 7
+def test_the_step_budget_follows_the_duration_and_the_fastest_motion_of_each_case() -> None:
+    columns = drive(1, excitation__frequency=[20.0, 100.0, 0.01])
+
+    def budgets(run: Run, **changes: float) -> list[float]:
+        found: list[float] = case_matrix(columns | changes, run, 3)[:, Column.MOST_STEPS].tolist()
+        return found
+
+    rate = math.sqrt(200.0 * (1.0 / 1e-3 + 1.0 / 2e-3)) / (2.0 * math.pi)  # of pendulum and shaft on the clutch
+    assert budgets(periods(60.0, 0.0, 60.0)) == pytest.approx([5e6, 5e6, 6e3 * rate / 0.01])
+    assert budgets(periods(1e6, 0.0, 1.0)) == pytest.approx([1e8 * rate / 20.0, 1e8, 1e8 * rate / 0.01])
+    assert budgets(Run(duration=Span(1e4, "s"))) == pytest.approx([1e6 * rate, 1e8, 1e6 * rate])
+    assert budgets(periods(1e6, 0.0, 1.0, max_steps=7)) == [7.0] * 3
+    stiff = budgets(Run(duration=Span(1e4, "s")), **{"pendulums.0.spring_rate": 1e12})
+    assert stiff == pytest.approx([1e9] * 3), "what is faster than 1 kHz is hardly meant"
+
+
+def test_a_slow_excitation_has_steps_for_the_motion_of_the_pendulum_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a run of 20,000 periods at 0.5 Hz, which takes more than five million steps."""
+    monkeypatch.setattr("sprag.engine.run._LEAST_STEPS", 200)
+    slow = drive(1, excitation__frequency=0.1, excitation__amplitude_x=1.0, excitation__amplitude_y=0.0)
+    hanging = slow | clutch(0.0, 1e-3) | pendulum(0, arm=-0.03, spring_rate=0.0) | {"excitation.frequency": 0.01}
+    for columns in (slow, hanging):
+        assert one(columns, periods(3.0, 1.0, 3.0))["run.steps"] > 100 * 3
 
 
 def test_a_run_with_more_steps_than_the_least_budget_ends_well(monkeypatch: pytest.MonkeyPatch) -> None:

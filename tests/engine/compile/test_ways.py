@@ -30,7 +30,7 @@ from tests.engine.taylor.polynomials import first_root, largest
 LAYOUT = make_layout(1, 4, 6, 8)
 fixed = constant_record(as_record(LAYOUT))
 step = lane_loops(series_loop(LAYOUT) + "\\n" + bounds_loop(LAYOUT), "tolerance", "log2_tolerance")
-advance = lane_loops(advance_loop(LAYOUT), "most_steps", "unused")
+advance = lane_loops(advance_loop(LAYOUT), "unused", "unused_too")
 find_roots = lane_loops(roots_loop(6), "unused", "unused_too")
 find_peaks = lane_loops(peaks_loop(6), "unused", "unused_too")
 exceeding = lane_mask(">", LAYOUT.excess, 8)
@@ -42,7 +42,7 @@ def run(lay, W, blocks):
     mask = exceeding(W)
     find_roots(blocks, 0.0, 0.0, 1)
     find_peaks(blocks, 0.0, 0.0, 1)
-    advance(W, 100.0, 0.0, 1)
+    advance(W, 0.0, 0.0, 1)
     return mask + lay.rows
 
 rng = np.random.default_rng(1)
