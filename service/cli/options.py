@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
 import typer
@@ -61,10 +62,21 @@ FinishBy = Annotated[
     ),
 ]
 
+
+def _no_nan(seconds: float | None) -> float | None:
+    if seconds is not None and math.isnan(seconds):  # every comparison with a range lets it pass
+        raise typer.BadParameter(f"{seconds} is not in the range x>=0.0.")
+    return seconds
+
+
 WaitTimeout = Annotated[
     float | None,
     typer.Option(
-        "--timeout", metavar="SECONDS", min=0.0, help="Longest time to wait, then exit code 3; default: no limit."
+        "--timeout",
+        metavar="SECONDS",
+        min=0.0,
+        callback=_no_nan,
+        help="Longest time to wait, then exit code 3; default: no limit.",
     ),
 ]
 

@@ -131,7 +131,7 @@ class Study:
         progress : bool or callable
             True shows a bar on standard error; a function is called with the study from time to time.
         timeout : float, optional
-            Seconds after which StudyTimeoutError is raised; the study goes on.
+            Seconds after which StudyTimeoutError is raised; the study goes on. NaN raises ValueError.
         """
         with reporting(progress) as tell:
             wait_for(self._client.plain, self.id, Waiting(tell, timeout))

@@ -7,6 +7,7 @@ service does not answer, the waiting goes on: services are restarted, and their 
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
@@ -37,7 +38,7 @@ class Waiting:
     tell : callable
         Called with the study at every poll.
     timeout : float, optional
-        Seconds after which StudyTimeoutError is raised; None waits without end.
+        Seconds after which StudyTimeoutError is raised; None waits without end. NaN raises ValueError.
     patient : bool
         Whether to wait while the service does not answer; otherwise the failure is raised.
     notify : callable
@@ -52,6 +53,8 @@ class Waiting:
         patient: bool = True,
         notify: Callable[[str], None] = _LOG.warning,
     ) -> None:
+        if timeout is not None and math.isnan(timeout):
+            raise ValueError("timeout must be a number of seconds, not NaN")
         self._tell = tell
         self._patient = patient
         self._notify = notify

@@ -277,3 +277,11 @@ def test_an_estimate_has_start_and_compilation_in_it(
 ) -> None:
     monkeypatch.setattr(models, "estimate_compile_seconds", lambda _study: 40.0)
     assert sprag("preview", examples / "press.toml", "--json").data["estimated_seconds"] > 42.0
+
+
+def test_a_timeout_that_is_no_number_is_a_wrong_option(sprag: Sprag) -> None:
+    for command in (("watch", "st_1"), ("extend", "st_1"), ("longer", "st_1"), ("submit", "spec.json")):
+        done = sprag(*command, "--timeout", "nan", "--server", "http://127.0.0.1:1")
+        assert (done.code, done.out) == (2, "")
+        assert "--timeout" in done.err
+        assert "nan is not in the range x>=0.0" in done.err

@@ -186,3 +186,8 @@ def test_the_demonstration_does_not_wait_for_a_service_that_it_started_itself(
 ) -> None:
     with pytest.raises(UnreachableError):
         remote.follow(served(Scripted([study("running"), DOWN], [[]])), "st_1", patient=False)
+
+
+def test_a_timeout_that_is_no_number_is_refused_before_the_service_is_asked() -> None:
+    with pytest.raises(ValueError, match="timeout must be a number of seconds"):
+        waiting.Waiting(lambda _: None, float("nan"))
