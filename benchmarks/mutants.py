@@ -19,7 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 _FOLDERS = ("sprag", "engine", "worker", "service", "migrations", "tests", "benchmarks")
 _FAULTS = "tests/acceptance/test_faults.py::"
-_SETTLED = "tests/engine/test_settled.py"
+_CERTIFICATE = "tests/engine/test_certificate.py::"
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,28 +104,35 @@ MUTANTS = (
         "engine/vibration_drive/search.py",
         "STABLE = 1.0 - 1e-4",
         "STABLE = math.inf",
-        (_SETTLED,),
+        (f"{_CERTIFICATE}test_an_unstable_orbit_does_not_count",),
     ),
     Mutant(
         "orbits with a multiplier up to 1.1 count as settled",
         "engine/vibration_drive/search.py",
         "STABLE = 1.0 - 1e-4",
         "STABLE = 1.1",
-        (_SETTLED,),
+        (f"{_CERTIFICATE}test_an_unstable_orbit_does_not_count",),
     ),
     Mutant(
         "states of clutches and shaft not compared",
         "engine/vibration_drive/orbits.py",
         "    if a[SHAFT] != b[SHAFT]:",
         "    return True\n    if a[SHAFT] != b[SHAFT]:",
-        (_SETTLED,),
+        (f"{_CERTIFICATE}test_strobes_of_other_states_are_not_the_same",),
     ),
     Mutant(
         "an order that is not the least",
         "engine/vibration_drive/search.py",
         "        again = np.flatnonzero(found.least < found.orders)",
         "        again = np.flatnonzero(found.least > found.orders)",
-        (_SETTLED,),
+        (f"{_CERTIFICATE}test_the_order_is_the_least",),
+    ),
+    Mutant(
+        "orbits far from the run count as settled",
+        "engine/vibration_drive/search.py",
+        "AWAY = 0.005",
+        "AWAY = math.inf",
+        (f"{_CERTIFICATE}test_an_orbit_far_from_the_run_does_not_count",),
     ),
 )
 
