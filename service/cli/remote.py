@@ -266,7 +266,7 @@ def pause(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = Non
 
 
 def resume(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
-    """Resume a study that is held; a deadline in the past no longer applies."""
+    """Resume a study that is held; a past deadline or a closed window no longer applies."""
     _act(study_id, "resume", server, token, as_json)
 
 

@@ -337,9 +337,15 @@ class Schedules(Part):
         )
 
 
-def unbind(connection: sa.Connection, study: int) -> None:
-    """Somebody resumes a study that its window holds: the window does not hold it any more."""
-    connection.execute(sa.update(SCHEDULE_RUNS).where(_R.study == study).values(unbound=1))
+def lift_window(connection: sa.Connection, study: int, now: datetime) -> None:
+    """Somebody resumes a study, whatever held it: a window that is closed does not hold it any more."""
+    query = (
+        sa.select(_S.window_begin, _S.window_end, _S.zone).join_from(SCHEDULE_RUNS, SCHEDULES).where(_R.study == study)
+    )
+    row = connection.execute(query).first()
+    window = None if row is None else _window(row)
+    if window is not None and not window.open_at(now):
+        connection.execute(sa.update(SCHEDULE_RUNS).where(_R.study == study).values(unbound=1))
 
 
 def _micros(when: datetime) -> int:

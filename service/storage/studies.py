@@ -18,7 +18,7 @@ from sprag.service.storage.order import Orders
 from sprag.service.storage.part import MAX_INTEGER, SILENT_SECONDS, announce, micros_of, moment, optional_moment
 from sprag.service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
 from sprag.service.storage.records import Progress, StudyPage, StudyRecord, record_of
-from sprag.service.storage.schedules import unbind
+from sprag.service.storage.schedules import lift_window
 from sprag.service.storage.tables import (
     CHUNKS,
     DISPATCHER,
@@ -27,7 +27,6 @@ from sprag.service.storage.tables import (
     IDEMPOTENCY_KEYS,
     RECORD_COLUMNS,
     STUDIES,
-    WAITS_FOR_WINDOW,
 )
 from sprag.worker import models
 from sprag.worker.chunking import Chunking, spans
@@ -266,8 +265,7 @@ class Studies(Orders):
             self._move(connection, row.number, event)
             if event is StudyEvent.RESUME:
                 self._lift_deadline(connection, row.number)
-            if event is StudyEvent.RESUME and row.waits_for == WAITS_FOR_WINDOW:
-                unbind(connection, row.number)
+                lift_window(connection, row.number, self.clock.now())
             # It was paused, but not by the user.
             if event is StudyEvent.PAUSE and row.waits_for not in {None, HELD_AT_DEADLINE}:
                 connection.execute(

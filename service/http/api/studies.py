@@ -192,7 +192,7 @@ def _verb(name: str, sentence: str) -> None:
 
 _verb("cancel", "Stop a study for good: the cases that are done are kept, the others are not run.")
 _verb("pause", "Hold a study: no new cases are started until it is resumed.")
-_verb("resume", "Resume a study that is held; a deadline in the past no longer applies.")
+_verb("resume", "Resume a study that is held; a past deadline or a closed window no longer applies.")
 
 
 @router.post(

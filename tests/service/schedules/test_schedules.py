@@ -215,6 +215,26 @@ def test_who_resumes_a_held_study_lifts_its_window(service: Service, clock: Cloc
     assert store.get_study(study.id).state is StudyState.QUEUED
 
 
+def test_who_resumes_a_study_outside_its_window_lifts_it_whatever_held_the_study(
+    service: Service, clock: Clock
+) -> None:
+    store, look = service.store, Scheduler(service.store).look
+    store.create_schedule(fields(at="2026-01-01T23:00", window=["22:00", "06:00"], finish_by="05:00"))
+    clock.set("2026-01-01T23:00")
+    look()
+    (study,) = store.list_studies().studies
+    store.pause_study(study.id)
+    store.resume_study(study.id)  # in its window, which stays
+    clock.set("2026-01-02T12:00")
+    look()
+    assert store.get_study(study.id).state is StudyState.PAUSED
+    store.time_is_over(store.take_over("tests"), study.number)
+    assert store.get_study(study.id).time_over
+    store.resume_study(study.id)
+    look()
+    assert store.get_study(study.id).state is StudyState.QUEUED
+
+
 def test_who_pauses_a_study_keeps_it_paused_in_its_window(service: Service, clock: Clock) -> None:
     store, look = service.store, Scheduler(service.store).look
     store.create_schedule(fields(at="2026-01-01T12:00", window=["22:00", "06:00"]))
