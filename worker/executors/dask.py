@@ -279,8 +279,11 @@ class DaskExecutor:
         if job.kind == "load" and job.shape is not None:
             self._died_of(worker.host, job.shape)
         elif job.kind == "chunk" and job.dropped is None:
-            if time.monotonic() - job.began >= self._timeout:
-                self._outcomes.put(Outcome(job.ticket, Fate.TIMED_OUT, detail=f"killed after {self._timeout:g} s"))
+            taken = time.monotonic() - job.began
+            # Dask does not say of what a worker died. Before this it cannot have been the limit.
+            if taken >= self._timeout:
+                detail = f"its worker was gone after {taken:.3g} s; the limit is {self._timeout:g} s of processor time"
+                self._outcomes.put(Outcome(job.ticket, Fate.TIMED_OUT, detail=detail))
             else:
                 self._outcomes.put(Outcome(job.ticket, Fate.CRASHED, detail="its worker died"))
         elif job.kind == "introduce":

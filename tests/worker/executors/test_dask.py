@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import shutil
 import sys
 import time
@@ -135,7 +136,8 @@ def test_what_never_returns_ends_with_its_worker(start: Callable[..., DaskExecut
     assert {ticket: outcome.fate for ticket, outcome in outcomes.items()} == {
         0: Fate.TIMED_OUT, 1: Fate.DONE, 2: Fate.DONE,
     }  # fmt: skip
-    assert outcomes[0].detail == "killed after 1 s"
+    # Of what the worker died is not known: a lack of memory looks the same.
+    assert re.fullmatch(r"its worker was gone after \S+ s; the limit is 1 s of processor time", outcomes[0].detail)
 
 
 def test_a_fault_of_the_program_is_told_by_its_name(start: Callable[..., DaskExecutor]) -> None:
