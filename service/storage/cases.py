@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-#: Cases named one by one in a statement.
+#: Most cases listed in one statement.
 CASES_AT_ONCE = 5_000
 #: Rows of one block of a stream.
 BLOCK_ROWS = 2_000
@@ -41,7 +41,7 @@ class _Rows:
 
 
 class Cases(Orders):
-    """Rows of finished cases; and the cases that a cancelled study never ran, which have no rows in the database."""
+    """Rows of finished cases, and the cases that a cancelled study never ran, which have no rows in the database."""
 
     def _rows(self, connection: sa.Connection, study_id: str) -> _Rows:
         c = STUDIES.c
@@ -69,10 +69,9 @@ class Cases(Orders):
         regime: str | None = None,
         flag: str | None = None,
     ) -> RowBlock:
-        """The same, and the cases that a cancelled study never ran in their places among them.
+        """The same, with the cases that a cancelled study never ran at their positions.
 
-        With ``ending`` only the cases that ended so, with ``regime`` only those of that regime, with ``flag`` only
-        those that have it.
+        ``ending``, ``regime`` and ``flag`` select the cases with that ending, regime or flag.
         """
         cancelled: str = WorkerEnding.CANCELLED.value
         with self.session.read() as connection:
@@ -86,7 +85,7 @@ class Cases(Orders):
         return _block(rows.infos, found)
 
     def kinds(self, study_id: str) -> Kinds:
-        """How many finished cases have which regime and which flag; raises StudyNotFound."""
+        """Numbers of finished cases by regime and by flag; raises StudyNotFound."""
         with self.session.read() as connection:
             rows = self._rows(connection, study_id)
             info, c = regime_info(rows.infos), rows.table.c
@@ -102,7 +101,7 @@ class Cases(Orders):
         return Kinds(_by_frequency(regimes, order), _by_frequency(flags, {}))
 
     def cases_of_kind(self, study_id: str, regime: str | None = None, flag: str | None = None) -> NDArray[np.int64]:
-        """Numbers of the cases of a regime, or that have a flag, ascending; raises StudyNotFound."""
+        """Numbers of the cases of a regime or with a flag, ascending; raises StudyNotFound."""
         with self.session.read() as connection:
             rows = self._rows(connection, study_id)
             kind = _of_kind(rows, regime, flag)
@@ -158,7 +157,7 @@ class Cases(Orders):
         )
 
     def _never_run(self, connection: sa.Connection, rows: _Rows, after_case: int) -> Iterator[int]:
-        """Cases above ``after_case`` that are in no chunk that is done, in order."""
+        """Cases above ``after_case`` that belong to no finished chunk, in order."""
         c = CHUNKS.c
         done = (
             sa.select(c["first"], c["count"])
@@ -202,7 +201,7 @@ def _read(
         ended = connection.execute(
             sa.select(ENDINGS.c.cases).where(ENDINGS.c.study == rows.number, ENDINGS.c.ending == ending)
         ).scalar_one_or_none()
-        # The rows are not ordered by ending: without the count, a rare one would have every row of the study read.
+        # Rows are not ordered by ending: without the count, a rare ending would require reading all rows of the study.
         if not ended:
             return []
         query, limit = query.where(c.ending == ending), min(limit, ended)
@@ -210,7 +209,7 @@ def _read(
 
 
 def _of_kind(rows: _Rows, regime: str | None, flag: str | None) -> list[sa.ColumnElement[bool]] | None:
-    """Conditions that select the rows of a regime that have a flag; None where there can be none."""
+    """Conditions that select the rows with a regime and a flag; None where there can be no such row."""
     found: list[sa.ColumnElement[bool]] = []
     if regime is not None:
         info = regime_info(rows.infos)
@@ -224,7 +223,7 @@ def _of_kind(rows: _Rows, regime: str | None, flag: str | None) -> list[sa.Colum
 
 
 def _by_frequency(counts: Counter[str], order: Mapping[str, int]) -> dict[str, int]:
-    """The same counts, the largest first, then in that order, then by name."""
+    """The counts, largest first; equal ones in ``order``, then by name."""
     return dict(sorted(counts.items(), key=lambda item: (-item[1], order.get(item[0], 0), item[0])))
 
 

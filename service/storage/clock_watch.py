@@ -1,7 +1,6 @@
-"""Whether the machine's clock can be believed: one that jumped ahead must not make old what is young.
+"""Whether the machine's clock is trusted: a clock that jumped ahead must not make recent data look old.
 
-The last moment that could be believed is kept in the database, so that neither a restart nor a start under a wrong
-clock makes a jump pass for the truth.
+The last trusted time is kept in the database, so neither a restart nor a start with a wrong clock hides a jump.
 """
 
 from __future__ import annotations
@@ -16,12 +15,12 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger("sprag.clock")
 
-#: A clock that is ahead of itself by more than this has jumped, while the worker runs and between two of its runs.
+#: A clock that is ahead of the expected time by more than this has jumped: while the worker runs, and between runs.
 JUMP: Final = timedelta(hours=1)
 LONGEST_PAUSE: Final = timedelta(days=60)
-#: A clock that was put back is followed after this time: one that the network sets after the start is right by then.
+#: A clock that was put back is trusted after this time, within which network time has corrected a wrong start.
 FOLLOWED_AFTER: Final = timedelta(hours=1)
-#: The believed moment is written down after this time.
+#: Interval at which the trusted time is stored.
 NOTE_AFTER: Final = timedelta(minutes=10)
 MESSAGE: Final = (
     "The clock jumped ahead, from {} to {}: nothing is deleted by age until it is corrected, or until "
@@ -30,23 +29,23 @@ MESSAGE: Final = (
 
 
 class ClockWatch:
-    """Compares the store's clock with the time that has passed. Safe to use from several threads."""
+    """Compares the store's clock with the elapsed time. Safe to use from several threads."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
         self._lock = Lock()
-        #: The latest believed moment, and how much time had passed then.
+        #: The latest trusted time, and the elapsed time at that moment.
         self._believed: tuple[datetime, float] | None = None
         self._noted: datetime | None = None
-        #: How much time had passed when the clock was first seen behind what was believed.
+        #: The elapsed time when the clock was first found behind the trusted time.
         self._behind_since: float | None = None
         self._told = False
 
     def believable(self) -> bool:
-        """Look at the clock: False as long as it is ahead of what it can be. Raises StoreError."""
+        """Check the clock: False while it is ahead of the expected time. Raises StoreError."""
         with self._lock:
             now, elapsed, noted = self._store.clock.now(), self._store.clock.monotonic(), self._store.believed_clock()
-            if self._believed is None or noted is None or noted != self._noted:  # the start, or the user's word
+            if self._believed is None or noted is None or noted != self._noted:  # the start, or `sprag db clock`
                 expected, allowed = noted or now, LONGEST_PAUSE
             else:
                 expected, allowed = self._believed[0] + timedelta(seconds=elapsed - self._believed[1]), JUMP
@@ -67,8 +66,8 @@ class ClockWatch:
             return True
 
     def _put_back(self, now: datetime, expected: datetime, elapsed: float) -> bool:
-        """Whether the clock has been behind what was believed for so long that it is followed: else its next jump to
-        that time, which was a wrong one, would pass for the truth.
+        """Whether the clock has been behind the trusted time long enough to be followed. Otherwise its next jump to
+        that time, which was wrong, would count as true.
         """
         if expected - now <= JUMP:
             self._behind_since = None
@@ -82,12 +81,12 @@ class ClockWatch:
 
 
 def jump_message(before: datetime, now: datetime) -> str:
-    """What is said of a jump."""
+    """The message about a jump."""
     return MESSAGE.format(*(moment.isoformat(timespec="seconds") for moment in (before, now)))
 
 
 def distrust(store: Store) -> str | None:
-    """Why nothing may be deleted by age now, for somebody who looks at the clock once; None where nothing is known."""
+    """Why nothing may be deleted by age now, from a single look at the clock; None where nothing speaks against it."""
     noted, now = store.believed_clock(), store.clock.now()
     if noted is not None and now - noted > LONGEST_PAUSE:
         return jump_message(noted, now)
@@ -95,7 +94,7 @@ def distrust(store: Store) -> str | None:
 
 
 def clock_problem(store: Store) -> str | None:
-    """Why the clock is not believed by the worker that is at work; None where it is, or no worker is at work."""
+    """Why the running worker does not trust the clock; None where it does, or no worker is running."""
     noted, worker, now = store.believed_clock(), store.dispatcher(), store.clock.now()
     if noted is None or worker is None or now - noted <= 2 * JUMP or now - worker.heartbeat_at > JUMP:
         return None

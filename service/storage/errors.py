@@ -1,4 +1,4 @@
-"""What can go wrong with the database, each in one plain sentence."""
+"""Errors of the database, each with a one-sentence message."""
 
 from sprag.worker.ports import StoreError, StoreFullError
 
@@ -23,7 +23,7 @@ __all__ = [
 
 
 class DatabaseError(StoreError):
-    """The database cannot be opened or used; ``code`` says why where the class does not."""
+    """The database cannot be opened or used; ``code`` gives the cause where the class does not."""
 
     def __init__(self, message: str, code: str | None = None) -> None:
         super().__init__(message)
@@ -32,28 +32,28 @@ class DatabaseError(StoreError):
 
 
 class SchemaError(DatabaseError):
-    """The database has another revision than this program; the message names the command that mends it."""
+    """The revision of the database is not that of this program; the message names the command that fixes it."""
 
     code = "wrong-revision"
 
 
 class DatabaseBusyError(DatabaseError):
-    """Another process kept the database for longer than the busy timeout."""
+    """Another process locked the database for longer than the busy timeout."""
 
     code = "database-busy"
 
 
 def busy(where: str) -> DatabaseBusyError:
     """The error of a writer that waited in vain for the database at ``where``."""
-    return DatabaseBusyError(f"another process kept the database {where} busy for too long; try again")
+    return DatabaseBusyError(f"another process locked the database {where} for too long; try again")
 
 
 class EndingError(DatabaseError):
-    """The service is ending, and writes nothing any more."""
+    """The service is shutting down and no longer writes."""
 
 
 class DatabaseFullError(DatabaseError, StoreFullError):
-    """The disk has no room, or does not take what is written."""
+    """The disk is full, or writing to it fails."""
 
     code = "storage-full"
 
@@ -81,7 +81,7 @@ class ScheduleNotFound(StoreError):  # noqa: N818
 
 
 class TooManySchedules(StoreError):  # noqa: N818
-    """There are as many schedules as are kept."""
+    """The limit of schedules is reached."""
 
     code = "wrong-state"
 
@@ -96,19 +96,19 @@ class TokenNotFound(StoreError):  # noqa: N818
 
 
 class StudyBusy(StoreError):  # noqa: N818
-    """The study has not come to its end, so it cannot be deleted."""
+    """The study has not ended, so it cannot be deleted."""
 
     code = "wrong-state"
 
 
 class StudyEnded(StoreError):  # noqa: N818
-    """The study has come to its end, so its priority cannot be changed."""
+    """The study has ended, so its priority cannot be changed."""
 
     code = "wrong-state"
 
 
 class NothingToRetry(StoreError):  # noqa: N818
-    """The study has no case that could be run again as asked."""
+    """The study has no case to run again as requested."""
 
     code = "wrong-state"
 
@@ -120,6 +120,6 @@ class IdempotencyConflict(StoreError):  # noqa: N818
 
 
 class PageTokenError(StoreError):
-    """A page token that no list has given out."""
+    """A page token that no list has issued."""
 
     code = "invalid-parameter"

@@ -1,4 +1,4 @@
-"""Figures over all studies, for whoever looks after the service."""
+"""Figures over all studies, for monitoring."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ _TERMINAL = [state.value for state in TERMINAL]
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """Studies by state, cases by ending, cases still to be run, cases taken from others, the worker's last sign."""
+    """Studies by state, cases by ending, cases to be run, cases reused from other studies, the worker's latest
+    heartbeat.
+    """
 
     studies: Mapping[str, int]
     endings: Mapping[str, int]
@@ -31,7 +33,7 @@ class Figures:
 
 @dataclass(frozen=True, slots=True)
 class FinishedWork:
-    """A chunk that was done: its cases, and the seconds from its claim to its commit."""
+    """A finished chunk: its cases, and the seconds from its claim to its commit."""
 
     finished_at: datetime
     seconds: float
@@ -39,10 +41,10 @@ class FinishedWork:
 
 
 class Totals(Part):
-    """Figures as the metrics see them."""
+    """The figures of the metrics."""
 
     def figures(self) -> Figures:
-        """The figures of this moment."""
+        """The current figures."""
         c = STUDIES.c
         alive = c.deleted_at.is_(None)
         going = alive & c.state.not_in(_TERMINAL) & c.waits_for.is_distinct_from(HELD_AT_DEADLINE)
@@ -67,10 +69,10 @@ class Totals(Part):
         )
 
     def finished_since(self, since: datetime) -> list[FinishedWork]:
-        """Chunks that were done later than ``since``, in that order."""
+        """Chunks finished after ``since``, in order."""
         micros = (since - EPOCH) // timedelta(microseconds=1)
         c = CHUNKS.c
-        # Only studies that may have such chunks are looked at: by study they have an index.
+        # Only studies that may have such chunks are read; chunks are indexed by study.
         lately = STUDIES.c.finished_at.is_(None) | (STUDIES.c.finished_at >= micros)
         query = (
             sa.select(c.claimed_at, c.finished_at, c["count"])

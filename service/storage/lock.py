@@ -1,4 +1,4 @@
-"""The lock that lets one dispatcher at a time work on a database: it goes with its process, however that ends."""
+"""The lock that admits one dispatcher at a time to a database; it is released when its process ends in any way."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ if TYPE_CHECKING:
     pass
 
 
-#: Seconds for a killed process to be gone.
+#: Seconds to wait for a killed process to exit.
 _KILL_SECONDS: Final = 10.0
 
 
 class OneHolder(Protocol):
-    """Held by at most one process; it goes with that process."""
+    """A lock of at most one process, released when that process ends."""
 
     def take(self) -> bool:
         """Take the lock if it is free; True when it is ours."""
 
     def seize(self) -> None:
-        """Take the lock from whoever has it, which only the epoch then keeps from the database."""
+        """Take the lock from its holder; only the epoch then prevents the old holder from writing."""
 
     def end_holder(self) -> bool:
-        """End the process that has the lock, at once, where it can be told and reached; whether it was ended."""
+        """Kill the process that holds the lock, where it is known and reachable; whether it was killed."""
 
     def holder(self) -> str:
-        """Whoever took the lock last, "" where nobody did."""
+        """The last process that took the lock, "" where none did."""
 
     def release(self) -> None:
-        """Give the lock up."""
+        """Release the lock."""
 
 
 class DispatcherLock:
@@ -104,7 +104,7 @@ class DispatcherLock:
             os.close(process)
 
     def release(self) -> None:
-        """Give the lock up."""
+        """Release the lock."""
         if self._file is not None:
             os.close(self._file)
             self._file = None

@@ -22,14 +22,14 @@ from sprag.service.storage.tables import HEAD_REVISION
 if TYPE_CHECKING:
     from sprag.service.storage.session import Session
 
-#: Bytes of a database up to which it is looked over at every start: that takes less than a second.
+#: Largest database, in bytes, that is checked at every start; the check takes less than a second.
 CHECKED_BYTES = 256_000_000
-#: How the name of a backup that is not whole yet ends.
+#: Suffix of a backup that is not complete yet.
 PART_SUFFIX = ".part"
 
 
 def revision(session: Session) -> str | None:
-    """Revision of the database; None when it is empty. Raises SchemaError when it holds something else."""
+    """Revision of the database; None when it is empty. Raises SchemaError when it belongs to another program."""
     with session.read() as connection:
         names = set(sa.inspect(connection).get_table_names())
         if "alembic_version" in names:
@@ -43,7 +43,7 @@ def revision(session: Session) -> str | None:
 
 
 def require_current(session: Session) -> None:
-    """Make an empty database ready; raise SchemaError when it has another revision than this program."""
+    """Initialise an empty database; raise SchemaError when its revision is not that of this program."""
     found = revision(session)
     if found is None:
         upgrade(session)
@@ -58,13 +58,13 @@ def _other_revision(session: Session, found: str) -> str:
             "run `sprag db upgrade`"
         )
     return (
-        f"the database {session.location} has revision {found}, which is newer than this program knows "
+        f"the database {session.location} has revision {found}, which is newer than this program's "
         f"({HEAD_REVISION}): install the newer Sprag and run its `sprag db upgrade`"
     )
 
 
 def known_revisions() -> list[str]:
-    """Revisions this program has a migration for, oldest first."""
+    """Revisions for which this program has a migration, oldest first."""
     from alembic.script import ScriptDirectory
 
     scripts = ScriptDirectory(str(_migrations()))
@@ -78,14 +78,14 @@ def _migrations() -> Path:
 
 
 def upgrade(session: Session) -> tuple[str | None, str]:
-    """Bring the database to this program's revision, in one transaction; gives (revision before, revision now).
+    """Bring the database to this program's revision, in one transaction; returns (old revision, new revision).
 
-    Raises SchemaError when the database is of a newer program.
+    Raises SchemaError when the database belongs to a newer program.
     """
     from alembic import command
     from alembic.config import Config
 
-    # What it tells of its own progress is for those who write migrations, not for a user.
+    # Alembic's messages about its progress are for authors of migrations, not for users.
     logging.getLogger("alembic").setLevel(logging.WARNING)
     before = revision(session)
     if before is not None and before not in known_revisions():
@@ -99,9 +99,9 @@ def upgrade(session: Session) -> tuple[str | None, str]:
 
 
 def require_sound(session: Session) -> None:
-    """Raise DatabaseError when the pages of the database are damaged; large ones are not looked over.
+    """Raise DatabaseError when the pages of the database are damaged; large databases are not checked.
 
-    `check` looks at everything, and takes its time. A server sees to its pages by itself.
+    `check` checks everything and may take long. A server checks its own pages.
     """
     if session.on_server or session.path.stat().st_size > CHECKED_BYTES:
         return
@@ -111,7 +111,7 @@ def require_sound(session: Session) -> None:
 
 
 def check(session: Session) -> CheckReport:
-    """Look the database over: its revision, its pages, its references, the library that reads it."""
+    """Check the database: its revision, pages and references, and the library that reads it."""
     problems: list[str] = []
     found = None
     try:
@@ -134,12 +134,12 @@ def check(session: Session) -> CheckReport:
 
 
 def _look_over_file(session: Session) -> list[str]:
-    """What SQLite finds wrong in its file: pages and references. A server sees to both by itself."""
+    """Faults that SQLite finds in the pages and references of its file. A server checks both itself."""
     with session.read() as connection:
         pages = connection.exec_driver_sql("PRAGMA integrity_check").scalars().all()
         problems = [f"integrity: {line}" for line in pages if line != "ok"]
         references = connection.exec_driver_sql("PRAGMA foreign_key_check").all()
-        return problems + [f"a row of {row[0]} refers to a study that is not there" for row in references]
+        return problems + [f"a row of {row[0]} refers to a study that does not exist" for row in references]
 
 
 def _server_version(session: Session) -> str:
@@ -150,7 +150,7 @@ def _server_version(session: Session) -> str:
 
 
 def checkpoint(session: Session) -> None:
-    """Move the write-ahead log into the database file as far as nobody reads the old state; a server does it itself.
+    """Move the write-ahead log into the database file as far as no reader needs the old state; a server does so itself.
 
     Neither readers nor writers wait for it.
     """
@@ -160,9 +160,9 @@ def checkpoint(session: Session) -> None:
 
 
 def backup(session: Session, path: Path) -> None:
-    """Write a consistent copy of the database to ``path`` while others go on working.
+    """Write a consistent copy of the database to ``path`` while others continue to work.
 
-    Raises DatabaseError when there is a file already or it cannot be written, or the database is on a server.
+    Raises DatabaseError when the file exists or cannot be written, or the database is on a server.
     """
     if session.on_server:
         raise DatabaseError(

@@ -1,4 +1,4 @@
-"""Which cases a chunk of a study is: consecutive ones, or those at its positions in the order coarse to fine."""
+"""The cases of a chunk: consecutive numbers, or those at its positions in the order coarse to fine."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from sprag.worker.order import Coverage, Order
     from sprag.worker.ports import Chunk, Clock
 
-#: Studies whose orders are kept in memory; each is a few numbers for every value of an axis, or of the list.
+#: Studies whose orders are kept in memory; each takes a few numbers per value of an axis, or of the list.
 _KEPT: Final = 16
 
 
@@ -35,9 +35,9 @@ class Orders(Part):
         self._orders_lock = Lock()
 
     def _order(self, number: int, connection: sa.Connection | None = None) -> Order | None:
-        """The order of a study; None where its cases are run by their numbers.
+        """The order of a study; None where its cases run in the order of their numbers.
 
-        Without a connection it is asked of the database in a transaction of its own, once.
+        Without a connection it is read once, in a transaction of its own.
         """
         with self._orders_lock:
             if number in self._orders:
@@ -62,7 +62,7 @@ class Orders(Part):
         return positions if order is None else np.sort(order.cases(positions))
 
     def _coverage(self, connection: sa.Connection, number: int, cases: int) -> Coverage | None:
-        """What of a study is complete, of its ``cases``; None where it is not run coarse to fine."""
+        """The complete part of a study of ``cases`` cases; None where it is not run coarse to fine."""
         order = self._order(number, connection)
         if order is None:
             return None
@@ -79,7 +79,7 @@ class Orders(Part):
 
     @staticmethod
     def _first_gap(connection: sa.Connection, number: int) -> int:
-        """First position that no chunk has: a cancelled study has lost its open ones."""
+        """First position without a chunk: a cancelled study has lost its open ones."""
         ends = (
             sa.select((CHUNKS.c["first"] + CHUNKS.c["count"]).label("end")).where(CHUNKS.c.study == number).subquery()
         )

@@ -1,4 +1,4 @@
-"""What every part of the store stands on: the session, the clock, and a study's row."""
+"""The base of every part of the store: the session, the clock, and a study's row."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class SystemClock:
     """The machine's clocks."""
 
     def now(self) -> datetime:
-        """The present moment, aware, UTC."""
+        """The current time, aware, UTC."""
         return datetime.now(UTC)
 
     def monotonic(self) -> float:
-        """Seconds on a clock that never goes back, and goes on while the machine sleeps."""
+        """Seconds on a clock that never goes back and keeps running while the machine sleeps."""
         return time.clock_gettime(time.CLOCK_BOOTTIME) if hasattr(time, "CLOCK_BOOTTIME") else time.monotonic()
 
 
@@ -47,14 +47,14 @@ def optional_moment(micros: int | None) -> datetime | None:
     return None if micros is None else moment(micros)
 
 
-#: Seconds without a sign of life of the worker after which it counts as gone: several times what lies between two.
+#: Seconds without a heartbeat after which the worker counts as gone: several times the interval of heartbeats.
 SILENT_SECONDS = 60.0
-#: The largest number that a column of integers takes on every server.
+#: The largest number that an integer column holds on every server.
 MAX_INTEGER = 2**31 - 1
 
 
 def announce(connection: sa.Connection) -> None:
-    """Tell dispatchers, once this transaction is committed, that there is something new; where one can be told."""
+    """Notify dispatchers of a change once this transaction is committed, where the database supports it."""
     if connection.dialect.name == "postgresql":
         connection.exec_driver_sql("NOTIFY sprag")
 
@@ -67,7 +67,7 @@ class Part:
         self.clock = clock
 
     def _now(self) -> int:
-        """The present moment in microseconds since 1970."""
+        """The current time in microseconds since 1970."""
         return micros_of(self.clock.now())
 
     def _row(self, connection: sa.Connection, study_id: str, *columns: sa.ColumnElement[Any]) -> sa.Row[Any]:
@@ -80,13 +80,13 @@ class Part:
         return found
 
     def _own(self, connection: sa.Connection, epoch: int) -> None:
-        """Raise EpochLostError when the epoch is not the latest any more."""
+        """Raise EpochLostError when the epoch is no longer the latest."""
         latest = connection.execute(sa.select(DISPATCHER.c.epoch).with_for_update()).scalar_one_or_none()
         if latest != epoch:
             raise EpochLostError(f"another dispatcher has taken over (epoch {latest}, this one has {epoch})")
 
     def _lift_deadline(self, connection: sa.Connection, number: int) -> None:
-        """Somebody lets the study go on: a deadline that has passed does not hold it any more."""
+        """Let a resumed study run although its deadline has passed."""
         connection.execute(
             sa.update(STUDIES)
             .where(STUDIES.c.number == number, STUDIES.c.finish_by <= self._now())
@@ -94,9 +94,9 @@ class Part:
         )
 
     def _move(self, connection: sa.Connection, number: int, event: StudyEvent, reason: str | None = None) -> StudyState:
-        """Take the study through ``event``; raises TransitionError where the table of states has no such step.
+        """Apply ``event`` to the study; raises TransitionError where the table of states has no such transition.
 
-        It waits for nothing by itself afterwards.
+        Afterwards the study does not wait for anything.
         """
         before = StudyState(
             connection.execute(

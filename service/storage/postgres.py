@@ -1,7 +1,7 @@
-"""PostgreSQL in the place of SQLite: its URL, connections and transactions, its lock, and news of changes.
+"""PostgreSQL instead of SQLite: its URL, connections and transactions, its lock, and notifications of changes.
 
-Writers take one advisory lock for the length of their transaction, so that the store has one writer at a time on a
-server too, and everything that was reasoned about SQLite's immediate transactions holds unchanged.
+Each writer holds an advisory lock for the length of its transaction. So the store has one writer at a time on a server
+too, and reasoning about SQLite's immediate transactions remains valid.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, Datab
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-#: First number of every advisory lock of Sprag ("SPRA" in ASCII); the second says what it is for.
+#: First key of every advisory lock of Sprag ("SPRA" in ASCII); the second key gives its purpose.
 _LOCKS: Final = 0x53505241
 _WRITER, _DISPATCHER = 1, 2
 _HOLDER: Final = (
@@ -29,13 +29,13 @@ _HOLDER: Final = (
 )
 #: Begins a write transaction.
 TAKE_WRITER: Final = f"SELECT pg_advisory_xact_lock({_LOCKS}, {_WRITER})"
-#: The channel on which changes of studies are told.
+#: The channel of notifications about changed studies.
 CHANNEL: Final = "sprag"
-#: Older ones lack what is used here and are out of support.
+#: Older versions lack features that are used here, and are out of support.
 OLDEST_SERVER: Final = 140_000
-#: Seconds after which a connection that gives no sign of life counts as lost, on either side.
+#: Seconds after which either side counts a silent connection as lost.
 LOST_SECONDS: Final = 5
-#: Seconds for which a process that was frozen in a transaction keeps the others waiting.
+#: Seconds for which a process frozen in a transaction blocks the others.
 FROZEN_SECONDS: Final = 60
 #: Options of the URL that are passed on to the driver.
 URL_OPTIONS: Final = frozenset({"host", "passfile", "sslcert", "sslkey", "sslmode", "sslrootcert"})
@@ -43,9 +43,9 @@ _LOCAL: Final = frozenset({"", "localhost", "127.0.0.1", "::1"})
 
 
 def checked(url: URL) -> URL:
-    """The URL with the driver named, and with encryption asked of every server that is not on this machine.
+    """The URL with the driver, and with encryption required of every server that is not on this machine.
 
-    Raises DatabaseError for a URL that is not understood.
+    Raises DatabaseError for an invalid URL.
     """
     if url.drivername not in {"postgresql", "postgresql+psycopg"}:
         raise DatabaseError(
@@ -54,7 +54,7 @@ def checked(url: URL) -> URL:
     unknown = sorted(set(url.query) - URL_OPTIONS)
     if unknown:
         raise DatabaseError(
-            f"a PostgreSQL URL takes no option {', '.join(unknown)} here; known are {', '.join(sorted(URL_OPTIONS))}",
+            f"unknown option {', '.join(unknown)} in the PostgreSQL URL; allowed are {', '.join(sorted(URL_OPTIONS))}",
             "invalid-database-url",
         )
     if not url.database:
@@ -68,13 +68,13 @@ def checked(url: URL) -> URL:
 
 
 def location(url: URL) -> str:
-    """The database as it may be shown: without password and options."""
+    """The database for display: without password and options."""
     shown = URL.create("postgresql", url.username, None, url.host, url.port, url.database)
     return shown.render_as_string()
 
 
 def _arguments(lock_seconds: float) -> dict[str, Any]:
-    """Of every connection: a partner that has gone is noticed by the client and by the server alike."""
+    """Arguments of every connection; both client and server notice when the other is gone."""
     server = {
         "tcp_keepalives_idle": 2,
         "tcp_keepalives_interval": 1,
@@ -95,7 +95,7 @@ def _arguments(lock_seconds: float) -> dict[str, Any]:
 
 
 def make_engine(url: URL, *, lock_seconds: float, connections: int) -> sa.Engine:
-    """Connections to the server; one that was lost is replaced before it is used."""
+    """Connections to the server; a lost one is replaced before use."""
     engine = sa.create_engine(
         url,
         connect_args=_arguments(lock_seconds),
@@ -117,7 +117,7 @@ def _require_version(connection: Any, _record: object) -> None:
 
 
 def connect(url: URL, lock_seconds: float, application: str = "sprag") -> psycopg.Connection[Any]:
-    """A connection beside the pool, each statement for itself. Raises DatabaseError."""
+    """A connection outside the pool, in autocommit mode. Raises DatabaseError."""
     given = {**_arguments(lock_seconds), "application_name": application[:63]}
     dialect = url.get_dialect()()
     _, named = dialect.create_connect_args(url)
@@ -139,7 +139,7 @@ def _unreachable(error: BaseException, where: str) -> str:
 
 
 def explained(error: BaseException, where: str) -> DatabaseError | None:
-    """One sentence for an error of the driver whose cause is outside the program; None for the others."""
+    """The DatabaseError for an error of the driver that has an external cause; None for other errors."""
     state = getattr(error, "sqlstate", None) or ""
     if state in {"55P03", "40001", "40P01"}:
         return busy(where)
@@ -160,7 +160,7 @@ def explained(error: BaseException, where: str) -> DatabaseError | None:
 
 
 def writer_is_free(connection: sa.Connection, seconds: float) -> bool:
-    """Whether the writers' lock can be had within ``seconds``; it is given back at once."""
+    """Whether the writers' lock can be acquired within ``seconds``; it is released immediately."""
     until = time.monotonic() + seconds
     while True:
         if connection.exec_driver_sql(f"SELECT pg_try_advisory_xact_lock({_LOCKS}, {_WRITER})").scalar_one():
@@ -184,9 +184,9 @@ def copy_in(connection: sa.Connection, table: str, columns: Sequence[str], rows:
 
 
 class ServerLock:
-    """An advisory lock of the server: the server gives it up when the connection of its holder is gone.
+    """An advisory lock of the server, which releases it when its holder's connection ends.
 
-    A holder whose connection was lost without its knowledge meets the next one's epoch at its next write.
+    A holder that has not noticed the loss of its connection is stopped by the next holder's epoch at its next write.
     """
 
     def __init__(self, url: URL, owner: str, lock_seconds: float) -> None:
@@ -197,24 +197,24 @@ class ServerLock:
         self._held = False
 
     def take(self) -> bool:
-        """Take the lock if it is free; True when it is ours. Raises DatabaseError when the server is not there."""
+        """Take the lock if it is free; True when it is ours. Raises DatabaseError when the server cannot be reached."""
         if not self._held:
             row = self._ask("SELECT pg_try_advisory_lock(%s::int, %s::int)")
             self._held = bool(row and row[0])
         return self._held
 
     def seize(self) -> None:
-        """Take the lock from whoever has it, by ending its connection; only the epoch then keeps it from the database.
+        """Take the lock from its holder by ending its connection; only the epoch then prevents the holder from writing.
 
-        Raises DatabaseError when the server does not let this user do that.
+        Raises DatabaseError when the server does not permit this user to do so.
         """
         while not self.take():
             self._ask(f"SELECT pg_terminate_backend(a.pid, {LOST_SECONDS * 1000}) {_HOLDER}")
 
     def end_holder(self) -> bool:
-        """End the connection in whose transaction a hung process keeps all others from writing; whether there was one.
+        """End the connection of a hung process whose transaction blocks all writers; whether there was one.
 
-        `seize` ends the connection that has the lock, which is another one.
+        `seize` ends the connection that holds the lock, which is a different one.
         """
         frozen = "AND a.state LIKE 'idle in transaction%%' AND clock_timestamp() - a.state_change > interval '1 s'"
         return self._ask(f"SELECT pg_terminate_backend(a.pid, {LOST_SECONDS * 1000}) {_HOLDER} {frozen}", _WRITER) == (
@@ -222,7 +222,7 @@ class ServerLock:
         )
 
     def holder(self) -> str:
-        """Host and process of whoever has the lock, "" where nobody does."""
+        """Host and process of the holder of the lock, "" where there is none."""
         row = self._ask(f"SELECT a.application_name {_HOLDER}")
         return str(row[0]) if row else ""
 
@@ -237,19 +237,19 @@ class ServerLock:
             raise explained(error, location(self._url)) or error from None
 
     def release(self) -> None:
-        """Give the lock up; never fails."""
+        """Release the lock; never fails."""
         held, self._held = self._held, False
         connection, self._connection = self._connection, None
         if connection is not None:
             with suppress(psycopg.Error):
-                if held:  # at once; the end of a connection is noticed a little later
+                if held:  # takes effect now; the server notices the end of a connection a little later
                     connection.execute("SELECT pg_advisory_unlock_all()")
             with suppress(psycopg.Error):
                 connection.close()
 
 
 class News:
-    """Hears of changes of studies as soon as they are committed, wherever they are made."""
+    """Notifications of changed studies as soon as they are committed by any process."""
 
     def __init__(self, url: URL, lock_seconds: float) -> None:
         self._url = url
@@ -257,12 +257,12 @@ class News:
         self._connection: psycopg.Connection[Any] | None = None
 
     def wait(self, timeout: float) -> bool:
-        """Whether something has changed since the last call, or may have; waits for it at most ``timeout`` s."""
+        """Whether something has or may have changed since the last call; waits at most ``timeout`` s."""
         try:
             if self._connection is None:
                 self._connection = connect(self._url, self._lock_seconds)
                 self._connection.execute(f"LISTEN {CHANNEL}".encode())
-                return True  # whatever happened before is not told
+                return True  # earlier changes are not reported
             heard = False
             for _ in self._connection.notifies(timeout=timeout, stop_after=1):
                 heard = True

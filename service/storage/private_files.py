@@ -1,4 +1,4 @@
-"""Files that only their owner may read: they hold the digests of tokens, the key of sessions, and designs."""
+"""Files that only their owner may read: they contain token digests, the session key, and designs."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ if TYPE_CHECKING:
 
 PRIVATE_MODE: Final = 0o600
 PRIVATE_FOLDER_MODE: Final = 0o700
-#: What group and others may do with a file that is not private.
+#: Permission bits of group and others.
 _OTHERS: Final = 0o077
 
 
 def create_private(path: Path, flags: int = os.O_EXCL) -> int:
-    """Create a file that only its owner may read, whatever the umask; the descriptor, open for reading and writing.
+    """Create a file that only its owner may read, whatever the umask; returns a descriptor for reading and writing.
 
     Raises OSError, FileExistsError when the file exists and ``flags`` has ``O_EXCL``.
     """
@@ -23,12 +23,12 @@ def create_private(path: Path, flags: int = os.O_EXCL) -> int:
 
 
 def readable_by_others(path: Path) -> bool:
-    """Whether the group or others may do anything with the file."""
+    """Whether the group or others have any permission for the file."""
     return bool(path.stat().st_mode & _OTHERS)
 
 
 def sync_folder(folder: Path) -> None:
-    """Write the names in ``folder`` to disk, so that a file renamed into it survives a power failure."""
+    """Flush the directory ``folder`` to disk, so that a file renamed into it survives a power failure."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         os.fsync(descriptor)

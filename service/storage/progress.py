@@ -1,9 +1,9 @@
-"""Rate and time left of a study, from its recently finished chunks and those that are being run.
+"""Rate and time left of a study, from its recently finished and running chunks.
 
-The cases of a chunk count as done evenly from its claim to its end, so that the rate is right however many chunks run
-side by side. The interval is made to hold nine times out of ten for studies whose cost changes as studies' costs do
-(`benchmarks.time_left` measures it): it has the spread of the pace over the recent chunks, the trend in it carried on,
-and a share for what cannot be seen yet, which shrinks as the study goes on.
+The cases of a chunk count as done evenly from its claim to its end, so the rate is correct for any number of parallel
+chunks. The interval is designed to hold nine times out of ten for the usual courses of cost (measured by
+`benchmarks.time_left`). It combines the spread of the pace over the recent chunks, the extrapolated trend of the pace,
+and a share for the unknown rest, which shrinks as the study proceeds.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ if TYPE_CHECKING:
 
 #: Finished chunks that count as recent.
 RECENT_CHUNKS = 256
-#: Stretches that the recent past is parted into, to see how the pace varies and where it tends.
+#: Sections of the recent past, from which spread and trend of the pace are derived.
 STRETCHES = 8
 #: Half width of the interval in standard errors of the pace.
 STANDARD_ERRORS = 2.2
-#: Share of the time left that is unknown while all is left, and the least.
+#: Unknown share of the time left at the beginning of a study, and its minimum.
 UNSEEN_SHARE = 0.45
 LEAST_SHARE = 0.04
-#: The same where the cases are run coarse to fine: those that are done tell of the others.
+#: The same where cases run coarse to fine: the finished cases represent the others.
 SAMPLED_SHARE = 0.15
-#: Relative spread of the pace that is assumed while there is too little to tell it from.
+#: Relative spread of the pace that is assumed while there are too few chunks to derive it.
 FIRST_SPREAD = 0.6
-#: Bounds of what a trend may do to the time left: at most this many times as long, at least this part.
+#: Limits of the effect of a trend on the time left: the largest and the smallest factor.
 LONGER, SHORTER = 3.0, 0.4
 
 
 @dataclass(frozen=True, slots=True)
 class FinishedChunk:
-    """When a chunk was claimed and done (s on any one clock), and its cases."""
+    """When a chunk was claimed and finished (s on any clock), and its cases."""
 
     begin: float
     end: float
@@ -50,7 +50,7 @@ class FinishedChunk:
 
 @dataclass(frozen=True, slots=True)
 class RunningChunk:
-    """When a chunk that is not done was claimed (s on the same clock), and its cases."""
+    """When an unfinished chunk was claimed (s on the same clock), and its cases."""
 
     begin: float
     cases: int
@@ -58,7 +58,7 @@ class RunningChunk:
 
 @dataclass(frozen=True, slots=True)
 class _Past:
-    """Chunks as arrays, ``work`` (cases) done evenly from ``begin`` to ``end``; after ``since`` none is lacking."""
+    """Chunks as arrays, ``work`` (cases) done evenly from ``begin`` to ``end``; complete after ``since``."""
 
     begin: Times
     end: Times
@@ -67,7 +67,7 @@ class _Past:
     until: float
 
     def busy(self, begin: float, end: float) -> float:
-        """Seconds between two times in which at least one chunk was being run: pauses do not count."""
+        """Seconds between two times during which at least one chunk was running; pauses do not count."""
         order = np.argsort(self.begin)
         starts, ends = np.clip(self.begin[order], begin, end), np.clip(self.end[order], begin, end)
         reached = np.concatenate([[begin], np.maximum.accumulate(ends)[:-1]])
@@ -87,18 +87,16 @@ def estimate(
     cases_done: int | None = None,
     sampled: bool = False,
 ) -> tuple[float | None, tuple[float, float] | None]:
-    """Rate in cases/s and the (low, high) seconds left; None where there is nothing to tell it from.
+    """Rate in cases/s and the (low, high) seconds left; None where there is no basis for them.
 
     Parameters
     ----------
-    cases_left : int
-        Cases without an ending, those being run among them.
+    cases_left : int Cases without an ending, including those being run.
     recent : finished chunks, the latest `RECENT_CHUNKS` or all of them
     running : chunks being run ``now`` (s); without it, the end of the latest finished one
     cases_done : int, optional
         Cases with an ending; those of ``recent`` unless given.
-    sampled : bool
-        Whether the cases that are done lie among those that are left (`sprag.worker.order`).
+    sampled : bool Whether the finished cases are spread among the remaining ones (`sprag.worker.order`).
     """
     if not recent:
         return None, None
@@ -109,7 +107,7 @@ def estimate(
         return None, None
     rate = work / busy
     typical = float(np.mean([chunk.end - chunk.begin for chunk in recent]))
-    # At the end some processes have nothing more to do while the others finish their last chunks.
+    # At the end some processes are idle while the others finish their last chunks.
     beside = max(1.0, rate * typical / float(np.mean([chunk.cases for chunk in recent])))
     left = max(cases_left - credit, 0.0) / rate
     left += 0.5 * typical * (1.0 - 1.0 / beside) if cases_left else 0.0
@@ -124,7 +122,7 @@ def _past(recent: Sequence[FinishedChunk], running: Sequence[RunningChunk], now:
     """The recent past, and how many cases of the running chunks count as done."""
     typical = max(float(np.mean([chunk.end - chunk.begin for chunk in recent])), 1e-9)
     since = min(chunk.begin for chunk in recent)
-    if len(recent) >= RECENT_CHUNKS:  # others, of which nothing is known here, may have run until the first of these
+    if len(recent) >= RECENT_CHUNKS:  # earlier chunks, which are unknown here, may have run until the first of these
         since = min(chunk.end for chunk in recent)
     shares = [min(0.95, max(0.0, now - chunk.begin) / typical) for chunk in running]
     credits = [share * chunk.cases for share, chunk in zip(shares, running, strict=True)]
@@ -139,9 +137,9 @@ def _past(recent: Sequence[FinishedChunk], running: Sequence[RunningChunk], now:
 
 
 def _factors(past: _Past, chunks: int, ahead: float, unseen: float) -> tuple[float, float]:
-    """What the time left may be at least and at most, in parts of the estimate.
+    """The least and the largest time left, relative to the estimate.
 
-    ``ahead`` is the estimate in parts of the recent past, ``unseen`` the share of it that is unknown in any case.
+    ``ahead`` is the estimate relative to the recent past, ``unseen`` the share of it that is unknown in any case.
     """
     paces = _paces(past, min(STRETCHES, chunks // 2))
     if paces.size < 3:
@@ -153,7 +151,7 @@ def _factors(past: _Past, chunks: int, ahead: float, unseen: float) -> tuple[flo
     rest = paces - paces.mean() - slope * at
     variance = float((rest**2).sum()) / (count - 2)
     slope_variance = variance / float((at**2).sum())
-    # The mean of the recent past is uncertain, and so is that of the time to come, the shorter it is.
+    # The mean of the recent past is uncertain, and that of the future is more uncertain the shorter it is.
     error = math.sqrt(variance * (1.0 / count + 1.0 / max(1.0, ahead * count)))
     trend = slope * slope**2 / max(slope**2 + slope_variance, 1e-300) * 0.5 * count * (1.0 + ahead)
     trend = min(max(trend, SHORTER - 1.0), LONGER - 1.0)
@@ -163,7 +161,7 @@ def _factors(past: _Past, chunks: int, ahead: float, unseen: float) -> tuple[flo
 
 
 def _paces(past: _Past, stretches: int) -> Times:
-    """Seconds for each case in stretches of the recent past, in parts of their mean; as many chunks ended in each."""
+    """Seconds per case in sections of the recent past with equal numbers of ended chunks, relative to their mean."""
     if stretches < 3:
         return np.ones(1)
     ends = np.sort(past.end[past.end > past.since])

@@ -1,4 +1,4 @@
-"""Removing what is left of deleted studies, step by step, so that other writers get their turn in between."""
+"""Removal of the rows of deleted studies in steps, so that other writers can work in between."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ class Purging(Part):
     """The rows of deleted studies."""
 
     def purge(self) -> None:
-        """Remove all of it now."""
+        """Remove all of them now."""
         for _ in self.purge_steps():
             pass
 
     def purge_steps(self) -> Iterator[int]:
-        """Remove it in short transactions; the rows that each of them deleted."""
+        """Remove them in short transactions; yields the number of rows that each deleted."""
         c = STUDIES.c
         with self.session.read() as connection:
             gone = connection.execute(sa.select(c.number, c.model, c.variant).where(c.deleted_at.is_not(None))).all()
@@ -42,7 +42,7 @@ class Purging(Part):
         mine = table.c.study == number
         while True:
             with self.session.write() as connection:
-                # The first row that stays; none where the rest is small enough.
+                # The first row that is kept; none where the rest is small enough.
                 edge = connection.execute(
                     sa.select(key).where(mine).order_by(key).offset(PURGED_ROWS).limit(1)
                 ).scalar_one_or_none()

@@ -1,4 +1,4 @@
-"""Whether a database can take and run studies: its file, its write lock, and the worker."""
+"""Whether a database can accept and run studies: its file, its write lock, and the worker."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from sprag.worker.ports import StoreError
 if TYPE_CHECKING:
     from sprag.service.storage.store import Store
 
-#: Seconds that the write lock may be held by others: far longer than any write transaction of Sprag takes.
+#: Seconds that others may hold the write lock: far longer than any write transaction of Sprag.
 LOCKED_SECONDS: Final = 5.0
-#: Seconds for which an answer holds, since everybody may ask.
+#: Seconds for which an answer is cached, because anybody may ask.
 _KEPT_SECONDS: Final = 2.0
-#: Seconds between two looks at all pages of a database of moderate size.
+#: Seconds between two checks of all pages of a database of moderate size.
 _CHECK_SECONDS: Final = 600.0
 
 
 class Readiness:
-    """Looks at a store when asked, one look at a time."""
+    """Checks a store on request, one check at a time."""
 
     def __init__(self, store: Store, locked_seconds: float = LOCKED_SECONDS) -> None:
         self._store = store
@@ -31,11 +31,11 @@ class Readiness:
         self._looking = Lock()
         self._found: tuple[str, ...] = ()
         self._until = float("-inf")
-        # Services look over the pages when they start.
+        # Services check the pages when they start.
         self._next_check = store.clock.monotonic() + _CHECK_SECONDS
 
     def problems(self) -> tuple[str, ...]:
-        """What keeps studies from being taken or run, a sentence each; while somebody looks, what was found before."""
+        """What prevents studies from being accepted or run, one sentence each; during a check, the last findings."""
         if self._store.clock.monotonic() < self._until or not self._looking.acquire(blocking=False):
             return self._found
         try:
@@ -46,7 +46,7 @@ class Readiness:
         return self._found
 
     def warnings(self) -> tuple[str, ...]:
-        """What keeps nobody from working and should be looked at, a sentence each."""
+        """What does not prevent work but needs attention, one sentence each."""
         with suppress(StoreError):
             if problem := clock_problem(self._store):
                 return (f"{problem}.",)

@@ -1,4 +1,4 @@
-"""What the store hands out: plain frozen values, SI units, aware times in UTC."""
+"""Records returned by the store: frozen values, SI units, aware times in UTC."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class StudyRecord:
     """A study without its heavy parts (`Store.spec`, `Store.study`).
 
     ``number`` counts studies in order of submission; ``id`` is the public name. ``done`` counts cases with an ending,
-    ``ok`` those that ended ok. ``reason`` says why the study is held or failed. ``revision`` rises with every change of
-    the record or its rows: together with ``id`` it makes an ETag. Studies of higher ``priority`` go first.
-    ``reused`` counts the cases whose rows were taken from earlier studies. A study is held at ``finish_by``; it is
-    ``coarse`` when its cases are run coarse to fine. ``time_over`` tells that this is what holds it.
+    ``ok`` those that ended ok. ``reason`` states why the study is held or failed. ``revision`` increases with every
+    change of the record or its rows: together with ``id`` it forms the ETag. Studies of higher ``priority`` run first.
+    ``reused`` counts the cases whose rows were copied from earlier studies. A study is held at ``finish_by``;
+    ``coarse`` states that its cases run coarse to fine, and ``time_over`` that its deadline holds it.
     """
 
     number: int
@@ -60,7 +60,7 @@ class StudyRecord:
 
     @property
     def over(self) -> bool:
-        """Whether nothing more of it is run unless somebody asks for it."""
+        """Whether the study runs no further unless somebody requests it."""
         return self.state.terminal or self.time_over
 
 
@@ -73,7 +73,7 @@ class StudyPage:
 
 
 class InTime(StrEnum):
-    """Whether a study will be finished by its deadline, from the interval of the time it will take."""
+    """Whether a study will finish by its deadline, judged by the interval of its time left."""
 
     YES = "yes"
     NO = "no"
@@ -82,11 +82,12 @@ class InTime(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a study is, computed when asked.
+    """Progress of a study, computed on request.
 
     ``rate`` is in cases/s over the recent chunks, None before the first; ``seconds_left`` is a (low, high) interval,
-    None where the rate is or when the study is held or ended. ``covered`` tells what is complete of a study that is run
-    coarse to fine, None for others. The study is held at ``finish_by``; ``asked_at`` is the present.
+    None where the rate is None, or when the study is held or ended. ``covered`` describes the completed part of a study
+    that is run coarse to fine; it is None for others. The study is held at ``finish_by``; ``asked_at`` is the time of
+    the request.
     """
 
     state: StudyState
@@ -109,7 +110,7 @@ class Progress:
 
     @property
     def in_time(self) -> InTime | None:
-        """Whether the study will be finished by its deadline; None where it has none or nothing is known."""
+        """Whether the study will finish by its deadline; None without a deadline or an estimate."""
         until = self._until
         if until is None or self.seconds_left is None:
             return None
@@ -118,7 +119,7 @@ class Progress:
 
     @property
     def done_by_then(self) -> int | None:
-        """About how many cases will be done at the deadline; None where it has none or nothing is known."""
+        """Estimated number of cases done at the deadline; None without a deadline or an estimate."""
         until = self._until
         if until is None or self.seconds_left is None or self.rate is None:
             return None
@@ -163,7 +164,7 @@ class RowBlock:
         return len(self.endings)
 
     def rows(self) -> Iterator[CaseRow]:
-        """The same, case by case."""
+        """The rows, case by case."""
         columns = [(info.name, info.kind == "real", info.cell) for info in self.infos]
         for case, ending, flags, values in zip(
             self.cases.tolist(), self.endings, self.flags, self.values.tolist(), strict=True
@@ -177,13 +178,12 @@ class RowBlock:
 
 @dataclass(frozen=True, slots=True)
 class CaseColumns:
-    """Chosen results of chosen cases, aligned with the cases asked for.
+    """Selected results of selected cases, aligned with the requested cases.
 
     Attributes
     ----------
     cases : int64 array, shape (m,)
-    endings : list, length m
-        None where the case has no row yet, "cancelled" where it will not get one.
+    endings : list, length m None where the case has no row yet, "cancelled" where it never gets one.
     values : dict of float64 arrays, each shape (m,)
         By result name; NaN for null and for missing rows.
     """
@@ -195,7 +195,7 @@ class CaseColumns:
 
 @dataclass(frozen=True, slots=True)
 class Kinds:
-    """How many finished cases of a study have which regime and which flag, each the most frequent first."""
+    """Numbers of finished cases of a study by regime and by flag, most frequent first."""
 
     regimes: dict[str, int]
     flags: dict[str, int]
@@ -203,7 +203,7 @@ class Kinds:
 
 @dataclass(frozen=True, slots=True)
 class DispatcherRecord:
-    """The dispatcher that took over last, and when it was last heard of."""
+    """The dispatcher that took over last, and its latest heartbeat."""
 
     epoch: int
     owner: str

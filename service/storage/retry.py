@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from sprag.worker.order import Order
 
-#: First and number of chunk places that follow one another: case numbers, or positions in the study's order.
+#: First and count of consecutive places: case numbers, or positions in the study's order.
 Run = tuple[int, int]
 
 
@@ -38,13 +38,13 @@ class _Done:
 
 
 class Retries(Orders):
-    """Failed cases back to waiting."""
+    """Returning failed cases to waiting."""
 
     def retry_study(self, study_id: str, endings: Collection[str] | None = None) -> StudyRecord:
-        """Let the cases of an ended study that did not end ok, or that have one of ``endings``, be run again.
+        """Run the cases of an ended study again that did not end ok, or that have one of ``endings``.
 
-        Every other row stays as it is. Raises StudyNotFound, TransitionError when the study has not ended or was
-        cancelled, and NothingToRetry when there is no such case.
+        All other rows are kept. Raises StudyNotFound, TransitionError when the study has not ended or was cancelled,
+        and NothingToRetry when there is no such case.
         """
         c = STUDIES.c
         while True:
@@ -59,12 +59,12 @@ class Retries(Orders):
                 runs = _runs(connection, row, ended) if order is None else _places(connection, row, ended, order)
             with self.session.write() as connection:
                 now = self._row(connection, study_id, c.revision)
-                if now.revision != row.revision:  # it was run again, or deleted and not yet gone, in between
+                if now.revision != row.revision:  # it was run again or deleted in the meantime
                     continue
                 _give_back(connection, row, runs, counts)
                 self._move(connection, row.number, StudyEvent.RETRY)
                 self._lift_deadline(connection, row.number)
-                # To be run again means run, not taken from a study in which they failed in the same way.
+                # The cases must be run, not copied from a study in which they failed in the same way.
                 connection.execute(sa.update(STUDIES).where(c.number == row.number).values(fresh=1))
                 return record_of(self._row(connection, study_id, *RECORD_COLUMNS))
 
@@ -76,7 +76,7 @@ def _nothing(endings: Collection[str] | None) -> str:
 
 
 def _failed(connection: sa.Connection, number: int, endings: Collection[str] | None) -> dict[str, int]:
-    """Cases of each ending that are to be run again."""
+    """Number of cases to run again, by ending."""
     c = ENDINGS.c
     found = connection.execute(sa.select(c.ending, c.cases).where(c.study == number, c.ending != models.OK)).all()
     return {ending: cases for ending, cases in found if cases and (endings is None or ending in endings)}
@@ -85,7 +85,7 @@ def _failed(connection: sa.Connection, number: int, endings: Collection[str] | N
 def _runs(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...]) -> list[Run]:
     """The cases with those endings as runs, in order."""
     c = results_table(row.model, row.variant).c
-    # Cases that follow one another have the same difference to their place among the cases found.
+    # Consecutive cases have the same difference from their index in the list.
     place = sa.func.row_number().over(order_by=c.case_number)
     found = (
         sa.select(c.case_number, (c.case_number - place).label("same"))
@@ -98,7 +98,7 @@ def _runs(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...])
 
 
 def _places(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...], order: Order) -> list[Run]:
-    """The same of a study that is run coarse to fine: runs of positions in its order."""
+    """The same for a study that is run coarse to fine: runs of positions in its order."""
     c = results_table(row.model, row.variant).c
     query = sa.select(c.case_number).where(c.study == row.number, c.ending.in_(endings))
     places = np.sort(order.positions(np.fromiter(connection.execute(query).scalars(), dtype=np.int64)))
@@ -109,14 +109,14 @@ def _places(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...
 def _few(runs: list[Run]) -> list[Run]:
     if len(runs) > MAX_CHUNKS:
         raise NothingToRetry(
-            f"the failed cases lie in more than {MAX_CHUNKS} places: choose fewer by their ending, or submit them as "
+            f"the failed cases lie in more than {MAX_CHUNKS} places: select fewer by their ending, or submit them as "
             "a study of their own"
         )
     return runs
 
 
 def _give_back(connection: sa.Connection, row: sa.Row[Any], runs: Sequence[Run], counts: dict[str, int]) -> None:
-    """Take the rows of those endings away and cut the chunks so that exactly their cases are waiting."""
+    """Delete the rows with those endings and cut the chunks so that exactly these cases wait."""
     table = results_table(row.model, row.variant)
     connection.execute(sa.delete(table).where(table.c.study == row.number, table.c.ending.in_(tuple(counts))))
     _cut(connection, row.number, runs)
@@ -153,9 +153,9 @@ def _cut(connection: sa.Connection, number: int, runs: Sequence[Run]) -> None:
 
 
 def _pieces(number: int, chunk: _Done, inside: Sequence[Run]) -> list[dict[str, Any]]:
-    """A finished chunk as pieces that wait (from, to: ``inside``) and pieces that stay done in between.
+    """A finished chunk as waiting pieces (``inside``) and the finished pieces between them.
 
-    Those share the time it took by their numbers of cases, so that the reported speed stays right.
+    The finished pieces share its time in proportion to their cases, so the reported speed stays correct.
     """
     waiting = {first for first, _ in inside}
     borders = sorted({chunk.first, chunk.first + chunk.count, *(border for part in inside for border in part)})

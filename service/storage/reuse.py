@@ -1,4 +1,4 @@
-"""Cases whose rows other studies have already: found from the studies alone, copied when their chunk is committed."""
+"""Reuse of rows of other studies: found by comparing the studies, copied when a chunk is committed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     Cases = NDArray[np.int64]
 
-#: Studies whose spans are kept in memory, about a kilobyte each; and how many are read and compared in one go.
+#: Studies whose spans are kept in memory, about a kilobyte each; and how many are read and compared together.
 _KEPT_SPANS: Final = 20_000
 _SPANS_AT_ONCE: Final = 500
 #: Studies whose equal cases are kept in memory.
@@ -44,7 +44,7 @@ _SOURCE: Final[tuple[sa.ColumnElement[Any], ...]] = (
     STUDIES.c.coarse,
     STUDIES.c.study,
 )
-#: Endings that say nothing of the case itself: it deserves a run of its own.
+#: Endings that do not result from the case itself; such cases are run anew.
 _NO_RESULT: Final = tuple(ending.value for ending in WorkerEnding)
 
 _MIXED: Final = (
@@ -72,15 +72,16 @@ class Reuse(Orders):
         self._spans = _Spans()
 
     def reusable(self, study: Study) -> int:
-        """How many cases of a study that is not submitted yet would not have to be run."""
+        """Number of cases of an unsubmitted study that need not be run."""
         with self.session.read() as connection:
             found = _find(connection, self._spans, study, kin_hash(study, models.ENGINE_VERSION), 0)
         return 0 if found is None else found.cases.size
 
     def known(self, study: Study, chunk: Chunk) -> Known | None:
-        """Which cases of a chunk of ``study`` have to be run and which others have; None where all of a range have to.
+        """Which cases of a chunk of ``study`` must be run and which can be copied; None where the whole chunk must be
+        run.
 
-        What is found at the first chunk of a study holds for all of them.
+        The search at the first chunk of a study covers all its chunks.
         """
         found = self._of_study(study, chunk.study)
         plain, cases = self._order(chunk.study) is None, self._cases(chunk)
@@ -105,23 +106,23 @@ class Reuse(Orders):
         return self._found[number]
 
     def _forget_reuse(self, number: int) -> None:
-        """Look again at the next chunk of the study: its sources have changed."""
+        """Search again at the next chunk of the study, because its sources have changed."""
         self._found.pop(number, None)
 
 
 class _Spans:
-    """The `span` of every study that was looked at: it never changes, and most studies can be ruled out by it alone."""
+    """The `span` of every study examined; it never changes, and it alone rules out most studies."""
 
     def __init__(self) -> None:
         self._of: LRUCache[int, NDArray[np.float64]] = LRUCache(_KEPT_SPANS)
         self._lock = Lock()
 
     def candidates(self, connection: sa.Connection, wanted: Wanted, kin: str, number: int) -> list[int]:
-        """Numbers of the studies of that kin that may have a case in common with another, the newest first."""
+        """Numbers of the studies of that kin that may share a case with the wanted study, newest first."""
         c = STUDIES.c
         numbers = list(
             connection.execute(
-                # The index of the kin has the numbers: no study is read for this.
+                # The index on kin contains the numbers; no study is read for this.
                 sa.select(c.number).where(c.kin_hash == kin, c.number != number).order_by(c.number.desc())
             ).scalars()
         )
@@ -129,7 +130,7 @@ class _Spans:
         for first in range(0, len(numbers), _SPANS_AT_ONCE):
             part = numbers[first : first + _SPANS_AT_ONCE]
             spans = self._get(connection, part)
-            part = [study for study in part if study in spans]  # one may be gone since its number was read
+            part = [study for study in part if study in spans]  # one may have been deleted since
             if part:
                 may = wanted.may_share(np.stack([spans[study] for study in part]))
                 found += np.array(part)[may].tolist()
@@ -149,9 +150,9 @@ class _Spans:
 
 
 def _find(connection: sa.Connection, spans: _Spans, study: Study, kin: str, number: int) -> _Found | None:
-    """Equal cases with rows in the studies of the same kin, however many; the newest study that has a case counts.
+    """Equal cases with rows in any number of studies of the same kin; the newest study with a case counts.
 
-    Only rows that were computed under the fingerprint of this process count.
+    Only rows computed under the fingerprint of this process count.
     """
     wanted, c = Wanted(study), STUDIES.c
     found: list[tuple[Cases, int, Cases]] = []
@@ -189,7 +190,7 @@ def _find(connection: sa.Connection, spans: _Spans, study: Study, kin: str, numb
 
 
 def _has_rows(connection: sa.Connection, source: sa.Row[Any], study: Study, cases: Cases) -> NDArray[np.bool_]:
-    """Which of the cases of a study have rows that are results."""
+    """Which cases of a study have rows with results."""
     stored = np.ones(cases.size, dtype=np.bool_)
     if not cases.size:
         return stored
@@ -220,7 +221,7 @@ def _has_rows(connection: sa.Connection, source: sa.Row[Any], study: Study, case
 
 
 def mark_origin(connection: sa.Connection, number: int) -> None:
-    """Note on a study that rows of this process's fingerprint come in; rows of several lead to a warning."""
+    """Record that a study gets rows of this process's fingerprint; rows of several lead to a warning."""
     this = STUDIES.c.number == number
     origin, warnings = connection.execute(sa.select(STUDIES.c.fingerprint, STUDIES.c.warnings).where(this)).one()
     if origin is None:
@@ -231,7 +232,7 @@ def mark_origin(connection: sa.Connection, number: int) -> None:
 
 
 def copy_rows(connection: sa.Connection, model: str, variant: str, chunk: Chunk, known: Known) -> bool:
-    """Copy the known rows of a chunk; False when some are not there any more."""
+    """Copy the known rows of a chunk; False when some no longer exist."""
     table = results_table(model, variant)
     rest = ", ".join(column.name for column in table.c if column.name not in KEY_COLUMNS[:2])
     mark = "?" if connection.dialect.name == "sqlite" else "%s"
@@ -245,7 +246,7 @@ def copy_rows(connection: sa.Connection, model: str, variant: str, chunk: Chunk,
 
 
 def endings_of(connection: sa.Connection, model: str, variant: str, study: int, cases: Cases) -> Counter[str]:
-    """How many of the cases (ascending) of a study ended how."""
+    """Number of the given cases (ascending) of a study by ending."""
     c = results_table(model, variant).c
     found: Counter[str] = Counter()
     for condition in conditions(c.case_number, cases):

@@ -1,8 +1,8 @@
-"""How much the database can still take, and holding the studies while that is not enough.
+"""Free space for the database, and holding studies while there is not enough.
 
-A study is held before the disk is full, while there is room to say so. Where others take the last room in between, a
-write fails; the dispatcher then drops what it has in hand and says so with the help of a reserve: a file beside the
-database that is removed when there is no other room.
+Studies are held before the disk is full, while the reason can still be written. Where other programs use up the
+remaining space, a write fails. The dispatcher then discards its unfinished work and records the reason with the help of
+a reserve: a file beside the database that is removed when there is no other space.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ if TYPE_CHECKING:
 
     from sprag.service.storage.session import Session
 
-#: Bytes kept free for the chunks that are being run, and for saying that nothing more is.
+#: Bytes kept free for the running chunks and for recording the reason of a hold.
 RESERVE_BYTES = 4 * 1024 * 1024
-#: Bytes of the file that is given up when not even that can be said.
+#: Size in bytes of the reserve file, which is removed when not even the reason can be recorded.
 RESERVE_FILE_BYTES = 1024 * 1024
-#: Room where it is not known: enough for whatever is asked.
+#: Value for unknown free space: enough for any request.
 UNKNOWN_BYTES = 1 << 62
 GOES_ON = "the study continues when there is room"
 
 
 def room(session: Session) -> tuple[int, str]:
-    """Bytes that the database can still take, and what sets the limit: the disk, or the largest file allowed.
+    """Bytes available to the database, and the cause of the limit: the disk, or the largest file allowed.
 
-    The disk of a server cannot be asked from here: it is full when the server says so at a write. Raises DatabaseError
-    when the file was moved, replaced or deleted while in use.
+    The free space of a server is unknown until a write fails. Raises DatabaseError when the file was moved, replaced or
+    deleted while in use.
     """
     if session.on_server:
         return UNKNOWN_BYTES, f"the server of {session.location} does not report its free space"
@@ -68,7 +68,7 @@ def _size(path: Path) -> int:
 
 
 def _within(session: Session) -> tuple[int, int]:
-    """Bytes free inside the files: pages of deleted rows, and the part of the log that has been moved to its place."""
+    """Free bytes inside the files: pages of deleted rows, and the checkpointed part of the log."""
     with session.plain() as connection:
         page: int = connection.exec_driver_sql("PRAGMA page_size").scalar_one()
         unused: int = connection.exec_driver_sql("PRAGMA freelist_count").scalar_one()
@@ -77,7 +77,7 @@ def _within(session: Session) -> tuple[int, int]:
             _busy, logged, moved = connection.exec_driver_sql("PRAGMA wal_checkpoint(PASSIVE)").one()
     except DatabaseFullError:
         return unused * page, 0
-    # The log is written over from its beginning once all of it has been moved.
+    # The log is overwritten from its beginning once all of it is checkpointed.
     return unused * page, (logged * page if logged == moved else 0)
 
 
@@ -85,11 +85,11 @@ class Room(Part):
     """Studies held while the disk is full. Part of `sprag.worker.ports.Store`."""
 
     def room(self) -> int:
-        """Bytes that the database can still take."""
+        """Bytes available to the database."""
         return room(self.session)[0]
 
     def shortage(self) -> str | None:
-        """Why there is no room for more rows, as a sentence; None where there is."""
+        """Why there is no room for more rows, as a sentence; None where there is room."""
         left, limit = room(self.session)
         if left < RESERVE_BYTES:
             return f"no room: {limit}; {GOES_ON}"
@@ -101,11 +101,11 @@ class Room(Part):
         return self.session.path.with_name(f"{self.session.path.name}.reserve")
 
     def _keep_reserve(self) -> None:
-        """Have the file there that is given up when the disk is full; a server has to see to that itself."""
+        """Create the reserve file for a full disk; a server has to provide for that itself."""
         if self.session.on_server or self._reserve.exists():
             return
         with suppress(OSError), os.fdopen(create_private(self._reserve), "wb") as file:
-            file.write(os.urandom(RESERVE_FILE_BYTES))  # zeros could be stored as nothing
+            file.write(os.urandom(RESERVE_FILE_BYTES))  # a file of zeros could be sparse
             os.fsync(file.fileno())
 
     def hold(self, epoch: int, reason: str, *, returned: bool) -> None:
@@ -135,7 +135,7 @@ class Room(Part):
                 )
 
     def let_go(self, epoch: int) -> None:
-        """Queue again every study that `hold` paused and nobody has touched since."""
+        """Queue again every study that `hold` paused and nobody has changed since."""
         with self.session.write() as connection:
             self._own(connection, epoch)
             numbers = connection.execute(sa.select(STUDIES.c.number).where(STUDIES.c.waits_for == WAITS_FOR_ROOM))

@@ -28,7 +28,7 @@ def target(model: str, variant: str) -> tuple[str, tuple[str, ...]]:
 def tuples(
     study: int, numbers: Sequence[int], result: ChunkResult, infos: Sequence[models.ResultInfo]
 ) -> list[tuple[Any, ...]]:
-    """Rows for `target`, of the cases with those numbers: NaN and infinities become NULL, counts and codes whole."""
+    """Rows for `target`, of the cases with those numbers: NaN and infinities become NULL, counts and codes integers."""
     columns: list[list[Any]] = []
     for index, info in enumerate(infos):
         column = result.values[:, index]
@@ -45,7 +45,7 @@ def tuples(
 
 @contextmanager
 def without_collector() -> Iterator[None]:
-    """Make many rows without Python's collector looking through them again and again: that was half of the time."""
+    """Disable the garbage collector while many rows are built: its repeated scans took half of the time."""
     collects = gc.isenabled()
     gc.disable()
     try:

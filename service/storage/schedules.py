@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from datetime import datetime
 
 _S, _R = SCHEDULES.c, SCHEDULE_RUNS.c
-#: Runs that are told of one schedule, the latest ones.
+#: Number of latest runs reported for a schedule.
 SHOWN_RUNS: Final = 20
 
 
 class RunState(StrEnum):
-    """What became of a due time."""
+    """Outcome of a due time."""
 
     TAKEN = "taken"
     SUBMITTED = "submitted"
@@ -38,7 +38,7 @@ class RunState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class RunRecord:
-    """A due time that was taken up. ``study`` is None where none came of it or it was deleted since."""
+    """A due time that was taken up. ``study`` is None where none was submitted or it has been deleted."""
 
     due: datetime
     state: RunState
@@ -62,7 +62,7 @@ class ScheduleRecord:
 
 @dataclass(frozen=True, slots=True)
 class OpenRun:
-    """A due time that was taken up at ``begun_at`` and of which nothing has become yet; ``problem`` says why."""
+    """A due time that was taken up at ``begun_at`` and has no outcome yet; ``problem`` states why."""
 
     schedule: int
     id: str
@@ -74,9 +74,9 @@ class OpenRun:
 
 @dataclass(frozen=True, slots=True)
 class BoundStudy:
-    """A study with a window that has not ended. ``held`` tells whether the window is what it waits for.
+    """An unfinished study that is bound to a window. ``held`` states whether it waits for the window.
 
-    ``window`` is None where the schedule has none any more.
+    ``window`` is None where the schedule no longer has one.
     """
 
     number: int
@@ -87,15 +87,15 @@ class BoundStudy:
 
 
 class Schedules(Part):
-    """Schedules as the service and the scheduler see them."""
+    """The schedules of a database."""
 
     def create_schedule(
         self, fields: ScheduleFields, *, idempotency_key: str | None = None, body_hash: str = ""
     ) -> ScheduleRecord:
-        """Keep a new schedule; raises TooManySchedules.
+        """Store a new schedule; raises TooManySchedules.
 
-        A key that was used before with the same ``body_hash`` gives the schedule of that time; with another one raises
-        IdempotencyConflict.
+        A key that was used before with the same ``body_hash`` returns the schedule of that request; with another hash
+        it raises IdempotencyConflict.
         """
         schedule_id = f"sc_{secrets.token_hex(8)}"
         asked = {"idempotency_key": idempotency_key, "body_hash": body_hash} if idempotency_key is not None else {}
@@ -113,7 +113,7 @@ class Schedules(Part):
             return self._schedule(connection, schedule_id)
 
     def schedule_of_key(self, idempotency_key: str, body_hash: str) -> ScheduleRecord | None:
-        """The schedule that was sent with that key; raises IdempotencyConflict when its body was another."""
+        """The schedule that was sent with that key; raises IdempotencyConflict when it was sent with another body."""
         with self.session.read() as connection:
             return self._schedule_of_key(connection, idempotency_key, body_hash)
 
@@ -137,21 +137,21 @@ class Schedules(Part):
             return tuple(self._record(connection, row) for row in connection.execute(query).all())
 
     def schedule_runs(self, schedule_id: str) -> tuple[RunRecord, ...]:
-        """The latest due times that the schedule had, latest first; raises ScheduleNotFound."""
+        """The latest due times of the schedule, latest first; raises ScheduleNotFound."""
         with self.session.read() as connection:
             number = self._schedule_row(connection, schedule_id).number
             return self._runs(connection, number, SHOWN_RUNS)
 
     def change_schedule(self, schedule_id: str, fields: ScheduleFields) -> ScheduleRecord:
-        """Put ``fields`` in the place of those that the schedule has; what was missed before is forgotten.
+        """Replace the fields of the schedule by ``fields``; missed due times are forgotten.
 
-        A run of which no study came yet is tried no longer where the schedule is disabled.
+        Where the schedule is disabled, runs without a study are no longer tried.
         """
         with self.session.write() as connection:
             number = self._schedule_row(connection, schedule_id).number
             connection.execute(sa.update(SCHEDULES).where(_S.number == number).values(self._values(fields)))
             if not fields.enabled:
-                problem = "The schedule was disabled before a study came of it."
+                problem = "The schedule was disabled before a study was submitted."
                 connection.execute(
                     sa.update(SCHEDULE_RUNS)
                     .where(_R.schedule == number, _R.state == RunState.TAKEN.value)
@@ -160,7 +160,7 @@ class Schedules(Part):
             return self._schedule(connection, schedule_id)
 
     def delete_schedule(self, schedule_id: str) -> None:
-        """Delete the schedule; its studies stay, with their window. Raises ScheduleNotFound."""
+        """Delete the schedule; its studies are kept, with their window. Raises ScheduleNotFound."""
         with self.session.write() as connection:
             number = self._schedule_row(connection, schedule_id).number
             connection.execute(
@@ -176,7 +176,7 @@ class Schedules(Part):
             return [self._record(connection, row) for row in connection.execute(query).all()]
 
     def recover_schedules(self, now: datetime) -> list[str]:
-        """Have schedules due again at their next time after ``now`` that a clock that was ahead put off; their ids."""
+        """Make schedules that a fast clock postponed due again at their next time after ``now``; returns their ids."""
         recovered = []
         with self.session.read() as connection:
             rows = connection.execute(sa.select(SCHEDULES).where(_S.next_due > _micros(now))).all()
@@ -194,7 +194,9 @@ class Schedules(Part):
         return recovered
 
     def take_due(self, record: ScheduleRecord, due: datetime, missed: int, following: datetime | None) -> bool:
-        """Take ``due`` up, for whoever comes first: False when another did, or the schedule was changed meanwhile."""
+        """Take up ``due`` once: False when another process did so first, or the schedule was changed in the
+        meantime.
+        """
         assert record.next_due is not None
         with self.session.write() as connection:
             moved = connection.execute(
@@ -203,7 +205,7 @@ class Schedules(Part):
                 .values(next_due=None if following is None else _micros(following))
             )
             this = (_R.schedule == record.number) & (_R.due == _micros(due))
-            # A clock that was put back comes to the same due time again.
+            # After the clock was put back, the same due time comes again.
             if not moved.rowcount or connection.execute(sa.select(_R.due).where(this)).first():
                 return False
             connection.execute(
@@ -231,14 +233,14 @@ class Schedules(Part):
         return [OpenRun(row.number, row.id, row.due, _fields(row), moment(row.begun_at), row.problem) for row in rows]
 
     def put_off_run(self, run: OpenRun, problem: str) -> None:
-        """Note why no study came of a due time yet; it stays open."""
+        """Record why a due time has no study yet; it stays open."""
         with self.session.write() as connection:
             connection.execute(
                 sa.update(SCHEDULE_RUNS).where(_R.schedule == run.schedule, _R.due == run.due).values(problem=problem)
             )
 
     def close_run(self, run: OpenRun, *, study: int | None = None, problem: str | None = None) -> None:
-        """Note what became of a due time: a study by its number, or why there is none."""
+        """Record the outcome of a due time: the number of its study, or why there is none."""
         state = RunState.REFUSED if study is None else RunState.SUBMITTED
         with self.session.write() as connection:
             connection.execute(
@@ -267,7 +269,7 @@ class Schedules(Part):
         ]
 
     def hold_for_window(self, number: int, reason: str) -> None:
-        """Pause a queued or running study until `let_in`; one that is held by its window has a new reason."""
+        """Pause a queued or running study until `let_in`; a study that its window already holds gets the new reason."""
         c = STUDIES.c
         with self.session.write() as connection:
             state = connection.execute(sa.select(c.state).where(c.number == number)).scalar_one()
@@ -279,7 +281,7 @@ class Schedules(Part):
                 connection.execute(sa.update(STUDIES).where(held).values(reason=reason, revision=c.revision + 1))
 
     def let_in(self, number: int) -> None:
-        """Queue a study again that `hold_for_window` paused and nobody has touched since."""
+        """Queue a study again that `hold_for_window` paused and nobody has changed since."""
         with self.session.write() as connection:
             waits = connection.execute(sa.select(STUDIES.c.waits_for).where(STUDIES.c.number == number)).scalar_one()
             if waits == WAITS_FOR_WINDOW:

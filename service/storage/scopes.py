@@ -1,10 +1,10 @@
-"""What tokens allow; apart from their storage, so that the command line starts without the database."""
+"""Scopes of tokens, apart from their storage, so that the command line starts without the database."""
 
 from enum import StrEnum
 
 
 class TokenScope(StrEnum):
-    """What a token allows: to look at everything, or also to change it."""
+    """Scope of a token: read everything, or also change it."""
 
     READ = "read"
     WRITE = "write"

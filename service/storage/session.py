@@ -33,23 +33,23 @@ _BEGIN = "sprag_begin"
 
 
 def _without_password(url: str) -> str:
-    """A text that should have been a URL, without what stands between its scheme and the last @."""
+    """An invalid URL without the part between its scheme and the last @."""
     return re.sub(r"(://).*@", r"\1...@", url)
 
 
 class Session:
     """Connections to one database.
 
-    ``url`` is a SQLAlchemy URL of an SQLite file or of a database on a PostgreSQL server. Raises DatabaseError, with
-    one sentence, when it cannot be used. ``location`` is the database as it may be shown to people.
+    ``url`` is a SQLAlchemy URL of an SQLite file or of a database on a PostgreSQL server. Raises DatabaseError when it
+    cannot be used. ``location`` is the database for display.
     """
 
     def __init__(self, url: str) -> None:
         try:
             self.url: URL = make_url(url)
-        except (sa.exc.ArgumentError, ValueError):  # the latter of a port that is no number
+        except (sa.exc.ArgumentError, ValueError):  # the latter for an invalid port
             raise DatabaseError(
-                f"{_without_password(url)!r} is not a database URL; one looks like sqlite:////path/to/sprag.sqlite3 or "
+                f"{_without_password(url)!r} is not a database URL; use sqlite:////path/to/sprag.sqlite3 or "
                 "postgresql://user@host:5432/database",
                 "invalid-database-url",
             ) from None
@@ -82,19 +82,19 @@ class Session:
         sa.event.listen(self._engine, "begin", _begin)
         self._turn = Condition()
         self._writing = self._refusing = False
-        #: Told how long ("read" or "write", s) each transaction waited for its beginning.
+        #: Called with the time ("read" or "write", s) that each transaction waited for its beginning.
         self.on_wait: Callable[[str, float], None] | None = None
         self._reader = self._engine.execution_options(**{_BEGIN: begin["read"]}, **reading)
         self._writer = self._engine.execution_options(**{_BEGIN: begin["write"]})
 
     @property
     def on_server(self) -> bool:
-        """Whether the database is on a PostgreSQL server and not in a file here."""
+        """Whether the database is on a PostgreSQL server and not in a local file."""
         return self._file is None
 
     @property
     def file(self) -> sqlite_files.DatabaseFile:
-        """The file of an SQLite database; only for code that has asked `on_server`."""
+        """The file of an SQLite database; only valid where `on_server` is false."""
         assert self._file is not None
         return self._file
 
@@ -109,7 +109,7 @@ class Session:
         return None if self._file is None else self._file.damage
 
     def require_same_file(self) -> None:
-        """Raise DatabaseError when the file is not the one that was opened: what is written would be lost with it."""
+        """Raise DatabaseError when the file is not the one that was opened: writes would be lost with it."""
         if self._file is not None:
             self._file.require_same()
 
@@ -127,14 +127,15 @@ class Session:
 
     @contextmanager
     def read(self) -> Iterator[sa.Connection]:
-        """A short read transaction: everything read inside is of one moment."""
+        """A short read transaction: all reads see the same state."""
         with self._transaction(self._reader, "read", perf_counter()) as connection:
             yield connection
 
     @contextmanager
     def write(self) -> Iterator[sa.Connection]:
-        """A write transaction, with the write lock from its first moment; commits at the end, or changes nothing."""
-        # Threads of one process queue here: SQLite's own waiting is by sleeping ever longer, and the last wakes last.
+        """A write transaction that holds the write lock from its beginning; commits at the end, or changes nothing."""
+        # Threads of one process queue here: SQLite waits by sleeping for increasing times, which is unfair to early
+        # waiters.
         began = perf_counter()
         self.require_same_file()
         with self._turn:
@@ -152,7 +153,7 @@ class Session:
                 self._turn.notify()
 
     def refuse_writes(self) -> None:
-        """Let no write begin from now on: EndingError for those that wait. The one under way goes on."""
+        """Refuse writes from now on: waiting ones get EndingError. The current one continues."""
         with self._turn:
             self._refusing = True
             self._turn.notify_all()
@@ -170,13 +171,13 @@ class Session:
     def insert_rows(
         self, connection: sa.Connection, table: str, columns: Sequence[str], rows: Sequence[tuple[Any, ...]]
     ) -> None:
-        """Insert rows into one of our own tables; they go past SQLAlchemy for speed."""
+        """Insert rows into one of our own tables, bypassing SQLAlchemy for speed."""
         insert = _postgres().copy_in if self.on_server else sqlite_files.insert_rows
         insert(connection, table, columns, rows)
 
     @contextmanager
     def plain(self) -> Iterator[sa.Connection]:
-        """A connection outside any transaction, for statements that do not work inside one."""
+        """A connection in autocommit mode, for statements that do not work in a transaction."""
         try:
             options = {"isolation_level": "AUTOCOMMIT"} if self.on_server else {}
             with self._engine.connect().execution_options(**{_BEGIN: ""}, **options) as connection:
@@ -190,7 +191,7 @@ class Session:
         return lock
 
     def news(self) -> News | None:
-        """What tells of changes at once; None where one has to look for them."""
+        """Notifications of changes; None where the database must be polled."""
         news: News | None = _postgres().News(self.url, BUSY_SECONDS) if self.on_server else None
         return news
 
@@ -205,7 +206,7 @@ class Session:
 
 
 def _postgres() -> ModuleType:
-    """The module for servers, whose driver is installed only where it is wanted."""
+    """The module for servers; its driver is an optional dependency."""
     try:
         from sprag.service.storage import postgres
     except ImportError:
@@ -216,8 +217,8 @@ def _postgres() -> ModuleType:
 
 
 def _begin(connection: sa.Connection) -> None:
-    # The driver never begins by itself (isolation_level None). A transaction that began as a reader could not become
-    # a writer once another process has written in between, so writers take the lock at once.
+    # The driver never begins a transaction by itself (isolation_level None). A read transaction cannot become a write
+    # transaction once another process has written in between, so writers take the lock when they begin.
     if statement := connection.get_execution_options().get(_BEGIN):
         connection.exec_driver_sql(statement)
 

@@ -1,6 +1,6 @@
-"""Sessions of browsers: the key that seals their cookies and the sessions that were ended early, for every host.
+"""Browser sessions: the key that signs their cookies, and the sessions that were ended early, for all hosts.
 
-A cookie carries its own end and a seal, so that looking at one needs no row of its own and logging in no write.
+A cookie contains its expiry and a signature, so a session needs no row of its own and a login no write.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 _KEY_BYTES: Final = 32
-#: Number of the only row of the key.
+#: Primary key of the only row of the key's table.
 _ONLY: Final = 1
 
 SESSION_KEY = sa.Table(
@@ -33,23 +33,23 @@ ENDED_SESSIONS = sa.Table(
     "ended_sessions",
     METADATA,
     sa.Column("seal", sa.String(64), primary_key=True),
-    # Seconds since 1970-01-01 UTC, as in the cookie: after that the row is of no use.
+    # Seconds since 1970-01-01 UTC, as in the cookie; afterwards the row is useless.
     sa.Column("ends_at", sa.BigInteger, nullable=False),
 )
 
 
 @dataclass(frozen=True, slots=True)
 class SessionSecrets:
-    """What tells a session that holds: the key of the seals, and the seals of the sessions that were ended early."""
+    """The data that validate sessions: the signing key, and the signatures of the sessions that were ended early."""
 
-    #: None before the first login there ever was.
+    #: None before the very first login.
     key: bytes | None
-    #: Seal and end (seconds since 1970-01-01 UTC).
+    #: Signature and expiry (seconds since 1970-01-01 UTC).
     ended: Mapping[str, int]
 
 
 class Sessions(Part):
-    """Sessions as the service sees them."""
+    """The service's view of sessions."""
 
     def session_secrets(self) -> SessionSecrets:
         """The key, and the sessions that were ended early."""
@@ -59,7 +59,7 @@ class Sessions(Part):
         return SessionSecrets(None if key is None else bytes.fromhex(key), ended)
 
     def create_session_key(self) -> bytes:
-        """The key of the seals, created where there is none."""
+        """The signing key; created where there is none."""
         with self.session.write() as connection:
             key: str | None = connection.execute(sa.select(SESSION_KEY.c.key)).scalar_one_or_none()
             if key is None:
@@ -68,7 +68,7 @@ class Sessions(Part):
         return bytes.fromhex(key)
 
     def end_session(self, seal: str, ends_at: int) -> None:
-        """Note that a session was ended before its time; forget those whose time is over."""
+        """Record that a session was ended before its expiry; forget the expired ones."""
         c = ENDED_SESSIONS.c
         with self.session.write() as connection:
             connection.execute(sa.delete(ENDED_SESSIONS).where(c.ends_at < self._now() // 1_000_000))

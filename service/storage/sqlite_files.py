@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 #: Older libraries can corrupt a write-ahead log that several connections share.
 SAFE_SQLITE: Final = (3, 51, 3)
-#: Rows have some 45 to 150 numbers; larger pages than SQLite's 4 KiB hold several of them and keep the trees flat.
+#: Rows have about 45 to 150 numbers; pages larger than SQLite's 4 KiB hold several rows and keep the trees flat.
 PAGE_BYTES: Final = 16_384
 NETWORK_FILE_SYSTEMS: Final = frozenset(
     {"afs", "ceph", "cifs", "fuse.sshfs", "glusterfs", "nfs", "nfs4", "smb3", "smbfs"}
@@ -28,7 +28,7 @@ NETWORK_FILE_SYSTEMS: Final = frozenset(
 
 
 def sqlite_driver() -> Any:
-    """The DB-API module for SQLite: pysqlite3, which brings its own library, else Python's own."""
+    """The DB-API module for SQLite: pysqlite3, which includes its own library, otherwise Python's own."""
     try:
         from pysqlite3 import dbapi2
     except ImportError:
@@ -43,7 +43,7 @@ def sqlite_version() -> tuple[int, ...]:
 
 
 def sqlite_warning() -> str | None:
-    """A sentence when the SQLite library is older than the one that is safe, else None."""
+    """A warning when the SQLite library is older than the first safe version, otherwise None."""
     version = sqlite_version()
     if version >= SAFE_SQLITE:
         return None
@@ -52,7 +52,7 @@ def sqlite_warning() -> str | None:
 
 
 def file_system_of(path: Path, mounts: str | None = None) -> str:
-    """Type of the file system that holds ``path``, as Linux's table of mounts names it; "" where that is not known."""
+    """Type of the file system that holds ``path``, as in Linux's mount table; "" where it is unknown."""
     if mounts is None:
         try:
             mounts = Path("/proc/self/mounts").read_text(encoding="utf-8", errors="surrogateescape")
@@ -71,9 +71,7 @@ def file_system_of(path: Path, mounts: str | None = None) -> str:
 
 def _path_of(url: URL) -> Path:
     if url.query:
-        raise DatabaseError(
-            f"a database URL takes no options here ({', '.join(sorted(url.query))})", "invalid-database-url"
-        )
+        raise DatabaseError(f"an SQLite URL takes no options ({', '.join(sorted(url.query))})", "invalid-database-url")
     if url.database in (None, "", ":memory:"):
         raise DatabaseError("the database must be a file: several processes work on it", "invalid-database-url")
     return Path(str(url.database)).absolute()
@@ -91,7 +89,7 @@ class DatabaseFile:
         self._busy_seconds = busy_seconds
         #: Device and number of the file that was opened first.
         self._first: tuple[int, int] | None = None
-        #: Why the database cannot be trusted any more; None where nothing wrong was met.
+        #: Why the database can no longer be trusted; None while nothing wrong was found.
         self.damage: str | None = None
         self._check_place()
 
@@ -114,7 +112,7 @@ class DatabaseFile:
         try:
             folder.mkdir(PRIVATE_FOLDER_MODE, parents=True, exist_ok=True)
         except OSError as error:
-            raise DatabaseError(f"the folder {folder} cannot be made: {error.strerror}", "write-failed") from None
+            raise DatabaseError(f"the folder {folder} cannot be created: {error.strerror}", "write-failed") from None
         if self.path.is_dir():
             raise DatabaseError(f"{self.path} is a folder, not a database file", "not-a-database")
         if not os.access(folder, os.W_OK):
@@ -132,12 +130,12 @@ class DatabaseFile:
             )
 
     def _create(self, *_: object) -> None:
-        """Create the database file before SQLite would, which lets others read it; the log beside it follows suit.
+        """Create the database file before SQLite does, which would let others read it; the log gets the same rights.
 
-        Raises DatabaseError where the file that was opened first is gone: it is never replaced by an empty one.
+        Raises DatabaseError where the file opened first is gone: it is never replaced by an empty one.
         """
         self.require_same()
-        with suppress(OSError):  # it exists, or SQLite tells what is wrong
+        with suppress(OSError):  # it exists, or SQLite reports the error
             os.close(create_private(self.path))
 
     def _set_pragmas(self, connection: Any, _record: object) -> None:
@@ -196,7 +194,7 @@ class DatabaseFile:
         return True
 
     def explained(self, error: sa.exc.DBAPIError) -> Exception:
-        """The error with one sentence for a user where its cause is outside the program, else the error itself."""
+        """A DatabaseError with one sentence where the cause is external, otherwise the error itself."""
         # SQLite reports all kinds of errors when the file and its log no longer belong together.
         try:
             self.require_same()

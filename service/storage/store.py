@@ -32,12 +32,12 @@ class Store(Studies, Purging, Retries, Cases, Room, Schedules, Sessions, Tokens,
 
     @classmethod
     def open(cls, url: str, *, chunking: Chunking | None = None, clock: Clock | None = None) -> Store:
-        """Open the database at ``url`` (SQLAlchemy URL of an SQLite file or a PostgreSQL server), making it ready.
+        """Open and prepare the database at ``url`` (SQLAlchemy URL of an SQLite file or a PostgreSQL server).
 
         Raises
         ------
         DatabaseError
-            When it cannot be used; SchemaError when it has another revision than this program.
+            When it cannot be used; SchemaError when its revision is not that of this program.
         """
         store = cls(Session(url), clock or SystemClock(), chunking or Chunking())
         try:
@@ -56,15 +56,15 @@ class Store(Studies, Purging, Retries, Cases, Room, Schedules, Sessions, Tokens,
         maintenance.require_sound(self.session)
 
     def check(self) -> CheckReport:
-        """Look the database over; can take minutes on a large one."""
+        """Check the database; can take minutes on a large one."""
         return maintenance.check(self.session)
 
     def backup(self, path: Path) -> None:
-        """Write a consistent copy to ``path`` while others go on working; raises DatabaseError."""
+        """Write a consistent copy to ``path`` while others continue to work; raises DatabaseError."""
         maintenance.backup(self.session, path)
 
     def checkpoint(self) -> None:
-        """Move the write-ahead log to its place, as far as nobody reads the old state; holds up nobody."""
+        """Move the write-ahead log into the file as far as no reader needs the old state; blocks nobody."""
         maintenance.checkpoint(self.session)
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""The service's side of studies: create, read, list, wishes, delete."""
+"""The service's view of studies: create, read, list, control, delete."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from sprag.worker.ports import Clock
 
 MAX_PAGE = 1000
-#: Studies kept in memory after they were read, and the values of their axes in all, 8 bytes each.
+#: Studies kept in memory after reading, and the total number of their axis values, 8 bytes each.
 KEPT_STUDIES = 32
 KEPT_VALUES = 2 * MAX_AXIS_VALUES
 
@@ -54,7 +54,7 @@ class Studies(Orders):
     def __init__(self, session: Session, clock: Clock, chunking: Chunking) -> None:
         super().__init__(session, clock)
         self.chunking = chunking
-        # Each counts as its share of the number of studies at least.
+        # Each counts at least as its share of the number of studies.
         self._studies: LRUCache[str, Study] = LRUCache(
             KEPT_VALUES, lambda study: max(_values(study), KEPT_VALUES // KEPT_STUDIES)
         )
@@ -77,9 +77,9 @@ class Studies(Orders):
     ) -> StudyRecord:
         """Accept a study: the study and its chunks in one transaction.
 
-        ``spec`` is the user's own, kept verbatim. A key that was used before with the same ``body_hash`` gives the
-        study of that time; with another one raises IdempotencyConflict. A ``fresh`` study takes no rows from others.
-        One with a moment to ``finish_by`` is run coarse to fine, and held then.
+        ``spec`` is the user's own, kept verbatim. A key that was used before with the same ``body_hash`` returns the
+        study of that request; with another hash it raises IdempotencyConflict. A ``fresh`` study reuses no rows of
+        others. A study with a deadline ``finish_by`` is run coarse to fine and held at that time.
         """
         return self.insert_study(
             study_row(spec, study, self.chunking, warnings),
@@ -100,7 +100,7 @@ class Studies(Orders):
         fresh: bool = False,
         finish_by: datetime | None = None,
     ) -> StudyRecord:
-        """Accept the study of a `study_row`; the rest as for `create_study`."""
+        """Accept the study of a `study_row`; otherwise as `create_study`."""
         values = {
             **row,
             "id": f"st_{secrets.token_hex(8)}",
@@ -143,7 +143,7 @@ class Studies(Orders):
             return self._told(connection, record_of(self._row(connection, study_id, *RECORD_COLUMNS)))
 
     def _told(self, connection: sa.Connection, record: StudyRecord) -> StudyRecord:
-        """The study, with the reason why it does not go on where its worker is silent and cannot note one itself."""
+        """The study; where its worker is silent and cannot record a reason itself, with that reason."""
         if record.reason is not None or record.state not in {StudyState.QUEUED, StudyState.RUNNING}:
             return record
         row = connection.execute(sa.select(DISPATCHER.c.owner, DISPATCHER.c.heartbeat_at)).one_or_none()
@@ -157,7 +157,7 @@ class Studies(Orders):
         )
 
     def spec(self, study_id: str) -> dict[str, Any]:
-        """The user's own spec, as it was given; raises StudyNotFound."""
+        """The user's spec, verbatim; raises StudyNotFound."""
         with self.session.read() as connection:
             spec: dict[str, Any] = json.loads(self._row(connection, study_id, STUDIES.c.spec).spec)
         return spec
@@ -167,7 +167,7 @@ class Studies(Orders):
         with self._lock:
             if study_id in self._studies:
                 return self._studies[study_id]
-        with self._reading:  # one long study at a time, and once for all who wait for it
+        with self._reading:  # one long study at a time, read once for all who wait for it
             return self._read_study(study_id)
 
     def _read_study(self, study_id: str) -> Study:
@@ -177,14 +177,16 @@ class Studies(Orders):
         with self.session.read() as connection:
             text = self._row(connection, study_id, STUDIES.c.study).study
         study = Study.from_text(text)
-        with self._lock, suppress(ValueError):  # too large to be kept
+        with self._lock, suppress(ValueError):  # too large for the cache
             self._studies[study_id] = study
         return study
 
     def list_studies(
         self, page_size: int = 50, page_token: str | None = None, state: StudyState | None = None
     ) -> StudyPage:
-        """A page of studies, newest first. ``page_token`` is the last page's; raises PageTokenError when it is not."""
+        """A page of studies, newest first. ``page_token`` comes from the previous page; raises PageTokenError for any
+        other.
+        """
         size = min(max(page_size, 1), MAX_PAGE)
         query = sa.select(*RECORD_COLUMNS).where(STUDIES.c.deleted_at.is_(None))
         if page_token is not None:
@@ -197,7 +199,7 @@ class Studies(Orders):
         return StudyPage(records, str(records[-1].number) if len(rows) > size else None)
 
     def waiting_studies(self) -> int:
-        """Number of studies that have not ended, without those whose time was over."""
+        """Number of studies that have not ended, except those held at their deadline."""
         c = STUDIES.c
         query = sa.select(sa.func.count()).where(
             c.state.not_in([state.value for state in TERMINAL]), c.waits_for.is_distinct_from(HELD_AT_DEADLINE)
@@ -206,11 +208,11 @@ class Studies(Orders):
             return connection.execute(query).scalar_one()
 
     def progress(self, study_id: str) -> Progress:
-        """How far the study is; raises StudyNotFound."""
+        """Progress of the study; raises StudyNotFound."""
         return self.look(study_id)[1]
 
     def look(self, study_id: str) -> tuple[StudyRecord, Progress]:
-        """The study and how far it is, both of one moment; raises StudyNotFound."""
+        """The study and its progress, both read in one transaction; raises StudyNotFound."""
         with self.session.read() as connection:
             row = self._row(connection, study_id, *RECORD_COLUMNS)
             endings = connection.execute(
@@ -252,11 +254,11 @@ class Studies(Orders):
         return self._wish(study_id, StudyEvent.PAUSE)
 
     def resume_study(self, study_id: str) -> StudyRecord:
-        """Let a held study go on; raises StudyNotFound, TransitionError when it has ended."""
+        """Let a held study continue; raises StudyNotFound, TransitionError when it has ended."""
         return self._wish(study_id, StudyEvent.RESUME)
 
     def cancel_study(self, study_id: str) -> StudyRecord:
-        """Ask for the study's end; raises StudyNotFound, TransitionError when it is finished or failed."""
+        """Request the end of the study; raises StudyNotFound, TransitionError when it is finished or failed."""
         return self._wish(study_id, StudyEvent.CANCEL)
 
     def _wish(self, study_id: str, event: StudyEvent) -> StudyRecord:
@@ -276,15 +278,15 @@ class Studies(Orders):
             return self._told(connection, record_of(self._row(connection, study_id, *RECORD_COLUMNS)))
 
     def prioritize_study(self, study_id: str, priority: int) -> StudyRecord:
-        """Give the study another priority: of studies that wait, the highest goes first.
+        """Change the priority of the study: among waiting studies the highest runs first.
 
-        Raises StudyNotFound, and StudyEnded where there is nothing left to go first with.
+        Raises StudyNotFound, and StudyEnded where the study has ended.
         """
         with self.session.write() as connection:
             row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.state)
             number, state = row.number, StudyState(row.state)
             if state.terminal:
-                raise StudyEnded(f"the study {study_id} is {state.value}: it waits for nothing, so no priority counts")
+                raise StudyEnded(f"the study {study_id} is {state.value}: its priority no longer matters")
             connection.execute(
                 sa.update(STUDIES)
                 .where(STUDIES.c.number == number, STUDIES.c.priority != priority)
@@ -294,17 +296,17 @@ class Studies(Orders):
             return self._told(connection, record_of(self._row(connection, study_id, *RECORD_COLUMNS)))
 
     def study_of_key(self, idempotency_key: str, body_hash: str | None) -> StudyRecord | None:
-        """The study that was submitted with that key, with any body where ``body_hash`` is None.
+        """The study that was submitted with that key; ``body_hash`` None stands for any body.
 
-        Raises IdempotencyConflict when its body was another.
+        Raises IdempotencyConflict when it was submitted with another body.
         """
         with self.session.read() as connection:
             return _study_of_key(connection, idempotency_key, body_hash)
 
     def delete_study(self, study_id: str) -> None:
-        """Delete a study that has ended, or whose time was over; raises StudyNotFound, else StudyBusy.
+        """Delete a study that has ended or is held at its deadline; raises StudyNotFound, or StudyBusy for any other.
 
-        Nobody sees it any more when this returns; its rows are removed afterwards, by `Purging.purge_steps`.
+        The study is invisible when this returns; `Purging.purge_steps` removes its rows later.
         """
         with self.session.write() as connection:
             row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.state, STUDIES.c.waits_for)
@@ -317,9 +319,9 @@ class Studies(Orders):
         self.deleted.set()
 
     def prune(self, ended_before: datetime, *, dry: bool = False) -> list[str]:
-        """Delete every study that ended, or whose time was over, before ``ended_before``; their ids.
+        """Delete every study that ended, or was held at its deadline, before ``ended_before``; returns their ids.
 
-        ``dry``: only tell.
+        ``dry``: only return the ids.
         """
         c = STUDIES.c
         ended = c.state.in_([state.value for state in TERMINAL]) & (c.finished_at < micros_of(ended_before))
@@ -328,7 +330,7 @@ class Studies(Orders):
         with self.session.read() as connection:
             found = list(connection.execute(sa.select(c.id).where(old).order_by(c.number)).scalars())
         for study_id in () if dry else found:
-            with suppress(StudyNotFound, StudyBusy):  # somebody else deleted it, or runs it again
+            with suppress(StudyNotFound, StudyBusy):  # somebody else has deleted it or runs it again
                 self.delete_study(study_id)
         return found
 
@@ -338,7 +340,7 @@ def study_row(
 ) -> dict[str, Any]:
     """The columns of a new study that follow from the study itself.
 
-    Takes about a second for a million values, so that it is made where studies are checked.
+    This takes about a second for a million values, so it is computed in the processes that check studies.
     """
     return {
         "name": study.name,
@@ -374,5 +376,5 @@ def _study_of_key(connection: sa.Connection, key: str, body_hash: str | None) ->
 
 def _number_of(token: str) -> int:
     if not (token.isascii() and token.isdigit() and len(token) < 19):
-        raise PageTokenError(f"{token[:40]!r} is no page token of this list")
+        raise PageTokenError(f"{token[:40]!r} is not a page token of this list")
     return int(token)

@@ -26,7 +26,7 @@ STUDIES = sa.Table(
     sa.Column("id", sa.String(40), nullable=False, unique=True),
     sa.Column("name", sa.Text, nullable=False),
     sa.Column("model", sa.String(40), nullable=False),
-    # Of its model: studies of one variant share a table of results. The model alone knows what it means.
+    # Variant of the model: studies of one variant share a table of results. Only the model interprets it.
     sa.Column("variant", sa.String(40), nullable=False, server_default=""),
     sa.Column("state", sa.String(12), nullable=False, index=True),
     sa.Column("reason", sa.Text),
@@ -43,38 +43,39 @@ STUDIES = sa.Table(
     sa.Column("created_at", sa.BigInteger, nullable=False),
     sa.Column("started_at", sa.BigInteger),
     sa.Column("finished_at", sa.BigInteger),
-    # Set at once when a study is deleted; its rows then go in short transactions, and this row goes last.
+    # Set when a study is deleted; its rows are then removed in short transactions, and this row last.
     sa.Column("deleted_at", sa.BigInteger),
-    # Of two studies the one with the higher number goes first.
+    # The study with the higher priority runs first.
     sa.Column("priority", sa.Integer, nullable=False, server_default="0"),
-    # What a paused study waits for (`WAITS_FOR_ROOM` and below); NULL where it was paused, or a fault.
+    # What a paused study waits for (`WAITS_FOR_ROOM` and below); NULL where the user or a fault paused it.
     sa.Column("waits_for", sa.String(12)),
-    # Equal for studies that may have cases in common (`sprag.worker.reuse`).
+    # Equal for studies that may share cases (`sprag.worker.reuse`).
     sa.Column("kin_hash", sa.String(64), nullable=False, server_default="", index=True),
-    # 1: every case is run, whatever other studies have.
+    # 1: every case is run, without reuse of other studies.
     sa.Column("fresh", sa.Integer, nullable=False, server_default="0"),
-    # Cases whose rows were taken from other studies.
+    # Cases whose rows were copied from other studies.
     sa.Column("reused", sa.Integer, nullable=False, server_default="0"),
-    # When the study is held, whatever is done then; NULL where it takes as long as it takes.
+    # Deadline at which the study is held; NULL where it has none.
     sa.Column("finish_by", sa.BigInteger),
     # 1: it is run coarse to fine, and its chunks are ranges of positions in that order (`sprag.worker.order`).
     sa.Column("coarse", sa.Integer, nullable=False, server_default="0"),
-    # Of the processes that computed its rows (`sprag.worker.fingerprint`); NULL: no rows yet, "": unknown, or several.
+    # Fingerprint of the processes that computed its rows (`sprag.worker.fingerprint`); NULL: no rows yet, "": unknown,
+    # or several.
     sa.Column("fingerprint", sa.String(64)),
     sqlite_autoincrement=True,
 )
 
-#: What a study waits for that the dispatcher holds while the disk is full.
+#: The study is held by the dispatcher while the disk is full.
 WAITS_FOR_ROOM = "room"
-#: What a study waits for that is held outside its window.
+#: The study is held outside its window.
 WAITS_FOR_WINDOW = "window"
-#: What a paused study waits for that goes on by itself.
+#: Held studies that resume by themselves.
 GO_ON = frozenset({WAITS_FOR_ROOM, WAITS_FOR_WINDOW})
 
-#: What holds a study whose deadline came; it does not go on by itself.
+#: The study is held at its deadline; it does not resume by itself.
 HELD_AT_DEADLINE = "deadline"
 
-#: The columns of a `StudyRecord`: without the texts that can be long.
+#: The columns of a `StudyRecord`, without the long texts.
 RECORD_COLUMNS = tuple(
     column
     for column in STUDIES.c
@@ -87,7 +88,7 @@ CHUNKS = sa.Table(
     "chunks",
     METADATA,
     sa.Column("study", sa.Integer, sa.ForeignKey("studies.number"), primary_key=True),
-    # Of case numbers, or of positions in the study's order where it is coarse to fine.
+    # Range of case numbers, or of positions in the study's order where it is coarse to fine.
     sa.Column("first", sa.Integer, primary_key=True),
     sa.Column("count", sa.Integer, nullable=False),
     sa.Column("state", _CHUNK_STATE, nullable=False),
@@ -100,7 +101,7 @@ CHUNKS = sa.Table(
     sqlite_with_rowid=False,
 )
 
-#: How many cases of a study ended how, kept with every commit so that nothing has to be counted when asked.
+#: Numbers of cases of a study by ending, updated with every commit so that reading needs no counting.
 ENDINGS = sa.Table(
     "endings",
     METADATA,
@@ -119,7 +120,7 @@ IDEMPOTENCY_KEYS = sa.Table(
     sa.Column("created_at", sa.BigInteger, nullable=False),
 )
 
-#: One row: the latest epoch and who has it.
+#: One row: the latest epoch and its owner.
 DISPATCHER = sa.Table(
     "dispatcher",
     METADATA,
@@ -128,7 +129,7 @@ DISPATCHER = sa.Table(
     sa.Column("owner", sa.Text, nullable=False),
     sa.Column("started_at", sa.BigInteger, nullable=False),
     sa.Column("heartbeat_at", sa.BigInteger, nullable=False),
-    # The last moment at which the clock was believed; NULL: nobody has looked yet.
+    # The last time at which the clock was trusted; NULL before the first check.
     sa.Column("clock_at", sa.BigInteger),
 )
 
@@ -149,7 +150,7 @@ def results_table(model: str, variant: str) -> sa.Table:
         return METADATA.tables[name]
     infos = models.result_infos(model, variant)
     results = (sa.Column(info.column, sa.Double if info.kind == "real" else sa.Integer) for info in infos)
-    # Cases are counted and looked for by their categories.
+    # Cases are counted and selected by their categories.
     categories = [info.column for info in infos if info.kind == "category"]
     indexes = (sa.Index(f"ix_{name}_{column}", "study", column, "case_number") for column in categories)
     return sa.Table(

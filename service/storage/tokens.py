@@ -1,6 +1,6 @@
-"""Tokens: created, listed, revoked. A token itself is shown once and never stored, only its SHA-256 digest is.
+"""Tokens: created, listed, revoked. A token is shown once and never stored; only its SHA-256 digest is.
 
-A digest without salt and stretching is enough here: a token is made of 256 random bits, which nobody can guess.
+A digest without salt or key stretching is enough: a token consists of 256 random bits, which nobody can guess.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from datetime import datetime
     from typing import Any
 
-#: What a token begins with, so that people and scanners of secrets know it.
+#: Prefix of a token, so that people and secret scanners recognise it.
 TOKEN_PREFIX: Final = "sprag_"  # noqa: S105 - the beginning of all tokens is no secret
 _TOKEN_BYTES: Final = 32
 
@@ -34,7 +34,7 @@ TOKENS = sa.Table(
     sa.Column("scope", sa.String(8), nullable=False),
     sa.Column("digest", sa.String(64), nullable=False, unique=True),
     sa.Column("created_at", sa.BigInteger, nullable=False),
-    # Revoked tokens stay listed, and a service that ever had a token never becomes open again.
+    # Revoked tokens stay listed, so a service that ever had a token never becomes open again.
     sa.Column("revoked_at", sa.BigInteger),
     sqlite_autoincrement=True,
 )
@@ -53,15 +53,15 @@ class TokenRecord:
 
 
 def digest_of(token: bytes) -> str:
-    """What is stored of a token."""
+    """The digest that is stored for a token."""
     return hashlib.sha256(token).hexdigest()
 
 
 class Tokens(Part):
-    """Tokens as the command line and the guard see them."""
+    """The tokens of a database."""
 
     def create_token(self, name: str, scope: TokenScope) -> tuple[str, TokenRecord]:
-        """Make a token; its secret, which nobody can show again, and its record."""
+        """Create a token; returns its secret, which cannot be shown again, and its record."""
         secret = TOKEN_PREFIX + secrets.token_urlsafe(_TOKEN_BYTES)
         values = {
             "id": f"tk_{secrets.token_hex(6)}",
@@ -75,13 +75,13 @@ class Tokens(Part):
         return secret, _record(row)
 
     def tokens(self) -> tuple[TokenRecord, ...]:
-        """Every token that there ever was, newest first."""
+        """Every token ever created, newest first."""
         with self.session.read() as connection:
             rows = connection.execute(sa.select(TOKENS).order_by(TOKENS.c.number.desc())).all()
         return tuple(map(_record, rows))
 
     def revoke_token(self, token_id: str) -> TokenRecord:
-        """Make a token worthless from now on; raises TokenNotFound. Twice is as good as once."""
+        """Revoke a token; raises TokenNotFound. Revoking it twice has no further effect."""
         with self.session.write() as connection:
             row = connection.execute(
                 sa.update(TOKENS)

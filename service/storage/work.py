@@ -1,4 +1,4 @@
-"""The dispatcher's side of the store: epochs, claims, rows. Implements `sprag.worker.ports.Store`."""
+"""The dispatcher's view of the store: epochs, claims, rows. Implements `sprag.worker.ports.Store`."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ CLAIMED = (CHUNKS.c.state == ChunkState.CLAIMED) & CHUNKS.c.study.in_(
 
 
 class _SourceGoneError(Exception):
-    """Rows that were to be copied are not there any more."""
+    """Rows to be copied no longer exist."""
 
 
 def return_claims(connection: sa.Connection) -> None:
@@ -55,9 +55,9 @@ class Work(Reuse):
     """Claims and results."""
 
     def take_over(self, owner: str) -> int:
-        """Raise the epoch, return every claim of an older one to waiting, and give the new epoch.
+        """Increase the epoch, return every claim of an older one to waiting, and return the new epoch.
 
-        The study of a `run_owner` that has left it unfinished is held: nobody asked a worker for it.
+        The study that a `run_owner` left unfinished is held, because nobody asked a worker for it.
         """
         now = self._now()
         with self.session.write() as connection:
@@ -82,7 +82,7 @@ class Work(Reuse):
             self._move(connection, row.number, StudyEvent.FAULT, why_abandoned(owner))
 
     def dispatcher(self) -> DispatcherRecord | None:
-        """The dispatcher that took over last; None when there never was one."""
+        """The dispatcher that took over last; None when there was none."""
         with self.session.read() as connection:
             row = connection.execute(sa.select(DISPATCHER)).one_or_none()
         if row is None:
@@ -90,22 +90,22 @@ class Work(Reuse):
         return DispatcherRecord(row.epoch, row.owner, moment(row.started_at), moment(row.heartbeat_at))
 
     def believed_clock(self) -> datetime | None:
-        """The last moment at which the clock was believed; None when nobody has looked yet."""
+        """The last time at which the clock was trusted; None before the first check."""
         with self.session.read() as connection:
             return optional_moment(connection.execute(sa.select(DISPATCHER.c.clock_at)).scalar_one_or_none())
 
     def note_clock(self, now: datetime) -> None:
-        """Note that the clock is believed at ``now``; nothing where there was no dispatcher yet."""
+        """Record that the clock is trusted at ``now``; no effect before the first dispatcher."""
         with self.session.write() as connection:
             connection.execute(sa.update(DISPATCHER).values(clock_at=micros_of(now)))
 
     def silence(self) -> float | None:
-        """Seconds since the dispatcher that took over last was heard of; None when there never was one."""
+        """Seconds since the latest heartbeat of the current dispatcher; None when there was none."""
         found = self.dispatcher()
         return None if found is None else (self.clock.now() - found.heartbeat_at).total_seconds()
 
     def heartbeat(self, epoch: int) -> None:
-        """Note that the dispatcher is alive."""
+        """Record that the dispatcher is alive."""
         with self.session.write() as connection:
             self._own(connection, epoch)
             connection.execute(sa.update(DISPATCHER).values(heartbeat_at=self._now()))
@@ -117,9 +117,9 @@ class Work(Reuse):
             return_claims(connection)
 
     def active_studies(self) -> list[ActiveStudy]:
-        """Studies that have not ended, those of the highest priority first, then in order of submission.
+        """Studies that have not ended, by priority and then in order of submission.
 
-        Those that are held because their time was over are left out.
+        Studies held at their deadline are left out.
         """
         c = STUDIES.c
         with self.session.read() as connection:
@@ -148,7 +148,7 @@ class Work(Reuse):
         return Study.from_text(text)
 
     def open_chunks(self, number: int) -> list[Chunk]:
-        """Chunks of a study that are not done, in the order in which they are to be run."""
+        """Unfinished chunks of a study, in the order in which they will run."""
         c = CHUNKS.c
         with self.session.read() as connection:
             rows = connection.execute(
@@ -159,7 +159,7 @@ class Work(Reuse):
         return [Chunk(number, first, count, failures) for first, count, failures in rows]
 
     def claim(self, epoch: int, chunks: Sequence[Chunk]) -> list[Chunk]:
-        """Claim waiting chunks of studies that are queued or running and in time; gives those that were got."""
+        """Claim waiting chunks of queued or running studies before their deadline; returns the claimed ones."""
         got: list[Chunk] = []
         with self.session.write() as connection:
             self._own(connection, epoch)
@@ -188,7 +188,7 @@ class Work(Reuse):
         return got
 
     def _claimed(self, connection: sa.Connection, epoch: int, chunk: Chunk) -> bool:
-        """Whether the chunk is claimed in this epoch; raises EpochLostError when the epoch is not ours any more."""
+        """Whether the chunk is claimed in this epoch; raises EpochLostError when the epoch is no longer ours."""
         self._own(connection, epoch)
         found = connection.execute(
             sa.select(CHUNKS.c["first"]).where(
@@ -200,12 +200,12 @@ class Work(Reuse):
     def commit(self, epoch: int, chunk: Chunk, result: ChunkResult, known: Known | None = None) -> bool:
         """Insert the rows of a claimed chunk and mark it done. False, and no change, when it is not claimed by us.
 
-        With ``known`` the result is that of the missing cases only, and the other rows are copied; where one of them is
-        gone, the chunk is returned to waiting instead (False).
+        With ``known`` the result covers the missing cases only, and the other rows are copied; where one of them is
+        gone, the chunk returns to waiting instead (False).
         """
         expected = (chunk.first, chunk.count) if known is None else (0, known.missing.size)
         if (result.first, result.count) != expected:
-            raise ValueError(f"a result of {result.count} cases from {result.first} is not that of {chunk}")
+            raise ValueError(f"a result of {result.count} cases from {result.first} does not belong to {chunk}")
         try:
             with self.session.write() as connection:
                 if not self._claimed(connection, epoch, chunk):
@@ -213,7 +213,7 @@ class Work(Reuse):
                 self._store(connection, chunk, result, None, known)
         except _SourceGoneError:
             self._forget_reuse(chunk.study)
-            self.put_back(epoch, chunk, "cases of another study were to be taken, and it was deleted")
+            self.put_back(epoch, chunk, "the study from which cases were to be copied was deleted")
             return False
         return True
 
@@ -302,7 +302,7 @@ class Work(Reuse):
             self._store(connection, chunk, result, detail)
 
     def note(self, epoch: int, number: int, reason: str | None) -> None:
-        """Say why a queued or running study does not go on; None takes the note away."""
+        """Record why a queued or running study does not proceed; None removes the reason."""
         going = STUDIES.c.state.in_([StudyState.QUEUED.value, StudyState.RUNNING.value])
         new = STUDIES.c.reason.is_distinct_from(reason)
         with self.session.write() as connection:
@@ -314,7 +314,7 @@ class Work(Reuse):
             )
 
     def fault(self, epoch: int, number: int, reason: str) -> None:
-        """Hold the study with a reason and return its claims to waiting, without blame for the cases."""
+        """Hold the study with a reason and return its claims to waiting, without counting a failure of the cases."""
         with self.session.write() as connection:
             self._own(connection, epoch)
             connection.execute(
@@ -327,9 +327,9 @@ class Work(Reuse):
                 self._move(connection, number, StudyEvent.FAULT, reason)
 
     def time_is_over(self, epoch: int, number: int) -> None:
-        """Hold a study that is queued, running or would go on by itself, at its deadline; nothing is in flight.
+        """Hold a study that is queued, running or would resume by itself at its deadline; no chunk is in flight.
 
-        A study without open chunks comes to its end instead.
+        A study without open chunks ends instead.
         """
         c = STUDIES.c
         with self.session.write() as connection:
@@ -344,8 +344,8 @@ class Work(Reuse):
                 covered = self._coverage(connection, number, cases)
                 complete = f"; {covered}" if covered else ""
                 reason = (
-                    f"its time was over at {moment(finish_by).isoformat(timespec='seconds')}: {done:,} of {cases:,} "
-                    f"cases are done{complete}. Resume it to have the others run, too."
+                    f"its deadline passed at {moment(finish_by).isoformat(timespec='seconds')}: {done:,} of {cases:,} "
+                    f"cases are done{complete}. Resume it to run the others too."
                 )
                 if not paused:
                     self._move(connection, number, StudyEvent.FAULT)
@@ -358,7 +358,7 @@ class Work(Reuse):
         self.settle(epoch, number)
 
     def begin_again(self, epoch: int, number: int) -> None:
-        """Return every claim of this epoch to waiting, and take all blame from the study's chunks."""
+        """Return every claim of this epoch to waiting, and reset the failures of the study's chunks."""
         with self.session.write() as connection:
             self._own(connection, epoch)
             return_claims(connection)
@@ -367,7 +367,7 @@ class Work(Reuse):
             )
 
     def settle(self, epoch: int, number: int) -> StudyState:
-        """Bring a study without open claims to its end: cancelled when that was asked for, else finished or failed."""
+        """End a study without open claims: as cancelled when that was requested, otherwise as finished or failed."""
         self._forget_reuse(number)
         open_chunks = (CHUNKS.c.study == number) & (CHUNKS.c.state != ChunkState.DONE)
         with self.session.write() as connection:

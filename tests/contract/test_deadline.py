@@ -94,7 +94,7 @@ def test_at_the_deadline_the_study_is_held_and_says_what_it_has(store: Store, cl
     assert (held.state, held.done, held.time_over, held.over) == (StudyState.PAUSED, 6, True, True)
     assert (store.waiting_studies(), store.active_studies(), store.figures().waiting) == (0, [], 0)
     assert held.reason is not None
-    for part in ("its time was over at 20", "+00:00", "6 of 9 cases", "pass 3 of 4 is complete, a grid of 5 values"):
+    for part in ("its deadline passed at 20", "+00:00", "6 of 9 cases", "pass 3 of 4 is complete, a grid of 5 values"):
         assert part in held.reason
     store.time_is_over(epoch, record.number)
     assert store.get_study(record.id) == held

@@ -242,7 +242,7 @@ def test_pages_show_the_deadline_and_what_is_complete(service: Service, clock: f
     dispatch(service, clock, chunks=3)
     held = service.http.get(f"/studies/{study_id}").text
     assert "pass 3 of 4 is complete, a grid of 5 values" in held
-    assert "Resume it to have the others run, too." in held
+    assert "Resume it to run the others too." in held
     assert "Finish by" in service.http.get("/").text
 
 

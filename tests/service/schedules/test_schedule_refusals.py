@@ -62,7 +62,7 @@ def test_a_deadline_outside_the_window_is_kept(store: Store, clock: Clock) -> No
     Dispatcher(store, InlineExecutor(fakes.run), clock).run(lambda: next(turns) == 9)
     held = store.get_study(study.id)
     assert (held.state, held.time_over) == (StudyState.PAUSED, True)
-    assert (held.reason or "").startswith("its time was over at 2026-01-01T00:28:00+00:00: 0 of 9 cases are done")
+    assert (held.reason or "").startswith("its deadline passed at 2026-01-01T00:28:00+00:00: 0 of 9 cases are done")
     assert store.waiting_studies() == 0
     clock.set("2026-01-02T00:25")
     look()
@@ -133,7 +133,7 @@ def test_a_disabled_schedule_is_tried_no_more(store: Store, clock: Clock, monkey
     Scheduler(store).look()
     assert store.list_studies().studies == ()
     (run,) = store.schedule_runs(kept)
-    assert (run.state, run.problem) == (RunState.REFUSED, "The schedule was disabled before a study came of it.")
+    assert (run.state, run.problem) == (RunState.REFUSED, "The schedule was disabled before a study was submitted.")
 
 
 def test_a_schedule_that_changed_after_its_study_was_submitted_finds_it(
