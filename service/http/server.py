@@ -72,7 +72,7 @@ class Supervisor(threading.Thread):
     delays : (first, longest)
         Seconds before it is started again.
     leaving : Event
-        Set when everything is about to end: a child that ends then has only got the same signal.
+        Set when everything is about to end: the child is ended while requests under way are still answered.
     """
 
     def __init__(
@@ -89,23 +89,24 @@ class Supervisor(threading.Thread):
         self._child: Child | None = None
 
     def run(self) -> None:
-        """Start the child, and again whenever it has died, until `stop`."""
+        """Start the child, and again whenever it has died, until `stop` or until everything is about to end."""
         delay = self._first
-        while not self._ending.is_set():
+        while not self._over():
             born = time.monotonic()
             self._child = child = self._start_child()
-            while child.exitcode is None and not self._ending.is_set():
+            while child.exitcode is None and not self._over():
                 child.join(0.2)
-            if self._ending.is_set():
-                break
             delay = self._first if time.monotonic() - born > _LONG_LIFE else delay
             # The signal that ended it may be on its way to this process too.
-            if self._leaving.wait(self._first) or self._ending.is_set():
+            if self._leaving.wait(self._first) or self._over():
                 break
             _LOG.error("The worker ended (exit code %s); it is started again.", child.exitcode)
             self._ending.wait(delay - self._first)
             delay = min(2.0 * delay, self._longest)
         self._end_child()
+
+    def _over(self) -> bool:
+        return self._ending.is_set() or self._leaving.is_set()
 
     def _end_child(self) -> None:
         child = self._child

@@ -90,6 +90,18 @@ def test_a_child_that_ends_with_everything_else_is_not_replaced(caplog: pytest.L
     assert caplog.messages == []
 
 
+def test_a_child_is_ended_as_soon_as_everything_is_about_to_end() -> None:
+    """Not only when the last request is answered: on a busy machine both may take their time."""
+    nursery, leaving = Nursery(), threading.Event()
+    supervisor = Supervisor(nursery, leaving=leaving)
+    supervisor.start()
+    assert nursery.born.acquire(timeout=10)
+    leaving.set()
+    supervisor.join(10)
+    assert not supervisor.is_alive()
+    assert nursery.children[0].asked == ["terminate"]
+
+
 def test_a_child_that_does_not_end_is_killed() -> None:
     nursery = Nursery(obedient=False)
     supervisor = Supervisor(nursery)
