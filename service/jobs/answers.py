@@ -1,7 +1,7 @@
 """Curves and maps as bytes that are ready to be sent.
 
-Few numbers are written by whoever answers; more than `FEW` belong into a process that checks, as reading and writing
-them takes seconds in which nobody else would be answered.
+The service itself writes small answers; those with more than `FEW` numbers belong in a checking process, because
+reading and writing them takes seconds during which nobody else would be answered.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from sprag.service.jobs.checks import Library
     from sprag.service.results.curves import CurveQuery, Curves, Map
 
-#: Numbers of curves or a map that are read and written in some ten milliseconds.
+#: Numbers of curves or a map that are read and written in about ten milliseconds.
 FEW: Final = 20_000
 
 

@@ -1,6 +1,6 @@
-"""What users define, read and worked out: functions for the processes that check, which can be ended at any time.
+"""Functions for the checking processes, which read and evaluate user input and can be ended at any time.
 
-Their answers are small, or bytes that are ready to be sent or stored: the service that asks has to stay quick.
+Their answers are small, or bytes ready to be sent or stored, so that the service stays responsive.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ if TYPE_CHECKING:
 
 
 def prepare() -> None:
-    """First thing in a process that checks: this module and units are loaded, what is not compiled is left to others.
+    """Prepare a checking process: load this module and the units, and leave missing kernels to other processes.
 
-    matplotlib and the machine shaft's kernels are loaded for the first who needs them, in time that does not count
-    against his limit: a process that takes the place of one that was ended is there sooner without them.
+    matplotlib and the machine shaft's kernels are loaded on first use, outside the time limit of the request, so that a
+    replacement process starts sooner.
     """
     units.load()
     compile_elsewhere()
 
 
 class Library:
-    """The studies that there are, for what has to be known of them; a process it is sent to opens a store of its own.
+    """Access to the stored studies; a process that receives it opens its own store.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def _library(url: str, chunking: Chunking) -> Library:
 
 
 def begin(library: Library) -> None:
-    """The first work of a process that checks: open the ``library`` and load the engine, so that no client waits."""
+    """First task of a checking process: open the ``library`` and load the engine, so that no client waits for that."""
     library.store.ping()
     models.prepare()
 
@@ -97,7 +97,7 @@ def extended_study(
     now: datetime,
     given: Mapping[str, object],
 ) -> Submission:
-    """A study with what the body of a request adds to it; raises SpecError and StudyNotFound."""
+    """A study extended by the body of a request; raises SpecError and StudyNotFound."""
     store = library.store
     parsed = parse_extended(store.spec(study_id), store.study(study_id), load_spec(content, form))
     return submission(parsed, store.chunking, store.reusable, now, finish_by=finish, given=given)
@@ -111,9 +111,9 @@ def longer_study(
     now: datetime,
     given: Mapping[str, object],
 ) -> Submission:
-    """The cases of a study that have that regime, or that flag where there are no regimes, with more time to settle.
+    """The cases of a study with that regime, or with that flag where there are no regimes, with more time to settle.
 
-    There must be one. Raises SpecError and StudyNotFound.
+    There must be at least one. Raises SpecError and StudyNotFound.
     """
     store = library.store
     named = {"regime" if models.is_settled(store.study(study_id).run) else "flag": kind}
@@ -123,7 +123,7 @@ def longer_study(
 
 
 def clutch_fit(content: bytes, form: Format) -> bytes:
-    """The report of the fit that a request's body asks for, as JSON text; raises SpecError."""
+    """The report of the fit described in a request's body, as JSON text; raises SpecError."""
     return to_bytes(fit_json(read_fit(load_spec(content, form))))
 
 
@@ -133,10 +133,10 @@ def schedule_body(content: bytes, form: Format, now: datetime, old: ScheduleFiel
 
 
 def body_hash(content: bytes, form: Format) -> str:
-    """`hash_of` the body of a request; raises SpecError when it cannot be read at all."""
+    """`hash_of` the body of a request; raises SpecError when it cannot be read."""
     return hash_of(load_spec(content, form))
 
 
 def schedule_fields(data: object, now: datetime, old: ScheduleFields | None = None) -> ScheduleFields:
-    """The fields of a new schedule, or those of an ``old`` one with some changed; raises SpecError."""
+    """The fields of a new schedule, or of an ``old`` one with changes; raises SpecError."""
     return read_fields(data, now) if old is None else change_fields(old, data, now)

@@ -1,4 +1,4 @@
-"""A dispatcher on a database: alone (`sprag worker`) or as a child process of the service (`sprag serve`)."""
+"""The dispatcher of a database, run alone (`sprag worker`) or as a child process of the service (`sprag serve`)."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger(__name__)
 
-#: Seconds between two tries of a standby to take the lock.
+#: Seconds between two attempts of a standby to take the lock.
 STANDBY_SECONDS = 0.3
-#: Seconds without a sign of life after which a worker that is to be replaced counts as hung.
+#: Seconds without a heartbeat after which a worker that is to be replaced counts as hung.
 HUNG_SECONDS = 20.0
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerSettings:
-    """What a dispatcher needs to know: database (SQLAlchemy URL), processes of the pool, seconds allowed to a chunk."""
+    """Settings of a dispatcher: database (SQLAlchemy URL), processes of the pool, time limit of a chunk (s), ..."""
 
     database_url: str
     processes: int
@@ -84,7 +84,7 @@ class StopFlag:
         self._set = False
 
     def set(self) -> None:
-        """Ask for the end."""
+        """Request the end."""
         self._set = True
 
     def __call__(self) -> bool:
@@ -92,12 +92,12 @@ class StopFlag:
 
 
 def owner_name() -> str:
-    """This process as people can find it."""
+    """Host and id of this process, for display."""
     return f"{socket.gethostname()}:{os.getpid()}"
 
 
 def pool(settings: WorkerSettings) -> Executor:
-    """Where the chunks of these settings run: a process pool, whose processes start with the first, or Dask."""
+    """The executor of these settings: Dask, or a process pool whose processes start with the first chunk."""
     if settings.executor != "pool":
         return _cluster(settings)
     from sprag.worker.executors.process_pool import ProcessPoolExecutor
@@ -115,7 +115,7 @@ def _cluster(settings: WorkerSettings, *, renew: bool = False) -> Executor:
 
 
 def renewed_pool(settings: WorkerSettings) -> Executor:
-    """A new pool whose processes compile every kernel anew: what lay in the cache is thrown away, on every host."""
+    """A new pool whose processes compile every kernel anew; the caches of all hosts are cleared."""
     if "://" in settings.executor:
         return _cluster(settings, renew=True)
     models.discard_compiled()
@@ -131,10 +131,10 @@ def run_dispatcher(
     renewed: Callable[[WorkerSettings], Executor] = renewed_pool,
     take_over: bool = False,
 ) -> None:
-    """Run every study of the database until ``stopping()``. Waits as a standby while another dispatcher is at work.
+    """Run every study of the database until ``stopping()``; wait as a standby while another dispatcher is active.
 
-    With ``take_over`` it does not wait: the other one can store nothing any more, and ends when it finds that out. One
-    that hangs on this host is killed.
+    With ``take_over`` it does not wait: the other dispatcher can no longer store anything and ends when it notices. A
+    hung one on this host is killed.
 
     Raises StoreError (EpochLostError when another dispatcher took over) and ExecutorError, each with one sentence.
     """
@@ -170,7 +170,7 @@ def run_dispatcher(
 
 
 def _possible(store: Store, plan: MaintenancePlan, say: Callable[[str], None]) -> MaintenancePlan:
-    """The plan without backups where the database is not ours to copy."""
+    """The plan, without backups for a database on a server."""
     if plan.folder is None or not store.session.on_server:
         return plan
     say(f"no backups are made of {store.session.location}: use PostgreSQL's own tools, such as pg_dump")
@@ -197,7 +197,7 @@ def _stand_by(store: Store, lock: OneHolder, stopping: Callable[[], bool], say: 
 
 
 def _take_over(store: Store, lock: OneHolder, say: Callable[[str], None]) -> None:
-    """Take the lock from its holder. One that hangs is ended: its transaction may keep all others out."""
+    """Take the lock from its holder. A hung holder is ended, because its transaction may block all others."""
     if lock.take():
         return
     holder = lock.holder()
@@ -208,7 +208,7 @@ def _take_over(store: Store, lock: OneHolder, say: Callable[[str], None]) -> Non
 
 
 def stop_on_signals() -> StopFlag:
-    """A flag that SIGTERM and SIGINT set, so that the loop ends in order; for the main thread of a process."""
+    """A flag set by SIGTERM and SIGINT, so that the loop ends cleanly; for the main thread of a process."""
     flag = StopFlag()
 
     def ask(_number: int, _frame: FrameType | None) -> None:
@@ -220,7 +220,7 @@ def stop_on_signals() -> StopFlag:
 
 
 def start_dispatcher_process(settings: WorkerSettings) -> SpawnProcess:
-    """Start a dispatcher as a child of this process, which it does not outlive; ``terminate()`` ends it in order."""
+    """Start a dispatcher as a child of this process, which it does not outlive; ``terminate()`` ends it cleanly."""
     process = get_context("spawn").Process(
         target=_child, args=(settings, os.getpid()), name="sprag-dispatcher", daemon=False
     )
@@ -230,7 +230,7 @@ def start_dispatcher_process(settings: WorkerSettings) -> SpawnProcess:
 
 
 def require_file(url: str) -> None:
-    """Raise DatabaseError where the file of the service's database is gone: a worker must not make an empty one."""
+    """Raise DatabaseError where the service's database file is gone: a worker must not create an empty one."""
     place = make_url(url)
     if place.get_backend_name() == "sqlite" and not Path(place.database or "").exists():
         raise DatabaseError(f"the database file {place.database} was deleted or moved", "database-replaced")

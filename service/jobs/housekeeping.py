@@ -1,4 +1,4 @@
-"""What keeps a database in order while it is open: deleted studies removed, the write-ahead log moved to its place."""
+"""Housekeeping of an open database: removes deleted studies and checkpoints the write-ahead log."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger("sprag.housekeeping")
 
-#: Seconds between two looks where nothing was deleted.
+#: Seconds between two checks while nothing is deleted.
 LOOK_SECONDS: Final = 30.0
 
 
 class Housekeeping(threading.Thread):
-    """Removes deleted studies at once and in turns with other writers, until `stop`.
+    """Removes deleted studies promptly, in turns with other writers, until `stop`.
 
-    What another process deleted, and did not live to remove, is removed by the dispatcher that starts next.
+    What another process deleted but did not live to remove is removed by the next dispatcher that starts.
     """
 
     def __init__(self, store: Store) -> None:
@@ -31,7 +31,7 @@ class Housekeeping(threading.Thread):
         self._failed = False
 
     def run(self) -> None:
-        """Remove what is there at the start; then look whenever something is deleted, and now and then."""
+        """Remove deleted studies at the start, after each deletion, and periodically."""
         self.purge()
         while not self._ending.is_set():
             deleted = self._store.deleted.wait(LOOK_SECONDS)
@@ -43,14 +43,14 @@ class Housekeeping(threading.Thread):
                 self.checkpoint()
 
     def stop(self) -> None:
-        """End the thread; returns when it has ended, after the step that is under way."""
+        """Stop the thread; returns when it has ended, after the current step."""
         self._ending.set()
         self._store.deleted.set()
         if self.is_alive():
             self.join()
 
     def purge(self) -> None:
-        """Remove what is deleted, and leave the database to others for as long as each step took."""
+        """Remove deleted studies; after each step, leave the database to others for as long as the step took."""
         self._store.deleted.clear()
         self._failed = False
         try:
@@ -61,11 +61,11 @@ class Housekeeping(threading.Thread):
                 began = time.monotonic()
         except StoreError as error:
             self._failed = True
-            _LOG.warning("Deleted studies are removed later: %s", error)
+            _LOG.warning("Deleted studies will be removed later: %s", error)
 
     def checkpoint(self) -> None:
-        """Move the log to its place, so that the file by itself is never far behind."""
+        """Checkpoint the write-ahead log, so that the database file alone is nearly up to date."""
         try:
             self._store.checkpoint()
         except StoreError as error:
-            _LOG.warning("The write-ahead log stays where it is for now: %s", error)
+            _LOG.warning("The write-ahead log cannot be checkpointed for now: %s", error)

@@ -1,4 +1,4 @@
-"""Running one study to its end in this process, without a server: `sprag run`."""
+"""Running one study to its end without a server: `sprag run`."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
 _FOLDER_PREFIX = "sprag-run-"
-#: What the reason of a study that is held for want of room ends with; true of services, and not here.
+#: Endings of the reason of a study held for lack of space; they apply to services, not here.
 _LATER = (f"; {GOES_ON}", "; it is retried from time to time")
-#: A study that takes less is not worth a pool.
+#: Shortest estimated time (s) of a study for which a pool pays off.
 _NO_POOL_SECONDS = 1.0
 #: Seconds between two reports of progress.
 REPORT_SECONDS = 0.25
@@ -47,7 +47,7 @@ class StudyHeldError(StoreError):
 
 
 class RunInterruptedError(KeyboardInterrupt):
-    """The run was interrupted and its study cancelled; ``record`` tells what of it is kept."""
+    """The run was interrupted and its study cancelled; ``record`` shows what is kept."""
 
     def __init__(self, record: StudyRecord) -> None:
         super().__init__()
@@ -77,13 +77,13 @@ def run_here(
     on_progress: Callable[[Progress], None] | None = None,
     executor: Executor | None = None,
 ) -> Iterator[LocalRun]:
-    """Run ``study`` to its end on ``processes`` processes and give its rows.
+    """Run ``study`` to its end on ``processes`` processes and return its rows.
 
-    Without ``database_url`` the database is a temporary one and gone with the context. When another dispatcher is at
-    work on the database given, that one runs the study and this process waits. ``processes`` 0 runs the cases in this
-    process, which suits a few; 1 and more start a pool. At ``finish_by`` it ends with what is done. Raises StoreError
-    and ExecutorError, each with one sentence; RunInterruptedError on Ctrl-C, when the study has been cancelled, so that
-    no later worker goes on with it.
+    Without ``database_url`` the database is temporary and is deleted with the context. When another dispatcher is
+    active on the given database, it runs the study while this process waits. ``processes`` 0 runs the cases in this
+    process, which suits small studies; 1 or more start a pool. At ``finish_by`` it ends with what is done. Raises
+    StoreError and ExecutorError, each with one sentence, and RunInterruptedError on Ctrl-C; the study is then
+    cancelled, so that no later worker continues it.
     """
     sweep(Path(tempfile.gettempdir()).glob(f"{_FOLDER_PREFIX}*"))
     with tempfile.TemporaryDirectory(prefix=_FOLDER_PREFIX) as folder, marked(Path(folder)):
@@ -115,9 +115,9 @@ def run_here(
 
 
 def pool_size(study: Study, most: int, *, asked: bool) -> int:
-    """Processes to run on: ``most``, or 0, which is this process itself, where a pool takes longer than the study.
+    """Number of processes: ``most``, or 0 (this process) where starting a pool takes longer than the study.
 
-    ``asked`` tells that somebody named the number.
+    ``asked`` states that the user gave the number.
     """
     if not asked and study.cases * estimate_seconds_per_case(study) < _NO_POOL_SECONDS:
         return 0
@@ -125,14 +125,14 @@ def pool_size(study: Study, most: int, *, asked: bool) -> int:
 
 
 def source_of(done: LocalRun, study: Study) -> Source:
-    """The rows of a study that was run, for an export."""
+    """The rows of a completed run, for an export."""
     record = done.record
     about = {"study": record.id, "name": record.name, "model": record.model, "engine_version": record.engine_version}
     return Source(study, study_results(study), done.store.iter_rows(record.id), about, done.store.spec(record.id))
 
 
 def _cancelled(store: Store, study_id: str, *, ours: bool) -> StudyRecord:
-    """Cancel the study unless it has ended; ``ours``: no other dispatcher is there to bring it to its end."""
+    """Cancel the study unless it has ended; ``ours``: no other dispatcher is there to end it."""
     with suppress(TransitionError):
         record = store.cancel_study(study_id)
         if ours:
@@ -141,7 +141,7 @@ def _cancelled(store: Store, study_id: str, *, ours: bool) -> StudyRecord:
 
 
 class _Watch:
-    """Looks at one study now and then: tells its progress, knows its end."""
+    """Polls one study: reports its progress, detects its end."""
 
     def __init__(self, store: Store, study_id: str, report: Callable[[Progress], None] | None) -> None:
         self._store = store
@@ -159,9 +159,9 @@ class _Watch:
         return state.terminal or state is StudyState.PAUSED
 
     def final(self, *, passing: bool) -> StudyRecord:
-        """The study at its end; raises StudyHeldError when it was held instead, its rows lost with a passing database.
+        """The study at its end; raises StudyHeldError when it was held instead; a ``passing`` database loses its rows.
 
-        Nothing goes on by itself here, whatever the reason says of services.
+        Nothing resumes by itself here, unlike in a service.
         """
         record = self._store.get_study(self._id)
         if self._report is not None:
@@ -172,14 +172,14 @@ class _Watch:
 
 
 def _told(record: StudyRecord, *, passing: bool) -> str:
-    """Why the study was held, and what can be done where it was for want of room."""
+    """Why the study was held, and what to do where it was for lack of space."""
     reason = record.reason or "it was paused"
     cause = next((reason.removesuffix(later) for later in _LATER if reason.endswith(later)), None)
     if cause is None:
         return reason
     if passing:
-        return f"{cause}; nothing of it is kept: make room, or name another place with TMPDIR or --db"
+        return f"{cause}; nothing of it is kept: free some space, or name another place with TMPDIR or --db"
     return (
         f"{cause}; {record.done} of {record.cases} cases are kept as {record.id}, and `sprag worker` or `sprag serve` "
-        "with this database goes on with it when there is room"
+        "with this database continues it when there is room"
     )

@@ -1,6 +1,6 @@
-"""Maintenance at night, beside a dispatcher: backups, of which the latest are kept; old studies are deleted.
+"""Nightly maintenance beside a dispatcher: backups, of which the latest are kept, and deletion of old studies.
 
-A backup's name tells when it was made, and from the names follows whether one is due: nothing else is remembered.
+The name of a backup contains its time, and the names alone determine whether one is due; nothing else is stored.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger("sprag.maintenance")
 
-#: Seconds between two looks at the clock, and before something that failed is tried again.
+#: Seconds between two checks of the clock, and before a failed task is retried.
 LOOK_SECONDS = 20.0
 AGAIN = timedelta(minutes=10)
 _NAME: Final = re.compile(r"sprag-(\d{8}T\d{6}Z)\.sqlite3")
@@ -37,7 +37,7 @@ _STAMP: Final = "%Y%m%dT%H%M%SZ"
 
 @dataclass(frozen=True, slots=True)
 class MaintenancePlan:
-    """Where backups go (None: there are none) and how many stay; days ended studies stay (0: for ever); when."""
+    """Folder of the backups (None: no backups) and how many to keep; days to keep ended studies (0: for ever); time."""
 
     folder: Path | None = None
     keep: int = 14
@@ -53,7 +53,7 @@ class MaintenancePlan:
 
     @property
     def wanted(self) -> bool:
-        """Whether there is anything to do."""
+        """Whether any task is enabled."""
         return self.folder is not None or self.study_days > 0
 
 
@@ -64,17 +64,17 @@ def backups(folder: Path) -> list[tuple[datetime, Path]]:
     found = []
     for path in folder.iterdir():
         if match := _NAME.fullmatch(path.name):
-            with suppress(ValueError):  # a name like that of a backup, with a date that does not exist
+            with suppress(ValueError):  # the name of a backup with an invalid date
                 found.append((datetime.strptime(match[1], _STAMP).replace(tzinfo=UTC), path))
     return sorted(found)
 
 
 @dataclass(slots=True)
 class _Task:
-    """A nightly task; `do` gets the time, when it was due and whether the clock is trusted, and returns whether it was
+    """A nightly task; `do` gets the time, the due time and whether the clock is trusted, and returns whether it was
     done.
 
-    ``done`` is the due time that is done with, ``wait_until`` the time before which it is not tried again.
+    ``done`` is the last due time that was handled, ``wait_until`` the time before which it is not retried.
     """
 
     name: str
@@ -99,19 +99,19 @@ class Maintenance(threading.Thread):
             self._tasks.append(_Task("deletion of old studies", self._prune))
 
     def run(self) -> None:
-        """Run until stopped; watch the clock even where nothing else is enabled. What was missed is done at once."""
+        """Run until stopped; watch the clock even where nothing else is enabled. Missed tasks are done immediately."""
         self.look()
         while not self._ending.wait(LOOK_SECONDS):
             self.look()
 
     def stop(self) -> None:
-        """End the thread; returns when it has ended, after a backup that is being written."""
+        """Stop the thread; returns when it has ended, after any backup in progress."""
         self._ending.set()
         if self.is_alive():
             self.join()
 
     def look(self) -> None:
-        """Do what is due, each task for itself; what fails is said, and tried again later."""
+        """Run the due tasks independently; failures are logged and retried later."""
         now = self._store.clock.now()
         due = self._plan.timing.latest_until(now)
         assert due is not None, "a time of day comes every day"
@@ -126,7 +126,7 @@ class Maintenance(threading.Thread):
             try:
                 if not task.do(now, due, believed):
                     continue
-            except Exception as error:  # whatever it is, it must end neither the other tasks nor the nights to come
+            except Exception as error:  # no failure may prevent the other tasks or later nights
                 known = isinstance(error, StoreError | OSError)
                 _LOG.error(
                     "The nightly %s failed and is retried in 10 minutes: %s",
@@ -147,7 +147,7 @@ class Maintenance(threading.Thread):
             self._store.backup(target)
             _LOG.info("Backup: %s (%.3g MB).", target, target.stat().st_size / 1e6)
         if believed:
-            # A name from the future was made under a wrong clock: it neither goes nor pushes a true one out.
+            # A backup with a future name was made under a wrong clock: it is neither removed nor counted.
             for _, path in [made for made in backups(folder) if made[0] <= now][: -self._plan.keep]:
                 path.unlink()
         return True
@@ -157,5 +157,5 @@ class Maintenance(threading.Thread):
             return False
         gone = self._store.prune(now - timedelta(days=self._plan.study_days))
         if gone:
-            _LOG.info("Deleted, because they ended more than %d days ago: %s.", self._plan.study_days, ", ".join(gone))
+            _LOG.info("Deleted studies that ended more than %d days ago: %s.", self._plan.study_days, ", ".join(gone))
         return True

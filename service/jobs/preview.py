@@ -1,4 +1,4 @@
-"""What a study would cost, said before it is submitted."""
+"""The estimated cost of a study before it is submitted."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
 _FIRST_CASES = 5
-#: Bytes of a row beside its results: key, case number, ending, flags and SQLite's own header.
+#: Bytes of a row besides its results: key, case number, ending, flags and SQLite's header.
 _ROW_BYTES = 48
 _NUMBER_BYTES = 10
 
@@ -31,7 +31,7 @@ def estimated_seconds(study: Study, chunking: Chunking, to_run: int) -> float:
     """Rough time (s) of running that many cases of ``study`` on the processes of ``chunking``, compilation included."""
     if not to_run:
         return 0.0
-    # A study of fewer cases than processes still takes the time of one case.
+    # A study with fewer cases than processes still takes the time of one case.
     rounds = max(to_run / chunking.processes, 1.0)
     return work_of(rounds) * models.estimate_seconds_per_case(study) + models.estimate_compile_seconds(study)
 
@@ -43,12 +43,12 @@ def preview_json(
     seconds_left: float | None = None,
     start_seconds: float = 0.0,
 ) -> Preview:
-    """What ``parsed`` would be as a study that is cut and run so, as JSON data.
+    """The preview of ``parsed``, divided into chunks and run with ``chunking``, as JSON data.
 
-    ``reusable`` of its cases need not be run, because studies of the database have them. ``estimated_seconds`` (wall
-    time, the compilation of a kernel that the cache does not have and ``start_seconds`` of the pool included) and
-    ``estimated_bytes`` (in the database) are rough. When ``seconds_left`` until a deadline will hardly do, it
-    is told.
+    ``reusable`` of its cases need not be run, because other studies of the database have them. ``estimated_seconds``
+    (elapsed time, including ``start_seconds`` of the pool and the compilation of kernels that are not cached) and
+    ``estimated_bytes`` (in the database) are rough. A warning is added when ``seconds_left`` until a deadline will
+    hardly suffice.
     """
     study = parsed.study
     seconds = start_seconds + estimated_seconds(study, chunking, study.cases - reusable)

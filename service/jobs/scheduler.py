@@ -1,7 +1,7 @@
-"""The scheduler: takes up what is due, submits it, and holds studies outside their windows. Runs beside a dispatcher.
+"""The scheduler: submits the studies that are due and holds studies outside their windows. Runs beside a dispatcher.
 
-However many schedulers look at one database, each due time becomes one study: who takes it up first writes its row, and
-the study is submitted under a key made of schedule and due time, so that a scheduler that dies in between is no loss.
+Each due time becomes one study, with any number of schedulers on one database: the first one writes the row of the due
+time, and the study is submitted under a key of schedule and due time, so a scheduler may die in between.
 """
 
 from __future__ import annotations
@@ -23,30 +23,30 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger("sprag.schedules")
 
-#: Seconds between two looks at what is due.
+#: Seconds between two checks for due schedules.
 LOOK_SECONDS = 1.0
-#: Seconds between two tries of a run that was refused for a reason that passes, and for how long it is tried.
+#: Seconds between two attempts at a run that was refused for a temporary reason, and the time limit of the attempts.
 RETRY_SECONDS = 30.0
 GRACE = timedelta(hours=12)
-#: Seconds between two looks for schedules that a clock that was ahead has put off.
+#: Seconds between two checks for schedules that a fast clock has postponed.
 RECOVERY_SECONDS = 30.0
-#: Problems that pass by themselves: the disk is short, the queue is full, a process is not to be had.
+#: Temporary problems: not enough disk space, a full queue, no process available.
 _TRANSIENT = frozenset({"storage-full", "queue-full", "unavailable"})
 
 
 class Scheduler(threading.Thread):
-    """Looks at the schedules of a store every second, by the store's clock, until `stop`."""
+    """Checks the schedules of a store every second, by the store's clock, until `stop`."""
 
     def __init__(self, store: Store) -> None:
         super().__init__(name="sprag-scheduler", daemon=True)
         self._store = store
         self._ending = threading.Event()
         self._next_recovery = float("-inf")
-        #: By schedule and due time: before when (monotonic, s) what was refused for the time being is not tried again.
+        #: By schedule and due time: the time (monotonic, s) before which a refused run is not tried again.
         self._next_try: dict[tuple[int, int], float] = {}
 
     def run(self) -> None:
-        """Run until stopped. Trouble with the database is said once and waited out."""
+        """Run until stopped. Database errors are logged once and waited out."""
         trouble = None
         while not self._ending.wait(LOOK_SECONDS):
             try:
@@ -61,13 +61,13 @@ class Scheduler(threading.Thread):
                 self._ending.wait(60.0)
 
     def stop(self) -> None:
-        """End the thread; returns when it has ended."""
+        """Stop the thread; returns when it has ended."""
         self._ending.set()
         if self.is_alive():
             self.join()
 
     def look(self) -> None:
-        """One look: what is due is submitted, and windows are kept."""
+        """One check: submit what is due, and apply the windows."""
         now = self._store.clock.now()
         if self._store.clock.monotonic() >= self._next_recovery:
             self._next_recovery = self._store.clock.monotonic() + RECOVERY_SECONDS
@@ -85,13 +85,13 @@ class Scheduler(threading.Thread):
                 if study.held:
                     self._store.let_in(study.number)
                 continue
-            reason = f"outside its window, {study.window}; it goes on by itself"
+            reason = f"outside its window, {study.window}; it continues by itself"
             going = study.state in {StudyState.QUEUED, StudyState.RUNNING}
             if going or (study.held and study.reason != reason):
                 self._store.hold_for_window(study.number, reason)
 
     def _take(self, record: ScheduleRecord) -> None:
-        """Take up the latest due time; the ones before it that nobody was there for are only counted."""
+        """Take up the latest due time; earlier missed ones are only counted."""
         now, timing = self._store.clock.now(), record.fields.timing
         assert record.next_due is not None
         due = max(timing.latest_until(now) or record.next_due, record.next_due)
@@ -100,10 +100,10 @@ class Scheduler(threading.Thread):
             _LOG.warning("The schedule %s was missed %d times before %s.", record.id, missed, due.isoformat())
 
     def _put_off(self, run: OpenRun, problem: str) -> None:
-        """Try a run again later that was refused for a reason that passes."""
+        """Retry a run later that was refused for a temporary reason."""
         self._next_try[run.schedule, run.due] = self._store.clock.monotonic() + RETRY_SECONDS
         if run.problem is None:
-            _LOG.warning("The schedule %s was due, and no study came of it yet: %s", run.id, problem)
+            _LOG.warning("The schedule %s was due, but its study is not submitted yet: %s", run.id, problem)
         self._store.put_off_run(run, problem)
 
     def _submit(self, run: OpenRun) -> None:
@@ -114,10 +114,10 @@ class Scheduler(threading.Thread):
         from sprag.service.spec.document import parse_spec
         from sprag.service.spec.report import SpecError
 
-        # No client can send a key with a blank in it.
+        # The key contains a blank, which no client can send.
         key = f"schedule {run.id} {run.due}"
         known = self._store.study_of_key(key, None)
-        if known is not None:  # whoever submitted it died before this was noted; the schedule may have changed since
+        if known is not None:  # the submitting process died before recording it; the schedule may have changed since
             self._close(run, known)
             return
         try:
@@ -125,7 +125,7 @@ class Scheduler(threading.Thread):
             if run.fields.name:
                 parsed = replace(parsed, study=replace(parsed.study, name=run.fields.name))
             fields = run.fields
-            # Of the beginning that was meant: a run that is put off must not slip to the deadline of the next day.
+            # Relative to the planned beginning: a postponed run must not get the deadline of the next day.
             finish = _finish_of(run)
             study = accept(self._store, parsed, key, fields.priority, fields.fresh, finish)
         except (SpecError, FaultError) as error:
@@ -138,12 +138,14 @@ class Scheduler(threading.Thread):
         self._close(run, study)
 
     def _give_up(self, run: OpenRun) -> None:
-        """Refuse a run whose time was over before it could be tried again: nothing was running, or nothing changed."""
+        """Refuse a run whose deadline passed before it could be retried: no worker was running, or the reason
+        persisted.
+        """
         why = (run.problem or "").removesuffix(_again_until(_grace_end(run)))
         self._refuse(run, why or "Its deadline passed before it could be submitted.")
 
     def _refuse(self, run: OpenRun, problem: str) -> None:
-        _LOG.error("The schedule %s was due, and no study came of it: %s", run.id, problem)
+        _LOG.error("The schedule %s was due, but its study was not submitted: %s", run.id, problem)
         self._next_try.pop((run.schedule, run.due), None)
         self._store.close_run(run, problem=problem)
 
@@ -162,7 +164,7 @@ def _finish_of(run: OpenRun) -> datetime | None:
 
 
 def _is_over(run: OpenRun, now: datetime) -> bool:
-    """Whether a run may be submitted no longer: its deadline is over, or the grace for what was refused once."""
+    """Whether it is too late to submit a run: after its deadline, or after the grace time of a refused run."""
     finish = _finish_of(run)
     return (finish is not None and finish <= now) or (run.problem is not None and _grace_end(run) <= now)
 
@@ -172,6 +174,8 @@ def _again_until(end: datetime) -> str:
 
 
 def _grace_end(run: OpenRun) -> datetime:
-    """Until when a run that is refused for a reason that passes is tried: its deadline, the next due time, `GRACE`."""
+    """Until when a run that is refused for a temporary reason is retried: its deadline, the next due time, or
+    `GRACE`.
+    """
     ends = (run.begun_at + GRACE, _finish_of(run), run.fields.timing.next_after(run.begun_at))
     return min(end for end in ends if end is not None)

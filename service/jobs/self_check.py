@@ -1,7 +1,6 @@
-"""Known values that the engine of an installation must give: closed forms of both models and a reference case.
+"""Known values that an installed engine must reproduce: closed forms of both models and a reference case.
 
-They tell a broken compiler, library or processor from a sound one, not a wrong model from a right one; that is what
-the tests are for.
+They detect a faulty compiler, library or processor; a wrong model is detected by the tests.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ import math
 from sprag.worker.models import MACHINE_SHAFT, OK, run_chunk, study_results
 from sprag.worker.study import Study
 
-#: Largest relative difference that is sound.
+#: Largest acceptable relative difference.
 TOLERANCE = 1e-8
 
 _RUN = {"duration": [60.0, "periods"], "window": [[40.0, "periods"], [60.0, "periods"]], "tolerance": 1e-9}
@@ -30,7 +29,7 @@ _REFERENCE = {
 
 
 def check_known_values() -> tuple[list[str], float]:
-    """Run the cases; what is wrong, each a sentence, and the largest relative difference found."""
+    """Run the cases; returns the faults, one sentence each, and the largest relative difference."""
     wrong: list[str] = []
     largest = 0.0
     for study, expected in (_quiet(), _driven(), _free_shaft()):
@@ -42,7 +41,7 @@ def check_known_values() -> tuple[list[str], float]:
         for name, value in expected.items():
             difference = abs(values[name] - value) / abs(value)
             largest = max(largest, difference)
-            if not difference <= TOLERANCE:  # a NaN is wrong too
+            if not difference <= TOLERANCE:  # also true for a NaN
                 wrong.append(f"{study.name}: {name} is {values[name]!r} instead of {value!r}")
     return wrong, largest
 
@@ -55,7 +54,7 @@ def _study(name: str, base: dict[str, float]) -> Study:
 
 
 def _quiet() -> tuple[Study, dict[str, float]]:
-    """Small forced oscillation within the lost motion: amplitude and loss in closed form (docs/theory.md)."""
+    """Small forced oscillation within the backlash: amplitude and loss in closed form (docs/theory.md)."""
     frequency, amplitude, damping = 25.0, 1e-7, 0.05
     nu = 2.0 * math.pi * frequency
     stiffness = (

@@ -1,4 +1,4 @@
-"""Taking a study in: the one way for the interface, the form and the schedules."""
+"""Submission of studies, shared by the HTTP interface, the form and the schedules."""
 
 from __future__ import annotations
 
@@ -27,14 +27,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Submission:
-    """A checked study as it will be written down.
+    """A checked study, ready to be stored.
 
     Attributes
     ----------
     row : dict
         See `sprag.service.storage.studies.study_row`.
-    body_hash : str
-        Of the spec and the parameters of the request, for the idempotency key.
+    body_hash : str Hash of the spec and the parameters of the request, for the idempotency key.
     bytes : int
         Rough size of its results.
     fresh, finish_by
@@ -49,7 +48,7 @@ class Submission:
 
 
 def hash_of(asked: object) -> str:
-    """Of what a request asks for, as plain data, for its idempotency key: the order of names does not matter."""
+    """Hash of a request, as plain data, for its idempotency key; the order of names does not matter."""
     return hashlib.sha256(json.dumps(asked, sort_keys=True).encode("ascii")).hexdigest()
 
 
@@ -62,10 +61,10 @@ def submission(
     finish_by: datetime | None = None,
     given: Mapping[str, object] | None = None,
 ) -> Submission:
-    """``parsed`` with all its warnings; ``reusable`` tells how many cases of a study other studies have.
+    """The submission of ``parsed`` with all its warnings; ``reusable`` counts the cases of a study that can be reused.
 
-    One idempotency key means one spec with one set of ``given`` parameters, as the client wrote them: a deadline "8 h"
-    is another moment at each sending.
+    An idempotency key stands for one spec with one set of ``given`` parameters, as the client wrote them, because a
+    deadline "8 h" is a different time in each request.
     """
     asked = [parsed.spec, dict(given)] if given else parsed.spec
     warnings = (*parsed.warnings, *chunking.warnings(parsed.study))
@@ -91,7 +90,7 @@ def accept(
     finish_by: datetime | None = None,
     given: Mapping[str, object] | None = None,
 ) -> StudyRecord:
-    """Take a study in, warnings and all; FaultError when its results would not fit on the disk.
+    """Accept a study with its warnings; FaultError when its results would not fit on the disk.
 
     ``given`` as for `submission`.
     """
@@ -100,7 +99,7 @@ def accept(
 
 
 def take_in(store: Store, made: Submission, idempotency_key: str | None = None, priority: int = 0) -> StudyRecord:
-    """Write a submission down; FaultError when there are too many studies, or no room for its results."""
+    """Store a submission; FaultError when there are too many studies, or no room for its results."""
     known = store.study_of_key(idempotency_key, made.body_hash) if idempotency_key else None
     if known is not None:
         return known

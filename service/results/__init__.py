@@ -1,1 +1,1 @@
-"""What studies give: curves, maps, sensitivity, motions, and how numbers and names are written."""
+"""Results of studies: curves, maps, sensitivity, motions, and the wording of numbers and names."""

@@ -1,7 +1,7 @@
-"""Curves and maps of a study: which cases belong to which point, and their results, exact as the database has them.
+"""Curves and maps of a study: the cases of each point and their results, exactly as stored.
 
-`select` and `select_map` decide from the study alone which cases are drawn, and refuse what is not clear; `draw` and
-`draw_map` then fetch the results of just these cases. HTTP interface and command line both stand on these.
+`select` and `select_map` determine the drawn cases from the study alone and refuse ambiguous requests; `draw` and
+`draw_map` then fetch the results of these cases only. The HTTP interface and the command line both use them.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class CurveQuery:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """The cases of one curve, in order of its points; ``by`` and ``at`` hold the fixed parameters (SI)."""
+    """The cases of one curve, in order of its points; ``by`` and ``at`` contain the fixed parameters (SI)."""
 
     by: dict[str, float]
     at: dict[str, float]
@@ -66,11 +66,11 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The cases of all curves, chosen from the study alone; ``units`` (SI) of every path that is drawn or fixed.
+    """The cases of all curves, selected from the study alone; ``units`` (SI) of every drawn or fixed path.
 
-    For people: ``names`` of the drawn paths with those tied to them, and ``held``, the fixed ones with their values,
-    also those of the operating point that vary nowhere. ``regime`` is the result that tells the kinds of motion apart,
-    where the study has one.
+    For display: ``names`` of the drawn paths with those tied to them, and ``held``, the fixed ones with their values,
+    including constant ones of the operating point. ``regime`` is the result that gives the kind of motion, where the
+    study has one.
     """
 
     x: str
@@ -93,7 +93,7 @@ class Curve:
     regimes: list[str | None] | None = None
 
     def run(self) -> NDArray[np.intp]:
-        """Places of the cases that were run, ascending: what a picture joins. Of a coarser study, its own points."""
+        """Indices of the cases that were run, ascending, which a picture joins; of a coarser study, its own points."""
         return np.flatnonzero(~_not_run(np.array(self.endings, dtype=object)))
 
     def to_json(self, results: Sequence[ResultInfo]) -> CurveData:
@@ -117,7 +117,7 @@ class Curves:
     curves: tuple[Curve, ...]
 
     def to_json(self) -> CurvesData:
-        """The document of docs/http.md: null for a missing number, with the ending that explains it."""
+        """The document described in docs/http.md: null for a missing number, with the ending that explains it."""
         chosen = self.selection
         return {
             "x": {"path": chosen.x, "unit": chosen.units[chosen.x], "values": list(chosen.x_values)},
@@ -131,7 +131,7 @@ class Curves:
 class Map:
     """One result over two axes; ``values``, ``endings`` and ``cases`` have the shape (y values, x values).
 
-    ``names`` and ``held`` are for people, as those of `Selection`; ``units`` and ``names`` belong to x and y.
+    ``names`` and ``held`` are for display, as in `Selection`; ``units`` and ``names`` belong to x and y.
     """
 
     x: str
@@ -165,9 +165,9 @@ class Map:
         return data if self.regimes is None else {**data, "regime": self.regimes}
 
     def run(self) -> Map:
-        """The part of the map all of whose cases were run; the map itself where none was.
+        """The part of the map whose cases were all run; the map itself where none was.
 
-        Of a study that stopped on its way from coarse to fine it is a coarser grid without holes.
+        For a study that stopped between coarse and fine it is a coarser grid without holes.
         """
         missing = _not_run(np.array(self.endings, dtype=object)).reshape(self.values.shape)
         rows, columns = _complete(missing)
@@ -185,7 +185,7 @@ class Map:
 
 
 def _complete(missing: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Rows and columns that are left when the emptiest is taken away, again and again, until nothing is missing."""
+    """Rows and columns that remain when the emptiest is removed repeatedly until nothing is missing."""
     rows, columns = np.ones(missing.shape[0], dtype=np.bool_), np.ones(missing.shape[1], dtype=np.bool_)
     in_rows, in_columns = missing.sum(axis=1), missing.sum(axis=0)
     while in_rows.any():
@@ -200,17 +200,17 @@ def _complete(missing: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.
 
 
 def _not_run(endings: NDArray[np.object_]) -> NDArray[np.bool_]:
-    """Which cases have no ending of their own, yet or for good; shape as ``endings``."""
+    """Which cases have no ending of their own, either yet or ever; shape as ``endings``."""
     return np.asarray((endings == PENDING) | (endings == WorkerEnding.CANCELLED.value), dtype=np.bool_)
 
 
 def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Selection:
-    """The cases of the curves that ``query`` asks for.
+    """Select the cases of the curves of ``query``.
 
     Raises
     ------
     SelectionError
-        Unknown path or result, a value that its axis does not have, an axis left open, or too many numbers.
+        For an unknown path or result, a value that is not on its axis, an open axis, or too many numbers.
     """
     results = _results(infos, "y", query.y)
     x_axis = require_axis(study, "x", query.x)
@@ -226,7 +226,7 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
 
 
 def _held(study: Study, line: Line) -> tuple[str, ...]:
-    """The fixed axes, then what of the operating point varies nowhere."""
+    """The fixed axes, then the constant parameters of the operating point."""
     point, varying = models.presentation_of(study).operating_point, study.axis_paths
     always = [path for path in point if path in study.base and path not in varying]
     fixed = [*line.at.items(), *((path, study.base[path]) for path in always)]
@@ -234,7 +234,7 @@ def _held(study: Study, line: Line) -> tuple[str, ...]:
 
 
 def draw(selection: Selection, fetch: Fetch) -> Curves:
-    """Fetch the results of the selected cases, in one go."""
+    """Fetch the results of the selected cases in one query."""
     names = [info.name for info in selection.results]
     columns = fetch(np.concatenate([line.cases for line in selection.lines]), _with(names, selection.regime))
     endings, regimes = [ending or PENDING for ending in columns.endings], _regimes(columns, selection.regime)
@@ -330,9 +330,7 @@ def _no_axis_twice(x: dict[str, int], second: str, others: dict[str, int], fixed
 
 def _check_size(points: int, results: int) -> None:
     if points * results > MAX_CURVE_VALUES:
-        message = (
-            f"{points} points of {results} results are asked for; choose fewer with at=, or take them from the results"
-        )
+        message = f"{points} points of {results} results are requested; select fewer with at=, or export the results"
         raise SelectionError([ParameterFault("at", "too-many", message, allowed=f"<= {MAX_CURVE_VALUES} numbers")])
 
 

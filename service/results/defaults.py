@@ -1,4 +1,4 @@
-"""The curve shown first for a study: what its model says of it, whatever is nearest to that elsewhere."""
+"""The curve shown first for a study: as its model suggests, or the nearest that is available."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Axis, Study
 
-#: Curves that can be told apart by colour.
+#: Curves that can be distinguished by colour.
 _MOST_CURVES: Final = 8
-#: Results that stand for the main ones of a model that names none.
+#: Number of results shown first for a model that names no main ones.
 _MOST_MAIN: Final = 10
 
 
 def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
     """What to draw for ``study``; None when nothing varies.
 
-    Axes not drawn are held at the value of the base where they have it, else at the value in their middle.
+    Axes that are not drawn are held at the base's value where they contain it, otherwise at their middle value.
     """
     varying = [axis for axis in study.axes if len(axis) > 1]
     if not varying:
@@ -46,14 +46,14 @@ def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
 
 
 def main_results(study: Study, infos: Sequence[ResultInfo]) -> tuple[str, ...]:
-    """The results that tell most of a machine, by its model; the first ones where it names none."""
+    """The main results according to the model; the first ones where it names none."""
     names = [info.name for info in infos]
     main = models.presentation_of(study).main
     return tuple(name for name in main if name in names) or tuple(names[:_MOST_MAIN])
 
 
 def usual_value(study: Study, axis: Axis) -> float:
-    """The value at which an axis that is not drawn is held: the base's where the axis has it, else its middle one."""
+    """The value at which an undrawn axis is held: the base's where the axis contains it, otherwise its middle one."""
     base = study.base.get(axis.paths[0])
     index = None if base is None else axis.index_of(base)
     return float(np.sort(axis.array)[len(axis) // 2]) if index is None else axis.value(index)
@@ -68,7 +68,7 @@ def drawn_numbers(study: Study, query: CurveQuery) -> int:
 
 
 def caption(study: Study, query: CurveQuery) -> str:
-    """What the curves of ``query`` show, as a sentence without its full stop."""
+    """A caption of the curves of ``query``: a sentence without its full stop."""
     by = ", ".join(_with_unit(study, path) for path in query.by)
     held = [held_text(study, path, float(value)) for path, value in query.at]
     first = f"{', '.join(query.y)} against {_with_unit(study, query.x)}" + (f", a curve for each {by}" if by else "")
@@ -81,6 +81,6 @@ def _with_unit(study: Study, path: str) -> str:
 
 
 def query_pairs(query: CurveQuery, **more: str) -> list[tuple[str, str]]:
-    """The same as the query parameters of the curves' address."""
+    """``query`` as the query parameters of the curves' URL."""
     pairs = [("x", query.x), *(("y", name) for name in query.y), *(("by", path) for path in query.by)]
     return [*pairs, *(("at", f"{path}={value}") for path, value in query.at), *more.items()]

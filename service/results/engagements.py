@@ -33,11 +33,11 @@ COLUMNS: Final[dict[Table, dict[str, str]]] = {
 def require_clutches(study: Study) -> None:
     """Raise FaultError where the study's machine has no clutches."""
     if not models.has_clutches(study):
-        raise FaultError("not-found", f"A machine of model {study.model} has no clutches, so that nothing engages.")
+        raise FaultError("not-found", f"A machine of model {study.model} has no clutches, so it has no engagements.")
 
 
 def engagements_file(study: Study, case: int, table: Table, form: Format) -> bytes:
-    """The case run again and written down. For the computing process."""
+    """Run the case again and write the file. For the computing process."""
     made = models.run_engagements(study, case)
     if form == "csv":
         return engagements_csv(made, table)

@@ -1,4 +1,4 @@
-"""A clutch fit as asked for in JSON data, and its report, the same for the HTTP interface and the commands."""
+"""A clutch fit requested as JSON data, and its report, shared by the HTTP interface and the commands."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ def fit_json(fit: ClutchFit) -> ClutchFitReport:
 
 
 def read_fit(data: object) -> ClutchFit:
-    """The fit that plain JSON data with rows, accuracy and choices ask for; raises SpecError."""
+    """Compute the fit that JSON data with rows, accuracy and options request; raises SpecError."""
     report = Report(data)
     found = dict(read_object(report, "", data, REQUEST_FIELDS) or {})
     backlash = read_number(report, "/backlash", found.pop("backlash", 0.0), _backlash())
     if backlash and found.get("angles_include_backlash") is not True:
         report.fault(
-            "/backlash", "not-used", "is taken off the angles only where they include it", backlash,
+            "/backlash", "not-used", "is subtracted from the angles only where they include it", backlash,
             allowed="with `angles_include_backlash` true; else 0 or left out", unit="rad",
         )  # fmt: skip
     clutch = None
     if not report.faults:
-        # Without rows this would be taken for a law that lacks its coefficients.
+        # Without rows this would be read as a law without coefficients.
         clutch = read_clutch(report, "", {"data": None, **found}, "clutch.", [backlash or 0.0])
     report.raise_if_any()
     assert clutch is not None

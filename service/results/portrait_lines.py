@@ -1,4 +1,4 @@
-"""What the pictures of strobes and orbit show, whoever draws them."""
+"""Content of the pictures of strobes and orbit, for both painters."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def column_of(made: Trajectory, name: str) -> NDArray[np.float64]:
 
 
 def strobe_numbers(strobes: Trajectory) -> NDArray[np.int64]:
-    """The excitation period at whose end each strobe is, from 1."""
+    """Number of the excitation period at whose end each strobe lies, from 1."""
     if strobes.times.size < 2:
         return np.arange(1, strobes.times.size + 1)
     period = (strobes.times[-1] - strobes.times[0]) / (strobes.times.size - 1)
@@ -30,9 +30,9 @@ def strobe_numbers(strobes: Trajectory) -> NDArray[np.int64]:
 
 
 def approach(made: Portrait, shown: Presentation) -> tuple[str, str, list[tuple[str, str]]]:
-    """What is drawn strobe by strobe: title, unit, and pairs of a variable and what it is of.
+    """What is drawn strobe by strobe: title, unit, and pairs of a variable and its label.
 
-    The speed of the shaft; of one that never turns, the angles of what swings.
+    The speed of the shaft; where it never turns, the angles of the pendulums.
     """
     if np.any(column_of(made.strobes, "shaft.speed") != 0.0):
         return "speed of the shaft at the strobe", "rad/s", [("shaft.speed", "Shaft")]
@@ -40,7 +40,7 @@ def approach(made: Portrait, shown: Presentation) -> tuple[str, str, list[tuple[
 
 
 def described(made: Portrait) -> str:
-    """The picture in a sentence."""
+    """A sentence that describes the picture."""
     count = made.strobes.times.size
     strobes = f"{count:,} strobe{'' if count == 1 else 's'}"
     if made.order:

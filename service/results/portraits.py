@@ -1,4 +1,4 @@
-"""How one case comes to its motion, strobe by strobe, and the orbit: the document, and its tables as CSV."""
+"""How one case approaches its motion, strobe by strobe, and its orbit: the document, and its tables as CSV."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ TABLES: Final[tuple[Table, ...]] = ("strobes", "orbit")
 def require_strobes(study: Study) -> None:
     """Raise FaultError where the study's machine has no strobes."""
     if not models.has_strobes(study):
-        message = f"A machine of model {study.model} has no excitation, so that there are no strobes of it."
+        message = f"A machine of model {study.model} has no excitation, so it has no strobes."
         raise FaultError("not-found", message)
 
 
 def portrait_file(study: Study, case: int, table: Table, form: Format) -> bytes:
-    """The case run again and written down. For the computing process."""
+    """Run the case again and write the file. For the computing process."""
     made = models.run_portrait(study, case)
     if form == "csv":
         return trajectory_csv(made.strobes if table == "strobes" else made.orbit)

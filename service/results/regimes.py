@@ -1,4 +1,4 @@
-"""How pictures tell the regimes of points apart, and which points a line may join."""
+"""How pictures mark the regimes of points, and which points a line may join."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from sprag.worker.models import ResultInfo
 
-#: Regime of points that no line leads to: they are not of the settled machine.
+#: Regime of points that no line joins, because they do not show settled motion.
 UNSETTLED: Final = "unsettled"
-#: Regimes that lead into each other: a drive without a load coasts at the limit of a vanishing load.
+#: Regimes that a line may join: a drive without a load coasts, as the limit of a vanishing load.
 _CONTINUOUS: Final = frozenset({"coasting", "periodic"})
 
 
@@ -31,7 +31,7 @@ class Mark:
     marker: str
 
 
-#: Colours that people with any kind of colour vision tell apart, and shapes that tell the same in grey.
+#: Colours that are distinguishable with any kind of colour vision, and shapes that replace them in grey.
 MARKS: Final[dict[str, Mark]] = {
     "periodic": Mark("#777777", "circle", "o"),
     "held": Mark("#8c6d31", "square", "s"),
@@ -39,16 +39,16 @@ MARKS: Final[dict[str, Mark]] = {
     "irregular": Mark("#cc79a7", "triangle-up", "^"),
     UNSETTLED: Mark("#d55e00", "x", "x"),
 }
-#: Regimes that are marked upon their curves.
+#: Regimes that are marked on their curves.
 MARKED: Final = tuple(name for name in MARKS if name != "periodic")
-#: Regimes whose points are marked in maps: their results have an interval, or are not of a settled motion.
+#: Regimes whose points are marked in maps: their results have an interval, or do not show settled motion.
 DOUBTFUL: Final = ("irregular", UNSETTLED)
 
 
 def stretches(regimes: Sequence[str | None] | None, points: int) -> list[NDArray[np.int64]]:
-    """Places of the points that a line joins: neighbours of one regime, or coasting and periodic; no unsettled point.
+    """Indices of the points that a line joins: neighbours of one regime, or coasting and periodic; no unsettled point.
 
-    A point without a regime (it has no result) belongs to no stretch, unless the study knows no regimes at all.
+    A point without a regime (it has no result) belongs to no stretch, unless the study has no regimes at all.
     """
     if regimes is None:
         return [np.arange(points, dtype=np.int64)]
@@ -65,7 +65,7 @@ def stretches(regimes: Sequence[str | None] | None, points: int) -> list[NDArray
 
 
 def kind_columns(regime: ResultInfo | None) -> list[str]:
-    """Names of the results that tell what kind of motion a case has: its regime, and the order of its orbit."""
+    """Names of the results for the kind of motion of a case: its regime, and the order of its orbit."""
     return [] if regime is None else [regime.name, f"{regime.name}.order"]
 
 
@@ -90,5 +90,5 @@ def regimes_of(lists: Iterable[Sequence[str | None] | None]) -> list[str]:
 
 
 def counted(counts: Mapping[str, int]) -> str:
-    """How many cases have which regime, in words: ``486 periodic, 24 irregular``."""
+    """The number of cases by regime, in words: ``486 periodic, 24 irregular``."""
     return ", ".join(f"{count:,} {name}" for name, count in counts.items())

@@ -1,4 +1,4 @@
-"""Axes of a study as people name them: by any of their paths, their values with or without a unit."""
+"""Selection of axes by any of their paths, and of their values with or without a unit."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from sprag.worker.study import SAME_VALUE
 if TYPE_CHECKING:
     from sprag.worker.study import Axis, Study
 
-#: Fixed axes: position of the axis -> (the path it was named by, position of the value on it).
+#: Fixed axes: position of the axis -> (the path that named it, position of the value on it).
 Fixed = dict[int, tuple[str, int]]
 
 _LISTED = 24
 
 
 class SelectionError(FaultError):
-    """The selection of cases is not clear or not possible; ``faults`` names each parameter at fault."""
+    """The selection of cases is ambiguous or impossible; ``faults`` names each parameter at fault."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         faults = tuple(faults)
@@ -32,7 +32,7 @@ class SelectionError(FaultError):
 
 
 def listed(values: Iterable[object]) -> str:
-    """Values for a message, the middle of a long list left out."""
+    """Values for a message; the middle of a long list is left out."""
     texts = [f"{value!r}" if isinstance(value, float) else str(value) for value in values]
     if len(texts) > _LISTED:
         texts = [*texts[: _LISTED - 4], f"… {len(texts) - _LISTED} more", *texts[-4:]]
@@ -40,7 +40,7 @@ def listed(values: Iterable[object]) -> str:
 
 
 def require_axis(study: Study, parameter: str, path: str) -> int:
-    """Position of the axis that has ``path`` among its paths; SelectionError (about ``parameter``) else."""
+    """Position of the axis with ``path`` among its paths; SelectionError (about ``parameter``) otherwise."""
     position = study.axis_of(path)
     if position is not None:
         return position
@@ -71,13 +71,13 @@ def axis_name(study: Study, path: str) -> str:
 
 
 def held_text(study: Study, path: str, value: float) -> str:
-    """A parameter held at ``value`` (SI) as people read it: ``excitation.frequency = 25 Hz``."""
+    """A parameter held at ``value`` (SI) for display: ``excitation.frequency = 25 Hz``."""
     unit = unit_of(study, path)
     return f"{axis_name(study, path)} = {value:.6g}" + ("" if unit == "1" else f" {unit}")
 
 
 def locate_axes(study: Study, at: Sequence[tuple[str, str]]) -> Fixed:
-    """The axes and the positions on them that pairs of path and value (as text) name.
+    """The axes and the positions on them given by pairs of path and value (as text).
 
     A path that is not an axis is accepted where its only value is the given one. Raises SelectionError otherwise.
     """

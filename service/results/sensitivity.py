@@ -1,7 +1,7 @@
 """What the results of a study depend on: main effects of every axis, and shares of the variance (Sobol indices).
 
-First-order index of an axis: the share of a result's variance that knowing this axis alone would take away. Total
-index: the share that would stay if everything but this axis were known; it counts interactions too. (Saltelli et al.,
+First-order index of an axis: the share of a result's variance that would vanish if only this axis were fixed. Total
+index: the share that would remain if everything but this axis were fixed; it includes interactions. (Saltelli et al.,
 Computer Physics Communications 181 (2010) 259; Tarantola et al., Reliability Engineering 91 (2006) 717.)
 """
 
@@ -42,27 +42,26 @@ if TYPE_CHECKING:
 
     Numbers = NDArray[np.float64]
 
-#: How the indices were found: exactly from a full grid, from the design made for them, from a sample, or not at all.
+#: Method of the indices: exact from a full grid, from the Saltelli design, from a sample, or none.
 Method = Literal["grid", "saltelli", "rbd-fast", "none"]
-#: Cases that are looked at; more take seconds and say nothing new.
+#: Most cases that are used; more take seconds and add nothing.
 MOST_CASES: Final = 1_000_000
-#: Groups that the values of an axis without a grid are put into, to tell its main effect.
+#: Groups of values of an axis without a grid, for its main effect.
 BINS: Final = 10
-#: Least cases from which indices are estimated.
+#: Fewest cases from which indices are estimated.
 LEAST_CASES: Final = 65
 _SEED: Final = 1
 
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What one axis does to one result.
+    """The effect of one axis on one result.
 
     Attributes
     ----------
-    values, means : arrays of one length
-        Values of the axis (SI), or middles of groups of them, and the mean of the result there; NaN for none.
-    first, total : float or None
-        Indices, None where the method does not tell them.
+    values, means : arrays of one length Values of the axis (SI), or midpoints of groups of values, and the mean of the
+        result there; NaN for none.
+    first, total : float or None Indices, None where the method does not provide them.
     first_error, total_error : float or None
         Half widths of their 95 % intervals; None where they are exact.
     """
@@ -79,7 +78,7 @@ class Effect:
 
 @dataclass(frozen=True, slots=True)
 class Sensitivity:
-    """Effects of every axis that varies on one result, over the ``cases`` that have it; ``missing`` have not."""
+    """Effects of all varied axes on one result, over the ``cases`` that have it; ``missing`` cases do not."""
 
     info: ResultInfo
     method: Method
@@ -121,8 +120,8 @@ class Sensitivity:
 def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fetch: Fetch) -> list[Sensitivity]:
     """Effects of the axes of ``study`` on the results ``names``.
 
-    ``spec`` is the user's own: it tells whether the cases are the design for Sobol indices.
-    Raises SelectionError for an unknown result, a study in which nothing varies, or one that is too large.
+    ``spec`` is the user's own: it shows whether the cases are a Saltelli design. Raises SelectionError for an unknown
+    result, a study in which nothing varies, or one that is too large.
     """
     infos = models.study_results(study)
     faults: list[Fault] = [
@@ -160,7 +159,7 @@ def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fet
 
 
 def _saltelli_base(study: Study, spec: Mapping[str, Any]) -> int | None:
-    """Points that the study's Saltelli design was made from; None when its cases are not such a design."""
+    """Number of base points of the study's Saltelli design; None when its cases are not such a design."""
     axes = spec.get("axes")
     if not (isinstance(axes, list) and len(axes) == 1 and isinstance(axes[0], Mapping)) or spec.get("exclude"):
         return None
@@ -171,18 +170,18 @@ def _saltelli_base(study: Study, spec: Mapping[str, Any]) -> int | None:
 
 
 def _settled_only(y: Numbers, regimes: list[str | None] | None, notes: list[str]) -> Numbers:
-    """The result without that of unsettled cases; what there is to note about regimes goes to ``notes``."""
+    """The result without unsettled cases; remarks about regimes are added to ``notes``."""
     if regimes is None:
         return y
     names = np.array([name or "" for name in regimes])
     unsettled = (names == UNSETTLED) & np.isfinite(y)
     if unsettled.any():
-        notes.append(f"{int(unsettled.sum())} unsettled cases are left out: their results are not of a settled motion")
+        notes.append(f"{int(unsettled.sum())} unsettled cases are left out: their results do not show settled motion")
     y = np.where(unsettled, np.nan, y)
     counts = Counter(names[np.isfinite(y)].tolist())
     if len(counts) > 1:
         told = counted(dict(counts.most_common()))
-        notes.append(f"cases of different regimes are taken together ({told}): part of the variance is between these")
+        notes.append(f"cases of different regimes are combined ({told}): part of the variance lies between regimes")
     return y
 
 
@@ -242,7 +241,7 @@ Indices = tuple[float | None, float | None, float | None, float | None]
 def _main_effect(axis: Axis, column: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:
     """Mean of the result at each value of the axis, or over groups of about equally many values where it has many.
 
-    The cases of one value are never parted: a group that had some of them only would tell of other axes too.
+    The cases of one value stay together: a group with only some of them would also reflect other axes.
     """
     values = np.unique(axis.array)
     if values.size > 2 * BINS and column.size < 4 * values.size:
@@ -259,7 +258,7 @@ def _main_effect(axis: Axis, column: Numbers, y: Numbers) -> tuple[Numbers, Numb
 
 
 def _grid_indices(table: Numbers, positions: list[int]) -> list[Indices]:
-    """Exact shares of the variance over the points of a full grid, every point weighing the same."""
+    """Exact shares of the variance over the points of a full grid, all with equal weight."""
     variance = float(table.var())
     every = tuple(range(table.ndim))
     found: list[Indices] = []
@@ -272,7 +271,7 @@ def _grid_indices(table: Numbers, positions: list[int]) -> list[Indices]:
 
 
 def _saltelli_indices(y: Numbers, base: int, dimensions: int, notes: list[str]) -> list[Indices]:
-    """SALib's estimates; a point of which any case is missing is left out with all its cases."""
+    """SALib's estimates; a point with any missing case is left out with all its cases."""
     from SALib.analyze import sobol
 
     blocks = y.reshape(base, dimensions + 2)
@@ -291,7 +290,7 @@ def _saltelli_indices(y: Numbers, base: int, dimensions: int, notes: list[str]) 
 
 
 def _too_few(x: Numbers) -> str:
-    """The sentence for too few cases of a sample, shape (cases, axes); "" where they suffice or are not a sample."""
+    """The sentence about too few cases of a sample, shape (cases, axes); "" where they suffice or are not a sample."""
     few = len(x) < LEAST_CASES and going_together(x) is None and all(scattered(column) for column in x.T)
     return f"too few cases for indices: {len(x)}, and {LEAST_CASES} are needed" if few else ""
 
@@ -313,7 +312,7 @@ def _problem(dimensions: int) -> dict[str, Any]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """SALib divides by the variance without a look; where it is 0, the indices say nothing and become None."""
+    """Silence SALib's division by a zero variance; such indices are meaningless and become None."""
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         yield

@@ -1,4 +1,4 @@
-"""Which way to shares of the variance the cases of a study allow: a sample, a complete grid, or none."""
+"""Which method of variance decomposition the cases of a study allow: sample, complete grid, or none."""
 
 from __future__ import annotations
 
@@ -12,29 +12,28 @@ if TYPE_CHECKING:
 
     Numbers = NDArray[np.float64]
 
-#: Least part of the cases that must have a value of their own on an axis whose values were drawn.
+#: Least share of cases with a unique value on an axis whose values were drawn.
 _LEAST_DISTINCT: Final = 0.95
-#: Rank correlation of two columns of a sample that is too large, and its largest share of what chance alone makes of
-#: columns drawn apart (its standard deviation is 1 / sqrt(cases - 1)).
+#: Largest rank correlation of two columns of a sample: absolute, and in standard deviations of the correlation of
+#: independent columns, 1 / sqrt(cases - 1).
 _MOST_CORRELATED: Final = 0.45
 _CHANCE: Final = 4.5
-#: Rank correlation from which two axes go together.
+#: Rank correlation from which two axes count as varied together.
 _TOGETHER: Final = 0.99
-#: A grid that lacks more than this part of its points is not spoken of as one.
+#: A grid with a larger share of missing points is not called a grid.
 _LEAST_GRID: Final = 0.1
 
 
 def scattered(column: Numbers) -> bool:
-    """Whether nearly every case has a value of its own in ``column``, shape (cases,)."""
+    """Whether nearly every case has a unique value in ``column``, shape (cases,)."""
     return bool(np.unique(column).size >= _LEAST_DISTINCT * column.size)
 
 
 def is_sample(columns: Numbers) -> bool:
-    """Whether ``columns``, shape (cases, axes), are like points drawn at random, every axis for itself.
+    """Whether ``columns``, shape (cases, axes), look like points drawn at random, independently for each axis.
 
-    Nearly all values of an axis differ, and no axis tells of another, neither where it is high or low nor where it is
-    in its middle or at its ends. The cases are looked at and not how they were meant: those that failed can make a
-    sample lopsided.
+    Nearly all values of an axis must differ, and no axis may correlate with another, neither in its value nor in its
+    distance from the middle. The actual cases decide, not their design: failed cases can bias a sample.
     """
     cases, axes = columns.shape
     if not all(scattered(columns[:, axis]) for axis in range(axes)):
@@ -52,19 +51,19 @@ def is_sample(columns: Numbers) -> bool:
 
 
 def is_factorial(columns: Numbers) -> bool:
-    """Whether ``columns``, shape (cases, axes), hold every combination of their values just once."""
+    """Whether ``columns``, shape (cases, axes), contain every combination of their values exactly once."""
     found = math.prod(np.unique(column).size for column in columns.T)
     return found == len(columns) == len(np.unique(columns, axis=0))
 
 
 def factorial_table(columns: Numbers, y: Numbers) -> Numbers:
-    """``y`` of the cases of `is_factorial` columns as a table with one direction for each axis, values ascending."""
+    """``y`` of the cases of `is_factorial` columns as an array with one dimension per axis, values ascending."""
     shape = tuple(np.unique(column).size for column in columns.T)
     return y[np.lexsort(columns.T[::-1])].reshape(shape)
 
 
 def going_together(columns: Numbers) -> tuple[int, int] | None:
-    """Two axes of which the one gives the other away by order, such as those of a zip; None when there are none."""
+    """Two axes whose orders determine each other, such as those of a zip; None when there are none."""
     if len(columns) < 2 or columns.shape[1] < 2:
         return None
     ranks = _ranks(columns)
@@ -79,25 +78,25 @@ def going_together(columns: Numbers) -> tuple[int, int] | None:
 
 
 def why_no_shares(columns: Numbers, known: NDArray[np.bool_], names: list[str]) -> str:
-    """The sentence for cases that are neither a sample nor a complete grid; ``known`` are those that have the result.
+    """The sentence about cases that are neither a sample nor a complete grid; ``known`` marks those with the result.
 
     ``columns`` has shape (cases, axes), over all cases; ``names`` are those of the axes.
     """
     tied = going_together(columns)
     if tied is not None:
         first, second = (names[at] for at in tied)
-        return f"{first} and {second} were varied together: the cases cannot tell what each of them does"
+        return f"{first} and {second} were varied together: the cases cannot separate their effects"
     points, cases = math.prod(np.unique(column).size for column in columns.T), int(known.sum())
-    reason = "the cases are not a complete grid nor a sample"
+    reason = "the cases are neither a complete grid nor a sample"
     if all(scattered(column) for column in columns[known].T):
         reason += ": their axes are not independent of each other"
     elif cases < points and cases >= _LEAST_GRID * points:
         reason += f": {points - cases} of {points} are missing"
-    return f"{reason}; main effects are means over those there are"
+    return f"{reason}; main effects are means over the available cases"
 
 
 def _ranks(columns: Numbers) -> Numbers:
-    """Ranks of each column from -1 to 1, the same for the same value, shape (cases, axes)."""
+    """Ranks of each column from -1 to 1, equal for equal values, shape (cases, axes)."""
     found = np.empty(columns.shape)
     for at, column in enumerate(columns.T):
         _, group, count = np.unique(column, return_inverse=True, return_counts=True)

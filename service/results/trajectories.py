@@ -1,4 +1,4 @@
-"""Instantaneous values of one case: which times or angles, and the document or table of them."""
+"""Instantaneous values of one case: their times or angles, and the document or table."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 
 
 def span(study: Study, case: int, start: str | None, end: str | None) -> tuple[float, float]:
-    """First and last place of a part of the case's extent (time in s, angle in rad); by default from its `begin` on.
+    """Start and end of a part of the case's extent (time in s, angle in rad); by default from its `begin` on.
 
     ``start`` and ``end`` are SI numbers, or quantities with a unit or in periods. Raises FaultError, about the
-    parameter ``from`` or ``to``, when they are not places within it.
+    parameter ``from`` or ``to``, when they lie outside the extent.
     """
     extent = models.extent(study, case)
     last = extent.end if end is None else _place("to", end, extent)
     first = (extent.begin if extent.begin < last else 0.0) if start is None else _place("from", start, extent)
-    # The last digit of an end given in periods or degrees is not the client's to know.
+    # A client that gives the end in periods or degrees cannot know its last digit.
     if math.isclose(last, extent.end, rel_tol=1e-12):
         last = extent.end
     whole = {"time": "the run", "angle": "the cycle"}[extent.along]
@@ -54,7 +54,7 @@ def _place(name: str, text: str, extent: Extent) -> float:
 
 
 def trajectory_file(study: Study, case: int, start: float, end: float, points: int, form: Format) -> bytes:
-    """The case run again and written down. For the computing process: large answers take seconds to write."""
+    """Run the case again and write the file. For the computing process: large answers take seconds to write."""
     made = models.run_trajectory(study, case, start, end, points)
     if form == "csv":
         return trajectory_csv(made)

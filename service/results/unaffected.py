@@ -1,4 +1,4 @@
-"""Parameters that were varied without any result changing: found in pairs of cases that differ in nothing else."""
+"""Varied parameters that change no result: found by comparing cases that differ in nothing else."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
 
     Cases = NDArray[np.int64]
 
-#: Cases that are looked at for one axis.
+#: Most cases that are compared for one axis.
 MOST_CASES: Final = 5_000
-#: Cases of a study whose axes go together; of more it is not told.
+#: Largest study with zipped axes, in cases, that is examined.
 MOST_ROWS: Final = 200_000
-#: Results closer than this (relative) are the same: the rest is rounding.
+#: Results with a smaller relative difference count as equal, apart from rounding.
 _SAME: Final = 1e-9
-#: First parts of names of results that tell of the computation rather than of the machine.
+#: First parts of the names of results that describe the computation rather than the machine.
 _CHECKS: Final = ("balance", "run", "reset")
 _KEPT: Final = 256
 
 
 def unaffected(study: Study, fetch: Fetch) -> tuple[str, ...]:
-    """A sentence for each axis that changes no result in any of the cases looked at, which are many."""
+    """A sentence for each axis that changes no result in any of the many cases compared."""
     infos = models.study_results(study)
     names = [info.name for info in infos if info.name.split(".")[0] not in _CHECKS]
     found = []
@@ -48,7 +48,7 @@ def unaffected(study: Study, fetch: Fetch) -> tuple[str, ...]:
             looked += sum(map(len, groups))
         if looked:
             everywhere = looked >= study.cases
-            where = "any case" if everywhere else f"any of {looked:,} cases that were looked at"
+            where = "any case" if everywhere else f"any of {looked:,} cases that were compared"
             found.append(f"{' = '.join(axis.paths)} was varied, but changes no result in {where}")
     return tuple(found)
 
@@ -90,7 +90,7 @@ def _table_groups(study: Study, position: int) -> list[Cases]:
 
 
 def _changes(groups: Sequence[Cases], names: Sequence[str], fetch: Fetch) -> bool:
-    """Whether any result or ending differs within any group; a case that is not done yet could."""
+    """Whether any result or ending differs within any group; an unfinished case counts as different."""
     columns = fetch(np.concatenate(groups), names)
     table = np.stack([columns.values[name] for name in names], axis=1)
     start = 0

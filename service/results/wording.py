@@ -1,4 +1,4 @@
-"""How numbers, units and names are written for people."""
+"""Display of numbers, units and names."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from markupsafe import Markup
 
 from sprag.worker import models
 
-#: Narrow blank without a line break: between thousands, as ISO 80000 writes them.
+#: Narrow no-break space, the thousands separator of ISO 80000.
 _THIN: Final = "\N{NARROW NO-BREAK SPACE}"
 _RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-#: Significant digits of numbers on pages; files and the interface for programs have all of them.
+#: Significant digits of numbers on pages; files and the API have all digits.
 _DIGITS: Final = 5
 _GREEK: Final = {"beta": "β", "chi": "χ", "delta": "δ", "lambda": "λ", "phi": "φ", "w": "ω"}
 
 
 def number(value: float | str | None, digits: int = _DIGITS) -> str:
-    """A number as people read it: few digits, thousands apart, powers of ten raised; a dash for none.
+    """A number for display: few digits, separated thousands, superscript powers of ten; a dash for none.
 
-    The name of a category stays as it is.
+    The name of a category is unchanged.
     """
     if isinstance(value, str):
         return value
@@ -52,7 +52,7 @@ def unit_text(unit: str | None) -> str:
 
 
 def symbol(text: str) -> Markup:
-    """A letter of the model with its index, as books print it."""
+    """A symbol of the model with its index, as in print."""
     base, _, index = text.partition("_")
     if not index and (found := re.fullmatch(r"([A-Za-z]+)(\d+)", text)):
         base, index = found[1], found[2]

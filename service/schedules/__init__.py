@@ -1,1 +1,1 @@
-"""Studies that begin by themselves: when they are due, what is kept of them, and who submits them."""
+"""Scheduled studies: their fields, times and deadlines."""

@@ -1,4 +1,4 @@
-"""Deadlines as people give them, and what can be done by one."""
+"""Deadlines as users give them, and how much of a study can be done by then."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sprag.worker.order import coverage, order_of
 if TYPE_CHECKING:
     from sprag.worker.study import Study
 
-#: Least time that a deadline leaves, in s: a shorter one is a slip.
+#: Shortest time to a deadline, in s; a shorter one is a mistake.
 _LEAST_SECONDS: Final = 1.0
 ALLOWED: Final = (
     'a future time with its offset, such as "2027-01-31T06:00+01:00", or a duration from the submission, such as '
@@ -28,7 +28,7 @@ ALLOWED_OF_RUNS: Final = (
 
 
 class FinishError(ValueError):
-    """No deadline that can be kept; the message is one clause."""
+    """An invalid deadline; the message is one clause."""
 
     def __init__(self, code: Code, message: str) -> None:
         super().__init__(message)
@@ -43,7 +43,7 @@ def finish_at(text: str, now: datetime) -> datetime:
     except ValueError:
         return now + timedelta(seconds=_seconds(text))
     if moment.tzinfo is None:
-        # A sign that was not encoded comes out of an address as a blank.
+        # An unencoded plus sign in a URL is decoded as a blank.
         raise FinishError("invalid-time", "has no offset from UTC; write Z, or +01:00 (in an address %2B01:00)")
     try:
         ahead = (moment - now).total_seconds()
@@ -75,7 +75,7 @@ def _require_near(seconds: float) -> None:
 
 
 def check_run_finish(text: str) -> str:
-    """A deadline of the runs of a schedule, as it is kept: a time of day or a duration. Raises FinishError."""
+    """Check and normalise the deadline of a schedule's runs: a time of day or a duration. Raises FinishError."""
     text = text.strip()
     try:
         return f"{read_time_of_day(text):%H:%M}"
@@ -85,9 +85,9 @@ def check_run_finish(text: str) -> str:
 
 
 def run_finish_at(text: str, zone: str, begin: datetime) -> datetime:
-    """The deadline (UTC) of a run that begins at ``begin``: the next such time of day in ``zone``, or after a while.
+    """The deadline (UTC) of a run that begins at ``begin``: the next such time of day in ``zone``, or after a duration.
 
-    A time of day that a change of the clocks leaves out is read by the offset before it; one that comes twice is the
+    A time of day that a change of the clocks skips is read with the offset before it; one that occurs twice means the
     first.
     """
     try:
@@ -103,12 +103,12 @@ def run_finish_at(text: str, zone: str, begin: datetime) -> datetime:
 
 
 def finish_warnings(study: Study, seconds: float, left: float) -> tuple[str, ...]:
-    """What is to be said of a study that takes about ``seconds`` of work when ``left`` seconds are left for it."""
+    """Warnings about a study that takes about ``seconds`` of work when ``left`` seconds are left for it."""
     if seconds <= left:
         return ()
     done = int(study.cases * left / seconds)
     return (
-        f"By estimate it will not be finished by then: about {_hours(seconds)} are needed and {_hours(left)} are left, "
+        f"By estimate it will not be finished by then: it needs about {_hours(seconds)} and {_hours(left)} are left, "
         f"enough for about {done:,} of {study.cases:,} cases: then {coverage(order_of(study), done)}.",
     )
 

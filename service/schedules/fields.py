@@ -1,4 +1,4 @@
-"""The fields of a schedule as a client gives them, checked like a spec: every fault named by its JSON Pointer."""
+"""The fields of a schedule as a client gives them, checked like a spec: every fault has its JSON Pointer."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ _RUNS_LOOKED_AT: Final = 7
 
 @dataclass(frozen=True, slots=True)
 class ScheduleFields:
-    """A whole schedule: what is run (``spec``, the user's own), when, and how.
+    """A complete schedule: what is run (``spec``, the user's own), when, and how.
 
-    ``finish_by`` is when each run is held, whatever is done: a time of day in the zone, or a duration.
+    Each run is held at ``finish_by``, whether finished or not: a time of day in the zone, or a duration.
     """
 
     name: str
@@ -44,7 +44,7 @@ class ScheduleFields:
 
     @property
     def times(self) -> tuple[Timing, Window | None, str | None, bool]:
-        """What tells when its runs begin, go on and end."""
+        """The fields that determine when its runs begin, may run and end."""
         return self.timing, self.window, self.finish_by, self.enabled
 
     def next_due(self, now: datetime) -> datetime | None:
@@ -71,12 +71,12 @@ class ScheduleFields:
 
 
 def read_fields(data: object, now: datetime) -> ScheduleFields:
-    """The fields of a new schedule; raises SpecError with everything that is wrong."""
+    """Read the fields of a new schedule; raises SpecError with all faults."""
     return _read(data, now)
 
 
 def change_fields(fields: ScheduleFields, data: object, now: datetime) -> ScheduleFields:
-    """The fields with those of ``data`` in their place; raises SpecError."""
+    """Replace the fields given in ``data``; raises SpecError."""
     report = Report(data)
     given = read_object(report, "", data, FIELDS)
     report.raise_if_any()
@@ -85,7 +85,7 @@ def change_fields(fields: ScheduleFields, data: object, now: datetime) -> Schedu
     if {"cron", "at"} & set(given):
         whole.pop("cron", None)
         whole.pop("at", None)
-    # A time that is not given again may have passed.
+    # A time that is not given anew may have passed.
     return _read({**whole, **given}, now, old=None if "at" in given else fields)
 
 
@@ -111,7 +111,7 @@ def _read(data: object, now: datetime, old: ScheduleFields | None = None) -> Sch
 
 
 def _require_open_window(report: Report, fields: ScheduleFields, now: datetime) -> None:
-    """Refuse a window that is closed from each due time to its deadline: no run would ever do anything."""
+    """Refuse a window that is closed from each due time to its deadline: no case would ever run."""
     window, finish_by = fields.window, fields.finish_by
     if window is None or finish_by is None:
         return

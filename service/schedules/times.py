@@ -1,8 +1,8 @@
-"""When a schedule is due, and whether its window is open: arithmetic of wall clocks, without any clock of its own.
+"""When a schedule is due, and whether its window is open: arithmetic of wall-clock times without a clock of its own.
 
-A cron expression is read on the wall clock of its zone. A fixed time that a change to daylight saving time leaves out
-is due at the first moment after the gap; one that comes twice is due the first time only. Expressions that name no
-fixed hour ("every 30 minutes") go by real time instead. (That is what Debian's cron does, and `cronsim` after it.)
+Cron expressions refer to the wall clock of their zone. A fixed time that daylight saving time skips is due at the first
+moment after the gap; one that occurs twice is due the first time only. Expressions without a fixed hour ("every 30
+minutes") follow real time instead. (These are the rules of Debian's cron and of `cronsim`.)
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from cronsim import CronSim, CronSimError
 
 from sprag.service.faults import Code
 
-#: Due times that are counted when many were missed; what is told is "this many or more".
+#: Most missed due times that are counted; the report then reads "this many or more".
 MOST_COUNTED = 1000
 
 
 class TimingError(ValueError):
-    """A cron expression or a time that cannot be kept; the message is one clause."""
+    """A cron expression or a time that is invalid; the message is one clause."""
 
     def __init__(self, code: Code, message: str) -> None:
         super().__init__(message)
@@ -93,7 +93,7 @@ def check_cron(expression: str) -> None:
 def read_moment(text: str, zone: str) -> datetime:
     """A time such as ``2027-01-31T22:00``, on the wall clock of ``zone`` unless it carries its own offset; in UTC.
 
-    Of a time that comes twice the first one is meant. Raises TimingError for one that there is not.
+    A time that occurs twice means the first one. Raises TimingError for a time that does not exist.
     """
     try:
         moment = datetime.fromisoformat(text)
@@ -113,7 +113,7 @@ def read_moment(text: str, zone: str) -> datetime:
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """A part of each day on the wall clock of ``zone``, over midnight when ``end`` is less than ``begin``."""
+    """A part of each day on the wall clock of ``zone``; it spans midnight when ``end`` is less than ``begin``."""
 
     begin: time
     end: time

@@ -1,7 +1,7 @@
-"""All rows of a study as a file, in every format people work with, written piece by piece, however many there are.
+"""All rows of a study as a file, in all common formats, written piece by piece for any number of rows.
 
 CSV, JSON and JSON lines (`text`), Parquet and Arrow (`arrow`), spreadsheets (`xlsx`), labelled grids (`netcdf`).
-Reading the numbers gives the same doubles back; what could not be computed is empty, null or NaN, never 0.
+Numbers read back as the same doubles; values that could not be computed are empty, null or NaN, never 0.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ __all__ = [
 
 
 def export(source: Source, form: Format) -> Iterator[bytes]:
-    """The file in pieces, each of about one block of rows. Libraries are loaded for the format that is asked for."""
+    """The file in pieces of about one block of rows. Only the libraries of the requested format are loaded."""
     if form == "csv":
         return csv_pieces(source)
     if form == "json":

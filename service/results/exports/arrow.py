@@ -1,4 +1,4 @@
-"""Rows as Apache Arrow: Parquet for data tools, an Arrow stream for programs. Units stand in the fields' metadata."""
+"""Rows as Apache Arrow: Parquet for data tools, an Arrow stream for programs. The fields' metadata have the units."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from sprag.service.results.exports.source import Source
     from sprag.service.storage.records import RowBlock
 
-#: Rows of one group of a Parquet file: some 20 MB of numbers.
+#: Rows of one group of a Parquet file: about 20 MB of numbers.
 _GROUP_ROWS: Final = 50_000
 #: Type of the column of each kind of result.
 _TYPES: Final = {"real": pa.float64(), "count": pa.int64(), "category": pa.string()}
 
 
 class _Pieces(io.RawIOBase):
-    """A file that hands what is written to it out again, piece by piece."""
+    """A file object that returns the bytes written to it piece by piece."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -51,7 +51,7 @@ class _Pieces(io.RawIOBase):
 def schema(source: Source) -> pa.Schema:
     """Columns ``case``, axis paths, ``ending``, ``flags``, results; unit and meaning as metadata of each field.
 
-    The study itself is metadata of the whole, JSON under ``sprag``, as `machine` tells it.
+    The schema's metadata contain the study itself, as JSON of `machine` under ``sprag``.
     """
     study = source.study
     fields = [pa.field("case", pa.int64(), nullable=False)]
@@ -116,7 +116,7 @@ def parquet_pieces(source: Source) -> Iterator[bytes]:
 
 
 def _repeating(source: Source) -> list[str]:
-    """Columns that say the same in many rows; measured numbers hardly ever do, and trying costs time."""
+    """Columns with many repeated values; results hardly ever repeat, and trying costs time."""
     repeating = [info.name for info in source.infos if info.kind != "real"]
     return [*source.study.axis_paths, "ending", *repeating]
 

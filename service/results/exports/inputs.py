@@ -1,6 +1,6 @@
-"""Everything that a study was computed with, what the user left to the program included: numbers, choices, the run.
+"""All inputs of a study, including defaults: numbers, choices, the run.
 
-A default that nobody wrote is an input like any other: without it a file does not say what was computed.
+A default is an input like any other: without it a file does not document what was computed.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from sprag.service.spec.machine.registry import part_of
 if TYPE_CHECKING:
     from sprag.worker.study import Study
 
-#: Where the value of an input is from; "" where the user's own spec is not known.
+#: Origin of the value of an input; "" where the user's spec is unknown.
 Origin = Literal["given", "default", "fitted", "axes", ""]
 
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """One parameter of the machine, or setting of its run, as a table of inputs shows it.
+    """One parameter of the machine or setting of its run, for a table of inputs.
 
     ``value`` is a number in SI, the text of a choice, or None where the axes change it.
     """
@@ -39,15 +39,15 @@ class Input:
 
 
 def description_of(study: Study, path: str) -> str:
-    """What a flat path in a spec means, as a few words; "" where the catalogue does not have it."""
+    """A short description of a flat path of a spec; "" where the catalogue does not contain it."""
     entry = parameter_of(study, path)
     return "" if entry is None else entry.help
 
 
 def inputs(study: Study, spec: Mapping[str, Any]) -> tuple[Input, ...]:
-    """Every parameter of the machine: what varies, which has no single value, the base's numbers, and the choices.
+    """Every parameter of the machine: varied ones, which have no single value, the base's numbers, and the choices.
 
-    ``spec`` is the user's own, which tells what was given.
+    ``spec`` is the user's own, which shows what was given.
     """
     varying = study.axis_paths
     numbers = [
@@ -68,7 +68,7 @@ def inputs(study: Study, spec: Mapping[str, Any]) -> tuple[Input, ...]:
 
 
 def run_inputs(study: Study, spec: Mapping[str, Any]) -> tuple[Input, ...]:
-    """The settings of the run as people read them; none where the model has no run."""
+    """The settings of the run, formatted for display; none where the model has no run."""
     given = spec.get("run") or {}
     origins: dict[bool, Origin] = {True: "given", False: "default" if "base" in spec else ""}
     return tuple(
@@ -77,18 +77,18 @@ def run_inputs(study: Study, spec: Mapping[str, Any]) -> tuple[Input, ...]:
 
 
 def defaults(study: Study, spec: Mapping[str, Any]) -> list[str]:
-    """Paths under the spec (``base.gravity``, ``run.tolerance``) of everything that the user left to the program."""
+    """Paths in the spec (``base.gravity``, ``run.tolerance``) of everything for which a default was used."""
     parts = {"base": inputs(study, spec), "run": run_inputs(study, spec)}
     return [f"{name}.{item.path}" for name, found in parts.items() for item in found if item.origin == "default"]
 
 
 def choices(study: Study, spec: Mapping[str, Any]) -> dict[str, str]:
-    """The fields of the machine that are not numbers, by their paths in the base."""
+    """The non-numeric fields of the machine, by their paths in the base."""
     return {choice.path: choice.text for choice in part_of(study.model).choices(study, spec)}
 
 
 def _origin(spec: Mapping[str, Any], path: str) -> Origin:
-    """Where the input at a path of the base is from."""
+    """Origin of the input at a path of the base."""
     place: Any = spec.get("base")
     if not isinstance(place, Mapping):
         return ""

@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 _CONVENTIONS: Final = "CF-1.11"
 _CASE: Final = "case"
-#: Level of zlib: higher ones take several times as long for a few hundredths of the size.
+#: Level of zlib: higher ones take several times as long and save a few per cent.
 _LEVEL: Final = 1
 
 
 def netcdf_pieces(source: Source) -> Iterator[bytes]:
-    """The file in pieces. It is made on the disk, one result at a time, so that memory stays small."""
+    """The file in pieces. It is built on disk, one result at a time, to limit memory."""
     return spooled(partial(_write, source))
 
 
@@ -48,7 +48,7 @@ def _write(source: Source, folder: Path) -> Path:
     head.to_netcdf(path, engine="h5netcdf", unlimited_dims=())
     for index, info in enumerate(source.infos):
         column = grid.variable(*_variable(info, rows.column(index)))
-        # The coordinates are in the file already; xarray names them only for variables that are written beside them.
+        # The coordinates are in the file already; xarray names them only for variables written together with them.
         if grid.labels:
             column.attrs["coordinates"] = " ".join(grid.labels)
         xr.Dataset({info.name: column}).to_netcdf(path, engine="h5netcdf", mode="a")
@@ -56,13 +56,13 @@ def _write(source: Source, folder: Path) -> Path:
 
 
 class _Grid:
-    """The places of a study's cases in the file.
+    """The positions of a study's cases in the file.
 
     Attributes
     ----------
-    dims : names of the dimensions: the first path of each axis of a grid; ``case`` where axes go together
+    dims : names of the dimensions: the first path of each axis of a grid; ``case`` where axes are zipped
     shape : their lengths
-    labels : coordinates that are no dimension: the case's number in a grid, further paths of tied axes
+    labels : coordinates that are not dimensions: the case number in a grid, further paths of tied axes
     """
 
     def __init__(self, study: Study) -> None:
@@ -107,7 +107,7 @@ class _Grid:
 
 
 def _order(axis: Axis) -> Any:
-    """What brings the values of an axis into the order of CF coordinates, which only rise or only fall."""
+    """Indices that sort the values of an axis as CF coordinates, which must rise or fall monotonically."""
     steps = np.diff(axis.array)
     return slice(None) if (steps > 0).all() or (steps < 0).all() else np.argsort(axis.array)
 
@@ -133,14 +133,14 @@ def _ending_attributes() -> dict[str, Any]:
 
 def _flag_attributes() -> dict[str, Any]:
     return {
-        "long_name": "what to know of the case",
+        "long_name": "flags of the case",
         "flag_masks": np.array(list(FLAG_MASKS.values()), dtype=np.int32),
         "flag_meanings": " ".join(FLAG_MASKS),
     }
 
 
 def _variable(info: ResultInfo, column: NDArray[np.float64]) -> tuple[NDArray[Any], dict[str, Any]]:
-    """Values and attributes of a result: of a category its codes, the first where there is none."""
+    """Values and attributes of a result; a category becomes codes, the first of which means none."""
     if info.kind != "category":
         return column, {"units": info.unit, "long_name": info.description}
     attributes = {
@@ -163,7 +163,7 @@ class _Columns:
         try:
             for block in source.blocks:
                 self._note(block.cases, block.endings, block.flags)
-                # Runs of consecutive cases, which nearly always is the whole block.
+                # Runs of consecutive cases; nearly always one run is the whole block.
                 starts = np.flatnonzero(np.diff(block.cases, prepend=block.cases[0] - 2) != 1)
                 for begin, end in zip(starts, [*starts[1:], len(block)], strict=True):
                     for index in range(len(source.infos)):

@@ -1,4 +1,4 @@
-"""What is exported: a study, its rows, and what each column of the table means."""
+"""The source of an export: a study, its rows, and the meaning of each column."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
 
-#: Parts of a spec that describe the machine and its run; the axes stand in the rows themselves.
+#: Parts of a spec that describe the machine and its run; the rows themselves contain the axes.
 _GIVEN: Final = ("base", "run")
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """What is exported: a study, the description of its results, and where its rows come from, in order of cases.
+    """The source of an export: a study, the description of its results, and its rows in order of cases.
 
-    ``spec`` is the user's own, which has what is not a number: kinds, formulas, tables, measured points.
+    ``spec`` is the user's own, which contains the non-numeric inputs: kinds, formulas, tables, measured points.
     """
 
     study: Study
@@ -36,8 +36,8 @@ class Source:
 def machine(source: Source) -> dict[str, Any]:
     """The machine and its run for programs, plain JSON data.
 
-    ``base`` and ``run`` in SI numbers, ``choices`` (what is not a number), ``defaults`` (paths left out), and
-    ``given``, both as the user wrote them.
+    ``base`` and ``run`` in SI numbers, ``choices`` (non-numeric fields), ``defaults`` (paths that were left out), and
+    ``given``, base and run as the user wrote them.
     """
     study, spec = source.study, source.spec
     return {

@@ -1,4 +1,4 @@
-"""Files that cannot be written from front to back: made in a folder of their own, then handed out piece by piece."""
+"""Files that cannot be written sequentially: built in a folder of their own, then read piece by piece."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ _PIECE: Final = 1 << 20
 
 
 def spooled(write: Callable[[Path], Path]) -> Iterator[bytes]:
-    """The bytes of the file that ``write`` makes in the folder it is given; the folder goes with the last piece.
+    """The bytes of the file that ``write`` creates in the given folder; the folder is deleted with the last piece.
 
-    What a killed process left of such folders is swept up.
+    Folders left behind by killed processes are removed.
     """
     sweep(Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"))
     with (

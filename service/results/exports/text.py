@@ -1,4 +1,4 @@
-"""Rows as text: CSV for tables, JSON and JSON lines for programs. A row never depends on how the cases were batched."""
+"""Rows as text: CSV for tables, JSON and JSON lines for programs. Rows do not depend on the batching of cases."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from sprag.service.storage.records import CaseRow, RowBlock
     from sprag.worker.study import Study
 
-#: A spreadsheet takes a cell that begins like this for a formula.
+#: Spreadsheets interpret cells that begin with these characters as formulas.
 _FORMULA_STARTS: Final = ("=", "+", "-", "@", "\t", "\r")
 
 
 def row_json(row: CaseRow, parameters: dict[str, float]) -> Case:
-    """One case as every interface shows it; ``parameters`` are its axis parameters, SI."""
+    """One case as JSON data; ``parameters`` are its axis parameters, SI."""
     return {
         "case": row.case,
         "parameters": parameters,
@@ -40,7 +40,7 @@ def rows_json(study: Study, block: RowBlock) -> Iterator[Case]:
 
 
 def json_pieces(source: Source) -> Iterator[bytes]:
-    """``{..., "axes": [...], "results": [...], "rows": [row, row, ...]}``, a row on a line."""
+    """``{..., "axes": [...], "results": [...], "rows": [row, row, ...]}``, one row per line."""
     study = source.study
     head = {
         **source.about,
@@ -62,7 +62,7 @@ def json_pieces(source: Source) -> Iterator[bytes]:
 
 
 def json_lines_pieces(source: Source) -> Iterator[bytes]:
-    """One flat object a line, with the same names as the columns of `csv_pieces`; null for what is missing."""
+    """One flat object per line, with the names of the columns of `csv_pieces`; null for missing values."""
     study = source.study
     for block in source.blocks:
         columns = {path: column.tolist() for path, column in study.columns(block.cases).items()}
@@ -73,7 +73,7 @@ def json_lines_pieces(source: Source) -> Iterator[bytes]:
 
 
 def csv_pieces(source: Source) -> Iterator[bytes]:
-    """Header ``case, axis paths, ending, flags, result names``; empty cells for what could not be computed."""
+    """Header ``case, axis paths, ending, flags, result names``; empty cells for missing values."""
     study = source.study
     paths = study.axis_paths
     yield _csv_lines([["case", *paths, "ending", "flags", *(info.name for info in source.infos)]])
@@ -105,7 +105,7 @@ def _cell(value: object) -> str:
 
 
 def escape(text: str) -> str:
-    """Text that a spreadsheet does not take for a formula."""
+    """Escape text that a spreadsheet would interpret as a formula."""
     return "'" + text if text.startswith(_FORMULA_STARTS) else text
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from sprag.service.results.exports.source import Source
     from sprag.service.storage.records import RowBlock
 
-#: Rows of a sheet, the two of names and units included; more cases go on on a further sheet.
+#: Rows of a sheet, including those of names and units; further cases continue on another sheet.
 SHEET_ROWS: Final = 1_048_576
 _HEAD_ROWS: Final = 2
 _LONGEST_TEXT: Final = 32_767
@@ -35,7 +35,7 @@ class _ExactSheet(Worksheet):  # type: ignore[misc]
 
 
 def xlsx_pieces(source: Source) -> Iterator[bytes]:
-    """The workbook in pieces. It is written row by row to the disk first, so that memory stays small."""
+    """The workbook in pieces. It is first written to disk row by row, to limit memory."""
     return spooled(partial(_write, source))
 
 
@@ -95,7 +95,7 @@ def _rows(source: Source, block: RowBlock) -> Iterator[list[Any]]:
 
 
 def _write_row(sheet: Any, row: int, cells: list[Any]) -> None:
-    """Texts as texts, never as formulas; numbers as numbers; nothing where there is no number."""
+    """Write texts as texts, never as formulas, and numbers as numbers; missing numbers stay empty."""
     for column, cell in enumerate(cells):
         if isinstance(cell, str):
             if cell:

@@ -1,1 +1,1 @@
-"""What is drawn, described once: painters of pictures and of pages draw the same description."""
+"""Figures, described once; the painters of pictures and of pages draw the same description."""

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from sprag.service.results.curves import Curve, Curves, Map
     from sprag.worker.models import ResultInfo
 
-#: Points that all lines of a panel may have together, and one line at least and at most: the five that are kept of
-#: each column of pixels of a wide picture.
+#: Most points of all lines of a panel together, and the least and the most of one line: five per column of pixels of a
+#: wide picture.
 _MOST_POINTS: Final = 24_000
 _LEAST_POINTS: Final = 400
 _LINE_POINTS: Final = 6_000
@@ -76,13 +76,13 @@ def _lines(
                 listed=listed and place == 0,
                 cases=curve.line.cases[run],
                 stretches=None if regimes is None else tuple(stretches(regimes, x.size)),
-                # A line tells how x leads to y; points of a zip that go to and fro are not on one.
+                # A line needs y as a function of x; the points of a zip may go back and forth.
                 joined=bool(np.all(np.diff(x) > 0.0)),
             )
 
 
 def _marks(lines: Sequence[tuple[int, Curve]], infos: Sequence[ResultInfo], regimes: Sequence[str]) -> Iterator[Marks]:
-    """The points of each regime that occurs; none of the periodic ones, which have the colour of their curve."""
+    """The points of each regime that occurs, except periodic ones, which have the colour of their curve."""
     for name in regimes:
         places = [
             (curve, place, info.name)
@@ -100,7 +100,7 @@ def _marks(lines: Sequence[tuple[int, Curve]], infos: Sequence[ResultInfo], regi
 
 
 def _nothing(drawn: Sequence[tuple[str, Curves]]) -> str:
-    """Why there is nothing to draw, as a sentence; "" where there is anything: empty axes would be made-up scales."""
+    """Why there is nothing to draw, as a sentence; "" otherwise. Empty axes would have arbitrary scales."""
     curves = [curve for _, found in drawn for curve in found.curves]
     if any(not np.all(np.isnan(y)) for curve in curves for y in curve.y.values()):
         return ""
@@ -118,7 +118,7 @@ def _nothing(drawn: Sequence[tuple[str, Curves]]) -> str:
 
 
 def map_quantities(drawn: Map) -> tuple[Quantity, Quantity, Quantity]:
-    """What stands at the axes of a map, and what its colours are."""
+    """The quantities of the axes of a map, and of its colours."""
     (x, y), (x_unit, y_unit) = drawn.names, drawn.units
     return Quantity(x, x_unit), Quantity(y, y_unit), Quantity(drawn.result.name, drawn.result.unit)
 

@@ -1,4 +1,4 @@
-"""The description of a figure: panels of lines over one axis, without a word about who draws it."""
+"""The description of a figure: panels of lines over one axis, independent of the painter."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-#: Colours that people with any kind of colour vision tell apart (after Okabe and Ito), on light and on dark ground.
+#: Colours that are distinguishable with any kind of colour vision (after Okabe and Ito), on light and dark backgrounds.
 PALETTE: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f6fc4", "#8c6d31")
-#: How a state looks that its model has no look for.
+#: Look of a state for which its model defines none.
 OTHER_LOOK: Final = ("#999999", "+", "+++")
 
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """What stands at an axis: a name, "" for several of one unit, and a unit."""
+    """The quantity of an axis: its name, "" for several quantities of one unit, and its unit."""
 
     name: str
     unit: str
@@ -29,15 +29,15 @@ class Line:
 
     Attributes
     ----------
-    name, heading : what the legend calls it, and under which heading; ``listed``: whether the legend has it
+    name, heading : its name in the legend, and the heading above it; ``listed``: whether the legend contains it
     x, y : float64 arrays, shape (m,)
         NaN is a gap.
-    key : what belongs together in all panels
+    key : common to the lines that belong together in all panels
     colour, style : colour, and number of the dash
     cases : int64 array, shape (m,), optional
         The case of each point; a line without cases is drawn without markers.
-    stretches : places of the points that are joined, each ascending; None for all of them
-    joined : whether the line tells how x leads to y; otherwise there are points only
+    stretches : indices of the points that are joined, each ascending; None for all points
+    joined : whether y is a function of x; otherwise only points are drawn
     """
 
     name: str
@@ -55,7 +55,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """Points of one regime, upon the lines; ``x``, ``y`` and ``cases`` have the shape (m,)."""
+    """Points of one regime, drawn on the lines; ``x``, ``y`` and ``cases`` have the shape (m,)."""
 
     regime: str
     x: NDArray[np.float64]
@@ -65,7 +65,7 @@ class Marks:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One plot. ``styles`` tells what the dashes mean where they tell results apart."""
+    """One plot. ``styles`` explains the dashes where they distinguish results."""
 
     y: Quantity
     lines: tuple[Line, ...]
@@ -79,12 +79,12 @@ class Figure:
 
     Attributes
     ----------
-    family : what tells the lines of a study apart; ``studies`` is the number of studies
+    family : what distinguishes the lines of a study; ``studies`` is the number of studies
     regimes : names of the kinds of motion that occur, where not all are periodic
-    spans : for each row of a strip below the panels its states: (state, begin, end)
+    spans : for each row of the strip below the panels, its states: (state, begin, end)
     looks : colour and two patterns of each state
-    motion : whether it is a motion: all lines are read at one x
-    most : points that a line is drawn with at most, where there are more than can be told apart
+    motion : whether it shows a motion, whose lines are read at one x
+    most : most points of a drawn line, where there are more than can be distinguished
     note : a sentence, where there is nothing to draw
     """
 
@@ -113,7 +113,7 @@ class Figure:
 
 
 def line_colours(count: int) -> list[str]:
-    """Colours that differ most for a few lines, and that follow the order of many."""
+    """Colours: maximally different for a few lines, graded in order for many."""
     if count <= len(PALETTE):
         return list(PALETTE[:count])
     from matplotlib import colormaps
@@ -123,5 +123,5 @@ def line_colours(count: int) -> list[str]:
 
 
 def shortened(label: str, most: int) -> str:
-    """A long name without its middle: a legend has little room, and ends tell more of similar names apart."""
+    """A long name without its middle: a legend has little room, and similar names usually differ at their ends."""
     return label if len(label) <= most else f"{label[: most - 25]}…{label[-24:]}"

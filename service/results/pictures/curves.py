@@ -34,10 +34,10 @@ Picture = Literal["svg", "png", "pdf"]
 PICTURES: Final[tuple[Picture, ...]] = get_args(Picture)
 MEDIA_TYPES: Final[dict[Picture, str]] = {"svg": "image/svg+xml", "png": "image/png", "pdf": "application/pdf"}
 
-#: What one picture can show; more would take minutes to draw and nobody could read it.
+#: Limits of one picture; more would take minutes to draw and be unreadable.
 MAX_PICTURE_CURVES: Final = 200
 MAX_PICTURE_POINTS: Final = 100_000
-#: Labels of a colour bar, which tells more curves apart than a legend can.
+#: Labels of a colour bar, which distinguishes more curves than a legend.
 _BAR_LABELS: Final = 24
 #: Style of the line, and marker where there is none.
 _STYLES: Final[tuple[tuple[Literal["-", "--", ":", "-."], str], ...]] = (
@@ -46,12 +46,12 @@ _STYLES: Final[tuple[tuple[Literal["-", "--", ":", "-."], str], ...]] = (
     (":", "^"),
     ("-.", "D"),
 )
-#: Columns of the legend of several studies, and characters for which one has room.
+#: Columns of the legend of several studies, and the characters that fit in each.
 _COLUMNS: Final = 2
 _MOST_LABEL: Final = 52
 #: Characters on a line of a title.
 _TITLE_WIDTH: Final = 100
-#: Points of a map that are marked each.
+#: Most points of a map that are marked individually.
 _MARKED_POINTS: Final = 600
 _STYLE: Final[dict[Any, Any]] = {
     "svg.hashsalt": "sprag",
@@ -73,7 +73,7 @@ _METADATA: Final[dict[Picture, dict[str, str | None]]] = {
 
 
 def draw_curves(curves: Curves, title: str, picture: Picture) -> bytes:
-    """Curves as a picture: one plot under another for results of different units, missing points left out.
+    """Curves as a picture: a plot for each unit, one below the other; missing points are left out.
 
     Raises SelectionError when there are more curves or points than one picture can show.
     """
@@ -82,13 +82,15 @@ def draw_curves(curves: Curves, title: str, picture: Picture) -> bytes:
 
 
 def draw_compare(drawn: Sequence[tuple[str, Curves]], picture: Picture) -> bytes:
-    """Curves of studies, each with its name, a plot for each result; raises SelectionError as `draw_curves` does."""
+    """Curves of several studies with their names, a plot for each result; raises SelectionError as
+    `draw_curves` does.
+    """
     require_drawable([curves for _, curves in drawn])
     return draw_figure(curves_figure(drawn), "", picture)
 
 
 def draw_motion(made: Trajectory, shown: Presentation, title: str, picture: Picture) -> bytes:
-    """The motion of one case: its variables above the states of the parts of the machine."""
+    """The motion of one case: its variables, and below them the states of the parts of the machine."""
     return draw_figure(motion_figure(made, shown), title, picture)
 
 
@@ -108,7 +110,7 @@ def draw_figure(figure: Described, title: str, picture: Picture) -> bytes:
 
 
 def paint_figure(figure: Figure, drawn: Described, title: str) -> None:
-    """Draw what is described into an empty figure; for use inside `painting`."""
+    """Draw a described figure into an empty one; for use inside `painting`."""
     heights = [3.0] * drawn.rows + ([0.45 * len(drawn.spans) + 0.3] if drawn.spans else [])
     grid = figure.subplots(len(heights), drawn.columns, sharex=True, height_ratios=heights, squeeze=False)
     plots: list[Axes] = list(grid.reshape(-1))
@@ -166,7 +168,7 @@ def check_size(what: str, count: int, most: int) -> None:
 
 @cache
 def load_matplotlib() -> None:
-    """Load all of matplotlib that pictures need, once in a process: no picture is to be blamed for the time of that."""
+    """Load the parts of matplotlib that pictures need, once per process, so that the time counts for no picture."""
     with uncounted():
         import matplotlib.backends.backend_agg
         import matplotlib.backends.backend_pdf
@@ -177,7 +179,7 @@ def load_matplotlib() -> None:
 
 @contextmanager
 def painting() -> Iterator[None]:
-    """The style of every picture. matplotlib keeps it in globals, so that a process draws one picture at a time."""
+    """The style of every picture. matplotlib keeps it in globals, so a process draws one picture at a time."""
     load_matplotlib()
     import matplotlib as mpl
 
@@ -264,7 +266,7 @@ def _paint_states(axes: Axes, drawn: Described) -> None:
 
 
 def _handle(line: Line) -> Artist:
-    """What a legend shows of a line."""
+    """The legend handle of a line."""
     from matplotlib.lines import Line2D
 
     style, marker = _STYLES[line.style % len(_STYLES)]
@@ -272,7 +274,7 @@ def _handle(line: Line) -> Artist:
 
 
 def _explain(figure: Figure, plots: list[Axes], drawn: Described) -> None:
-    """What the colours mean, beside the plots: every curve in a legend, or in a colour bar where there are many."""
+    """Explain the colours beside the plots: in a legend, or in a colour bar where there are many curves."""
     if not drawn.family:
         return
     meaning = ",\n".join(quantity_label(quantity).replace(" = ", " =\n") for quantity in drawn.family)
@@ -287,7 +289,7 @@ def _explain(figure: Figure, plots: list[Axes], drawn: Described) -> None:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, Normalize
 
-    # One block of colour for each curve, its number in the middle: values need not be evenly spaced, nor be numbers.
+    # One block of colour for each curve, with its label in the middle: values may be unevenly spaced or not be numbers.
     blocks = ScalarMappable(Normalize(-0.5, len(texts) - 0.5), ListedColormap([line.colour for line in lines]))
     bar = figure.colorbar(blocks, ax=plots, aspect=30 * len(plots))
     labelled = range(0, len(texts), math.ceil(len(texts) / _BAR_LABELS))
@@ -297,13 +299,13 @@ def _explain(figure: Figure, plots: list[Axes], drawn: Described) -> None:
 
 
 def _explain_studies(figure: Figure, _plots: list[Axes], drawn: Described) -> None:
-    """The legend of several studies: the name of each once, and under it the values that tell its curves apart."""
+    """The legend of several studies: each name once, and below it the values that distinguish its curves."""
     from matplotlib.patches import Patch
 
     lines = [(line.heading, _handle(line), line.name) for line in drawn.listed]
     columns = _COLUMNS
     if drawn.family:
-        # A legend is filled column by column: blocks of one length, as many in each column, keep the studies apart.
+        # A legend is filled column by column: blocks of equal length, equally many per column, keep the studies apart.
         empty = Patch(visible=False)
         studies = {name: [line for line in lines if line[0] == name] for name, _, _ in lines}
         length = max(map(len, studies.values()))
@@ -320,7 +322,7 @@ def _explain_studies(figure: Figure, _plots: list[Axes], drawn: Described) -> No
 
 
 def _explain_regimes(figure: Figure, regimes: Sequence[str], edge: Literal["upper", "lower"] = "lower") -> None:
-    """What the marks of points mean, at an edge of the picture; nothing where all motions are periodic."""
+    """Explain the marks of points at an edge of the picture; nothing where all motions are periodic."""
     from matplotlib.lines import Line2D
 
     looks = [(name, MARKS[name]) for name in regimes]
@@ -339,7 +341,7 @@ def _explain_regimes(figure: Figure, regimes: Sequence[str], edge: Literal["uppe
 
 
 def head(figure: Figure, title: str, held: tuple[str, ...]) -> None:
-    """The title, and below it what is held at which value, broken between two of these only."""
+    """The title, and below it the held parameters with their values; lines break only between two of these."""
     lines = [_short(title)] if title else []
     line = ""
     for text in held:
@@ -354,30 +356,30 @@ def head(figure: Figure, title: str, held: tuple[str, ...]) -> None:
 
 
 def axis_label(name: str, unit: str, brackets: str = "()") -> str:
-    """What stands at an axis: the name, and its unit in ``brackets`` where it has one."""
+    """The label of an axis: the name, and its unit in ``brackets`` where it has one."""
     return f"{name} {brackets[:1]}{unit}{brackets[1:]}" if unit != "1" else name
 
 
 def quantity_label(quantity: Quantity) -> str:
-    """The same of a quantity; the unit alone where it has no name."""
+    """The same for a quantity; only the unit where it has no name."""
     if quantity.name:
         return axis_label(quantity.name, quantity.unit)
     return "dimensionless" if quantity.unit == "1" else quantity.unit
 
 
 def _fitting(label: str) -> str:
-    """A name as the font can write it, and not wider than a column of a legend."""
+    """A name limited to the font's characters and the width of a legend's column."""
     return shortened(writable(label), _MOST_LABEL)
 
 
 def _short(title: str) -> str:
-    """``title`` as the font can write it, and not wider than a picture."""
+    """``title`` limited to the font's characters and the width of a picture."""
     text = writable(title)
     return text if len(text) <= 80 else text[:79] + "…"
 
 
 def writable(text: str, family: str | None = None) -> str:
-    """``text`` with a square for every character that the font does not have; lines stay lines."""
+    """``text`` with a square for every character that the font lacks; line breaks are kept."""
     load_matplotlib()
     from matplotlib.font_manager import FontProperties, findfont, get_font
 
@@ -386,7 +388,7 @@ def writable(text: str, family: str | None = None) -> str:
 
 
 def _edges(values: tuple[float, ...]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Borders of the cells around ascending values, one more than there are values.
+    """Borders of the cells around ascending values, one more than values.
 
     The outer cells end at the outer values, so that nothing is drawn where nothing was computed.
     """

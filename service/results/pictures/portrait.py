@@ -1,4 +1,4 @@
-"""How one case comes to its motion, as a picture: strobes upon the orbit, and strobe by strobe."""
+"""How one case approaches its motion, as a picture: strobes on the orbit, and strobe by strobe."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of what results depend on: shares of the variance as bars, main effects as lines."""
+"""Pictures of sensitivities: shares of the variance as bars, main effects as lines."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     from sprag.service.results.sensitivity import Sensitivity
 
 MOST_RESULTS: Final = 8
-#: Characters of a line of notes that surely fit into the width of a picture.
+#: Characters of a line of notes that fit into the width of a picture.
 _NOTE_WIDTH: Final = 110
 
 
 def draw_sensitivity(found: Sequence[Sensitivity], title: str, picture: Picture) -> bytes:
     """A row of two plots for each result; raises SelectionError when there are more than one picture can show."""
     if len(found) > MOST_RESULTS:
-        message = f"{len(found)} results are too many for one picture; choose fewer, or take the numbers"
+        message = f"{len(found)} results are too many for one picture; choose fewer, or request the numbers"
         raise SelectionError([ParameterFault("y", "too-many", message, allowed=f"<= {MOST_RESULTS} results")])
     axes = len(found[0].effects)
     return render(partial(_paint, found, title), picture, (10.0, 0.8 + len(found) * max(2.6, 1.0 + 0.45 * axes)))
@@ -70,7 +70,7 @@ def _bars(axes: Axes, item: Sensitivity) -> None:
 
 
 def _lines(axes: Axes, item: Sensitivity) -> None:
-    """Every axis from its least to its largest value, so that axes of different units stand in one plot."""
+    """Every axis from its least to its largest value, so that axes of different units share one plot."""
     for index, effect in enumerate(item.effects):
         if not np.isfinite(effect.means).any():
             continue

@@ -1,4 +1,4 @@
-"""A study as a document to be printed: what was asked, how it ended, ranges of all results, and their curves."""
+"""A study as a printable document: its inputs, its endings, the ranges of all results, and their curves."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MEDIA_TYPES: Final[dict[ReportFormat, str]] = {"html": "text/html; charset=utf-8
 
 
 def write_report(report: Report, form: ReportFormat) -> bytes:
-    """The document. Libraries are loaded for the format that is asked for."""
+    """The document. Only the libraries of the requested format are loaded."""
     writer: Callable[[Report], bytes]
     if form == "html":
         from sprag.service.results.report.html import html_report as writer

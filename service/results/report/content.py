@@ -1,4 +1,4 @@
-"""What a report says, as plain values: the same for every way of writing it down."""
+"""The content of a report as plain values, independent of its format."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 
-#: Half widths of means stand in the table, beside their means.
+#: Half widths of means appear in the table beside their means.
 _HALF_WIDTH: Final = ".half_width"
 _RESULTS_A_PICTURE: Final = 3
 _MOST_PICTURES: Final = 24
@@ -45,7 +45,7 @@ class AxisRow:
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """What one result came to over all cases that have it; ``least`` and the others are None where none has."""
+    """The range of one result over all cases that have it; ``least`` and the others are None where no case has it."""
 
     info: ResultInfo
     known: int
@@ -58,7 +58,7 @@ class Range:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """Everything a report says."""
+    """The content of a report."""
 
     title: str
     facts: tuple[tuple[str, str], ...]
@@ -96,7 +96,7 @@ def make_report(
     spec: Mapping[str, Any],
     regimes: Mapping[str, int],
 ) -> Report:
-    """The report of a study as it is now; reads all its rows once. ``spec`` is the user's own.
+    """The report of a study in its current state; reads all its rows once. ``spec`` is the user's own.
 
     ``regimes`` counts the cases of each regime, the most frequent first.
     """
@@ -121,7 +121,7 @@ def make_report(
 
 
 def _shortened(text: str) -> str:
-    """A long table cut: a report is to be read, the exports have all of it."""
+    """Truncate a long table; the exports contain all of it."""
     return text if len(text) <= _LONGEST_GIVEN else f"{text[:_LONGEST_GIVEN]} ... ({len(text)} characters in all)"
 
 
@@ -145,7 +145,7 @@ def ranges(infos: Sequence[ResultInfo], blocks: Iterable[RowBlock]) -> tuple[Ran
     columns = [index for index, info in enumerate(infos) if info.kind != "category"]
     every = np.arange(len(columns))
     known, total = np.zeros(every.size, dtype=np.int64), np.zeros(every.size)
-    # Least and largest: of each result the value and its case.
+    # Value and case of the least and largest value of each result.
     value = {np.less: np.full(every.size, np.inf), np.greater: np.full(every.size, -np.inf)}
     case = {better: np.zeros(every.size, dtype=np.int64) for better in value}
     for block in blocks:
@@ -172,10 +172,10 @@ def ranges(infos: Sequence[ResultInfo], blocks: Iterable[RowBlock]) -> tuple[Ran
 
 
 def _pictures(study: Study, infos: tuple[ResultInfo, ...], fetch: Fetch) -> tuple[tuple[Curves, ...], str]:
-    """The study's main curve for every group of results that belong together; and why there is none."""
+    """The study's main curve for each group of related results; or why there is none."""
     query = main_query(study, infos)
     if query is None:
-        return (), "Nothing varies in this study, so that there is no curve."
+        return (), "Nothing varies in this study, so there is no curve."
     groups = list(_groups(infos, models.presentation_of(study).checks))
     chosen = [info for group in groups for info in group]
     try:

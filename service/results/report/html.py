@@ -1,4 +1,4 @@
-"""The report as one HTML file that needs nothing else: pictures inside, ready to be printed."""
+"""The report as one self-contained HTML file with embedded pictures, ready to be printed."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ def _template() -> Template:
 
 
 def number_text(value: float | None) -> str:
-    """A number as people read it, a dash for none."""
+    """A number for display, a dash for none."""
     return "–" if value is None else f"{value:.6g}"
 
 
 def input_text(value: float | str | None) -> str:
-    """An input: a number as people read it, a choice as it is called."""
+    """An input for display: a number, or the name of a choice."""
     return value if isinstance(value, str) else number_text(value)
 
 
 def _picture(curves: Curves) -> str:
-    """The curves as an image that stands in the page itself."""
+    """The curves as an image embedded in the page."""
     return "data:image/svg+xml;base64," + base64.b64encode(draw_curves(curves, "", "svg")).decode("ascii")
 
 

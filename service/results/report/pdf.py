@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _A4: Final = (8.27, 11.69)
 _LINES: Final = 66
 _WIDTH: Final = 96
-#: No dates: two reports of one study are the same bytes.
+#: No dates, so that two reports of one study have the same bytes.
 _METADATA: Final = {"CreationDate": None, "Creator": "Sprag", "Producer": "Sprag"}
 
 
@@ -95,7 +95,7 @@ def _lines(report: Report) -> Iterator[str]:
 
 
 def _mark(item: Input) -> str:
-    """What is said of an input that the user did not give."""
+    """The mark of an input that the user did not give."""
     return f" ({item.origin})" if item.origin in ("default", "fitted") else ""
 
 

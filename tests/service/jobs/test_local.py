@@ -77,7 +77,7 @@ def test_a_held_study_is_no_result() -> None:
 
 @pytest.mark.parametrize(
     ("database", "advice"),
-    [([], "nothing of it is kept: make room, or name another place with TMPDIR or --db"),
+    [([], "nothing of it is kept: free some space, or name another place with TMPDIR or --db"),
      (["--db", "runs.sqlite3"], "are kept as st_")],
 )  # fmt: skip
 def test_a_run_without_room_for_its_rows_is_trouble_of_the_storage(

@@ -46,7 +46,7 @@ def test_a_grid_that_lacks_a_row_has_means_but_no_shares() -> None:
     a_means, b_means = [2.0, 11.5, 21.5], [15.0, 11.0, 12.0, 13.0]
     for found in (effects(lacking, linear), effects({"axes": GRID}, failed)):
         assert (found.method, found.cases, indices(found)) == ("none", 220, {NONE})
-        assert "the cases are not a complete grid nor a sample: 20 of 240 are missing" in found.notes[-1]
+        assert "the cases are neither a complete grid nor a sample: 20 of 240 are missing" in found.notes[-1]
         assert found.effects[0].means.tolist() == pytest.approx(a_means)
         assert found.effects[1].means.tolist() == pytest.approx(b_means)
         assert found.effects[2].means.tolist() == pytest.approx([np.mean([2.0] * 3 + [11.5] * 4 + [21.5] * 4)] * 20)
@@ -79,12 +79,12 @@ def test_what_is_left_of_a_grid_may_be_a_grid() -> None:
 def test_zips_unions_and_cancelled_grids_have_no_shares() -> None:
     zipped = effects({"axes": [linspace(A, 0, 1, 100), linspace(B, 0, 3, 100)], "combine": "zip"}, linear)
     assert (zipped.method, indices(zipped)) == ("none", {NONE})
-    assert zipped.notes == (f"{A} and {B} were varied together: the cases cannot tell what each of them does",)
+    assert zipped.notes == (f"{A} and {B} were varied together: the cases cannot separate their effects",)
     group = {"combine": "zip", "axes": [linspace(A, 0, 1, 10), linspace(B, 3, 0, 10)]}
     assert "were varied together" in effects({"axes": [group, linspace(C, 0, 1, 9)]}, linear).notes[-1]
     union = effects({"axes": [linspace(A, 0, 1, 60), linspace(B, 0, 3, 60)], "combine": "union"}, linear)
     assert (union.method, indices(union)) == ("none", {NONE})
-    assert "not a complete grid nor a sample" in union.notes[-1]
+    assert "neither a complete grid nor a sample" in union.notes[-1]
     # Of 240 cases the first 100 were computed: a = 0 whole, of a = 1 one row of b.
     cancelled = effects({"axes": GRID}, lambda p: np.where(np.arange(240) < 100, linear(p), np.nan))
     assert (cancelled.method, cancelled.missing, indices(cancelled)) == ("none", 140, {NONE})
@@ -119,7 +119,7 @@ def test_a_sample_that_failed_cases_make_lopsided_is_none() -> None:
     assert [effect.first for effect in fair.effects] == pytest.approx([2.56 / 3.56, 1 / 3.56, 0.0], abs=0.06)
     corner = effects(sample, lambda p: np.where(p[A] + p[B] > 1.2, np.nan, p[A]))
     assert (corner.method, indices(corner)) == ("none", {NONE})
-    assert "not a complete grid nor a sample: their axes are not independent of each other" in corner.notes[-1]
+    assert "neither a complete grid nor a sample: their axes are not independent of each other" in corner.notes[-1]
 
 
 def test_chance_alone_makes_no_sample_lopsided() -> None:

@@ -88,7 +88,7 @@ def test_what_was_refused_for_a_reason_that_passes_is_tried_again(
         clock.set("2026-01-02T01:00")
         look()
     assert store.list_studies().studies == ()
-    assert caplog.text.count("no study came of it yet") == 1
+    assert caplog.text.count("its study is not submitted yet") == 1
     clock.set("2026-01-02T01:01")
     look()
     (study,) = store.list_studies().studies
@@ -160,9 +160,9 @@ def test_a_held_study_follows_the_window_of_its_schedule(store: Store, clock: Cl
     look()
     look()
     (study,) = store.list_studies().studies
-    assert study.reason == "outside its window, 22:00 to 06:00 (UTC); it goes on by itself"
+    assert study.reason == "outside its window, 22:00 to 06:00 (UTC); it continues by itself"
     for window, reason in (
-        (["20:00", "06:00"], "outside its window, 20:00 to 06:00 (UTC); it goes on by itself"),
+        (["20:00", "06:00"], "outside its window, 20:00 to 06:00 (UTC); it continues by itself"),
         (None, None),
     ):
         changed = change_fields(store.get_schedule(kept.id).fields, {"window": window}, clock.now())

@@ -181,7 +181,7 @@ def test_a_study_is_held_outside_its_window_and_goes_on_inside(service: Service,
     (study,) = store.list_studies().studies
     assert (study.state, study.reason) == (
         StudyState.PAUSED,
-        "outside its window, 22:00 to 06:00 (UTC); it goes on by itself",
+        "outside its window, 22:00 to 06:00 (UTC); it continues by itself",
     )
     clock.set("2026-01-01T22:00")
     look()
