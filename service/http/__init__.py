@@ -1,1 +1,1 @@
-"""The service over HTTP: the server, who may ask, problems, and the kit of the two kinds of answers."""
+"""The service over HTTP: server, authentication, problems, and the parts shared by the API and the pages."""

@@ -1,8 +1,8 @@
-"""Who asks: tokens in headers, sessions of browsers in cookies; and what each may do.
+"""Authentication: tokens in headers, browser sessions in cookies; and the rights of each.
 
 A request carries its token as ``Authorization: Bearer``. A browser logs in once with a token and gets a cookie that
-names the token and its own end, sealed with a key of the database: it holds on every host of that database and when the
-service starts again, until the token is revoked, the browser logs out, or `SESSION_SECONDS` are over.
+contains the token's id and the expiry, signed with a key of the database. The cookie is valid on all hosts of that
+database and across restarts, until the token is revoked, the browser logs out, or `SESSION_SECONDS` have passed.
 """
 
 from __future__ import annotations
@@ -28,52 +28,51 @@ if TYPE_CHECKING:
 
 COOKIE: Final = "sprag_session"
 SESSION_SECONDS: Final = 12 * 3600
-#: Seconds for which tokens are believed as they were last read: a revoked one works no longer than this.
+#: Seconds for which tokens are cached: a revoked one works no longer than this.
 BELIEVED_SECONDS: Final = 2.0
-#: Id of the token that is a setting.
+#: Id of the token from the settings.
 _SETTING: Final = "setting"
 
 
 class TokenStore(Protocol):
-    """What is needed of the store."""
+    """The required part of the store."""
 
     def tokens(self) -> tuple[TokenRecord, ...]:
-        """Every token that there ever was."""
+        """Every token ever created."""
 
     def session_secrets(self) -> SessionSecrets:
-        """What seals sessions, and those that were ended early."""
+        """The signing key of sessions, and the sessions that were ended early."""
 
     def create_session_key(self) -> bytes:
-        """What seals sessions, created where there is nothing yet."""
+        """The signing key of sessions; created where there is none."""
 
     def end_session(self, seal: str, ends_at: int) -> None:
-        """Note that a session was ended early."""
+        """Record that a session was ended early."""
 
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """Whose token it is (``id``, ``name``) and what it allows."""
+    """A token's identity (``id``, ``name``) and scope."""
 
     id: str
     name: str
     scope: TokenScope
 
 
-#: What everybody has where no token is needed.
+#: The grant of everybody where no token is needed.
 OPEN: Final = Grant("", "", TokenScope.WRITE)
-#: Who asks for the answer that is being made; None where nobody does or who asks is not known.
+#: The grant of the current request; None outside a request or where it is unknown.
 ASKING: ContextVar[Grant | None] = ContextVar("asking", default=None)
 
 
 class Access:
-    """Know the tokens of one service, and who tried others. For one event loop.
+    """The tokens of one service, and failed attempts. For one event loop.
 
     Parameters
     ----------
     settings : Settings
         `token`, `loopback`.
-    store : TokenStore, optional
-        Where further tokens are.
+    store : TokenStore, optional Holds further tokens.
     """
 
     def __init__(self, settings: Settings, store: TokenStore | None = None) -> None:
@@ -89,7 +88,7 @@ class Access:
         self._read_at: float | None = None
 
     async def refresh(self) -> None:
-        """Read the tokens again when that was a while ago; raises StoreError."""
+        """Read the tokens again when the cache is stale; raises StoreError."""
         now = time.monotonic()
         if self._store is None or (self._read_at is not None and now - self._read_at < BELIEVED_SECONDS):
             return
@@ -105,22 +104,22 @@ class Access:
 
     @property
     def needed(self) -> bool:
-        """Whether a request needs a token; so it is as soon as there has ever been one."""
+        """Whether requests need a token, which is the case as soon as one was ever created."""
         return self._always or self._any
 
     def of_token(self, token: bytes) -> Grant | None:
-        """What a token allows; None when it is none."""
+        """The grant of a token; None when it is invalid."""
         if self._setting is not None and hmac.compare_digest(token, self._setting):
             return Grant(_SETTING, "SPRAG_TOKEN", TokenScope.WRITE)
         return self._by_digest.get(digest_of(token))
 
     def of_header(self, header: str) -> Grant | None:
-        """What the token in an Authorization header allows; None when it is none."""
+        """The grant of the token in an Authorization header; None when it is invalid."""
         scheme, _, value = header.partition(" ")
         return self.of_token(value.strip().encode("utf-8", "replace")) if scheme.lower() == "bearer" else None
 
     def of_cookies(self, cookies: Mapping[str, str]) -> Grant | None:
-        """What the session in the cookies allows; None when there is none, or it has ended."""
+        """The grant of the session in the cookies; None when there is none or it has ended."""
         value = cookies.get(COOKIE, "")
         identity, dot, seal = value.rpartition(".")
         token_id, _, end = identity.partition(".")
@@ -133,26 +132,26 @@ class Access:
         return self._by_id.get(token_id)
 
     async def log_in(self, grant: Grant) -> str:
-        """The value of a cookie that carries ``grant`` until the session ends; raises StoreError."""
+        """The value of the session cookie for ``grant``; raises StoreError."""
         if self._key is None and self._store is not None:
             self._key = await run_in_threadpool(self._store.create_session_key)
         identity = f"{grant.id}.{int(time.time()) + SESSION_SECONDS}"
         return f"{identity}.{self._sealed(identity)}"
 
     async def log_out(self, cookies: Mapping[str, str]) -> None:
-        """End the session in the cookies, also for whoever has a copy of it; raises StoreError."""
+        """End the session in the cookies, including all copies of the cookie; raises StoreError."""
         if self.of_cookies(cookies) is None:
             return
         identity, _, seal = cookies[COOKIE].rpartition(".")
         end = int(identity.partition(".")[2])
-        self._logged_out[seal] = end  # here at once, and when the note for other hosts fails
+        self._logged_out[seal] = end  # effective here immediately, even if storing it for other hosts fails
         if self._store is not None:
             await run_in_threadpool(self._store.end_session, seal, end)
 
     def _sealed(self, identity: str) -> str:
         message = identity.encode("utf-8", "replace")
         if identity.startswith(f"{_SETTING}.") and self._setting is not None:
-            # A session does not outlive the token it began with: another value of the setting makes another seal.
+            # A session does not outlive its token: another value of the setting gives another signature.
             message += digest_of(self._setting).encode("ascii")
         return hmac.new(self._key or secrets.token_bytes(32), message, hashlib.sha256).hexdigest()
 

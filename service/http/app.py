@@ -58,7 +58,7 @@ from sprag.worker.pool.child_process import ProcessDiedError, ProcessStartError
 from sprag.worker.ports import StoreError
 
 _LOG = logging.getLogger("sprag.service")
-#: Seconds before processes that did not start are tried again.
+#: Seconds before the start of failed processes is retried.
 _AGAIN_SECONDS = 5.0
 
 DESCRIPTION = """\
@@ -81,7 +81,7 @@ TAGS = [
 
 
 class Application(FastAPI):
-    """FastAPI whose outermost layer, outside even its own error pages, is the guard."""
+    """FastAPI with the guard as outermost layer, outside its own error pages."""
 
     def __init__(self, settings: Settings, access: Access, metrics: Metrics, **options: Any) -> None:
         super().__init__(**options)
@@ -97,7 +97,7 @@ class Application(FastAPI):
         return self.drain
 
     def openapi(self) -> dict[str, Any]:
-        """The OpenAPI document, made once."""
+        """The OpenAPI document, built once."""
         if self.openapi_schema is None:
             schemas = {
                 "Spec": spec_schema(),
@@ -119,8 +119,8 @@ def create_app(
 ) -> FastAPI:
     """The application for ``settings`` (by default from the environment).
 
-    A store, a computer or a checker that is handed in stays open when the application ends. Raises UnsafeSettingsError
-    for an address that others can reach without a token, and DatabaseError when the database cannot be used.
+    A given store, computer or checker stays open when the application ends. Raises UnsafeSettingsError for an address
+    that others can reach without a token, and DatabaseError when the database cannot be used.
     """
     settings = settings or Settings()
     own_store = store is None
@@ -192,7 +192,7 @@ def create_app(
 
 @cache
 def _routes() -> APIRouter:
-    """All routes, which know no application: what they take is worked out once in a process, by the first request."""
+    """All routes, independent of the application, so that their signatures are analysed once per process."""
     routes = APIRouter(generate_unique_id_function=_operation_id)
     api = APIRouter(prefix=API_PREFIX)
     for module in (
@@ -233,14 +233,14 @@ def _operation_id(route: APIRoute) -> str:
 
 
 async def _make_ready(checker: ProcessComputer, context: Context) -> None:
-    """Tell `Context.ready` when every process that checks can take work; where one cannot be started, try again."""
+    """Set `Context.ready` when every checking process accepts work; retry where one cannot be started."""
     while True:
         try:
             await checker.ready(checks.begin, context.library)
         except JobStoppedError:
             return
         except (ProcessStartError, ProcessDiedError, StoreError) as error:
-            _LOG.error("The processes that check what is submitted do not start (%s); they are retried.", error)
+            _LOG.error("The checking processes do not start (%s); retrying.", error)
             await asyncio.sleep(_AGAIN_SECONDS)
         else:
             context.ready.set()
@@ -272,5 +272,5 @@ def _sound_store(settings: Settings) -> Store:
 
 
 def chunking(settings: Settings) -> Chunking:
-    """How studies are cut into chunks under ``settings``."""
+    """How studies are divided into chunks under ``settings``."""
     return Chunking(settings.chunk_cases, settings.pool_processes, settings.chunk_timeout)

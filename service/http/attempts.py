@@ -1,7 +1,7 @@
 """Attempts to log in with an invalid token: logged, answered more and more slowly, limited in number.
 
-Delays hold up refusals only: a valid token is let in at once, unless several refusals of its address wait; so guessing
-does not get faster with more connections. Guessers at many addresses shut nobody else out.
+Only refusals are delayed: a valid token is accepted immediately, unless several refusals of its address are waiting; so
+more connections do not make guessing faster. Attackers at many addresses lock nobody else out.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from sprag.service.http.problems import ApiError
 
 _LOG = logging.getLogger("sprag.access")
 
-#: Seconds before the first refusal of an address; twice as many before each further one, up to the longest.
+#: Seconds before the first refusal of an address, doubled for each further one up to the longest.
 FIRST_SECONDS: Final = 0.25
 LONGEST_SECONDS: Final = 4.0
-#: Seconds without a failed attempt after which an address begins anew.
+#: Seconds without a failed attempt after which an address starts afresh.
 FORGET_SECONDS: Final = 900.0
-#: Refusals of one address that wait; further attempts from there are refused at once, whatever their token.
+#: Most waiting refusals of one address; further attempts from there are refused immediately, whatever their token.
 MOST_WAITING: Final = 4
-#: Refusals that wait in all, as each keeps a connection; further ones do not wait.
+#: Most waiting refusals in all, because each occupies a connection; further ones do not wait.
 MOST_WAITING_IN_ALL: Final = 64
 #: Addresses that are remembered: the latest ones.
 _MOST_ADDRESSES: Final = 10_000
-#: Bits of an IPv6 address that tell networks apart; one client has all addresses of its network.
+#: Length of the network prefix of an IPv6 address; one client owns all addresses of its network.
 _NETWORK_BITS: Final = 64
 _UNKNOWN: Final = "an unknown address"
 
@@ -52,9 +52,8 @@ class Attempts:
 
     Parameters
     ----------
-    trusted : networks of proxies whose X-Forwarded-For is believed
-    sleep, clock : functions
-        Wait for so many seconds; seconds that have passed since any moment. Others than the system's in tests.
+    trusted : networks of proxies whose X-Forwarded-For is trusted
+    sleep, clock : functions Wait for a number of seconds; seconds since any fixed time. Replaced in tests.
     """
 
     def __init__(
@@ -69,10 +68,10 @@ class Attempts:
         self._waiting = 0
 
     def address_of(self, scope: Scope) -> str:
-        """Address of the client: the connection's, or that which a trusted proxy tells."""
+        """Address of the client: the connection's, or the one that a trusted proxy reports."""
         client = scope.get("client")
         address = str(client[0]) if client else _UNKNOWN
-        # The last entry is the nearest proxy's own word; each further one is believed only if a trusted proxy told it.
+        # The nearest proxy wrote the last entry; each earlier one is trusted only if a trusted proxy wrote it.
         told = ",".join(Headers(scope=scope).getlist("x-forwarded-for")).split(",")
         for entry in reversed(told):
             if not self._is_trusted(address) or _parsed(entry.strip()) is None:
@@ -85,21 +84,21 @@ class Attempts:
         return parsed is not None and any(parsed in network for network in self._trusted)
 
     def admit(self, scope: Scope) -> None:
-        """Raise ApiError when too many refusals of the client's address wait already."""
+        """Raise ApiError when too many refusals of the client's address are waiting."""
         history = self._histories.get(_network(self.address_of(scope)))
         if history is not None and history.waiting >= MOST_WAITING:
             raise _too_many()
 
     async def failed(self, scope: Scope, place: str) -> None:
-        """Note that a token was not valid at ``place``, and wait before answering.
+        """Record an invalid token at ``place``, and wait before answering.
 
-        Raises ApiError at once where too many refusals wait already.
+        Raises ApiError immediately where too many refusals are waiting.
         """
         address = self.address_of(scope)
         # The words and their order are those of the filter for fail2ban in the documentation.
         _LOG.warning("Failed login from %s: %s", address, place)
         network = _network(address)
-        # Kept anew, so that an address is remembered from its latest failure on.
+        # Inserted anew, so that an address is remembered from its latest failure.
         history = self._histories[network] = self._histories.get(network) or _History()
         history.failures += 1
         if self._waiting >= MOST_WAITING_IN_ALL:
@@ -127,7 +126,7 @@ def _too_many() -> ApiError:
 
 
 def _parsed(address: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
-    """The address without port and zone; None when it is none. An IPv4 address in IPv6's clothes is an IPv4 address."""
+    """The address without port and zone; None when it is invalid. IPv4-mapped IPv6 addresses become IPv4 addresses."""
     text = address.removeprefix("[").partition("]")[0] if address.startswith("[") else address
     host, colon, port = text.partition(":")
     if colon and ":" not in port and port.isdigit():
@@ -140,7 +139,7 @@ def _parsed(address: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | Non
 
 
 def _network(address: str) -> str:
-    """What counts as one client: an IPv4 address, or a network of IPv6."""
+    """The key of one client: an IPv4 address, or an IPv6 network."""
     parsed = _parsed(address)
     if isinstance(parsed, ipaddress.IPv6Address):
         return str(ipaddress.ip_network((parsed, _NETWORK_BITS), strict=False))

@@ -1,4 +1,4 @@
-"""Computations for the service, in processes of their own: they neither hold up answers nor take them down."""
+"""Computations for the service in separate processes, which can neither block nor crash it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from sprag.worker.pool.processes import limit_memory, single_threaded_children, 
 Args = TypeVarTuple("Args")
 R = TypeVar("R")
 
-#: Computations that may wait for the process; more are refused at once rather than late.
+#: Most computations that wait for the process; further ones are refused immediately.
 MAX_WAITING = 8
 _LATER = {"Retry-After": "5"}
 _ENDING = "The service is shutting down; the request was not carried out."
@@ -35,32 +35,27 @@ class Computes(Protocol):
         """The function's value; ApiError when it takes too long or its process dies."""
 
     async def load(self, shape: models.KernelShape) -> None:
-        """Have a kernel ready, however long it takes to compile; ApiError when that fails."""
+        """Load a kernel, however long its compilation takes; ApiError when that fails."""
 
     def close(self) -> None:
-        """Leave no process behind."""
+        """End all processes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What each computation may take, and what is said of one that takes more.
+    """Limits of each computation, and the problem reported when they are exceeded.
 
     Attributes
     ----------
-    seconds : float
-        Processor time after which it is killed, and after `WALL_TIMES` as much on the wall: on a crowded machine a
-        small computation takes long.
+    seconds : float Processor time after which it is killed. By the clock it may take `WALL_TIMES` as long, because
+        small computations take long on a busy machine.
     memory : int
         Bytes that it may take beyond what its process has at the start.
-    waiting : int
-        Computations that may be there at once; more are refused at once rather than late.
-    problem : str
-        Kind of the problem that its client gets.
-    setting : str
-        Name of the setting of the time, where there is one.
-    leave_seconds : float
-        Time that one whose client has left is given to end before its process is killed: about what another process
-        takes to start. It counts as one of its client's until then.
+    waiting : int Most simultaneous computations; further ones are refused immediately.
+    problem : str Kind of the problem reported to the client.
+    setting : str Name of the setting of the time limit, if any.
+    leave_seconds : float Time for a computation to end after its client disconnected, before its process is killed;
+        about the start time of another process. Until then it counts toward its client's share.
     """
 
     seconds: float
@@ -76,12 +71,10 @@ class ProcessComputer:
 
     Parameters
     ----------
-    limits : Limits
-        Of each computation.
-    processes : int
-        How many there are side by side.
-    prepare, load : functions
-        What a process does first, and what compiles a kernel into the cache on disk or loads it; importable by name.
+    limits : Limits Limits of each computation.
+    processes : int Number of parallel processes.
+    prepare, load : functions Called first in each process; compiles a kernel into the cache on disk or loads it. Both
+        are importable by name.
     """
 
     def __init__(
@@ -102,17 +95,17 @@ class ProcessComputer:
         self._lock = threading.Lock()
 
     def start(self) -> None:
-        """Have the processes ready before they are needed. The calling thread has to outlive them."""
+        """Start the processes before they are needed. The calling thread must outlive them."""
         with self._lock:
             self._started()
 
     async def ready(self, function: Callable[[*Args], object], *args: *Args) -> None:
-        """Run a function in each process as the first, however long they take to start.
+        """Run a function first in each process, however long they take to start.
 
         Raises ProcessStartError and ProcessDiedError where one cannot be started, JobStoppedError after `close`, or
         what the function raises.
         """
-        # As many at once as there are processes, which are taken in turn: each gets one of its own.
+        # As many calls as processes, which are assigned in turn, so each process gets one.
         jobs = [self._schedule(LOAD_SECONDS, function, *args) for _ in range(self._processes)]
         found = await asyncio.gather(*(asyncio.wrap_future(job.future) for job in jobs), return_exceptions=True)
         for fault in found:
@@ -129,13 +122,13 @@ class ProcessComputer:
                 return await asyncio.shield(future)
             except asyncio.CancelledError:
                 task = asyncio.current_task()
-                if task is not None and not task.cancelling():  # it was `close` that cancelled what waited
+                if task is not None and not task.cancelling():  # cancelled by `close`, not by the client
                     raise JobStoppedError from None
                 await self._leave(job, future)
                 raise
 
     async def _leave(self, job: Job[R], future: asyncio.Future[R]) -> None:
-        """Nobody waits for the job any more: end it, with its process only where it runs on for long."""
+        """End a job that nobody waits for; its process is killed only if the job continues for long."""
         if job.future.cancel():
             return
         try:
@@ -145,18 +138,18 @@ class ProcessComputer:
             future.cancel()
 
     async def load(self, shape: models.KernelShape) -> None:
-        """Have a kernel ready. The compilation goes on when its request is gone, so that the next one finds it."""
+        """Load a kernel. Its compilation continues when the request is cancelled, so that the next one finds it."""
         with self._turn(LOAD_SECONDS):
             loading = self._loads.get(shape)
             if loading is None or (loading.future.done() and loading.future.exception() is not None):
                 loading = self._loads[shape] = self._schedule(LOAD_SECONDS, self._load, shape)
             future = asyncio.wrap_future(loading.future)
-            future.add_done_callback(_retrieve)  # of a request that is gone nobody else does
+            future.add_done_callback(_retrieve)  # nobody else retrieves the result for a cancelled request
             await asyncio.shield(future)
 
     @contextmanager
     def _turn(self, timeout: float) -> Iterator[None]:
-        """One of the computations that may wait; what goes wrong with it becomes an ApiError."""
+        """Admit one waiting computation; convert its failures to ApiErrors."""
         if self._waiting >= self._limits.waiting:
             raise ApiError("unavailable", "Too many computations are waiting already.", headers=_LATER)
         self._waiting += 1
@@ -167,7 +160,9 @@ class ProcessComputer:
             detail = f"The computation did not end within {timeout:g} s by the clock."
             raise ApiError(self._limits.problem, detail) from error
         except MemoryError as error:
-            detail = f"The computation needs more memory than the {self._limits.memory // 2**20} MiB that it may take."
+            detail = (
+                f"The computation needs more than the {self._limits.memory // 2**20} MiB of memory it may use."
+            )
             raise ApiError(self._limits.problem, detail) from error
         except ProcessDiedError as error:
             if error.exitcode == -signal.SIGPROF:
@@ -194,7 +189,9 @@ class ProcessComputer:
         return self._pool
 
     def close(self) -> None:
-        """End the processes, whatever they are doing; what waits is told that the service is shutting down."""
+        """End the processes, whatever they are doing; waiting requests get the error that the service is
+        shutting down.
+        """
         with self._lock:
             pool, self._pool, self._closed = self._pool, None, True
         if pool is not None:
@@ -202,12 +199,12 @@ class ProcessComputer:
 
 
 def _retrieve(future: asyncio.Future[None]) -> None:
-    """Take note of how a future ended, so that asyncio does not log an exception that nobody waits for."""
+    """Retrieve the outcome of a future, so that asyncio does not log an exception that nobody awaits."""
     if not future.cancelled():
         future.exception()
 
 
 def _prepare(prepare: Callable[[], None], memory: int) -> None:
-    """First thing that a process does."""
+    """The first task of a process."""
     prepare()
     limit_memory(memory)

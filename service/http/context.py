@@ -1,4 +1,4 @@
-"""What the operations work with: settings, store and computer of the running service."""
+"""Context of the operations: settings, store and computer of the running service."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ CaseNumber = Annotated[
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """Settings, store and computer of one service; ``ending`` is set when the service is about to end.
+    """Settings, store and computer of one service; ``ending`` is set when the service begins to shut down.
 
-    ``checker`` runs what reads, expands, fits or draws what users wrote, and ``library`` is the store for it; requests
-    use it and the computer through `sprag.service.http.work`, which keeps to the shares of each token. ``unaffected``
-    tells of parameters that change nothing; ``streams`` are the places for streams of events. ``ready`` is set when
-    the checker can take work.
+    ``checker`` runs the functions that read, expand, fit or draw user input, and ``library`` gives them the store.
+    Requests use it and the computer through `sprag.service.http.work`, which enforces the share of each token.
+    ``unaffected`` finds parameters without effect; ``streams`` are the places for event streams. ``ready`` is set when
+    the checker accepts work.
     """
 
     settings: Settings
@@ -56,32 +56,34 @@ class Context:
     check_shares: Shares = field(default_factory=lambda: Shares(1, MAX_CHECKS_EACH))
 
     def cut(self) -> None:
-        """Stop computations and let no write begin; what waits is notified. Takes as long as killing does."""
+        """Stop computations and refuse writes; waiting requests are notified. Takes as long as killing the
+        processes.
+        """
         self.store.session.refuse_writes()
         for computer in (self.checker, self.computer):
             computer.close()
 
 
-#: What an id can be; without a colon, which begins a verb.
+#: Pattern of an id; a colon would begin a verb.
 ID_PATTERN: Final = "^[A-Za-z0-9_-]{1,64}$"
 
 
 class StudyIdConvertor(Convertor[str]):
-    """Part of an address that can be the id of a study; without a colon, which begins a verb."""
+    """Path segment with the id of a study; a colon would begin a verb."""
 
     regex = ID_PATTERN.strip("^$")
 
     def convert(self, value: str) -> str:
-        """The id as it stands in the address."""
+        """The id, unchanged."""
         return value
 
     def to_string(self, value: str) -> str:
-        """The id as it stands in the address."""
+        """The id, unchanged."""
         return value
 
 
 class CaseConvertor(StudyIdConvertor):
-    """Part of an address that can be the number of a case: not longer than any number of a case is."""
+    """Path segment with the number of a case, limited to the digits of the largest number."""
 
     regex = "[0-9]{1,12}"
 

@@ -1,7 +1,7 @@
-"""The end of the service seen by requests: none is told of a failure when its request was carried out.
+"""Shutdown as seen by requests: no request that was carried out is answered with a failure.
 
-When the grace of the requests is over, what users define is ended and no write begins any more, so that every request
-comes to its own answer. One that the server cuts off all the same, and that changes something, is waited for.
+After the grace period, computations are ended and no further write begins, so that every request gets its own answer.
+If the server still cancels a request that changes something, its end is awaited.
 """
 
 from __future__ import annotations
@@ -62,9 +62,9 @@ class Drain:
             except asyncio.CancelledError:
                 if task.cancelled():
                     raise
-                # Its thread may be writing: only its own answer tells what became of it.
+                # Its thread may be writing; only its own answer shows the outcome.
 
     async def idle(self) -> None:
-        """Wait until nothing is being changed any more."""
+        """Wait until no request changes anything."""
         while self._changing:
             await asyncio.wait(set(self._changing))

@@ -1,4 +1,4 @@
-"""Files that are drawn for a request: pictures, which can do nothing but be looked at, and attachments."""
+"""Files drawn for a request: pictures, with a policy that disables everything active, and attachments."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from sprag.service.http.context import Context
     from sprag.service.storage.records import StudyRecord
 
-#: matplotlib puts its styles into the picture, which the pages' policy forbids; a picture can do nothing else.
+#: matplotlib embeds its styles in the picture, which the pages' policy forbids; everything else is disabled.
 _PICTURE_POLICY = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
 
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A file that is still to be drawn, in another process: by what, from what, and how it is sent."""
+    """A file to be drawn in another process: the function, its arguments, and the form of the answer."""
 
     draw: Callable[..., bytes]
     args: tuple[Any, ...]
@@ -38,7 +38,7 @@ class Drawing:
         return self._sent(await work.check(self.draw, *self.args))
 
     def here(self) -> Response:
-        """The file, drawn by this process at once."""
+        """The file, drawn by this process now."""
         return self._sent(self.draw(*self.args))
 
     def _sent(self, content: bytes) -> Response:
@@ -46,7 +46,7 @@ class Drawing:
 
 
 def picture(draw: Callable[..., bytes], form: pictures.Picture, *shown: object) -> Drawing:
-    """A picture of something, with a policy under which it can do nothing but be looked at."""
+    """A picture, with a policy that disables everything active in it."""
     headers = {"Content-Security-Policy": _PICTURE_POLICY} if form == "svg" else {}
     return Drawing(draw, (*shown, form), pictures.MEDIA_TYPES[form], headers)
 
@@ -57,17 +57,19 @@ def picture_of(form: str) -> pictures.Picture:
 
 
 def attachment(content: bytes, media_type: str, filename: str) -> Response:
-    """A small file to be saved under that name."""
+    """A small file, downloaded under that name."""
     return Response(content, media_type=media_type, headers=attached(filename))
 
 
 def attached(filename: str) -> dict[str, str]:
-    """The headers of a file that is to be saved under that name."""
+    """The headers of a file that is downloaded under that name."""
     return {"Content-Disposition": f'attachment; filename="{filename}"'}
 
 
 def placed(context: Context, drawing: Drawing) -> Response | Drawing:
-    """A drawing of `sprag.service.jobs.answers`: at once where it has few numbers, else still to be made, elsewhere."""
+    """A drawing of `sprag.service.jobs.answers`: made here where it has few numbers, otherwise left to another
+    process.
+    """
     _, study_id, query, *_ = drawing.args
     return drawing if drawn_numbers(context.store.study(study_id), query) > answers.FEW else drawing.here()
 
@@ -80,7 +82,7 @@ async def conditional(
     form: str,
     make: Callable[[StudyRecord], Response | Drawing],
 ) -> Response:
-    """The answer that ``make`` gives, or 304 when the client has it: it depends on the study's rows and the query."""
+    """The answer of ``make``, or 304 when the client has it; it depends on the study's rows and the query."""
 
     def look() -> tuple[str, Response | Drawing, bool]:
         record = context.store.get_study(study_id)

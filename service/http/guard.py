@@ -1,4 +1,4 @@
-"""The outermost layer of the service: who may send what. Nothing behind it runs for a request that it refuses."""
+"""The outermost layer of the service, which refuses unauthorised and unsafe requests before anything else runs."""
 
 import logging
 import re
@@ -21,15 +21,15 @@ from sprag.worker.limits import BODY_SECONDS, MAX_BODY_BYTES
 
 _LOG = logging.getLogger("sprag.service")
 
-#: What anybody may ask for, token or not: whether the service is up, and the way in.
+#: Paths that need no token: health checks and the login.
 OPEN_PATHS: Final = frozenset({"/livez", "/readyz", LOGIN_PATH, "/static/sprag.css", "/static/sprag.svg"})
-#: Requests that change nothing, whatever their method says.
+#: Requests that change nothing despite their method.
 _LOOKING: Final = frozenset({"/api/v1/studies:preview", "/api/v1/clutch-fits", "/new/check", LOGIN_PATH, "/logout"})
 SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 
-#: An empty style element: the script that draws pictures fills it rule by rule, which asks for no further permission.
+#: Hash of an empty style element, which plotly's script fills rule by rule; that needs no further permission.
 _EMPTY_STYLE: Final = "'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='"
-#: The style for maps of the world that the same script brings along: no page shows one, and refused it is an error.
+#: Hash of the style for world maps in the same script: no page uses it, but refusing it would log an error.
 _MAP_STYLE: Final = "'sha256-ji27qzEtxXZW+7dun6UwjHXJ18e6WAin1VvNtkzIE/o='"
 
 SECURITY_HEADERS: Final = {
@@ -53,8 +53,7 @@ class Guard:
     app : ASGI application behind the guard
     settings : Settings
         `host_names`; by default also those of ``access``.
-    access : Access, optional
-        Knows the tokens.
+    access : Access, optional Checks the tokens.
     """
 
     def __init__(self, app: ASGIApp, settings: Settings, access: Access | None = None) -> None:
@@ -66,7 +65,7 @@ class Guard:
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
-        if scope["type"] != "http":  # there are no web sockets here
+        if scope["type"] != "http":  # the service has no web sockets
             await send({"type": "websocket.close", "code": 1008})
             return
         try:
@@ -76,7 +75,7 @@ class Guard:
             await answer(scope, receive, _with_headers(send))
             return
         if scope["method"] == "HEAD":
-            # Whatever can be read can be asked for its headers; the server itself sends no body then.
+            # HEAD is allowed wherever GET is; the server then sends no body.
             scope = {**scope, "method": "GET"}
         asking = ASKING.set(scope["sprag.grant"])
         try:
@@ -85,7 +84,7 @@ class Guard:
             ASKING.reset(asking)
 
     async def _refusal(self, request: Request, error: ApiError) -> Response:
-        """The answer to a request that was refused: for pages, the login where that helps."""
+        """The answer to a refused request: for pages, the login where that helps."""
         try:
             answer = await way_in(request, error, self._access)
         except ApiError as unreadable:
@@ -103,10 +102,10 @@ class Guard:
             detail = "This service does not answer to the host name of the request"
             raise ApiError("wrong-host", f"{detail}; SPRAG_ALLOWED_HOSTS adds names.")
         if scope["method"] not in SAFE_METHODS and _is_cross_site(headers):
-            raise ApiError("cross-site", "A page of another site may not change anything here.")
+            raise ApiError("cross-site", "Requests from pages of other sites cannot change anything here.")
         scope["sprag.grant"] = await self._grant(scope, headers)
         if "\n" in scope["path"]:
-            # The patterns of the routes end in "$", which a line feed at the very end would slip past.
+            # The patterns of the routes end in "$", which also matches before a final line feed.
             raise ApiError("not-found", "There is nothing at this address: it has a line feed in it.")
         length = headers.get("content-length", "0")
         if not (length.isascii() and length.isdigit()):
@@ -115,7 +114,7 @@ class Guard:
             raise body_too_large()
 
     async def _grant(self, scope: Scope, headers: Headers) -> Grant | None:
-        """Who asks; ApiError where nobody may who has no token, or only a lesser one."""
+        """The grant of the request; ApiError where a token, or one of higher scope, is required."""
         opened, safe = scope["path"] in OPEN_PATHS, scope["method"] in SAFE_METHODS
         try:
             await self._access.refresh()
@@ -134,15 +133,15 @@ class Guard:
         if not sent:
             grant = self._access.of_cookies(cookie_parser(headers.get("cookie", "")))
             if grant is not None and not safe and not _names_its_site(headers):
-                raise ApiError("cross-site", "A browser says which page sent a request; this request does not.")
+                raise ApiError("cross-site", "This request does not name the page that sent it, as browsers do.")
         if opened:
             return grant
         if grant is None:
-            # Another challenge would make a browser ask for a password by itself, and drop the page it was to send.
+            # Any other challenge would make a browser ask for a password and lose the form that it was to send.
             headers_of_answer = {"WWW-Authenticate": "Bearer"}
             raise ApiError("unauthorized", "This request carries no valid token.", headers=headers_of_answer)
         if grant.scope is not TokenScope.WRITE and not safe and scope["path"] not in _LOOKING:
-            scope["sprag.grant"] = grant  # the login says whose token it is
+            scope["sprag.grant"] = grant  # the login page shows the name of the token
             raise ApiError("read-only", f"Token {grant.name or grant.id} is read-only.")
         return grant
 
@@ -150,12 +149,12 @@ class Guard:
 def body_too_large() -> ApiError:
     """The error for a body beyond the limit."""
     return ApiError(
-        "body-too-large", f"The body may have {MAX_BODY_BYTES} bytes at most.", headers={"Connection": "close"}
+        "body-too-large", f"The body is limited to {MAX_BODY_BYTES} bytes.", headers={"Connection": "close"}
     )
 
 
 def _names_its_site(headers: Headers) -> bool:
-    """Whether the request says for which page it is sent; then `_is_cross_site` has let it pass."""
+    """Whether the request names the page that sent it; `_is_cross_site` has accepted it then."""
     return "sec-fetch-site" in headers or "origin" in headers
 
 
@@ -163,7 +162,7 @@ _HOST: Final = re.compile(r"(\[[0-9a-f:.%]+\]|[^:@/\[\]]+)(:[0-9]{0,5})?")
 
 
 def _host_name(host: str) -> str:
-    """The name in a Host header, lower case, without its port; "" when it is not a host and port."""
+    """The name in a Host header, in lower case and without its port; "" when the header is invalid."""
     found = _HOST.fullmatch(host.strip().lower())
     return "" if found is None else found[1]
 
@@ -174,17 +173,17 @@ def _is_cross_site(headers: Headers) -> bool:
     if site is not None and site not in ("same-origin", "none"):
         return True
     origin = headers.get("origin")
-    # Only the authority is compared: behind a proxy that ends TLS the scheme seen here is not the browser's.
+    # Only the authority is compared, because behind a TLS proxy the scheme seen here differs from the browser's.
     return origin is not None and origin.lower().partition("://")[2] != headers.get("host", "").lower()
 
 
 def _limited(receive: Receive) -> Receive:
-    """``receive`` that raises 413 as soon as more than the limit has come in, and 408 when it comes too slowly."""
+    """Wrap ``receive`` to raise 413 as soon as the body exceeds the limit, and 408 when it arrives too slowly."""
     total, more, until = 0, True, None
 
     async def limited() -> Message:
         nonlocal total, more, until
-        if not more:  # what comes now is the end of the connection, however late
+        if not more:  # the next message is the end of the connection, which may come late
             return await receive()
         until = until or anyio.current_time() + BODY_SECONDS
         with anyio.move_on_after(until - anyio.current_time()) as scope:
@@ -203,7 +202,7 @@ def _limited(receive: Receive) -> Receive:
 
 
 def _with_headers(send: Send) -> Send:
-    """``send`` that adds the security headers where the response has none of its own."""
+    """Wrap ``send`` to add the security headers that the response does not set itself."""
 
     async def wrapped(message: Message) -> None:
         if message["type"] == "http.response.start":

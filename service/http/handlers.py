@@ -1,4 +1,4 @@
-"""From whatever is raised while a request is answered to the one shape of error."""
+"""Conversion of exceptions to problem documents."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from sprag.worker.states import TransitionError
 _log = logging.getLogger("sprag.service")
 
 _LATER = {"Retry-After": "5"}
-#: What the patterns of texts mean, for people.
+#: Descriptions of the patterns of texts.
 _PATTERNS = {r"^[!-~]+$": "printable ASCII characters without blanks"}
 
 
 def as_api_error(error: Exception) -> ApiError | None:
-    """What a client is told about an exception; None when it is a bug in the program."""
+    """The error for the client; None when the exception is a bug in the program."""
     if isinstance(error, FaultError):
         return api_error(error)
     if isinstance(error, PageTokenError):
@@ -59,7 +59,7 @@ def _known(request: Request, error: Exception) -> Response:
 
 def _unknown(request: Request, error: Exception) -> Response:
     _log.error("%s %s failed", request.method, request.url.path, exc_info=error)
-    # The framework passes the fault on to the server, which then ends the connection; the client has to know.
+    # The framework passes the exception on to the server, which then closes the connection; the client must know.
     detail = "The service failed to answer; the fault is in its log."
     return _answer(request, ApiError("internal", detail, headers={"Connection": "close"}))
 
@@ -78,12 +78,12 @@ def _http(request: Request, error: Exception) -> Response:
 
 
 def _left(request: Request, _: Exception) -> Response:
-    """For the log and the metrics only: nobody is there any more to read it."""
-    return _answer(request, ApiError("bad-request", "The connection ended before the request was whole."))
+    """An answer for the log and the metrics only; the client has disconnected."""
+    return _answer(request, ApiError("bad-request", "The connection ended before the request was complete."))
 
 
 def _methods_at(app: FastAPI, path: str) -> set[str]:
-    """Every method that some route takes at ``path``; the framework itself names those of one route only."""
+    """Every method that any route accepts at ``path``; the framework itself names those of one route only."""
     found: set[str] = set()
     for route in iter_route_contexts(app.routes):
         pattern = getattr(route, "path_regex", None)
@@ -116,7 +116,7 @@ def _parameter_item(fault: dict[str, Any]) -> Fault:
 
 
 def _code(kind: str) -> Code:
-    """The code of what pydantic found."""
+    """The code of a pydantic error."""
     if kind == "missing":
         return "required"
     if kind in ("literal_error", "enum"):
@@ -137,7 +137,7 @@ def _allowed(bounds: dict[str, Any]) -> str | None:
 
 
 def install(app: FastAPI) -> None:
-    """Give ``app`` its error handlers."""
+    """Install the error handlers of ``app``."""
     handled: Iterable[tuple[type[Exception], Callable[[Request, Exception], Response]]] = (
         *((kind, _known) for kind in (FaultError, TransitionError, StoreError)),
         (ClientDisconnect, _left),
@@ -150,7 +150,7 @@ def install(app: FastAPI) -> None:
 
 
 def _asynchronous(handler: Callable[[Request, Exception], Response]) -> Any:
-    # Plain functions would be sent to a thread; these only build a small document.
+    # Plain functions would run in a thread; these only build a small document.
     async def handle(request: Request, error: Exception) -> Response:
         return handler(request, error)
 

@@ -1,6 +1,6 @@
-"""What the service measures, in the text format of Prometheus. Labels are few and never ids.
+"""Metrics of the service in the text format of Prometheus. Labels are few and never ids.
 
-The cases are run by other processes; what became of them is read from the database when the metrics are asked for.
+Other processes run the cases; their outcomes are read from the database when the metrics are requested.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
 CONTENT_TYPE: Final = CONTENT_TYPE_LATEST
 METHODS: Final = frozenset({"GET", "HEAD", "POST", "PATCH", "DELETE"})
-#: Upper bounds in s: of one case, of an answer, of waiting for the database.
+#: Upper bounds in s for one case, for an answer, for waiting for the database.
 CASE_BOUNDS: Final = (0.0001, 0.0003, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 REQUEST_BOUNDS: Final = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 WAIT_BOUNDS: Final = (0.0001, 0.001, 0.01, 0.1, 1.0, 10.0, 30.0)
-#: Seconds over which the present rate is taken.
+#: Seconds over which the current rate is averaged.
 RATE_SECONDS: Final = 60.0
 
 
@@ -58,8 +58,8 @@ class Metrics:
         store.session.on_wait = self.waited
 
     def answered(self, method: str, route: str, status: int, seconds: float) -> None:
-        """Count a request; ``route`` is the pattern of its address."""
-        # What clients make up must not make new series.
+        """Count a request; ``route`` is the pattern of its URL."""
+        # Arbitrary input of clients must not create new series.
         self._requests.labels(method if method in METHODS else "other", route, str(status)).inc()
         self._seconds.labels(route).observe(seconds)
 
@@ -68,14 +68,14 @@ class Metrics:
         self._wait.labels(kind).observe(seconds)
 
     def text(self) -> bytes:
-        """All of them, in the text format; raises StoreError."""
+        """All metrics in the text format; raises StoreError."""
         return generate_latest(self._registry)
 
 
 class StudyCollector(Collector):
-    """What the database tells of studies and cases.
+    """Metrics of studies and cases from the database.
 
-    Cases that are done are counted from the moment on at which this began, so that deleting studies takes none away.
+    Finished cases are counted from the start of the collector, so that deleting studies does not reduce the count.
     """
 
     def __init__(self, store: Store) -> None:
@@ -89,11 +89,11 @@ class StudyCollector(Collector):
         self._recent: deque[FinishedWork] = deque()
 
     def describe(self) -> Iterable[Metric]:
-        """Nothing is read for being registered."""
+        """Describe nothing, so that registration reads nothing."""
         return ()
 
     def collect(self) -> Iterator[Metric]:
-        """Read and tell; raises StoreError."""
+        """Read the metrics; raises StoreError."""
         now = self._store.clock.now()
         with self._lock:
             self._look(now)

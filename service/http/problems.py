@@ -1,4 +1,4 @@
-"""The one shape of every error of the HTTP interface: RFC 9457 problem documents, their types and their catalogue."""
+"""Errors of the HTTP interface as RFC 9457 problem documents, and the catalogue of their types."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class ProblemType:
 
     @property
     def uri(self) -> str:
-        """The type as a relative reference; it is stable, and a page of the service."""
+        """The type as a relative reference, which is stable and also a page of the service."""
         return PROBLEM_PATH + self.slug
 
 
@@ -38,7 +38,7 @@ _P = ProblemType
 PROBLEM_TYPES: dict[Kind, ProblemType] = _catalogue(
     _P("invalid-spec", 422, "The study spec is not valid", _FIELDS_HELP),
     _P("invalid-body", 422, "The request body is not valid", _FIELDS_HELP),
-    _P("invalid-parameter", 422, "A request parameter is not valid", "`errors` names each and what it may be."),
+    _P("invalid-parameter", 422, "A request parameter is not valid", "`errors` lists each one and what is allowed."),
     _P("invalid-selection", 422, "The selected cases cannot be drawn", "A curve needs a value for every axis."),
     _P(
         "idempotency-conflict",
@@ -53,8 +53,8 @@ PROBLEM_TYPES: dict[Kind, ProblemType] = _catalogue(
     _P(
         "method-not-allowed", 405, "This address does not support this method", "The header Allow lists those it takes."
     ),
-    _P("not-acceptable", 406, "No acceptable format", "`detail` names the media types that there are."),
-    _P("wrong-state", 409, "The state of the study does not allow this", "Look at the state of the study first."),
+    _P("not-acceptable", 406, "No acceptable format", "`detail` names the available media types."),
+    _P("wrong-state", 409, "The state of the study does not allow this", "Check the state of the study first."),
     _P("not-computed", 409, "The case cannot be computed", "Running it ends the process that computes it."),
     _P("body-too-large", 413, "The request body is too large", "A study is a small document: give axes as ranges."),
     _P("unsupported-media-type", 415, "The content type is not supported", "Send the type that `detail` names."),
@@ -73,20 +73,20 @@ PROBLEM_TYPES: dict[Kind, ProblemType] = _catalogue(
         "too-many-attempts",
         429,
         "Too many attempts with invalid tokens",
-        "Wait as long as the header Retry-After says.",
+        "Wait for the time given by the header Retry-After.",
     ),
-    _P("too-costly", 422, "This takes too much time or memory", "Ask for a smaller study, formula or picture."),
-    _P("too-many-requests", 429, "Too many requests of one token at once", "Wait as long as Retry-After says."),
+    _P("too-costly", 422, "This takes too much time or memory", "Request a smaller study, formula or picture."),
+    _P("too-many-requests", 429, "Too many requests of one token at once", "Wait for the time given by Retry-After."),
     _P("queue-full", 429, "Too many studies are waiting", "Wait until some have ended, or cancel some."),
     _P("internal", 500, "The service failed", "This is a bug in the program; the server's log has the details."),
     _P("unavailable", 503, "The service cannot do this now", "Try again later; `sprag doctor` looks for the cause."),
-    _P("storage-full", 507, "There is no room for this", "Make room on the disk, or delete studies."),
-    _P("timed-out", 504, "The computation took too long", "Ask for a shorter part of the run."),
+    _P("storage-full", 507, "There is no room for this", "Free space on the disk, or delete studies."),
+    _P("timed-out", 504, "The computation took too long", "Request a shorter part of the run."),
 )
 
 
 class ApiError(FaultError):
-    """A fault as HTTP tells it.
+    """A fault with its HTTP status and headers.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class ApiError(FaultError):
 
 
 def api_error(fault: FaultError) -> ApiError:
-    """The fault with what HTTP adds to it."""
+    """The fault as an ApiError."""
     if isinstance(fault, ApiError):
         return fault
     headers = {} if fault.retry_after is None else {"Retry-After": str(fault.retry_after)}

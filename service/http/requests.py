@@ -1,4 +1,4 @@
-"""How a request is read: bodies without loss through the spec's strict reader, and no query parameter passed over."""
+"""Reading of requests: bodies through the spec's strict reader; unknown query parameters are refused."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _FORMATS: dict[str, BodyFormat] = {"application/json": "json", "application/toml
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A request body as it came in, within the limit that the guard sets."""
+    """A raw request body, within the size limit of the guard."""
 
     content: bytes
     format: BodyFormat
@@ -49,9 +49,9 @@ async def read_body(request: Request) -> Body:
 
 
 async def strict_query(request: Request) -> None:
-    """Refuse query parameters that the operation does not have, or takes once only, so misspelled ones are noticed.
+    """Refuse unknown query parameters, so that misspelled ones are noticed, and repeated ones that may occur only once.
 
-    A header that the operation reads, such as an Idempotency-Key, is refused when it is there twice.
+    A header that the operation reads, such as an Idempotency-Key, is refused when it occurs twice.
     """
     dependant = request.scope["route"].dependant
     known = _query_parameters(dependant)

@@ -1,4 +1,4 @@
-"""How an answer is written: JSON without NaN, entity tags, formats by query or by Accept."""
+"""Writing of answers: JSON without NaN, entity tags, formats by query or by Accept."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ JSON = "application/json"
 
 
 def json_response(data: Any, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
-    """``data`` as a JSON answer; NaN in it is a fault of the program."""
+    """``data`` as a JSON answer; NaN in it is a bug."""
     return Response(to_bytes(data), status_code=status, media_type=JSON, headers=dict(headers or {}))
 
 
 def entity_tag(*parts: object) -> str:
-    """A strong entity tag of what decides an answer."""
+    """A strong entity tag derived from everything that determines an answer."""
     return '"' + hashlib.sha256("\n".join(map(str, parts)).encode("utf-8", "backslashreplace")).hexdigest()[:32] + '"'
 
 
 def not_modified(request: Request, tag: str) -> Response | None:
-    """The answer 304 when the client has the version of ``tag`` already (If-None-Match), else None."""
+    """The answer 304 when the client already has the version of ``tag`` (If-None-Match), otherwise None."""
     if parse_etags(",".join(request.headers.getlist("if-none-match"))).contains_weak(tag.strip('"')):
         return Response(status_code=304, headers={"ETag": tag, "Vary": "Accept"})
     return None
@@ -45,9 +45,9 @@ def tagged(response: Response, tag: str) -> Response:
 
 
 def streamed(pieces: Iterable[bytes], media_type: str, filename: str) -> StreamingResponse:
-    """A file sent piece by piece; the pieces are made in a thread, so that the service goes on answering.
+    """A file sent piece by piece; the pieces are made in a thread, so that the service stays responsive.
 
-    The first is made here, so that what goes wrong before it still becomes a problem document.
+    The first piece is made here, so that earlier errors still become problem documents.
     """
     headers = {"Content-Disposition": f'attachment; filename="{filename}"', "Vary": "Accept"}
     rest = iter(pieces)
@@ -56,10 +56,10 @@ def streamed(pieces: Iterable[bytes], media_type: str, filename: str) -> Streami
 
 
 def choose_format(request: Request, wanted: str | None, media_types: Mapping[str, str]) -> str:
-    """The format of the answer: ``wanted`` (the query's ``format``), else the one Accept likes best, else the first.
+    """The format of the answer: ``wanted`` (the query's ``format``), else the one preferred by Accept, else the first.
 
-    A type that Accept names goes before one that it only allows (``image/*``, ``*/*``). Raises ApiError when the query
-    names a format that there is not, and when Accept allows none.
+    A type that Accept names precedes one that it only allows (``image/*``, ``*/*``). Raises ApiError when the query
+    names an unknown format, and when Accept allows none.
     """
     formats: Sequence[str] = tuple(media_types)
     if wanted is not None:

@@ -1,4 +1,4 @@
-"""Schedules as the interface shows them: plain data from the store's records."""
+"""Schedules for the API: plain data from the store's records."""
 
 from __future__ import annotations
 
@@ -35,5 +35,5 @@ def detail(record: ScheduleRecord, runs: tuple[RunRecord, ...]) -> ScheduleDetai
 
 
 def run_json(run: RunRecord) -> ScheduleRun:
-    """A due time and what became of it."""
+    """A due time and its outcome."""
     return filled(ScheduleRun, run, address=None if run.study is None else study_address(run.study))

@@ -1,4 +1,4 @@
-"""`sprag serve`: the HTTP service, and beside it a dispatcher as a child process that is started again if it dies."""
+"""`sprag serve`: the HTTP service, and beside it a dispatcher as a child process that is restarted if it dies."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from sprag.worker.limits import MAX_CONNECTIONS
 
 _LOG = logging.getLogger("sprag.service")
 
-#: Seconds that requests under way are given when the service ends; then those that were cut off, to be answered; then
-#: the dispatcher for its chunks. After the last the process ends, whatever is left of it.
+#: Time limits of the shutdown in s: for current requests, then for the answers of cancelled ones, then for the
+#: dispatcher and its chunks. After the last limit the process exits in any case.
 _GRACE_SECONDS = 5.0
 _ANSWER_SECONDS = 3
 _STOP_SECONDS = 15.0
 _LAST_SECONDS = 30.0
-#: Seconds before a dead dispatcher is started again: doubled each time, back to the first after a long life.
+#: Seconds before a dead dispatcher is restarted: doubled each time, and reset after a long life.
 _FIRST_DELAY = 0.5
 _LONGEST_DELAY = 10.0
 _LONG_LIFE = 10.0
@@ -43,7 +43,7 @@ class AddressError(Exception):
 
 
 class Child(Protocol):
-    """What the supervisor needs of a process."""
+    """The part of a process that the supervisor uses."""
 
     @property
     def exitcode(self) -> int | None:
@@ -62,17 +62,15 @@ class Child(Protocol):
 class Supervisor(threading.Thread):
     """Keeps one child process alive.
 
-    The child is started by this thread, which lives as long as it is wanted: on Linux a child that is to die with its
-    parent dies with the very thread that started it.
+    This thread starts the child and outlives it: on Linux a child that is to die with its parent dies with the thread
+    that started it.
 
     Parameters
     ----------
     start : function
         Starts the child.
-    delays : (first, longest)
-        Seconds before it is started again.
-    leaving : Event
-        Set when everything is about to end: the child is ended while requests under way are still answered.
+    delays : (first, longest) Seconds before it is restarted.
+    leaving : Event Set when the shutdown begins: the child is ended while current requests are still answered.
     """
 
     def __init__(
@@ -89,7 +87,7 @@ class Supervisor(threading.Thread):
         self._child: Child | None = None
 
     def run(self) -> None:
-        """Start the child, and again whenever it has died, until `stop` or until everything is about to end."""
+        """Start the child, and restart it whenever it dies, until `stop` or the shutdown."""
         delay = self._first
         while not self._over():
             born = time.monotonic()
@@ -97,10 +95,10 @@ class Supervisor(threading.Thread):
             while child.exitcode is None and not self._over():
                 child.join(0.2)
             delay = self._first if time.monotonic() - born > _LONG_LIFE else delay
-            # The signal that ended it may be on its way to this process too.
+            # The signal that ended it may also be about to reach this process.
             if self._leaving.wait(self._first) or self._over():
                 break
-            _LOG.error("The worker ended (exit code %s); it is started again.", child.exitcode)
+            _LOG.error("The worker ended (exit code %s); it is restarted.", child.exitcode)
             self._ending.wait(delay - self._first)
             delay = min(2.0 * delay, self._longest)
         self._end_child()
@@ -120,26 +118,23 @@ class Supervisor(threading.Thread):
             child.join()
 
     def stop(self) -> None:
-        """End the child and this thread; returns when both are gone, or never were there."""
+        """End the child and this thread; returns when neither is running."""
         self._ending.set()
         if self.ident is not None:
             self.join()
 
 
 class Server(uvicorn.Server):
-    """A server that tells the application when it is about to end, so that open streams end too.
+    """A server that notifies the application of the shutdown, so that open streams end too.
 
     Parameters
     ----------
     config : uvicorn.Config
     ending : Event
         Set by the first signal.
-    cut : function
-        Called when the grace of the requests is over, in a thread: has them come to an answer.
-    give_up : function
-        Called when the service has not ended long after the signal.
-    listening : function
-        Called once, when the service listens.
+    cut : function Called in a thread when the grace period is over; makes the remaining requests answer.
+    give_up : function Called when the service is still running long after the signal.
+    listening : function Called once the service listens.
     """
 
     def __init__(
@@ -164,18 +159,18 @@ class Server(uvicorn.Server):
             self._listening()
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """A signal asks for the end."""
+        """A signal requests the shutdown."""
         if not self._told.is_set():
             self._told.set()
             self._last.start()
         super().handle_exit(sig, frame)
 
     def ended(self) -> None:
-        """Everything has ended in time: nothing is to be given up."""
+        """Cancel the forced exit, because everything has ended in time."""
         self._last.cancel()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Let requests end by themselves, then have them ended."""
+        """Let requests finish, then cancel them."""
         loop = asyncio.get_running_loop()
         cutting = loop.call_later(_GRACE_SECONDS, lambda: loop.run_in_executor(None, self._cut))
         try:
@@ -185,7 +180,7 @@ class Server(uvicorn.Server):
 
 
 def _give_up() -> None:
-    """End this process and all that it started, now."""
+    """Kill this process and all its children."""
     _LOG.critical("The service did not stop within %g s; it is stopped now.", _LAST_SECONDS)
     for child in psutil.Process().children(recursive=True):
         with suppress(psutil.Error):
@@ -201,7 +196,7 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
     and AddressError, each with one sentence, before anything is started.
     """
     logs.configure(settings.log_format, requests=settings.log_requests)
-    app = create_app(settings)  # makes the database ready before the dispatcher looks for it
+    app = create_app(settings)  # initialises the database before the dispatcher opens it
     listener = _listen(settings)
     address = _address(settings, listener)
     config = uvicorn.Config(
@@ -248,7 +243,7 @@ def _listen(settings: Settings) -> socket.socket:
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise AddressError(f"The service cannot listen on {settings.host} port {settings.port}: {reason}.") from error
-    # Connections inherit it. Without it the body of a small answer waits 40 ms for the client's word on its head.
+    # Inherited by connections. Without it the body of a small answer waits 40 ms for the acknowledgement of its head.
     listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return listener
 
@@ -261,7 +256,7 @@ def _address(settings: Settings, listener: socket.socket) -> str:
 
 @contextmanager
 def _outlived_signals() -> Iterator[None]:
-    """Make SIGTERM end the server and not this process, which the server would send it to again at its own end."""
+    """Let SIGTERM end only the server: at its end, the server would send the signal to this process again."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

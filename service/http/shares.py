@@ -1,4 +1,4 @@
-"""How much of something each owner may have at once, so that none of them can take all of it."""
+"""Limits on the simultaneous work of each owner, so that none can occupy everything."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class _Share:
-    """What one owner has: how many are there, and the right to be at work."""
+    """The share of one owner: its number of requests, and its semaphore."""
 
     def __init__(self, at_work: int) -> None:
         self.taken = 0
@@ -21,9 +21,9 @@ class _Share:
 
 
 class Shares:
-    """Lets each owner have ``at_work`` things done at once, and ``each`` in all with those that wait.
+    """Limits each owner to ``at_work`` simultaneous requests, and to ``each`` including waiting ones.
 
-    For one event loop. Nothing is kept of an owner that has nothing done.
+    For one event loop. Nothing is stored for an owner without requests.
     """
 
     def __init__(self, at_work: int, each: int) -> None:
@@ -33,7 +33,7 @@ class Shares:
 
     @asynccontextmanager
     async def take(self, owner: str) -> AsyncIterator[None]:
-        """Wait for one's turn; ApiError at once when the owner has too many already."""
+        """Wait for a turn; ApiError immediately when the owner has too many requests."""
         share = self._owners.setdefault(owner, _Share(self._at_work))
         if share.taken >= self._each:
             detail = f"{self._each} requests of this token are being worked on, the most that one may have at once."

@@ -1,6 +1,6 @@
-"""How long the service waits for a client: connections that send or take nothing are closed.
+"""Timeouts of connections: those that neither send nor receive are closed.
 
-The server itself waits for ever for the head of a request, and for whoever reads nothing of an answer.
+The server itself waits indefinitely for the head of a request, and for clients that do not read their answer.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from sprag.worker.limits import HEAD_SECONDS, WRITE_SECONDS
 
 
 class TimeoutProtocol(H11Protocol):
-    """HTTP/1.1 with header and write timeouts. The body of a request is the guard's to wait for.
+    """HTTP/1.1 with header and write timeouts. The guard limits the time for the body of a request.
 
     ``head_seconds`` are allowed from the first byte of a connection or request to the end of its head,
-    ``write_seconds`` between two moments at which the client takes something of a long answer.
+    ``write_seconds`` between two reads of the client from a long answer.
     """
 
     head_seconds = HEAD_SECONDS
@@ -29,12 +29,12 @@ class TimeoutProtocol(H11Protocol):
         self._write: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """A client is there; its request is waited for."""
+        """A client connects; wait for its request."""
         super().connection_made(transport)
         self._await_head()
 
     def data_received(self, data: bytes) -> None:
-        """Something of a request came in."""
+        """Part of a request arrives."""
         super().data_received(data)
         if self._busy():
             self._head = _stopped(self._head)
@@ -42,24 +42,24 @@ class TimeoutProtocol(H11Protocol):
             self._await_head()
 
     def on_response_complete(self) -> None:
-        """An answer is out; a head that came behind it is waited for no longer than any other."""
+        """An answer is complete; the timeout applies to the head of a request that follows it."""
         super().on_response_complete()
         if self._busy():
             self._head = _stopped(self._head)
 
     def pause_writing(self) -> None:
-        """The client takes nothing for now."""
+        """The client stops reading."""
         super().pause_writing()
         _stopped(self._write)
         self._write = self.loop.call_later(self.write_seconds, self.transport.abort)
 
     def resume_writing(self) -> None:
-        """The client takes something again."""
+        """The client reads again."""
         super().resume_writing()
         self._write = _stopped(self._write)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """The client is gone."""
+        """The client disconnects."""
         self._head, self._write = _stopped(self._head), _stopped(self._write)
         super().connection_lost(exc)
 
@@ -71,7 +71,7 @@ class TimeoutProtocol(H11Protocol):
 
 
 def _stopped(timer: asyncio.TimerHandle | None) -> asyncio.TimerHandle | None:
-    """Nothing in the place of ``timer``, which does not ring any more."""
+    """Cancel ``timer``; returns None in its place."""
     if timer is not None:
         timer.cancel()
     return None

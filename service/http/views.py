@@ -1,4 +1,4 @@
-"""Studies and cases as the interface shows them: plain data from the store's records."""
+"""Studies and cases for the API: plain data from the store's records."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def study_address(study_id: str) -> str:
 
 
 def study_links(study_id: str) -> dict[str, str]:
-    """Addresses of what belongs to a study."""
+    """URLs of the resources of a study."""
     own = study_address(study_id)
     parts = {name: f"{own}/{name}" for name in ("cases", "results", "curves", "map", "sensitivity", "report", "events")}
     return {"self": own, **parts, "cancel": f"{own}:cancel", "page": f"/studies/{study_id}"}
@@ -44,7 +44,7 @@ def summary(record: StudyRecord) -> StudySummary:
 
 
 def progress_json(progress: Progress) -> FullProgress:
-    """How far a study is, how fast, and how long it will take."""
+    """Progress of a study, its rate and its time left."""
     left, covered = progress.seconds_left, progress.covered
     return filled(
         FullProgress,
@@ -55,7 +55,7 @@ def progress_json(progress: Progress) -> FullProgress:
 
 
 def detail(record: StudyRecord, progress: Progress, study: Study, spec: dict[str, Any], kinds: Kinds) -> StudyDetail:
-    """A study with everything; ``record`` and ``progress`` are of one moment (`Store.look`)."""
+    """A study with everything; ``record`` and ``progress`` come from one transaction (`Store.look`)."""
     return {
         **summary(record),
         "progress": progress_json(progress),
@@ -70,7 +70,7 @@ def detail(record: StudyRecord, progress: Progress, study: Study, spec: dict[str
 
 @lru_cache
 def preset_of(name: str) -> Preset:
-    """A study that comes with the program, with its spec and what it shows; KeyError when there is none so named."""
+    """A preset with its spec and description; KeyError for an unknown name."""
     file, text = preset_text(name)
     spec = parse_spec(load_spec(text, format_of(file)))
     return {

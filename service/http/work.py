@@ -1,4 +1,4 @@
-"""What a request has done in other processes: ended when its client leaves, and within the share of its token."""
+"""Work for a request in other processes: ended when its client disconnects, and limited by the share of its token."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from sprag.service.http.shares import Shares
     from sprag.worker.models import KernelShape
 
-#: What can become of anything that is checked, whatever it is.
+#: Problems that any check can lead to.
 CHECK_PROBLEMS: Final = ("too-costly", "not-computed", "too-many-requests", "unavailable")
 
 Args = TypeVarTuple("Args")
@@ -29,10 +29,10 @@ R = TypeVar("R")
 
 
 class Work:
-    """The door of one request to the processes that do what users define.
+    """Access of one request to the processes that evaluate user input.
 
-    Every method raises ApiError when there is too much to do, when a limit of time or memory is reached, and
-    ClientDisconnect when the client is gone.
+    Every method raises ApiError when there is too much work or a limit of time or memory is reached, and
+    ClientDisconnect when the client has disconnected.
     """
 
     def __init__(self, request: Request) -> None:
@@ -40,10 +40,10 @@ class Work:
         self._context = cast("Context", request.app.state.context)
 
     async def check(self, function: Callable[[*Args], R], *args: *Args) -> R:
-        """The value of a function that reads, expands, fits or draws what users wrote."""
+        """The value of a function that reads, expands, fits or draws user input."""
         try:
             return await self._check(function, *args)
-        except NotCompiledError as error:  # the first time on a machine
+        except NotCompiledError as error:  # the first use on a machine
             await self.load(error.shape)
             return await self._check(function, *args)
 
@@ -57,7 +57,7 @@ class Work:
         return await self._attended(self._in_turn(context.compute_shares, context.computer, function, *args))
 
     async def load(self, shape: KernelShape) -> None:
-        """Have a kernel ready; its compilation goes on when the client is gone."""
+        """Load a kernel, compiling it if necessary; the compilation continues when the client disconnects."""
         await self._attended(self._context.computer.load(shape))
 
     async def _in_turn(self, shares: Shares, computer: Computes, function: Callable[[*Args], R], *args: *Args) -> R:
@@ -66,7 +66,7 @@ class Work:
             return await computer.run(function, *args)
 
     async def _attended(self, work: Coroutine[Any, Any, R]) -> R:
-        """The value of ``work``, which is cancelled when the client is gone."""
+        """The value of ``work``, which is cancelled when the client disconnects."""
         doing, leaving = asyncio.ensure_future(work), asyncio.ensure_future(self._left())
         try:
             await asyncio.wait((doing, leaving), return_when=asyncio.FIRST_COMPLETED)
@@ -80,7 +80,7 @@ class Work:
             await asyncio.gather(doing, leaving, return_exceptions=True)
 
     async def _left(self) -> None:
-        """Wait until the client is gone."""
+        """Wait until the client has disconnected."""
         while (await self._request.receive())["type"] != "http.disconnect":
             pass
 

@@ -75,7 +75,7 @@ def list_cases(
     if flag is not None and flag not in FLAG_MASKS:
         raise parameter_error("flag", "invalid-choice", "unknown flag", shown(flag), ", ".join(FLAG_MASKS))
     after = _after(page_token)
-    # One more than the page, which tells whether there is another.
+    # One more than the page, which shows whether there is another page.
     block = context.store.case_page(study_id, after, page_size + 1, ending, regime, flag)
     rows = list(rows_json(context.store.study(study_id), block))
     token = str(rows[page_size - 1]["case"]) if len(rows) > page_size else None
@@ -87,7 +87,11 @@ def _after(page_token: str | None) -> int:
         return -1
     if not (page_token.isascii() and page_token.isdigit() and len(page_token) < 19):
         raise parameter_error(
-            "page_token", "invalid-text", "not a token of this list", shown(page_token), "`next_page_token` of a page"
+            "page_token",
+            "invalid-text",
+            "is not a token of the list",
+            shown(page_token),
+            "`next_page_token` of a page",
         )
     return int(page_token)
 
@@ -160,7 +164,7 @@ async def get_trajectory(
     ] = 1000,
     form: Annotated[str | None, format_query(("json", "csv"))] = None,
 ) -> Response:
-    """Every variable, torque, power and state of one case over time (or the angle). The case is run again for it."""
+    """Every variable, torque, power and state of one case over time (or the angle). The case is run again for this."""
     chosen = choose_format(request, form, {"json": MEDIA_TYPES["json"], "csv": MEDIA_TYPES["csv"]})
     written: Format = "csv" if chosen == "csv" else "json"
 

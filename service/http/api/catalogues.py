@@ -1,4 +1,4 @@
-"""What there is: models with their parameters, results and endings; studies that come with the program."""
+"""Catalogues: models with their parameters, results and endings; presets."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def get_model(request: Request, name: ModelName) -> Any:
 
 @router.get("/presets", response_model=m.PresetList, responses=problems("invalid-parameter") | documented_304())
 def list_presets(request: Request) -> Any:
-    """Studies that come with the program, each with its whole spec, to be submitted as they are or changed."""
+    """Studies that come with the program, with their complete specs, to be submitted unchanged or modified."""
     return _answer(request, {"presets": [preset_of(name) for name in preset_names()]})
 
 

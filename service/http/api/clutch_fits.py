@@ -23,7 +23,7 @@ router = APIRouter(tags=["clutch"], dependencies=[Depends(strict_query)])
 _QUANTITY: Final = {"anyOf": [{"type": "number"}, {"type": "string", "minLength": 1}]}
 SCHEMA: Final[dict[str, Any]] = {
     "type": "object",
-    "description": "Measured data of a clutch and how well it is to be fitted; numbers in SI or texts with a unit.",
+    "description": "Measured data of a clutch and the accuracy of its fit; numbers in SI or texts with a unit.",
     "required": ["data", "accuracy"],
     "additionalProperties": False,
     "properties": {
@@ -35,7 +35,7 @@ SCHEMA: Final[dict[str, Any]] = {
         },
         "accuracy": {**_QUANTITY, "description": "largest residual accepted (N*m)"},
         **schemas(FIT),
-        "backlash": {**_QUANTITY, "description": "lost motion to be taken off the angles (rad)", "default": 0},
+        "backlash": {**_QUANTITY, "description": "backlash to be subtracted from the angles (rad)", "default": 0},
     },
 }
 

@@ -126,7 +126,7 @@ async def get_map(
     "/results",
     response_class=Response,
     responses={
-        **files("All finished cases, in the format asked for.", exports.MEDIA_TYPES.values()),
+        **files("All finished cases, in the requested format.", exports.MEDIA_TYPES.values()),
         **problems("invalid-parameter", "study-not-found", "not-acceptable"),
         **documented_304(),
     },
@@ -158,7 +158,7 @@ async def get_results(
     "/report",
     response_class=Response,
     responses={
-        **files("The study as a document to be printed.", report.MEDIA_TYPES.values()),
+        **files("The study as a printable document.", report.MEDIA_TYPES.values()),
         **problems("invalid-parameter", "study-not-found", "not-acceptable", *CHECK_PROBLEMS),
         **documented_304(),
     },

@@ -1,4 +1,4 @@
-"""What OpenAPI says about bodies, problems and security, in one way for every operation."""
+"""OpenAPI documentation of bodies, problems and security, uniform for all operations."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Responses = dict[int | str, dict[str, Any]]
 
 for _module in (catalogue, results, schedules, studies):
     for _shape in filter(is_typeddict, vars(_module).values()):
-        _shape.__pydantic_config__ = {"extra": "forbid"}  # an answer has these fields and no others
+        _shape.__pydantic_config__ = {"extra": "forbid"}  # an answer has exactly these fields
 
 
 def problems(*slugs: str) -> Responses:
@@ -79,7 +79,7 @@ _EXAMPLE_ERRORS: Final = {
 
 
 def key_header(example: str, once: str) -> Any:
-    """The header that makes sure that something is made once; ``once`` says so."""
+    """The idempotency key header; ``once`` describes its effect."""
     return Header(
         alias="Idempotency-Key",
         min_length=1,
@@ -106,16 +106,16 @@ def files(description: str, media_types: Iterable[str]) -> Responses:
 
 def not_modified() -> Responses:
     """Documentation of the answer to a conditional request."""
-    return {304: {"description": "The version named by If-None-Match is still the right one.", "headers": _TAG}}
+    return {304: {"description": "The version named by If-None-Match is current.", "headers": _TAG}}
 
 
 def located(status: int) -> Responses:
-    """Documentation of the answer that tells where the new thing is."""
+    """Documentation of the answer with the location of the new resource."""
     return {status: {"headers": {"Location": {"description": "its address", "required": True, "schema": _TEXT}}}}
 
 
 def one_of(names: Iterable[str]) -> dict[str, Any]:
-    """``json_schema_extra`` of a text that takes these values only, which generated clients go on taking as a text."""
+    """``json_schema_extra`` of a text with these values only; generated clients still treat it as a text."""
     return {"pattern": f"^({'|'.join(names)})$"}
 
 

@@ -49,7 +49,7 @@ async def get_engagements(
     ] = "engagements",
     form: Annotated[str | None, format_query(("json", "csv"))] = None,
 ) -> Response:
-    """Every engagement of the clutches of one case, and the means of its periods. The case is run again for it."""
+    """Every engagement of the clutches of one case, and the means of its periods. The case is run again for this."""
     chosen = choose_format(request, form, {"json": MEDIA_TYPES["json"], "csv": MEDIA_TYPES["csv"]})
     written: Format = "csv" if chosen == "csv" else "json"
     asked = _table(table)

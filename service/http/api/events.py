@@ -1,4 +1,4 @@
-"""GET /studies/{id}/events: the progress of a study as it goes, as server-sent events."""
+"""GET /studies/{id}/events: the progress of a study as server-sent events."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from sprag.worker.limits import MAX_STREAMS
 router = APIRouter(tags=["studies"], dependencies=[Depends(strict_query)])
 
 _MEDIA_TYPE: Final = "text/event-stream"
-#: Seconds between two looks at the study, and of silence after which a comment keeps the connection open.
+#: Seconds between two checks of the study, and of silence after which a comment keeps the connection open.
 LOOK_SECONDS = 0.5
 _SILENCE_SECONDS: Final = 15.0
-#: Milliseconds after which a browser that lost the connection comes again.
+#: Milliseconds after which a browser reconnects.
 _RETRY: Final = 2000
 
 LastEventId = Annotated[
-    str | None, Header(alias="Last-Event-ID", max_length=40, description="id of the last event that was received")
+    str | None, Header(alias="Last-Event-ID", max_length=40, description="id of the last received event")
 ]
 
 
@@ -41,12 +41,12 @@ LastEventId = Annotated[
     response_class=StreamingResponse,
     responses={
         **files("Events `progress`, and `end` as the last one.", [_MEDIA_TYPE]),
-        204: {"description": "The study has ended and the client knows it: it need not come again."},
+        204: {"description": "The study has ended and the client knows it: it must not reconnect."},
         **problems("invalid-parameter", "study-not-found"),
     },
 )
 async def get_events(context: Ctx, study_id: StudyId, last_event_id: LastEventId = None) -> Response:
-    """The progress of a study as it goes. Each event has the whole state, so a missed one does not matter."""
+    """The live progress of a study. Each event has the complete state, so a missed one does not matter."""
     record = await run_in_threadpool(context.store.get_study, study_id)
     if record.state.terminal and last_event_id == str(record.revision):
         return Response(status_code=204)
@@ -58,7 +58,7 @@ async def get_events(context: Ctx, study_id: StudyId, last_event_id: LastEventId
 
 
 class _Stream(StreamingResponse):
-    """The stream, which gives its place back however it ends."""
+    """The stream, which releases its place however it ends."""
 
     def __init__(self, context: Context, study_id: str, last: str | None) -> None:
         super().__init__(_events(context, study_id, last), media_type=_MEDIA_TYPE)
@@ -79,7 +79,7 @@ async def _events(context: Context, study_id: str, last: str | None) -> AsyncIte
         try:
             record, progress = await run_in_threadpool(context.store.look, study_id)
         except StoreError:
-            return  # deleted, or the database has a problem: a client that comes again is told which
+            return  # deleted, or a database problem, which a reconnecting client learns
         if str(record.revision) != last:
             last, spoke = str(record.revision), time.monotonic()
             yield _event(record, progress)

@@ -1,4 +1,4 @@
-"""The examples of the interface's documentation. A test sends every one of them."""
+"""The examples of the API documentation. A test sends each of them."""
 
 from __future__ import annotations
 

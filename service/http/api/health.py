@@ -1,4 +1,4 @@
-"""Whether the service is up (livez) and able to work (readyz); open to everybody, so they tell nothing else."""
+"""Whether the service is up (livez) and able to work (readyz); open to everybody, so they reveal nothing else."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ async def livez() -> Any:
 def readyz(request: Request) -> Any:
     """Whether studies can be submitted, read and run: checks, database, its schema, file and write lock, the worker."""
     readiness, context = cast("Readiness", request.app.state.readiness), cast("Context", request.app.state.context)
-    starting = () if context.ready.is_set() else ("The processes that check what is submitted are starting.",)
+    starting = () if context.ready.is_set() else ("The checking processes are starting.",)
     if found := (*starting, *readiness.problems()):
         raise ApiError("unavailable", " ".join(found), headers={"Retry-After": "5"})
     warnings = readiness.warnings()
@@ -45,6 +45,6 @@ def readyz(request: Request) -> Any:
     },
 )
 def metrics(request: Request) -> Response:
-    """What the service measures, for Prometheus: queue, cases, endings, requests, waits for the database."""
+    """Metrics for Prometheus: queue, cases, endings, requests, waits for the database."""
     found = cast("Metrics", request.app.state.metrics)
     return Response(found.text(), headers={"Content-Type": CONTENT_TYPE})

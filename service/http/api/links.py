@@ -1,4 +1,4 @@
-"""Where the answers of the interface lead (OpenAPI links): ids that one operation gives and others take."""
+"""OpenAPI links: ids that one operation returns and others accept."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, Final
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """What is in an answer of ``source`` with ``status`` is what ``target`` takes, as parameters or as its body."""
+    """A value in the answer of ``source`` with ``status`` that ``target`` accepts, as parameters or as its body."""
 
     source: str
     status: str
@@ -76,7 +76,7 @@ LINKS: Final = tuple(_all())
 
 
 def add_links(document: dict[str, Any]) -> None:
-    """Put the links into the answers of an OpenAPI document."""
+    """Add the links to the answers of an OpenAPI document."""
     operations = {
         operation["operationId"]: operation for item in document["paths"].values() for operation in item.values()
     }

@@ -57,7 +57,7 @@ async def get_strobes(
     ] = "strobes",
     form: Annotated[str | None, format_query(_FORMATS)] = None,
 ) -> Response:
-    """The state of one case once in each excitation period, and its orbit. The case is run again for it."""
+    """The state of one case once per excitation period, and its orbit. The case is run again for this."""
     chosen = choose_format(request, form, _FORMATS)
     asked = _table(table)
 

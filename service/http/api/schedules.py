@@ -1,4 +1,4 @@
-"""Schedules: studies that are submitted by themselves, once or again and again."""
+"""Schedules: studies that are submitted automatically, once or repeatedly."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _FIELDS: Final[dict[str, Any]] = {
         "type": ["string", "null"],
         "minLength": 1,
         "maxLength": MAX_NAME_LENGTH,
-        "description": "name of its studies; else the spec's own",
+        "description": "name of its studies; by default the spec's name",
     },
     "spec": {"$ref": "#/components/schemas/Spec"},
     "cron": {
@@ -64,7 +64,7 @@ _FIELDS: Final[dict[str, Any]] = {
     "finish_by": {
         "type": ["string", "null"],
         "maxLength": 80,
-        "description": f"each run goes coarse to fine and is held then: {ALLOWED_OF_RUNS}",
+        "description": f"deadline: each study is run coarse to fine and held then: {ALLOWED_OF_RUNS}",
     },
     "enabled": {"type": "boolean", "default": True},
 }
@@ -77,7 +77,7 @@ SCHEMA: Final[dict[str, Any]] = {
 }
 CHANGE_SCHEMA: Final[dict[str, Any]] = {
     "type": "object",
-    "description": "The fields of a schedule that are to change.",
+    "description": "The fields of a schedule to change.",
     "additionalProperties": False,
     "properties": _FIELDS,
 }
@@ -103,7 +103,9 @@ ScheduleId = Annotated[
 Fields = Annotated[Body, Depends(read_body)]
 IdempotencyKey = Annotated[
     str | None,
-    key_header("0b6e9a52-nights", "the same key with the same body keeps the schedule once, however often it is sent"),
+    key_header(
+        "0b6e9a52-nights", "the same key with the same body creates the schedule once, even if sent repeatedly"
+    ),
 ]
 
 
@@ -117,7 +119,7 @@ IdempotencyKey = Annotated[
 async def create_schedule(
     context: Ctx, work: Attended, received: Fields, idempotency_key: IdempotencyKey = None
 ) -> Response:
-    """Keep a schedule: its study is submitted whenever it is due. Due times that were missed are made up for once."""
+    """Create a schedule: its study is submitted whenever it is due; for missed due times, once."""
     store = context.store
 
     def keep(fields: ScheduleFields, key: str | None, body_hash: str) -> Response:
@@ -125,7 +127,7 @@ async def create_schedule(
 
     if idempotency_key is None:
         return await run_in_threadpool(keep, await _fields(context, work, received, None), None, "")
-    # Before the fields are read: what was a time to come may have passed since the key was sent first.
+    # Before the fields are read: a future time may have passed since the key was first sent.
     with _told():
         body_hash = await work.check(checks.body_hash, received.content, received.format)
     known = await run_in_threadpool(store.schedule_of_key, idempotency_key, body_hash)
@@ -146,7 +148,7 @@ async def _fields(context: Context, work: Work, received: Body, old: ScheduleFie
 
 @contextmanager
 def _told() -> Iterator[None]:
-    """What is wrong with a body becomes an ApiError."""
+    """Convert the faults of a body to an ApiError."""
     try:
         yield
     except SpecError as error:
@@ -176,7 +178,7 @@ def get_schedule(context: Ctx, schedule_id: ScheduleId) -> Response:
     openapi_extra=body({"disabled": {"enabled": False}}, {"$ref": "#/components/schemas/ScheduleChange"}),
 )
 async def change_schedule(context: Ctx, work: Attended, schedule_id: ScheduleId, received: Fields) -> Response:
-    """Change some fields of a schedule; the others stay. It begins anew: nothing missed is made up for."""
+    """Change some fields of a schedule; the others are kept. Due times missed before the change are dropped."""
     record = await run_in_threadpool(context.store.get_schedule, schedule_id)
     fields = await _fields(context, work, received, record.fields)
 
@@ -194,6 +196,6 @@ async def change_schedule(context: Ctx, work: Attended, schedule_id: ScheduleId,
     responses=problems("invalid-parameter", "schedule-not-found"),
 )
 def delete_schedule(context: Ctx, schedule_id: ScheduleId) -> Response:
-    """Delete a schedule. Studies that came of it stay."""
+    """Delete a schedule. Its studies are kept."""
     context.store.delete_schedule(schedule_id)
     return Response(status_code=204)

@@ -71,7 +71,7 @@ async def get_sensitivity(
 
 
 def indices_csv(found: list[Sensitivity]) -> bytes:
-    """A line for each result and axis: the indices with the half widths of their intervals."""
+    """A row for each result and axis: the indices with the half widths of their intervals."""
     rows: list[list[Any]] = [
         [
             item.info.name,

@@ -1,4 +1,4 @@
-"""Studies: submit, preview, list, look at, hold, cancel, delete."""
+"""Studies: submit, preview, list, read, hold, cancel, delete."""
 
 from __future__ import annotations
 
@@ -53,14 +53,14 @@ FinishBy = Annotated[
     str | None,
     Query(
         max_length=80,
-        description=f"the study is run coarse to fine and held at this time, whatever is done then: {ALLOWED}",
+        description=f"the study is run coarse to fine and held at this time, finished or not: {ALLOWED}",
         examples=["8 h"],
     ),
 ]
 
 
 def _finish(context: Context, text: str | None) -> datetime | None:
-    """The deadline that the parameter `finish_by` names; ApiError when it cannot be kept."""
+    """The deadline given by the parameter `finish_by`; ApiError when it is invalid."""
     if text is None:
         return None
     try:
@@ -88,10 +88,10 @@ async def create_study(
     ] = False,
     finish_by: FinishBy = None,
 ) -> Response:
-    """Submit a study. Rows that other studies have are taken.
+    """Submit a study. Rows of other studies are reused.
 
-    Its cases are run in the order of their numbers; with `finish_by` coarse to fine, each pass a complete coarser grid,
-    so that whatever is done then makes whole curves.
+    Its cases are run in the order of their numbers; with `finish_by` coarse to fine, in passes that are complete
+    coarser grids, so that the finished cases form complete curves.
     """
     finish, now = _finish(context, finish_by), context.store.clock.now()
     given = _given(priority=priority, fresh=fresh, finish_by=finish_by)
@@ -102,7 +102,7 @@ async def create_study(
 
 
 def _given(**options: object) -> dict[str, object]:
-    """The parameters of a request beside its body, as the client wrote them, without those left out."""
+    """The given parameters of a request besides its body, as the client wrote them."""
     return {name: value for name, value in options.items() if value}
 
 
@@ -118,7 +118,7 @@ def _take_in(context: Context, made: Submission, idempotency_key: str | None, pr
     openapi_extra=_SPEC_BODY,
 )
 async def preview_study(context: Ctx, work: Attended, received: SpecBody, finish_by: FinishBy = None) -> Response:
-    """What a study would be: cases, time, size, warnings and fitted clutch laws. Nothing is submitted."""
+    """Preview of a study: cases, time, size, warnings and fitted clutch laws. Nothing is submitted."""
     finish, now = _finish(context, finish_by), context.store.clock.now()
     text = await work.check(checks.preview, context.library, received.content, received.format, finish, now)
     return Response(text, media_type=JSON)
@@ -146,7 +146,7 @@ def list_studies(
     responses=problems("invalid-parameter", "study-not-found") | documented_304(),
 )
 def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
-    """A study: its state, how far it is, how long it will take, and its spec."""
+    """A study: its state, progress, time left and spec."""
     record, progress = context.store.look(study_id)
     tag = entity_tag(record.id, record.revision)
     if record.state.terminal and (unchanged := not_modified(request, tag)):
@@ -166,7 +166,7 @@ def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
     responses=problems("invalid-parameter", "study-not-found", "wrong-state"),
 )
 def delete_study(context: Ctx, study_id: StudyId) -> Response:
-    """Delete a study that has ended, or whose time was over, with all its results."""
+    """Delete a study that has ended, or is held at its deadline, with all its results."""
     context.store.delete_study(study_id)
     return Response(status_code=204)
 
@@ -190,7 +190,7 @@ def _verb(name: str, sentence: str) -> None:
     )(act)
 
 
-_verb("cancel", "Stop a study for good: the cases that are done are kept, the others are not run.")
+_verb("cancel", "Stop a study for good: finished cases are kept, the others are not run.")
 _verb("pause", "Hold a study: no new cases are started until it is resumed.")
 _verb("resume", "Resume a study that is held; a past deadline or a closed window no longer applies.")
 
@@ -209,10 +209,12 @@ def retry_study(
         Query(description="only cases with this ending; may be repeated", examples=[["chatter"]]),
     ] = None,
 ) -> Response:
-    """Run the cases of an ended study that did not end ok again, and no others."""
+    """Run only those cases of an ended study again that did not end ok."""
     for name in ending or ():
         if name not in _FAILED:
-            raise parameter_error("ending", "invalid-choice", "no ending of a failed case", name, ", ".join(_FAILED))
+            raise parameter_error(
+                "ending", "invalid-choice", "is not a failed case's ending", name, ", ".join(_FAILED)
+            )
     return json_response(views.summary(context.store.retry_study(study_id, ending)), 202)
 
 
@@ -238,7 +240,7 @@ async def extend_study(
     priority: Priority = 0,
     finish_by: FinishBy = None,
 ) -> Response:
-    """Submit a study with more values on the axes of an old one, or more cases; only what is new is run."""
+    """Submit a study with more values on the axes of an old one, or more cases; only new cases are run."""
     finish, now = _finish(context, finish_by), context.store.clock.now()
     given = _given(priority=priority, finish_by=finish_by)
     made = await work.check(
@@ -269,8 +271,8 @@ async def run_longer(
     regime: Annotated[
         str | None,
         Query(
-            description="regime of the cases of a settled study, by default `unsettled`; of a run of a given time the "
-            "cases with the flag `not_settled` are meant",
+            description="regime of the cases of a settled study, by default `unsettled`; for runs of a given time the "
+            "cases with the flag `not_settled` are used",
             json_schema_extra=one_of(REGIME_SENTENCES),
         ),
     ] = None,
@@ -284,7 +286,7 @@ async def run_longer(
     ] = None,
     idempotency_key: ExtensionKey = None,
 ) -> Response:
-    """Submit a study of the cases of a study that are not settled, with more time for each."""
+    """Submit a study of the unsettled cases of a study, with more time for each."""
     kind = await run_in_threadpool(_to_run_longer, context, study_id, regime)
     given = _given(regime=regime, at_most=at_most)
     now = context.store.clock.now()
@@ -293,7 +295,7 @@ async def run_longer(
 
 
 def _to_run_longer(context: Context, study_id: str, regime: str | None) -> str:
-    """The regime or the flag of the cases that are to be run longer; FaultError where no case has it."""
+    """The regime or flag of the cases to run longer; FaultError where no case has it."""
     study, kinds = context.store.study(study_id), context.store.kinds(study_id)
     if is_settled(study.run):
         if (wanted := regime or UNSETTLED) in kinds.regimes:
@@ -302,7 +304,7 @@ def _to_run_longer(context: Context, study_id: str, regime: str | None) -> str:
             "regime", "unknown-name", "no case of this study has it", wanted, ", ".join(kinds.regimes)
         )
     if regime is not None:
-        raise parameter_error("regime", "unknown-name", "a run of a given time has none", regime, "no `regime`")
+        raise parameter_error("regime", "unknown-name", "runs of a given time have no regime", regime, "no `regime`")
     if NOT_SETTLED in kinds.flags:
         return NOT_SETTLED
     raise parameter_error("regime", "unknown-name", "no case of this study has the flag `not_settled`")
@@ -315,5 +317,5 @@ def _to_run_longer(context: Context, study_id: str, regime: str | None) -> str:
     responses=problems("invalid-parameter", "study-not-found", "wrong-state"),
 )
 def prioritize_study(context: Ctx, study_id: StudyId, priority: Priority) -> Response:
-    """Give a study that has not ended another priority."""
+    """Change the priority of a study that has not ended."""
     return json_response(views.summary(context.store.prioritize_study(study_id, priority)), 202)

@@ -9,7 +9,7 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A parameter of an operation: ``place`` is query, path or header; ``kind`` says what values it takes."""
+    """A parameter of an operation: ``place`` is query, path or header; ``kind`` describes its values."""
 
     name: str
     place: str
@@ -21,7 +21,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """An answer: status, what it means, and its content types."""
+    """An answer: its status, meaning and content types."""
 
     status: str
     meaning: str
@@ -113,7 +113,7 @@ def _body_example(operation: dict[str, Any]) -> str:
 
 
 def with_token_needed(document: dict[str, Any]) -> dict[str, Any]:
-    """The document of a service whose every operation but the open ones needs a token."""
+    """The document of a service that requires a token for all operations except the open ones."""
     needed: list[dict[str, list[str]]] = [{"bearer": []}]
     paths = {
         path: {

@@ -38,7 +38,7 @@ End = Annotated[str, Query(alias="to", max_length=80)]
 
 
 def _span(study: Study, case: int, begin: str, end: str) -> tuple[float, float]:
-    """First and last time (s) that are shown: as asked for, else the last periods of the window."""
+    """First and last time shown (s): as requested, otherwise the last periods of the window."""
     if begin.strip() or end.strip():
         return trajectories.span(study, case, begin.strip() or None, end.strip() or None)
     extent = models.extent(study, case)
@@ -109,7 +109,7 @@ async def _asked(
         return study, _span(study, case, *span)
 
     study, times = await run_in_threadpool(find)
-    # A case is what its study says, and studies never change.
+    # A case is determined by its study, and studies never change.
     tag = entity_tag(study_id, request.url.path, request.url.query, models.ENGINE_VERSION)
     return study, times, tag, not_modified(request, tag)
 

@@ -1,4 +1,4 @@
-"""What a page is to draw, from its address: every choice stands there, and what is not chosen has a good default."""
+"""Content of a page from its URL, which contains every choice; the others have useful defaults."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class MapQuery:
-    """What a map shows: one result over two axes, the others held."""
+    """A map: one result over two axes, the others held."""
 
     x: str
     y: str
@@ -37,9 +37,9 @@ def characteristic(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | No
 
 
 def curve_query(study: Study, infos: Sequence[ResultInfo], given: QueryParams) -> CurveQuery | None:
-    """The curves that an address asks for; None for a study in which nothing varies.
+    """The curves requested by a URL; None for a study in which nothing varies.
 
-    Axes that it leaves open are held at their usual value. What it asks for wrongly is left for `select` to refuse.
+    Open axes are held at their usual value. Invalid choices are left for `select` to refuse.
     """
     main = main_query(study, infos)
     if main is None:
@@ -52,7 +52,7 @@ def curve_query(study: Study, infos: Sequence[ResultInfo], given: QueryParams) -
 
 
 def map_query(study: Study, infos: Sequence[ResultInfo], given: QueryParams) -> MapQuery | None:
-    """The map that an address asks for; None where there are no two axes to draw it over."""
+    """The map requested by a URL; None where fewer than two axes vary."""
     varying = [axis for axis in study.axes if len(axis) > 1]
     main = main_query(study, infos)
     if main is None or study.combine != "grid" or len(varying) < 2:
@@ -66,7 +66,7 @@ def map_query(study: Study, infos: Sequence[ResultInfo], given: QueryParams) -> 
 
 
 def held(study: Study, given: Sequence[str], drawn: Sequence[str]) -> tuple[tuple[str, str], ...]:
-    """The pairs ``path=value`` of the axes that are not drawn: as given, the others at their usual value (a grid)."""
+    """Pairs of path and value for the axes that are not drawn: as given, others (of a grid) at their usual value."""
     pairs: dict[str, str] = {}
     for item in given:
         path, equals, value = item.partition("=")
@@ -84,7 +84,7 @@ def held(study: Study, given: Sequence[str], drawn: Sequence[str]) -> tuple[tupl
 
 
 def pairs_of(query: CurveQuery | MapQuery) -> list[tuple[str, str]]:
-    """The same as parameters of an address."""
+    """The query as parameters of a URL."""
     at = [("at", f"{path}={value}") for path, value in query.at]
     if isinstance(query, MapQuery):
         return [("x", query.x), ("y", query.y), ("z", query.z), *at]

@@ -44,7 +44,7 @@ _LISTED: Final = 50
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What is compared: the studies, what all of them have in common, and what is chosen of it."""
+    """A comparison: the studies, what they have in common, and the choices."""
 
     records: list[StudyRecord]
     studies: list[Study]
@@ -62,19 +62,21 @@ class Comparison:
         return record.name if names.count(record.name) == 1 else f"{record.name} ({record.id})"
 
     def query(self, position: int) -> CurveQuery:
-        """The curves of one study: axes that it alone has are held at its usual value."""
+        """The curves of one study; axes that only it has are held at their usual value."""
         study = self.studies[position]
         given = [item for item in self.at if study.axis_of(item.partition("=")[0]) is not None]
         return CurveQuery(self.x, self.y, self.by, held(study, given, (self.x, *self.by)))
 
     def pairs(self) -> list[tuple[str, str]]:
-        """The same as parameters of an address."""
+        """The comparison as parameters of a URL."""
         chosen = [("x", self.x), *(("y", name) for name in self.y), *(("by", path) for path in self.by)]
         return [*(("study", record.id) for record in self.records), *chosen, *(("at", item) for item in self.at)]
 
 
 def comparison(context: Context, given: QueryParams) -> Comparison:
-    """What an address compares; SelectionError where the studies have nothing in common, StudyNotFound for others."""
+    """The comparison of a URL; SelectionError where the studies have nothing in common, StudyNotFound for
+    unknown ones.
+    """
     ids = list(dict.fromkeys(name for name in given.getlist("study") if name))[:_MOST]
     records = [context.store.get_study(study_id) for study_id in ids]
     studies = [context.store.study(study_id) for study_id in ids]
@@ -85,7 +87,7 @@ def comparison(context: Context, given: QueryParams) -> Comparison:
         if all((i := study.axis_of(path)) is not None and len(study.axes[i]) > 1 for study in studies)
     ]
     if not axes:
-        message = "these studies have no varying parameter in common, so that nothing can be drawn against it"
+        message = "these studies have no varying parameter in common against which to draw results"
         raise SelectionError([ParameterFault("study", "nothing-varies", message)])
     known = [{info.name for info in models.study_results(study)} for study in studies]
     results = [info for info in models.study_results(studies[0]) if all(info.name in names for names in known)]
@@ -170,7 +172,7 @@ def compare_figure(context: Ctx, request: Request) -> Response:
 
 @router.get("/compare/picture.svg")
 async def compare_picture(context: Ctx, work: Attended, request: Request) -> Response:
-    """The same as a picture, for pages without JavaScript."""
+    """The comparison as a picture, for pages without JavaScript."""
 
     def look() -> tuple[str, Response | Drawing, bool]:
         tag = _tag(context, request)

@@ -1,4 +1,4 @@
-"""The table of a case's engagements: a page of its own, which the page of the case takes in."""
+"""The table of a case's engagements: a page of its own, which the page of the case embeds."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 router = APIRouter(include_in_schema=False)
 
-#: Rows that a page shows.
+#: Most rows of a page.
 _SHOWN = 100
 
 

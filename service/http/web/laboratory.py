@@ -1,4 +1,4 @@
-"""The machine-shaft laboratory: a machine's motion over a cycle, redrawn at once while its numbers are changed."""
+"""The machine-shaft laboratory: a machine's motion over a cycle, redrawn live while its numbers change."""
 
 from __future__ import annotations
 
@@ -40,16 +40,16 @@ if TYPE_CHECKING:
 
 router = APIRouter(include_in_schema=False)
 
-#: Numbers besides the masses that have a slider, and how far it goes: (factor down, factor up) of the machine's own.
+#: Numbers besides the masses that have a slider, and its range: (lower, upper) factor on the machine's own value.
 _SLIDERS: Final = {"drive.inertia": (0.05, 20.0), "mean_speed": (0.25, 4.0), "operation.scale": (0.0, 3.0)}
 _MASSES: Final = (0.0, 4.0)
-#: Results that are told beside the picture.
+#: Results that are shown beside the picture.
 _TOLD: Final = (
     "irregularity", "omega.mean", "omega.max", "omega.angle_at_max", "omega.min", "omega.angle_at_min",
     "energy.fluctuation", "energy.mean", "drive_torque.mean", "power.mean", "acceleration.max",
     "s1.amplitude", "s2.amplitude", "s3.amplitude", "s4.amplitude", "required_inertia",
 )  # fmt: skip
-#: Questions about a machine, each a study: word, and what it varies.
+#: Questions about a machine, each a study: its name, and what it varies.
 QUESTIONS: Final = {"inertia": "the drive's inertia", "masses": "the masses", "load": "the operation's load"}
 _QUESTION_VALUES: Final = 25
 _QUESTION: Final = "question_"
@@ -73,10 +73,10 @@ class Slider:
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A machine with its numbers as an address gives them; ``faults`` by path where they cannot be taken.
+    """A machine with the numbers of a URL; ``faults``, by path, of invalid ones.
 
-    ``further`` are the numbers that have no slider, as they were given, by path. ``spec`` has every number as it was
-    given, wrong or not.
+    ``further`` are the numbers without a slider as given, by path. ``spec`` contains every number as given, valid or
+    not.
     """
 
     name: str
@@ -88,20 +88,20 @@ class Setting:
 
     @property
     def query(self) -> str:
-        """The same as parameters of an address."""
+        """The setting as parameters of a URL."""
         numbers = [*((slider.path, slider.text) for slider in self.sliders), *self.further.items()]
         return urlencode([("machine", self.name), *numbers])
 
 
 @lru_cache(maxsize=1)
 def machines() -> tuple[str, ...]:
-    """Names of the machines that come with the program; those of the questions are among them already."""
+    """Names of the built-in machines, including those of the questions."""
     shafts = (name for name in preset_names() if preset_of(name)["spec"]["model"] == models.MACHINE_SHAFT)
     return tuple(name for name in shafts if not name.startswith(_QUESTION))
 
 
 def setting(given: Mapping[str, str]) -> Setting:
-    """What an address sets; ApiError for a machine that there is not."""
+    """The setting of a URL; ApiError for an unknown machine."""
     name = given.get("machine") or next(iter(machines()), "")
     if name not in machines():
         raise ApiError("not-found", f"Unknown machine; known machines: {', '.join(machines()) or 'none'}.")
@@ -122,7 +122,7 @@ def setting(given: Mapping[str, str]) -> Setting:
 
 
 def _value(text: str, unit: str, otherwise: float) -> float:
-    """The number (SI) that a text with or without a unit gives, also where the machine cannot be with it."""
+    """The number (SI) of a text with or without a unit, even where the machine is invalid with it."""
     try:
         found = parse_quantity(text, unit) if split_quantity(text)[1] else parse_number(text.strip())
     except QuantityError:
@@ -162,7 +162,7 @@ def _slider(own: Study, study: Study, path: str, text: str) -> Slider:
 
 
 def number_text(value: float) -> str:
-    """A number as a field shows it."""
+    """A number for a field."""
     return f"{value:.6g}"
 
 
@@ -170,7 +170,7 @@ def number_text(value: float) -> str:
 async def laboratory(work: Attended, request: Request) -> Response:
     """The laboratory."""
     chosen = await work.check(setting, dict(request.query_params))
-    # Compiling takes seconds, once: the page is shown at once, and its script waits for the numbers.
+    # The first compilation takes seconds: the page is shown immediately, and its script waits for the numbers.
     ready = models.is_compiled(models.shape_of(chosen.study))
     case = await _case(work, chosen) if ready and not chosen.faults else None
     return page(
@@ -186,7 +186,7 @@ async def laboratory(work: Attended, request: Request) -> Response:
 
 
 def position(slider: Slider) -> float:
-    """Where a slider stands, 0 to 1000."""
+    """Position of a slider, 0 to 1000."""
     span = slider.high - slider.low
     if slider.logarithmic:
         value = max(slider.value, slider.low)
@@ -241,7 +241,7 @@ async def laboratory_picture(work: Attended, request: Request) -> Response:
 
 @router.get("/laboratory/study")
 async def laboratory_study(context: Ctx, work: Attended, request: Request, question: str = "inertia") -> Response:
-    """One of the questions about the machine as it is set, as a study to be looked over and submitted."""
+    """One of the questions about the current machine, as a study to check and submit."""
     chosen = await work.check(setting, dict(request.query_params))
     if question not in QUESTIONS:
         raise ApiError("not-found", f"Unknown question; known questions: {', '.join(QUESTIONS)}.")

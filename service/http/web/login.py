@@ -22,7 +22,7 @@ async def login(request: Request, next: str = "/") -> Response:
 
 @router.post(LOGIN_PATH)
 async def log_in(request: Request, values: Form) -> Response:
-    """The token is taken, and the browser sent where it wanted to go; or the form is shown again."""
+    """Accept the token and redirect the browser to its destination; or show the form again."""
     wanted, kept = values.get("next", "/"), kept_form(values)
     access = access_of(request)
     try:
@@ -52,7 +52,7 @@ async def log_in(request: Request, values: Form) -> Response:
 
 @router.post("/logout")
 async def log_out(request: Request) -> Response:
-    """The session is ended, here and wherever its cookie was copied to."""
+    """End the session, including all copies of its cookie."""
     await access_of(request).log_out(request.cookies)
     response = RedirectResponse(LOGIN_PATH, status_code=303)
     response.delete_cookie(COOKIE, httponly=True, samesite="lax", secure=_is_secure(request))
@@ -60,5 +60,5 @@ async def log_out(request: Request) -> Response:
 
 
 def _is_secure(request: Request) -> bool:
-    """Whether the browser speaks TLS, with us or with a proxy before us."""
+    """Whether the browser uses TLS, with this service or with a proxy before it."""
     return "https" in (request.url.scheme, request.headers.get("x-forwarded-proto", ""))

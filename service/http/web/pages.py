@@ -1,4 +1,4 @@
-"""Pages about the program itself: the studies, the interface's documentation, kinds of problems; and static files."""
+"""General pages: the list of studies, the documentation of the API, kinds of problems; and static files."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def index(
     after: Annotated[str | None, Query(max_length=200)] = None,
     state: Annotated[StudyState | None, Query()] = None,
 ) -> Response:
-    """The studies, newest first, and the examples to begin with."""
+    """The studies, newest first, and the examples to start from."""
     found = context.store.list_studies(page_size=_LISTED, page_token=after, state=state)
     return page(
         "index.html",
@@ -66,28 +66,28 @@ async def openapi(request: Request) -> Response:
 
 @router.get("/problems/{slug}")
 async def problem(slug: str) -> Response:
-    """What a kind of problem means."""
+    """Explanation of a kind of problem."""
     if slug not in PROBLEM_TYPES:
         raise ApiError("not-found", "Unknown kind of problem.")
     return page("problem.html", problem=PROBLEM_TYPES[slug])
 
 
 class _Files(StaticFiles):
-    """Style sheet, sign and scripts of all pages, and the script of plotly as it lies in the package of that name."""
+    """Style sheet, icon and scripts of all pages, and plotly's script from its package."""
 
     def get_path(self, scope: Scope) -> str:
-        """The name in the address."""
+        """The name in the URL."""
         return str(scope["path_params"]["name"])
 
     def lookup_path(self, path: str) -> tuple[str, os.stat_result | None]:
-        """The file of that name, and what is known of it; None where there is none."""
+        """The file of that name and its status; None where there is none."""
         if path != PLOTLY:
             return super().lookup_path(path)
         file = str(files("plotly") / "package_data" / PLOTLY)
         return file, os.stat(file)
 
     def file_response(self, *args: Any, **options: Any) -> Response:
-        """The file; it changes with the program only."""
+        """The file; it changes only with the program."""
         response = super().file_response(*args, **options)
         response.headers["Cache-Control"] = "max-age=3600"
         return response
@@ -103,5 +103,5 @@ class _FileAnswer(Response):
 
 @router.get("/static/{name}")
 async def static(name: str) -> Response:  # noqa: ARG001 - the files take it from the address
-    """Style sheet, sign and scripts of all pages."""
+    """Style sheet, icon and scripts of all pages."""
     return _FileAnswer()

@@ -30,7 +30,7 @@ async def strobes(
     case: CaseNumber,
     columns: Annotated[int, Query(ge=1, le=2)] = 2,
 ) -> Response:
-    """How a case comes to its motion."""
+    """How a case approaches its motion."""
 
     def find() -> Study:
         study = study_with(context, study_id, case)
@@ -38,7 +38,7 @@ async def strobes(
         return study
 
     study = await run_in_threadpool(find)
-    # A case is what its study says, and studies never change.
+    # A case is determined by its study, and studies never change.
     tag = entity_tag(study_id, request.url.path, request.url.query, models.ENGINE_VERSION)
     if unchanged := not_modified(request, tag):
         return unchanged

@@ -1,4 +1,4 @@
-"""Errors as pages, for people who follow an address in a browser."""
+"""Errors as pages, for browsers."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _API = "/api/"
 
 
 def wants_page(request: Request) -> bool:
-    """Whether somebody in a browser asks, and for a page."""
+    """Whether the request is a browser's request for a page."""
     return not request.url.path.startswith(_API) and "text/html" in request.headers.get("accept", "")
 
 
 def problem_page(request: Request, error: ApiError) -> Response | None:
-    """The page that tells ``error``; None for programs, which get the problem document."""
+    """The page for ``error``; None for programs, which get the problem document."""
     if not wants_page(request):
         return None
     response = page(

@@ -1,4 +1,4 @@
-"""Curves and maps of a study as pages, every choice in the address; and the figures that these pages draw."""
+"""Curves and maps of a study as pages, with every choice in the URL; and the figures of these pages."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ KINDS: Final = {"heatmap": "Colours", "contour": "Lines of equal value"}
 
 @router.get("/studies/{study_id:study}/curves")
 def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
-    """Results against an axis, the family and the values held chosen by the reader."""
+    """Results against an axis; the user chooses the family and the held values."""
     study = context.store.study(study_id)
     infos = models.study_results(study)
     faults: tuple[Any, ...] = ()
@@ -123,7 +123,7 @@ def _axis_choices(study: Study) -> list[dict[str, Any]]:
 async def curves_of(
     context: Ctx, work: Attended, request: Request, study_id: StudyId, columns: Annotated[int, Query(ge=1, le=2)] = 1
 ) -> Response:
-    """The figure of curves: as many points as the eye can tell apart, highest and lowest ones always among them."""
+    """The figure of curves: as many points as the eye can distinguish, always including the highest and lowest."""
 
     def make(_record: StudyRecord) -> Response | Drawing:
         study = context.store.study(study_id)

@@ -1,4 +1,4 @@
-"""The pages of schedules: all of them with their last and next run, and the form to keep or change one."""
+"""The pages of schedules: the list with last and next run, and the form to create or change one."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ from sprag.worker.limits import MAX_PRIORITY
 router = APIRouter(include_in_schema=False)
 
 _WHOLE: Final = re.compile(r"-?[0-9]{1,8}")
-#: Studies that are offered as what is to be run.
+#: Most studies offered for a schedule.
 _OFFERED: Final = 50
 _EMPTY: Final[Values] = {"when": "cron", "cron": "0 22 * * 1-5", "zone": "UTC", "priority": "0"}
-#: Field of the form by the first part of the JSON Pointer that a fault has.
+#: Field of the form by the first part of a fault's JSON Pointer.
 _FIELD_OF: Final = {"window": "window_begin", "spec": "source"}
 
 
@@ -56,7 +56,7 @@ def new_schedule(context: Ctx, study: Annotated[str | None, Query(max_length=80)
 
 @router.post("/schedules/new")
 async def keep_schedule(context: Ctx, work: Attended, values: Form) -> Response:
-    """The form filled in: the schedule is kept, or the form is shown again with what is wrong."""
+    """The submitted form: create the schedule, or show the form again with its faults."""
     return await _save(context, work, values, None)
 
 
@@ -69,7 +69,7 @@ def edit_schedule(context: Ctx, schedule_id: str) -> Response:
 
 @router.post("/schedules/{schedule_id:schedule}")
 async def change_schedule(context: Ctx, work: Attended, schedule_id: str, values: Form) -> Response:
-    """The form of a schedule filled in."""
+    """The submitted form of an existing schedule."""
     return await _save(context, work, values, schedule_id)
 
 
@@ -110,18 +110,18 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
 
 
 def _asked(context: Context, values: Values, schedule_id: str | None) -> tuple[dict[str, Any], ScheduleFields | None]:
-    """What a filled-in form asks for, and the schedule that it changes."""
+    """The request of a filled form, and the schedule that it changes."""
     data = _data_of(context, values)
     if schedule_id is None:
         return data, None
     old = context.store.get_schedule(schedule_id).fields
     if data.get("at") == _values_of(old)["at"] and data.get("zone") == old.timing.zone:
-        del data["at"]  # as it was: it may have passed
+        del data["at"]  # unchanged; the time may have passed
     return data, old
 
 
 def _data_of(context: Context, values: Mapping[str, str]) -> dict[str, Any]:
-    """The fields of a schedule that a filled-in form means."""
+    """The fields of a schedule from a filled form."""
     begin, end = values.get("window_begin", "").strip(), values.get("window_end", "").strip()
     priority = values.get("priority", "").strip() or "0"
     data: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""The page of one study: how far it is, its mechanical characteristic, what went in; and what can be done with it."""
+"""The page of one study: its progress, mechanical characteristic, inputs and actions."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 router = APIRouter(include_in_schema=False)
 
-#: What a person can do with a study: word on the button, and whether it ends something for good.
+#: Actions on a study and the labels of their buttons.
 VERBS: Final = {"pause": "Pause", "resume": "Resume", "cancel": "Cancel the rest", "retry": "Run failed cases again"}
 _EVENTS: Final = {
     "pause": StudyEvent.PAUSE,
@@ -59,9 +59,9 @@ _EVENTS: Final = {
 
 
 def study_frame(context: Context, study_id: str) -> dict[str, Any]:
-    """What every page about a study shows: the study as the interface tells it, its verbs, the pages beside it."""
+    """The common part of all pages about a study: the study as in the API, its actions, the related pages."""
     (record, progress), study = context.store.look(study_id), context.store.study(study_id)
-    # Counting kinds takes as long as there are rows: the one page that tells them does it by itself.
+    # Counting kinds takes time in proportion to the rows, so only the page that shows them does it.
     shown = views.detail(record, progress, study, context.store.spec(study_id), Kinds({}, {}))
     varies = any(len(axis) > 1 for axis in study.axes)
     mapped = study.combine == "grid" and sum(len(axis) > 1 for axis in study.axes) > 1
@@ -84,7 +84,7 @@ def _verbs(state: StudyState, some_failed: bool) -> list[str]:
 
 @router.get("/studies/{study_id:study}")
 async def study_page(context: Ctx, work: Attended, study_id: StudyId) -> Response:
-    """One study: how far it is, its mechanical characteristic, its inputs."""
+    """One study: its progress, mechanical characteristic and inputs."""
     spec = await run_in_threadpool(context.store.spec, study_id)
     fits = await work.check(fits_of, spec) if has_measured_clutch(spec) else {}
     return await run_in_threadpool(_study_page, context, study_id, fits)
@@ -115,7 +115,7 @@ def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[Clutch
         fits=fits,
         regimes=kinds.regimes,
         regime_meanings=models.REGIME_SENTENCES,
-        # The flags of regimes are told with these.
+        # The flags of regimes appear together with the regimes.
         flags={flag: count for flag, count in kinds.flags.items() if flag not in models.REGIME_SENTENCES},
         flag_meanings=models.flags_of(study.model),
         to_run_longer=(*DOUBTFUL, models.NOT_SETTLED),
@@ -123,7 +123,7 @@ def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[Clutch
 
 
 def _with_rows(context: Context, study: Study, study_id: str, query: CurveQuery | None) -> CurveQuery | None:
-    """The same curves, with the axes that are not drawn held where cases are done, should none be where they were."""
+    """The same curves; where they have no finished case, the undrawn axes are held where there are finished cases."""
     if query is None or not query.at or StudyState(context.store.get_study(study_id).state) is StudyState.FINISHED:
         return query
     try:
@@ -139,7 +139,7 @@ def _with_rows(context: Context, study: Study, study_id: str, query: CurveQuery 
 
 
 def inputs(study: Study, spec: Mapping[str, Any]) -> list[tuple[str, list[dict[str, Any]]]]:
-    """Every parameter of the base by its section, with letter, value, unit and where it is from."""
+    """Every parameter of the base by section, with letter, value, unit and origin."""
     sections: dict[str, list[dict[str, Any]]] = {}
     for item in every_input(study, spec):
         entry = parameter_of(study, item.path)
@@ -151,26 +151,26 @@ def inputs(study: Study, spec: Mapping[str, Any]) -> list[tuple[str, list[dict[s
 
 @router.get("/studies/{study_id:study}/delete")
 def delete_page(context: Ctx, study_id: StudyId) -> Response:
-    """The question whether a study is to be deleted, and what goes with it."""
+    """The confirmation page for deleting a study, with everything that is deleted."""
     record = context.store.get_study(study_id)
     return page("delete.html", study=views.summary(record), ended=record.over)
 
 
 @router.post("/studies/{study_id:study}/delete")
 def delete(context: Ctx, study_id: StudyId) -> Response:
-    """The answer: the study is deleted, and the list of those that are left is shown."""
+    """Delete the study and show the list of the remaining ones."""
     context.store.delete_study(study_id)
     return RedirectResponse("/", status_code=303)
 
 
 def _not_settled(flags: Mapping[str, int]) -> dict[str, int]:
-    """The flags whose cases a longer run helps."""
+    """The flags whose cases benefit from a longer run."""
     return {flag: count for flag, count in flags.items() if flag == models.NOT_SETTLED}
 
 
 @router.post("/studies/{study_id:study}/longer/{kind}")
 async def run_longer(context: Ctx, work: Attended, study_id: StudyId, kind: str) -> Response:
-    """The button beside the count of a regime, or of a flag: a study of its cases, with more time to settle."""
+    """The button beside the count of a regime or a flag: submit a study of its cases with more time to settle."""
 
     def find() -> Mapping[str, int]:
         study, kinds = context.store.study(study_id), context.store.kinds(study_id)
@@ -181,7 +181,7 @@ async def run_longer(context: Ctx, work: Attended, study_id: StudyId, kind: str)
         raise ApiError("not-found", "No case of this study is of this kind.")
     now = context.store.clock.now()
     made = await work.check(checks.longer_study, context.library, study_id, kind, None, now, {})
-    # Pressed twice it is one study, unless more cases have come to be of the kind.
+    # Pressed twice, it submits one study, unless more cases of this kind have finished.
     key = f"longer-{study_id}-{kind}-{counts[kind]}"
     record = await run_in_threadpool(take_in, context.store, made, key)
     return RedirectResponse(f"/studies/{record.id}", status_code=303)
@@ -189,7 +189,7 @@ async def run_longer(context: Ctx, work: Attended, study_id: StudyId, kind: str)
 
 @router.post("/studies/{study_id:study}/{verb}")
 def act(context: Ctx, study_id: StudyId, verb: str) -> Response:
-    """A button of the page: the wish is written down, and the page shown again."""
+    """A button of the page: perform the action and show the page again."""
     wishes = {
         "pause": context.store.pause_study,
         "resume": context.store.resume_study,
@@ -203,7 +203,7 @@ def act(context: Ctx, study_id: StudyId, verb: str) -> Response:
 
 
 def fixed_choices(study: Study, drawn: tuple[str, ...], at: tuple[tuple[str, str], ...]) -> list[dict[str, Any]]:
-    """For each axis that a picture holds: its values to choose from, and the one that is chosen."""
+    """For each held axis of a picture: its values, and the selected one."""
     chosen = dict(at)
     found = []
     for axis in study.axes:
@@ -225,7 +225,7 @@ def fixed_choices(study: Study, drawn: tuple[str, ...], at: tuple[tuple[str, str
     return found
 
 
-#: Values of an axis that a list to choose from may have; of more, the value is written.
+#: Most values of an axis in a selection list; beyond this the value is typed.
 _MOST_CHOICES: Final = 200
 
 
@@ -234,6 +234,6 @@ def _plain(text: str | None) -> float | None:
 
 
 def map_address(study: Study, given: QueryParams, study_id: str) -> str | None:
-    """Address of the map that the choices of ``given`` lead to; None where there is none."""
+    """URL of the map for the choices of ``given``; None where there is none."""
     query = map_query(study, models.study_results(study), given)
     return None if query is None else f"/studies/{study_id}/map?{urlencode(pairs_of(query))}"

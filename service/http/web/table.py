@@ -27,15 +27,17 @@ if TYPE_CHECKING:
 router = APIRouter(include_in_schema=False)
 
 _ROWS: Final = 50
-#: Cases that are read to be sorted; of more, a value has to be held first.
+#: Most cases that are sorted; with more, an axis must be held first.
 MOST_SORTED: Final = 20_000
-#: Results of a model that names none for the table.
+#: Number of results in the table for a model that names none.
 _FIRST: Final = 5
 
 
 @dataclass(frozen=True, slots=True)
 class TablePage:
-    """Rows of one page of the table: the cases in order, where the next page begins, and how many match (if known)."""
+    """Rows of one page of the table: the cases in order, the start of the next page, and the number of matches (if
+    known).
+    """
 
     rows: list[CaseRow]
     more: int | None
@@ -53,7 +55,7 @@ def cases_page(
     flag: Annotated[str, Query(max_length=40)] = "",
     after: Annotated[int, Query(ge=0, le=10**12)] = 0,
 ) -> Response:
-    """Cases with the results that were chosen, sorted and filtered."""
+    """Cases with the selected results, sorted and filtered."""
     study = context.store.study(study_id)
     infos = models.study_results(study)
     given = request.query_params
@@ -143,7 +145,7 @@ def _ordered(context: Context, study_id: str, study: Study, wanted: _Wanted) -> 
     fixed = {study.axes[i].paths[0]: study.axes[i].value(index) for i, (_, index) in locate_axes(study, at).items()}
     cases = study.cases_at(fixed)
     if cases.size > MOST_SORTED:
-        message = f"{cases.size:,} cases are too many to sort; hold further axes at a value, or take all results"
+        message = f"{cases.size:,} cases are too many to sort; hold further axes at a value, or export all results"
         raise SelectionError([ParameterFault("sort", "too-many", message, allowed=f"<= {MOST_SORTED:,} cases")])
     name = sort.removeprefix("-")
     infos = models.study_results(study)
@@ -165,7 +167,7 @@ def _ordered(context: Context, study_id: str, study: Study, wanted: _Wanted) -> 
     else:
         raise SelectionError([ParameterFault("sort", "invalid-choice", "unknown column", value=name)])
     cases, keys = cases[finished], np.asarray(keys, dtype=np.float64)[finished]
-    # What could not be computed stands last, whichever way the rest goes.
+    # Missing values come last in either direction.
     missing = np.isnan(keys)
     order = np.argsort(-keys if sort.startswith("-") else keys, kind="stable")
     return np.concatenate([cases[order][~missing[order]], cases[order][missing[order]]])

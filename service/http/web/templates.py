@@ -1,4 +1,4 @@
-"""The templates of the pages, and how numbers, units and names are written on them."""
+"""The templates of the pages, and the display of numbers, units and names on them."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _templates() -> Environment:
 
 
 def _read_only() -> str:
-    """Name of the token that the page is made for, where it only allows to look; "" where it allows everything."""
+    """Name of the token for which the page is made, where it is read-only; "" where it allows everything."""
     grant = ASKING.get()
     return "" if grant is None or grant.scope is TokenScope.WRITE else grant.name or grant.id
 
@@ -55,17 +55,17 @@ def page(name: str, status: int = 200, **values: Any) -> Response:
 
 
 def fragment(name: str, **values: Any) -> Markup:
-    """A part of a page, as its text; what it was made of is escaped in it."""
+    """A part of a page as text, with its values escaped."""
     return Markup(_templates().get_template(name).render(**values))  # noqa: S704
 
 
 def spec_text(spec: dict[str, Any]) -> str:
-    """A spec as it was given: keys in their order, every character itself; escaped with the rest of the page."""
+    """A spec as it was given: keys in order, characters unescaped; the page escapes it as a whole."""
     return json.dumps(spec, ensure_ascii=False, indent=2)
 
 
 def marked(text: str) -> Markup:
-    """A sentence of the documentation; what stands between backticks is code."""
+    """A sentence of the documentation; text between backticks is code."""
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))  # noqa: S704 - escaped just before
 
 
@@ -75,7 +75,7 @@ def moment(text: str | None) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A rough time span in the unit that suits it, two digits: ``40 s``, ``3 min``, ``2.5 h``."""
+    """A rough duration in a suitable unit, two digits: ``40 s``, ``3 min``, ``2.5 h``."""
     if seconds < 1.0:
         return "less than 1 s"
     for limit, divisor, unit in ((100.0, 1.0, "s"), (6000.0, 60.0, "min"), (172800.0, 3600.0, "h")):
@@ -85,7 +85,7 @@ def duration(seconds: float) -> str:
 
 
 def time_left(seconds: Mapping[str, float]) -> str:
-    """The bounds of a time that is left, or the one where both read the same."""
+    """The bounds of the time left, or a single value where both read the same."""
     low, high = duration(seconds["low"]), duration(seconds["high"])
     return low if low == high else f"{low} to {high}"
 

@@ -1,7 +1,7 @@
-"""The page where a browser logs in, and the way back from it: to an address, or with a form that was not taken.
+"""The login page and the way back from it: to a URL, or with a form that was refused.
 
-A form that is sent when its session has ended, or with a token that only allows to look, is not lost: the login keeps
-its fields, and sends them where they were to go.
+A form that is sent after its session has ended, or with a read-only token, is not lost: the login keeps its fields and
+sends them to their destination.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ if TYPE_CHECKING:
     from sprag.service.http.web.form.spec import Values
 
 LOGIN_PATH: Final = "/login"
-#: Field of the login that says that a form is to be sent afterwards, and what the names of its fields begin with.
+#: Field of the login that states that a form is sent afterwards, and the prefix of the names of its fields.
 KEPT: Final = "kept"
 KEPT_PREFIX: Final = "kept "
-#: Longest address that the answer to the login repeats.
+#: Longest URL that the answer to the login repeats.
 _LONGEST: Final = 4000
-#: What can be mended by logging in, and what the login says of it where a form was sent.
+#: Problems that a login can solve, and the message of the login where a form was sent.
 _MENDED: Final = frozenset({"unauthorized", "read-only"})
 
 
 def access_of(request: Request) -> Access:
-    """Who knows the tokens."""
+    """The service's `Access`."""
     return cast("Access", request.app.state.access)
 
 
 async def way_in(request: Request, error: ApiError, access: Access) -> Response | None:
-    """The way to the login for a page's request that was refused with ``error``; None where logging in helps nobody.
+    """The login for a page's request that was refused with ``error``; None where a login would not help.
 
-    Raises ApiError when the form that was sent cannot be read.
+    Raises ApiError when the sent form cannot be read.
     """
     if error.code not in _MENDED or not wants_page(request):
         return None
@@ -68,7 +68,7 @@ def login_page(
     status: int = 200,
     kept: Mapping[str, str] | None = None,
 ) -> Response:
-    """The form for the token, with the way to the address ``wanted`` and the form ``kept`` for it, if there is one."""
+    """The form for the token, with the destination ``wanted`` and the form ``kept`` for it, if any."""
     return _private(
         "login.html",
         status=status,
@@ -83,21 +83,21 @@ def login_page(
 
 
 def kept_form(values: Values) -> Values | None:
-    """The fields of the form that a login keeps; None where it keeps none."""
+    """The fields of the form kept by a login; None where there is none."""
     if KEPT not in values:
         return None
     return {name.removeprefix(KEPT_PREFIX): text for name, text in values.items() if name.startswith(KEPT_PREFIX)}
 
 
 def kept_page(grant: Grant, wanted: str, kept: Mapping[str, str]) -> Response:
-    """The page after a login that sends the form ``kept`` to where it was to go."""
+    """The page after a login that sends the form ``kept`` to its destination."""
     return _private("kept.html", grant=grant, action=within(wanted), kept=kept)
 
 
 def within(address: str) -> str:
-    """``address`` if it leads to a page of this service, else the first page: nobody is sent elsewhere after login.
+    """``address`` if it is a page of this service, otherwise the start page: a login never leads to another site.
 
-    One too long for the cookie's answer to repeat is the first page too, rather than a way in that is barred.
+    A URL that is too long for the answer to repeat also becomes the start page, so that the login still works.
     """
     try:
         parts = urlsplit(address)

@@ -171,6 +171,6 @@ def test_readyz_waits_for_the_processes_that_check(service: Service) -> None:
     answer = service.http.get("/readyz")
     assert (answer.status_code, answer.json()["detail"]) == (
         503,
-        "The processes that check what is submitted are starting.",
+        "The checking processes are starting.",
     )
     assert service.http.get("/livez").status_code == 200

@@ -32,7 +32,7 @@ def map_json(library: Library, study_id: str, query: CurveQuery, contours: bool)
 
 
 def motion_figures(study: Study, case: int, start: float, end: float) -> dict[str, Data]:
-    """The case run again and drawn. For the computing process."""
+    """Run the case again and draw it. For the computing process."""
     made = models.run_trajectory(study, case, start, end, SAMPLES)
     shown = models.presentation_of(study)
     if made.times.size == 0 or made.times[-1] == start < end:
@@ -43,7 +43,7 @@ def motion_figures(study: Study, case: int, start: float, end: float) -> dict[st
 
 
 def _no_motion(study: Study, case: int, ending: str) -> str:
-    """Why a part has no motion: the run stopped before."""
+    """Why a part has no motion: the run stopped earlier."""
     extent = models.extent(study, case)
     if extent.along == "angle":
         return f"There is no motion: the case ended with {ending}."

@@ -23,7 +23,7 @@ _LINE_POINTS: Final = 120
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """A tick: where it is in the picture, and what is written at it."""
+    """A tick: its position in the picture, and its label."""
 
     at: float
     text: str
@@ -50,7 +50,7 @@ class FitChart:
 
 
 def fit_chart(fit: ClutchFit, clutch: Mapping[str, Any], backlash: float) -> FitChart:
-    """The picture of ``fit`` for a clutch of a spec; ``backlash`` (rad) is what the fit took off the angles."""
+    """The picture of ``fit`` for a clutch of a spec; ``backlash`` (rad) is what the fit subtracted from the angles."""
     rows = np.array([[parse_quantity(a, "rad"), parse_quantity(t, "N*m")] for a, t in clutch["data"]])
     offset = backlash if clutch.get("angles_include_backlash") else 0.0
     windup, torque = np.maximum(rows[:, 0] - offset, 0.0), rows[:, 1]

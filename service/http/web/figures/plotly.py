@@ -1,4 +1,4 @@
-"""Figures as plotly draws them in the browser: plain data, without colours of the page."""
+"""Figures as plotly data for the browser, without the colours of the page."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Data = dict[str, Any]
 
-#: Markers and dashes say the same as the colours, for those who print in grey.
+#: Markers and dashes repeat the distinction by colour, for prints in grey.
 SYMBOLS: Final = ("circle", "square", "diamond", "triangle-up", "x", "triangle-down", "star", "cross")
 _DASHES: Final = ("solid", "dash", "dot", "dashdot")
 #: Lines with more points are drawn without markers.
@@ -82,18 +82,18 @@ def plotly_figure(figure: Figure) -> Data:
 
 
 def axis_title(quantity: Quantity) -> str:
-    """What stands at an axis: words and unit."""
+    """The title of an axis: words and unit."""
     shown = unit_text(quantity.unit)
     return f"{_escaped(words(quantity.name))} ({shown})" if shown else _escaped(words(quantity.name))
 
 
 def _escaped(text: str) -> str:
-    """Text that plotly does not take for its markup."""
+    """Escape text that plotly would interpret as markup."""
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
 def _domain(row: int, rows: int, panels: int, inner: int) -> tuple[float, float]:
-    """Lower and upper end of a row of panels, which are as high as in any other figure, however many there are."""
+    """Lower and upper end of a row of panels; the height of a panel does not depend on their number."""
     height = (panels - (rows - 1) * _ROW_GAP) / rows
     top = inner - row * (height + _ROW_GAP)
     return max((top - height) / inner, 0.0), top / inner
@@ -115,9 +115,11 @@ def _x_axis(figure: Figure, index: int, anchor: str) -> Data:
 
 
 def _legend(figure: Figure, *, beside: bool) -> Data:
-    """Few lines are named above the panels, which then have the whole width; many beside them, as are families."""
+    """The legend: above the panels for few lines, which leaves them the whole width; beside them for many or
+    families.
+    """
     text = ", ".join(map(axis_title, figure.family)) or ("Study" if figure.studies > 1 else "")
-    # Beside the entries a title would take room that plotly does not count, and the last entries would be cut off.
+    # plotly ignores the height of a title beside the entries, so the last entries would be cut off.
     title: Data = {"text": text, "side": "top"}
     if beside:
         more = {"tracegroupgap": 8, "groupclick": "toggleitem"} if figure.motion else {"tracegroupgap": 0}
@@ -126,7 +128,7 @@ def _legend(figure: Figure, *, beside: bool) -> Data:
 
 
 def _line_trace(line: Line, panel: Panel, figure: Figure, headings: set[str]) -> Data:
-    """A line; the first of its heading has it over itself."""
+    """A line; the first one of a heading shows the heading."""
     kept = thin(line.y, figure.most)
     places = _with_gaps(kept, line.stretches)
     heading, name = (_escaped(shortened(text, _MOST_LABEL)) for text in (line.heading, line.name))
@@ -160,7 +162,7 @@ def _hover(y: Quantity, told: str) -> str:
 
 
 def _with_gaps(kept: NDArray[np.int64], stretches: tuple[NDArray[np.int64], ...] | None) -> list[int | None]:
-    """Places of the points of a line, None where it is broken."""
+    """Indices of the points of a line, None where it is broken."""
     if stretches is None:
         return list(kept.tolist())
     shown, drawn = set(kept.tolist()), list[int | None]()
@@ -171,7 +173,7 @@ def _with_gaps(kept: NDArray[np.int64], stretches: tuple[NDArray[np.int64], ...]
 
 
 def _marks_trace(marks: Marks, y: Quantity, panel: int, place: int) -> Data:
-    """The points of a regime; one without points stands in the legend only."""
+    """The points of a regime; a regime without points appears in the legend only."""
     return {
         "type": "scatter",
         "mode": "markers",

@@ -1,4 +1,4 @@
-"""How one case comes to its motion as a figure: strobes upon the orbit, and strobe by strobe."""
+"""How one case approaches its motion, as a figure: strobes on the orbit, and strobe by strobe."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sprag.worker.models import Portrait, Presentation
     from sprag.worker.study import Study
 
-#: Points of all orbits of a figure together, about.
+#: Approximate number of points of all orbits of a figure together.
 _MOST_POINTS: Final = 12_000
 #: Colour of the strobes of an orbit.
 _RING: Final = "#d55e00"
@@ -27,7 +27,7 @@ _HEIGHT: Final = 430
 
 
 def portrait_figure(study: Study, case: int, columns: int) -> Data:
-    """The case run again and drawn, the panels beside each other (2) or one under the other (1).
+    """Run the case again and draw it, with panels side by side (2) or one below the other (1).
 
     For the computing process.
     """
@@ -68,7 +68,7 @@ def portrait_figure(study: Study, case: int, columns: int) -> Data:
 
 
 def _plane(made: Portrait, shown: Presentation, beside: bool) -> Iterator[Data]:
-    """The orbit of each pendulum, its strobes in the colours of their periods, and those of the orbit."""
+    """The orbit of each pendulum, its strobes coloured by period, and the strobes of the orbit."""
     phases = shown.phases(made.strobes.names)
     periods = strobe_numbers(made.strobes).tolist()
     step = max(made.orbit.times.size * len(phases) // _MOST_POINTS, 1)
@@ -123,7 +123,7 @@ def _plane(made: Portrait, shown: Presentation, beside: bool) -> Iterator[Data]:
 
 
 def _along(made: Portrait, lines: list[tuple[str, str]]) -> Iterator[Data]:
-    """Strobe by strobe, with the levels that the orbit has there."""
+    """Values strobe by strobe, with the levels of the orbit."""
     periods = strobe_numbers(made.strobes).tolist()
     for index, (name, label) in enumerate(lines):
         if made.order:

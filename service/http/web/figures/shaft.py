@@ -1,4 +1,4 @@
-"""A machine shaft whose parameters are moved by hand: its spec with other numbers, its results and its figure."""
+"""A machine shaft with sliders: its spec with changed numbers, its results and its figure."""
 
 from __future__ import annotations
 

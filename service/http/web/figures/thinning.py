@@ -1,4 +1,4 @@
-"""Fewer points of a line that look like all of them: every bucket keeps its first, lowest, highest and last point."""
+"""Thinning of a line without visible change: every bucket keeps its first, lowest, highest and last point."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ if TYPE_CHECKING:
 
 
 def thin(y: NDArray[np.float64], most: int) -> NDArray[np.int64]:
-    """Positions of the points that are to be drawn.
+    """Select the points to draw.
 
     Parameters
     ----------
-    y : float64 array, shape (m,)
-        Values along the line; NaN is a gap and one point of it is kept for each bucket that has one.
+    y : float64 array, shape (m,) Values along the line; NaN is a gap, of which each bucket keeps one point.
     most : int
         At most this many points are kept (at least 5 for each of one bucket).
 

@@ -1,4 +1,4 @@
-"""What a filled form amounts to: its spec, what is wrong beside which field, what it would cost, its clutch fits."""
+"""Check of a filled form: its spec, the faults by field, the estimated cost, the clutch fits."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class Checked:
-    """A filled form, looked over.
+    """The result of checking a filled form.
 
-    ``faults`` has the messages by field ("" for those of no field); ``preview`` is None while there are any. ``fits``
-    has the report and the picture of each clutch that could be fitted, whatever else is wrong; ``notes`` what was taken
-    for granted in measured data. ``finish`` is the deadline, which is not part of the spec.
+    ``faults`` contains the messages by field ("" for general ones); ``preview`` is None while there are any. ``fits``
+    contains the report and the picture of each clutch that could be fitted, regardless of other faults; ``notes`` the
+    assumptions about measured data. ``finish`` is the deadline, which is not part of the spec.
     """
 
     spec: dict[str, Any]
@@ -51,12 +51,12 @@ class Checked:
 
     @property
     def query(self) -> str:
-        """What an address carries beside the spec."""
+        """Parameters of the URL besides the spec."""
         return "" if self.finish is None else "?" + urlencode({"finish_by": self.finish_text})
 
     @property
     def missing(self) -> int:
-        """Number of required fields that are still empty; beside them it is said once they were left."""
+        """Number of empty required fields; their messages appear once the user has left them."""
         return sum(name in self.empty for name in self.faults)
 
     @property
@@ -70,7 +70,7 @@ def _none_known(_study: Study) -> int:
 
 
 def look_over(values: Mapping[str, str], chunking: Chunking, known: Known, now: datetime) -> Checked:
-    """Look a form over, field by field or as text, with its deadline; ``known`` as for `check_form`."""
+    """Check a form, given by fields or as text, with its deadline; ``known`` as for `check_form`."""
     text, finish, fault = values.get("finish_by", "").strip(), None, ""
     try:
         finish = finish_at(text, now) if text else None
@@ -90,9 +90,9 @@ def look_over(values: Mapping[str, str], chunking: Chunking, known: Known, now: 
 def check_form(
     values: Mapping[str, str], chunking: Chunking, known: Known = _none_known, left: float | None = None
 ) -> Checked:
-    """Look a filled form over.
+    """Check a filled form.
 
-    ``known`` tells how many cases of a study need not be run; ``left`` are the seconds until its deadline.
+    ``known`` counts the cases of a study that need not be run; ``left`` are the seconds until its deadline.
     """
     spec, faults = spec_of(values)
     found = Checked(spec, faults=faults, empty=frozenset(name for name, text in values.items() if not text.strip()))
@@ -101,7 +101,7 @@ def check_form(
     except SpecError as error:
         for item in error.faults:
             name = field_of(item.where or "", values)
-            # Data that could not be read were told of already, line by line.
+            # Faults of unreadable data were reported already, line by line.
             if not (name in faults and name.endswith("/data")):
                 found.faults.setdefault(name, []).append(message(item))
     if found.faults:
@@ -126,7 +126,7 @@ def _assumed(text: str) -> list[str]:
 def check_text(
     text: str, form: str, chunking: Chunking, known: Known = _none_known, left: float | None = None
 ) -> Checked:
-    """Look a spec over that is given as text, JSON or TOML; ``known`` and ``left`` as for `check_form`."""
+    """Check a spec given as text, JSON or TOML; ``known`` and ``left`` as for `check_form`."""
     found = Checked({})
     try:
         loaded = load_spec(text, "toml" if form == "toml" else "json")
@@ -152,7 +152,7 @@ def message(item: Fault) -> str:
 
 
 def plainly(value: object) -> object:
-    """A value as a person would have written it: a whole number without decimals."""
+    """A value as a user would write it: a whole number without decimals."""
     return int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 1e15 else value
 
 
@@ -198,7 +198,7 @@ def has_measured_clutch(spec: Mapping[str, Any]) -> bool:
 
 def fits_of(spec: dict[str, Any]) -> dict[str, tuple[ClutchFitReport, FitChart]]:
     """Report and picture of each clutch law that the spec gives as measured data, by their JSON Pointers."""
-    # The fit is not stored: it follows from the spec, to the last bit.
+    # The fit is not stored, because it follows from the spec exactly.
     found = {}
     alone = {key: value for key, value in spec.items() if key in ("sprag", "model", "name", "base", "run")}
     for pointer, fit in parse_spec(alone).fits.items():

@@ -1,7 +1,7 @@
 """The fields of the form for a new study, made from the model's catalogue: names, letters, units, ranges, help.
 
-A field is called by the JSON Pointer of what it gives in the spec, so that what is wrong with the spec is told beside
-the field that it comes from.
+The name of a field is the JSON Pointer of its value in the spec, so that each fault of the spec appears beside its
+field.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _SECTIONS: Final = {"excitation": "Vibration of the base", "shaft": "Output shaf
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One field: ``name`` is its JSON Pointer, ``mark`` what it is called in the sketch ("" where it is not in it)."""
+    """One field: ``name`` is its JSON Pointer, ``mark`` its letter in the sketch ("" where it is not shown there)."""
 
     name: str
     label: str
@@ -101,7 +101,7 @@ def _described(entry: Described, pointer: str) -> Field:
 
 
 def range_words(entry: Parameter) -> str:
-    """The allowed range in few words: ``0 … 10 m``, ``above 0 Hz, at most 100 000 Hz``; "" where everything is."""
+    """The allowed range in a few words: ``0 … 10 m``, ``above 0 Hz, at most 100 000 Hz``; "" without limits."""
     unit = "" if entry.unit == "1" else f" {entry.unit}"
     low, high = (number(bound, 8) for bound in (entry.low, entry.high))
     if math.isinf(entry.low) or math.isinf(entry.high):
@@ -113,7 +113,7 @@ def range_words(entry: Parameter) -> str:
 
 @dataclass(frozen=True, slots=True)
 class PathChoice:
-    """A parameter that an axis can vary: its path, and how it is called with its unit."""
+    """A parameter that an axis can vary: its path, its label and its unit."""
 
     path: str
     label: str
@@ -121,7 +121,7 @@ class PathChoice:
 
 
 def path_choices(pendulums: int, coefficients: dict[str, int]) -> list[tuple[str, list[PathChoice]]]:
-    """What an axis can vary, group by group.
+    """The parameters that an axis can vary, by group.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The form for a new study: an example, a clone or empty fields; looked over while it is filled in; submitted."""
+"""The form for a new study: empty, from an example or a clone; checked while it is filled in; submitted."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from sprag.worker.models import MAX_PENDULUMS
 
 router = APIRouter(include_in_schema=False)
 
-#: What an empty form begins with.
+#: Initial values of an empty form.
 EMPTY_FORM: Final[Values] = {
     "pendulums": "1",
     "axes": "1",
@@ -90,7 +90,7 @@ def _start(context: Context, preset: str | None, clone: str | None) -> dict[str,
 
 @router.post("/new")
 async def send_form(context: Ctx, work: Attended, request: Request, values: Form) -> Response:
-    """What the pressed button asks for: look the form over, change its shape, or submit the study."""
+    """Perform the pressed button: check the form, add or remove parts, or submit the study."""
     wanted = values.pop("do", "check")
     share_clutches(values)
     if wanted == "submit":
@@ -104,7 +104,7 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
 def _submit(context: Context, request: Request, values: Values, checked: Checked, made: Submission | None) -> Response:
     if made is None:
         return form_page(request, values, checked, status=422)
-    # Sent twice, by a second click, the same form is one study; changed and sent again it is another.
+    # A form that is sent twice by a second click is one study; changed and sent again, it is another.
     text = json.dumps([checked.spec, values.get("finish_by", "")], sort_keys=True)
     key = f"form-{values.get('key', '')[:64]}-{hashlib.sha256(text.encode()).hexdigest()[:32]}"
     key = "".join(character for character in key if "!" <= character <= "~")
@@ -118,7 +118,7 @@ def _submit(context: Context, request: Request, values: Values, checked: Checked
 
 @router.post("/new/check")
 async def check(context: Ctx, work: Attended, request: Request, values: Form) -> Response:
-    """The live preview: what is wrong by field, and the panel that tells cases, time, size, warnings and fits."""
+    """The live preview: faults by field, and the panel with cases, time, size, warnings and fits."""
     checked = await look_over(context, work, values)
 
     def answer() -> dict[str, Any]:
@@ -135,12 +135,12 @@ async def check(context: Ctx, work: Attended, request: Request, values: Form) ->
 
 
 async def look_over(context: Context, work: Work, values: Mapping[str, str]) -> Checked:
-    """A form, field by field or as text, looked over."""
+    """Check a form, given by fields or as text."""
     return await work.check(study_check.form, context.library, values, context.store.clock.now())
 
 
 def reshape(values: Values, wanted: str) -> None:
-    """Add or take away a pendulum or an axis, as the pressed button says; what is filled in stays."""
+    """Add or remove a pendulum or an axis, as the pressed button requests; the other fields are kept."""
     action, _, index = wanted.partition(" ")
     if action == "add-pendulum":
         count = pendulums_of(values)
@@ -162,7 +162,7 @@ def reshape(values: Values, wanted: str) -> None:
 
 
 def share_clutches(values: Values) -> None:
-    """Own laws begin as the common one, and the common one as the first's: what is filled in is not lost on the way."""
+    """Initialise own laws from the common one, and the common one from the first, so that no input is lost."""
     common, first = "/base/clutch/", "/base/pendulums/0/clutch/"
     own = values.get("clutches") == "own"
     if own and f"{common}kind" in values:
@@ -187,7 +187,7 @@ def _drop(values: Values, prefix: str) -> None:
 
 
 def form_page(request: Request, values: Values, checked: Checked | None, status: int = 200) -> Response:
-    """The page with the form filled in with ``values``; ``checked`` is None while nothing is to be said about them."""
+    """The page with the form filled in with ``values``; ``checked`` is None where they were not checked."""
     text_mode = "/text" in values
     laws = {} if text_mode else {pointer: _coefficients(values, pointer) for pointer in clutch_pointers(values)}
     prefixes = {pointer.removeprefix("/base/").replace("/", ".") + ".": count for pointer, count in laws.items()}
@@ -219,7 +219,7 @@ def _fits_form(preset: Mapping[str, Any]) -> bool:
 
 
 def _coefficients(values: Values, pointer: str) -> int:
-    """Number of coefficients that an axis can vary: none of a law that is fitted."""
+    """Number of coefficients that an axis can vary: none for a fitted law."""
     if values.get(f"{pointer}/kind", "law") != "law":
         return 0
     found = spec_of({**values, "axes": "0"})[0]["base"]
@@ -229,5 +229,5 @@ def _coefficients(values: Values, pointer: str) -> int:
 
 
 def _address(request: Request) -> str:
-    """The service's own address as the browser wrote it."""
+    """The address of the service as the browser used it."""
     return f"{request.url.scheme}://{request.headers.get('host', request.url.netloc)}"

@@ -1,4 +1,4 @@
-"""Between the form's fields and the study spec, both ways. What a field means is left to the spec's own reader."""
+"""Conversion between the form's fields and the study spec. Only the spec's reader interprets the fields."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Faults = dict[str, list[str]]
 
 _NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _WHOLE: Final = re.compile(r"[+-]?[0-9]{1,18}")
-#: Between the values of a list: a comma only before a blank, so that a decimal comma is told and not taken for one.
+#: Separator of a list: a comma counts only before a blank, so that a decimal comma is reported as a fault.
 _BETWEEN: Final = re.compile(r"[;\n]|,\s")
 #: Fields of an axis for each way of giving its values.
 WAYS: Final = {
@@ -28,7 +28,7 @@ WAYS: Final = {
     "geomspace": ("from", "to", "count"),
     "range": ("from", "to", "step"),
 }
-#: What the form says of a run for a given time, which a spec says by its duration or window.
+#: The form's choice for a run of a given time, which a spec expresses by its duration or window.
 TIMED: Final = "time"
 _FIELDS: Final = frozenset({"sprag", "model", "name", "base", "run", "axes", "combine"})
 
@@ -46,14 +46,14 @@ def axes_of(values: Mapping[str, str]) -> int:
 
 
 def clutch_pointers(values: Mapping[str, str]) -> list[str]:
-    """Where the form's clutches stand: one for all pendulums, or one in each."""
+    """JSON Pointers of the form's clutches: one for all pendulums, or one in each."""
     if values.get("clutches") == "own":
         return [f"/base/pendulums/{index}/clutch" for index in range(pendulums_of(values))]
     return ["/base/clutch"]
 
 
 def spec_of(values: Mapping[str, str]) -> tuple[dict[str, Any], Faults]:
-    """The spec that a filled form means, and what of it cannot even be written as one, by field."""
+    """The spec of a filled form, and the faults, by field, of what cannot be expressed as a spec."""
     faults: Faults = {}
     base: dict[str, Any] = {}
     for section in sections():
@@ -83,7 +83,7 @@ def spec_of(values: Mapping[str, str]) -> tuple[dict[str, Any], Faults]:
 
 
 def plain(text: str) -> Any:
-    """A field's text as the spec takes it: a number where it is one, else the text with its unit."""
+    """A field's text for the spec: a number where it is one, otherwise the text with its unit."""
     text = text.strip()
     if _WHOLE.fullmatch(text):
         return int(text)
@@ -109,7 +109,7 @@ def _list(text: str) -> list[Any]:
 def _clutch(values: Mapping[str, str], pointer: str, faults: Faults) -> dict[str, Any]:
     if values.get(f"{pointer}/kind", "law") != "data":
         coefficients = values.get(f"{pointer}/coefficients", "")
-        # Blanks part numbers as well, where no unit stands among them.
+        # Blanks also separate numbers, where there is no unit among them.
         if re.fullmatch(r"[-+0-9.eE\s]+", coefficients):
             coefficients = "; ".join(coefficients.split())
         return {
@@ -125,14 +125,14 @@ def _clutch(values: Mapping[str, str], pointer: str, faults: Faults) -> dict[str
         except MeasuredDataError as error:
             faults[f"{pointer}/data"] = [_told(fault) for fault in error.faults]
     found |= _given(values, f"{pointer}/accuracy", "accuracy") | _given(values, f"{pointer}/max_degree", "max_degree")
-    # A box that is not ticked is not sent, so that both are always said.
+    # An unticked box is not sent, so both values are written explicitly.
     found["through_origin"] = values.get(f"{pointer}/through_origin") == "on"
     found["angles_include_backlash"] = values.get(f"{pointer}/angles_include_backlash") == "on"
     return found
 
 
 def _told(fault: Fault) -> str:
-    """A fault of measured data as a sentence: the line, what is wrong, what stands there, what may."""
+    """A fault of measured data as a sentence: the line, the fault, the value, what is allowed."""
     parts = [f"{fault.where}: {fault.message}", *([] if fault.value is None else [f"got {fault.value}"])]
     return "; ".join([*parts, *([f"allowed: {fault.allowed}"] if fault.allowed else [])])
 
@@ -193,7 +193,7 @@ def field_of(pointer: str, values: Mapping[str, str]) -> str:
 
 
 def values_of(spec: Mapping[str, Any]) -> Values:
-    """The form filled in as ``spec`` says; raises ValueError where the form cannot show it."""
+    """The form's values for ``spec``; raises ValueError where the form cannot show it."""
     if spec.get("model") != FORM_MODEL:
         raise ValueError("the form describes another model")
     if not set(spec) <= _FIELDS or spec.get("combine", "grid") not in ("grid", "zip"):
@@ -230,7 +230,7 @@ def values_of(spec: Mapping[str, Any]) -> Values:
 
 
 def with_clutch_defaults(values: Values) -> Values:
-    """The values, with the box ticked of each clutch that the spec has ticked where nothing is said."""
+    """The values, with the boxes of the clutches ticked according to the spec's defaults."""
     return values | {f"{pointer}/through_origin": "on" for pointer in clutch_pointers(values)}
 
 
@@ -246,7 +246,7 @@ def _text(value: Any) -> str:
 def _clutch_values(pointer: str, clutch: Mapping[str, Any]) -> Values:
     if "data" not in clutch:
         found = {f"{pointer}/kind": "law", f"{pointer}/coefficients": "; ".join(map(_text, clutch["coefficients"]))}
-        # Ticked for when measured data take the place of the coefficients, as the spec has it.
+        # Ticked in case measured data replace the coefficients; this is the spec's default.
         found[f"{pointer}/through_origin"] = "on"
         return found | {f"{pointer}/windup_limit": _text(clutch[key]) for key in ("windup_limit",) if key in clutch}
     rows = [f"{_si(angle, 'rad')!r}\t{_si(torque, 'N*m')!r}" for angle, torque in clutch["data"]]

@@ -1,4 +1,4 @@
-"""A filled form, looked over: functions for the processes that check."""
+"""Check of a filled form: functions for the checking processes."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 
 def form(library: Library, values: Mapping[str, str], now: datetime) -> Checked:
-    """A filled form, looked over."""
+    """Check a filled form."""
     store = library.store
-    # The study itself stays here: it can be large, and nobody shows it.
+    # The study itself is not returned: it can be large, and no page shows it.
     return replace(look_over(values, store.chunking, store.reusable, now), parsed=None)
 
 
 def form_study(library: Library, values: Mapping[str, str], now: datetime) -> tuple[Checked, Submission | None]:
-    """A filled form, and the study that it is; None where something is wrong with it."""
+    """Check a filled form; also its study, None where the form has faults."""
     store = library.store
     checked = look_over(values, store.chunking, store.reusable, now)
     made = None

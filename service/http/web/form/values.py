@@ -16,7 +16,7 @@ _MOST_FIELDS: Final = 2000
 
 
 async def read_form(request: Request) -> Values:
-    """The fields; of a name that is sent twice, the last one. Raises ApiError."""
+    """Read the fields; the last value of a repeated name counts. Raises ApiError."""
     if request.headers.get("content-type", "").partition(";")[0].strip().lower() != _FORM_TYPE:
         raise ApiError("unsupported-media-type", f"A form is sent as {_FORM_TYPE}.")
     try:
