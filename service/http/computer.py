@@ -160,9 +160,7 @@ class ProcessComputer:
             detail = f"The computation did not end within {timeout:g} s by the clock."
             raise ApiError(self._limits.problem, detail) from error
         except MemoryError as error:
-            detail = (
-                f"The computation needs more than the {self._limits.memory // 2**20} MiB of memory it may use."
-            )
+            detail = f"The computation needs more than the {self._limits.memory // 2**20} MiB of memory it may use."
             raise ApiError(self._limits.problem, detail) from error
         except ProcessDiedError as error:
             if error.exitcode == -signal.SIGPROF:

@@ -103,9 +103,7 @@ ScheduleId = Annotated[
 Fields = Annotated[Body, Depends(read_body)]
 IdempotencyKey = Annotated[
     str | None,
-    key_header(
-        "0b6e9a52-nights", "the same key with the same body creates the schedule once, even if sent repeatedly"
-    ),
+    key_header("0b6e9a52-nights", "the same key with the same body creates the schedule once, even if sent repeatedly"),
 ]
 
 

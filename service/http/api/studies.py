@@ -212,9 +212,7 @@ def retry_study(
     """Run only those cases of an ended study again that did not end ok."""
     for name in ending or ():
         if name not in _FAILED:
-            raise parameter_error(
-                "ending", "invalid-choice", "is not a failed case's ending", name, ", ".join(_FAILED)
-            )
+            raise parameter_error("ending", "invalid-choice", "is not a failed case's ending", name, ", ".join(_FAILED))
     return json_response(views.summary(context.store.retry_study(study_id, ending)), 202)
 
 
