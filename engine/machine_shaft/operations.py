@@ -189,7 +189,8 @@ class Operation:
                 width = np.where(whole, self._cycle, np.mod(last - first, self._cycle))
                 inside = np.mod(place - first, self._cycle) < width
             else:
-                inside = (place >= first) & (place < last)
+                # Near its end the stroke is so flat that its fraction rounds to 1.
+                inside = (place >= first) & ((place < last) | (last >= 1.0))
             total = total + np.where(inside, value, 0.0)
         return total
 

@@ -142,3 +142,19 @@ def test_no_stroke_is_under_way_in_the_dwells_of_a_cam(during: During, angle: fl
         "mechanism.cam.fall_angle": 1.2, "mechanism.cam.follower_mass": 1.0,
     }  # fmt: skip
     assert one(spec, numbers)["work.resistance"] == pytest.approx(-100.0 * angle, rel=1e-12)
+
+
+@pytest.mark.parametrize("during", ["forward", "return"])
+def test_a_step_to_the_end_of_the_stroke_acts_where_the_fraction_rounds_to_one(during: During) -> None:
+    """Within 6e-6 rad of the dead centre; a panel that small begins there."""
+    spec = MachineSpec(
+        mechanism=MechanismChoice("cam", fall="polynomial_345"),
+        operation=OperationChoice("torque", "steps", "stroke", during=during, steps=1),
+    )
+    row = one(spec, {
+        "mean_speed": 50.0, "drive.inertia": 50.0, "operation.steps.0.from": 0.0, "operation.steps.0.to": 1.0,
+        "operation.steps.0.value": 100.0, "mechanism.cam.start": math.radians(359.999), "mechanism.cam.lift": 0.02,
+        "mechanism.cam.rise_angle": math.pi, "mechanism.cam.dwell_angle": 0.0, "mechanism.cam.fall_angle": math.pi,
+        "mechanism.cam.follower_mass": 1.0,
+    })  # fmt: skip
+    assert row["work.resistance"] == pytest.approx(-100.0 * math.pi, rel=1e-10)
