@@ -1,26 +1,28 @@
-"""Which extra of the distribution brings a package that is not installed."""
+"""Which extra of the distribution installs a missing package."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
 
-#: Packages of the project: where one of these is not found, no extra helps.
+#: Packages of the project itself, for which no extra helps.
 _OWN: Final = frozenset({"sprag"})
 
 
 class MissingExtraError(ImportError):
-    """Something needs a package that the base installation does not have; ``str()`` tells how to install it."""
+    """A feature needs a package outside the base installation; ``str()`` explains how to install it."""
 
 
 def command_for(missing: ModuleNotFoundError, extra: str = "server") -> str | None:
-    """The command that installs what is missing; None where it is not a package of an extra."""
+    """The command that installs the missing package; None where no extra contains it."""
     package = (missing.name or "").partition(".")[0]
     return None if not package or package in _OWN else f'pip install "sprag[{extra}]"'
 
 
 @contextmanager
 def naming_extra(what: str, extra: str = "server") -> Iterator[None]:
-    """Turn the failure to import a package into `MissingExtraError`: what needs it, and the command to install it."""
+    """Convert a failed import to `MissingExtraError`, which names the feature and the command to install the
+    package.
+    """
     try:
         yield
     except ModuleNotFoundError as error:

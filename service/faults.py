@@ -1,6 +1,6 @@
-"""Faults as they are reported to whoever caused them: where, what was given, what is allowed, and a code that stays.
+"""Faults of input: their place, the given value, what is allowed, and a stable code.
 
-Wording is free; codes are what programs and tests rely on. ``docs/faults.md`` lists them.
+Wording may change; programs and tests rely on the codes, which ``docs/faults.md`` lists.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 _SHOWN_LENGTH = 200
 
-#: What one place of the input has wrong.
+#: Codes of the faults of one place of the input.
 Code = Literal[
     "cannot-assemble",
     "conflict",
@@ -66,17 +66,17 @@ CODES: Final[dict[Code, str]] = {
     "exactly-one": "Exactly one of several fields must be given.",
     "inertia-insufficient": "The shaft would stop, or nearly stop, within the cycle.",
     "invalid-choice": "The value is not one of the choices.",
-    "invalid-formula": "The formula cannot be read, or it gives no number.",
-    "invalid-machine": "The parts named do not make a machine, or a name of its formulas cannot be used.",
-    "invalid-path": "The path names no number that can vary.",
-    "invalid-range": "The ends, the step or the count of a range do not go together.",
+    "invalid-formula": "The formula cannot be read, or its value is not a number.",
+    "invalid-machine": "The named parts do not form a machine, or a name in its formulas is invalid.",
+    "invalid-path": "The path does not name a number that can vary.",
+    "invalid-range": "The ends, the step or the count of a range contradict each other.",
     "invalid-table": "A table is too short, not ascending, or not closed over the cycle.",
     "invalid-text": "The text does not have the required form.",
-    "invalid-time": "The text is not a time, or not a time that comes.",
+    "invalid-time": "The text is not a time, or the time never occurs.",
     "missing-unit": "A text needs a unit.",
     "motor-overrun": "The load drives the shaft harder than the motor can brake it.",
     "motor-stalled": "The load stalls the motor.",
-    "near-singular": "The mechanism passes too near to a singular position.",
+    "near-singular": "The mechanism passes too close to a singular position.",
     "negative-inertia": "The reduced inertia is not positive at every angle.",
     "no-clutch-law": "The coefficients are not a clutch law, or no law fits the measured data.",
     "not-a-grid": "The axes vary together, and a grid is required.",
@@ -85,7 +85,7 @@ CODES: Final[dict[Code, str]] = {
     "not-finite": "The number is not finite.",
     "not-fixed": "An axis needs one value and has none.",
     "not-numeric": "The result is a category, and a number is required.",
-    "not-used": "The field has no effect here, so that it is refused.",
+    "not-used": "The field has no effect here and is therefore refused.",
     "nothing-varies": "The study has one case only, or no axis.",
     "out-of-range": "The value is outside the allowed range.",
     "quadrature-not-reached": "Torque or inertia is too rough to be integrated to the required accuracy.",
@@ -105,7 +105,7 @@ CODES: Final[dict[Code, str]] = {
     "wrong-unit": "The unit cannot be read, or it is a unit of another quantity.",
 }
 
-#: What went wrong as a whole; over HTTP the last part of a problem's type.
+#: Kinds of failures as a whole; over HTTP the last part of a problem's type.
 Kind = Literal[
     "bad-request",
     "body-too-large",
@@ -136,7 +136,7 @@ Kind = Literal[
     "unsupported-media-type",
     "wrong-host",
     "wrong-state",
-    # Of commands, the client and the database; over HTTP, those of the database are `unavailable`.
+    # Kinds of commands, the client and the database; over HTTP, those of the database are `unavailable`.
     "database-busy",
     "database-damaged",
     "database-forbidden",
@@ -157,9 +157,9 @@ Kind = Literal[
     "write-failed",
     "wrong-revision",
 ]
-#: Kinds that only commands and the Python client tell of; `sprag.service.http.problems` explains the others.
+#: Kinds that only commands and the Python client report; `sprag.service.http.problems` explains the others.
 LOCAL_KINDS: Final[dict[Kind, str]] = {
-    "database-busy": "Another process kept the database busy for too long.",
+    "database-busy": "Another process locked the database for too long.",
     "database-damaged": "The database is damaged.",
     "database-forbidden": "The user lacks the rights for this in the database.",
     "database-read-only": "The database, or its folder, is read-only.",
@@ -170,7 +170,7 @@ LOCAL_KINDS: Final[dict[Kind, str]] = {
     "invalid-database-url": "The URL does not name a database.",
     "invalid-file": "The file cannot be read.",
     "invalid-settings": "A setting is not valid.",
-    "missing-extra": "A package is not installed; the message names the extra that brings it.",
+    "missing-extra": "A package is not installed; the message names the extra that installs it.",
     "not-a-database": "The file or database is not one of Sprag.",
     "not-done": "The study was not finished.",
     "token-not-found": "There is no such token.",
@@ -183,16 +183,15 @@ LOCAL_KINDS: Final[dict[Kind, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One thing wrong with the input.
+    """One fault of the input.
 
     Attributes
     ----------
-    where : str or None
-        JSON Pointer (RFC 6901) to the field, "" for the whole document; of a file a line, of a command an option.
+    where : str or None JSON Pointer (RFC 6901) to the field, "" for the whole document; for a file a line, for a
+        command an option.
     code : str
         One of `CODES`.
-    message : str
-        What is wrong, for people, without the value.
+    message : str Description of the fault, without the value.
     value : object
         The value received, shortened, always plain JSON data.
     allowed : str or None
@@ -234,21 +233,20 @@ class Fault:
 
 
 class ParameterFault(Fault):
-    """One thing wrong with a parameter of a request; ``where`` is its name."""
+    """One fault of a parameter of a request; ``where`` is its name."""
 
     __slots__ = ()
     place = "parameter"
 
 
 class FaultError(Exception):
-    """A failure that is reported to the caller; its form over HTTP is in ``sprag.service.http.problems``.
+    """A failure that is reported to the caller; ``sprag.service.http.problems`` defines its form over HTTP.
 
     Attributes
     ----------
     code : str
         Kind of the fault, stable: one of `Kind`.
-    detail : str
-        What went wrong this time, as a sentence.
+    detail : str Description of this failure, as a sentence.
     faults : tuple of Fault
         Every faulty place, where there can be several.
     retry_after : int or None
@@ -269,7 +267,7 @@ class FaultError(Exception):
 
 
 def _restored(kind: type[FaultError], args: tuple[Any, ...], state: dict[str, Any]) -> FaultError:
-    """The fault as another process raised it."""
+    """Restore a fault that another process raised."""
     fault = kind.__new__(kind, *args)
     fault.__dict__.update(state)
     return fault
@@ -282,7 +280,7 @@ def parameter_error(name: str, code: Code, message: str, value: Any = None, allo
 
 
 def shown(value: Any) -> Any:
-    """``value`` cut to a length that is fit to be sent back; only text can be long here."""
+    """``value`` truncated for an answer; only text can be long here."""
     if isinstance(value, str) and len(value) > _SHOWN_LENGTH:
         return value[: _SHOWN_LENGTH - 1] + "\N{HORIZONTAL ELLIPSIS}"
     return value

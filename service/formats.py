@@ -1,4 +1,4 @@
-"""Formats of whole studies: names, media types, endings of files. Server and client agree on them here."""
+"""Formats of whole studies, shared by server and client: names, media types, file endings."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MEDIA_TYPES: Final[dict[Format, str]] = {
 #: Formats of a study's report.
 ReportFormat = Literal["html", "pdf"]
 REPORT_FORMATS: Final[tuple[ReportFormat, ...]] = get_args(ReportFormat)
-#: How the name of a file in each format ends; the first ending is the one that is given.
+#: File endings of each format; the first one is used for writing.
 SUFFIXES: Final[dict[Format, tuple[str, ...]]] = {
     "csv": ("csv",),
     "json": ("json",),
@@ -31,6 +31,6 @@ SUFFIXES: Final[dict[Format, tuple[str, ...]]] = {
 
 
 def format_of(file: str) -> Format | None:
-    """The format that the ending of a file's name tells; None when it tells none."""
+    """The format by the ending of a file's name; None for an unknown ending."""
     ending = file.rpartition(".")[2].lower()
     return next((form for form, endings in SUFFIXES.items() if ending in endings), None)

@@ -1,4 +1,4 @@
-"""JSON as it is sent and written."""
+"""JSON for answers and files."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 
 
 def to_bytes(data: Any) -> bytes:
-    """``data`` as JSON text in UTF-8. NaN and infinities are a fault (ValueError); a lone surrogate stays an escape."""
+    """``data`` as JSON text in UTF-8. NaN and infinities raise ValueError; a lone surrogate stays escaped."""
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.encode("utf-8", errors="backslashreplace")
 
 
 def timestamp(moment: datetime) -> str:
-    """A moment as RFC 3339 text in UTC."""
+    """A time as RFC 3339 text in UTC."""
     return moment.astimezone(UTC).isoformat().replace("+00:00", "Z")
 
 

@@ -17,24 +17,24 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 LogFormat = Literal["text", "json"]
-#: Called with method, pattern of the address, status and seconds of every request that was answered.
+#: Called with method, pattern of the URL, status and seconds of every answered request.
 Observer = Callable[[str, str, int, float], None]
 
-#: The id of the request that is being answered; "" outside of any.
+#: The id of the current request; "" outside a request.
 REQUEST_ID: ContextVar[str] = ContextVar("request_id", default="")
 REQUEST_HEADER: Final = "X-Request-ID"
 _REQUESTS = logging.getLogger("sprag.requests")
 _GIVEN_ID: Final = re.compile(r"[A-Za-z0-9_-]{1,64}")
 _STUDY_ID: Final = re.compile(r"\bst_[0-9a-f]{16}\b")
-#: The address of a request that no route takes.
+#: The pattern of a request that matches no route.
 NO_ROUTE: Final = "(none)"
 _API: Final = "/api/v1"
 
 
 def configure(form: LogFormat, *, requests: bool) -> None:
-    """Send the log of this process to standard error in that form, with a line for every request where that is asked.
+    """Send the log of this process to standard error in that form, with a line for every request if ``requests``.
 
-    What the program says begins at level INFO, what libraries say at WARNING.
+    The program logs from level INFO, libraries from WARNING.
     """
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(JsonFormatter() if form == "json" else TextFormatter())
@@ -48,13 +48,13 @@ def _time(record: logging.LogRecord) -> str:
 
 
 class TextFormatter(logging.Formatter):
-    """A record as a line for people: time (UTC), level, message; what it was caused by on the lines below."""
+    """A record as plain text: time (UTC), level, message; a traceback follows on further lines."""
 
     def __init__(self) -> None:
         super().__init__("%(asctime)s %(levelname)s %(message)s")
 
     def formatTime(self, record: logging.LogRecord, datefmt: str | None = None) -> str:  # noqa: N802, ARG002
-        """Time of the record as ISO 8601 has it."""
+        """Time of the record in ISO 8601."""
         return _time(record)
 
 
@@ -62,7 +62,7 @@ class JsonFormatter(logging.Formatter):
     """A record as one JSON object on one line: time, level, logger, message, and where known request and studies."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """The line; fields given as ``extra={"fields": {...}}`` stand in it too."""
+        """The line, including fields given as ``extra={"fields": {...}}``."""
         message = record.getMessage()
         line: dict[str, object] = {
             "time": _time(record),
@@ -85,9 +85,9 @@ class JsonFormatter(logging.Formatter):
 
 
 class RequestLog:
-    """ASGI application around everything: gives each request an id, tells how it went to the log and to ``observe``.
+    """Outermost ASGI application: gives each request an id and reports its outcome to the log and to ``observe``.
 
-    The id is that of the header X-Request-ID where a proxy gave one, and stands in the same header of the answer.
+    The id is taken from the header X-Request-ID where a proxy sent one, and is returned in the same header.
     """
 
     def __init__(self, app: ASGIApp, observe: Observer) -> None:
@@ -101,7 +101,7 @@ class RequestLog:
         given = Headers(scope=scope).get(REQUEST_HEADER, "")
         request_id = given if _GIVEN_ID.fullmatch(given) else secrets.token_hex(8)
         began, status = time.perf_counter(), 0
-        # The framework notes the route in a copy of the scope, so it is noted where both can see it.
+        # The framework records the route in a copy of the scope, so it is recorded in a shared object.
         seen: dict[str, str] = {}
         scope["sprag.seen"] = seen
 
@@ -129,7 +129,7 @@ class RequestLog:
                         "path": _plain(scope["path"]),
                         "status": status,
                         "milliseconds": round(1e3 * seconds, 3),
-                        # A study that was submitted stands in no address but that of the answer.
+                        # The id of a new study appears only in the location of the answer.
                         "studies": _STUDY_ID.findall(seen.get("made", "")),
                     }
                 },
@@ -138,7 +138,7 @@ class RequestLog:
 
 
 class Noted:
-    """ASGI application right around the routes: notes which of them took the request, for `RequestLog`."""
+    """ASGI application directly around the routes: records the matching route for `RequestLog`."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -152,13 +152,13 @@ class Noted:
 
 
 def pattern_of(scope: Scope) -> str:
-    """The pattern of the route that took the request, so that ids in addresses make no new one."""
+    """The pattern of the matching route, which contains no ids."""
     pattern = str(getattr(scope.get("route"), "path_format", NO_ROUTE))
-    # A route of the interface knows its address without the prefix that all of them have.
+    # The path of an API route lacks the common prefix.
     inside = scope["path"].startswith(_API) and pattern.startswith("/") and not pattern.startswith(_API)
     return _API + pattern if inside else pattern
 
 
 def _plain(path: str) -> str:
-    """A path without characters that would break a line of the log or steer a terminal."""
+    """A path without characters that would break a log line or control a terminal."""
     return path if path.isprintable() and path.isascii() else ascii(path)[1:-1]

@@ -1,7 +1,7 @@
 """Settings of the service and the worker: one table of names, defaults and help, read from environment and file.
 
-Every setting is an environment variable with the prefix ``SPRAG_``, and a field of the TOML file that the variable
-``SPRAG_SETTINGS`` names; the environment goes before the file. The documentation's table is made from `table`.
+Every setting is an environment variable with the prefix ``SPRAG_``, and a field of the TOML file named by the variable
+``SPRAG_SETTINGS``; the environment takes precedence. The documentation's table is generated from `table`.
 """
 
 import ipaddress
@@ -32,7 +32,7 @@ LOOPBACK_HOSTS = ("localhost", "127.0.0.1", "[::1]")
 
 
 class UnsafeSettingsError(Exception):
-    """The settings would open the service to other machines without protection."""
+    """The settings would expose the service to other machines without protection."""
 
 
 class SettingsFileError(Exception):
@@ -65,13 +65,11 @@ class Settings(BaseSettings):
     )
     allowed_hosts: Annotated[tuple[str, ...], NoDecode] = Field(
         default=(),
-        description="names, separated by commas, by which clients may call the service beside localhost and the host",
+        description="host names, separated by commas, that clients may use besides localhost and the host",
     )
     trusted_proxies: Annotated[tuple[IPv4Network | IPv6Network, ...], NoDecode] = Field(
         default=(IPv4Network("127.0.0.1/32"), IPv6Network("::1/128")),
-        description=(
-            "addresses or networks, separated by commas, of proxies whose `X-Forwarded-For` tells the client's address"
-        ),
+        description=("addresses or networks, separated by commas, of proxies whose `X-Forwarded-For` is trusted"),
     )
     processes: int = Field(default=0, ge=0, le=1024, description="processes of the pool; 0: one for each core")
     executor: str = Field(
@@ -95,25 +93,25 @@ class Settings(BaseSettings):
         default=60.0,
         gt=0.0,
         le=3_600.0,
-        description="seconds of processor time after which the instantaneous values of a case are given up",
+        description="seconds of processor time after which the computation of instantaneous values is ended",
     )
     check_processes: int = Field(
         default=2,
         ge=1,
         le=64,
-        description="processes that check specs, fit clutches and draw; one token has all but one of them at most",
+        description="processes that check specs, fit clutches and draw; one token can use all but one of them",
     )
     check_timeout: float = Field(
         default=20.0,
         gt=0.0,
         le=3_600.0,
         description=(
-            "seconds of processor time after which the check of a spec, a fit or a picture is given up; loading is not "
+            "seconds of processor time after which the check of a spec, a fit or a picture is ended; loading is not "
             "counted"
         ),
     )
     check_memory: int = Field(
-        default=512, ge=64, le=1_048_576, description="MiB that the check of a spec, a fit or a picture may take"
+        default=512, ge=64, le=1_048_576, description="MiB that the check of a spec, a fit or a picture may use"
     )
 
     log_format: Literal["text", "json"] = Field(
@@ -121,7 +119,7 @@ class Settings(BaseSettings):
     )
     log_requests: bool = Field(default=False, description="a line in the log for every request")
     backup_folder: str = Field(
-        default="", description="folder that the worker writes a backup of the database to every night; empty: none"
+        default="", description="folder to which the worker writes a backup of the database every night; empty: none"
     )
     backup_keep: int = Field(default=14, ge=1, le=10_000, description="backups that are kept, the latest ones")
     keep_days: int = Field(
@@ -139,7 +137,7 @@ class Settings(BaseSettings):
         dotenv_settings: PydanticBaseSettingsSource,  # noqa: ARG003 - pydantic names them
         file_secret_settings: PydanticBaseSettingsSource,  # noqa: ARG003
     ) -> tuple[PydanticBaseSettingsSource, ...]:
-        """Options first, then the environment, then the file that SPRAG_SETTINGS names."""
+        """Precedence: options, environment, the file named by SPRAG_SETTINGS."""
         return init_settings, env_settings, InitSettingsSource(settings_cls, _read_file(settings_cls))
 
     @field_validator("nightly_at")
@@ -168,7 +166,7 @@ class Settings(BaseSettings):
     def _known_executor(cls, value: str) -> str:
         found = re.fullmatch(r"pool|dask|dask://(\[[0-9a-fA-F:]+\]|[^\s:/@]+):([0-9]{1,5})", value)
         if not found or (found[2] and not 1 <= int(found[2]) <= 65_535):
-            raise ValueError("it is pool, dask, or dask://host:port, with a port of 1 to 65535")
+            raise ValueError("must be pool, dask, or dask://host:port, with a port of 1 to 65535")
         return value
 
     @field_validator("token")
@@ -206,7 +204,7 @@ class Settings(BaseSettings):
 
     @property
     def host_names(self) -> frozenset[str]:
-        """The host names, lower case and without port, that a request may be addressed to."""
+        """The allowed host names of requests, in lower case and without port."""
         host = self.host.lower()
         own = f"[{host}]" if ":" in host and not host.startswith("[") else host
         return frozenset({*LOOPBACK_HOSTS, own, *(name.lower() for name in self.allowed_hosts)})
@@ -214,7 +212,7 @@ class Settings(BaseSettings):
     def require_safe(self, *, stored: bool = False) -> None:
         """Raise `UnsafeSettingsError` when another machine could reach the service and there is no token.
 
-        ``stored`` tells whether the database has one.
+        ``stored`` states whether the database has one.
         """
         if not self.loopback and self.token is None and not stored:
             raise UnsafeSettingsError(
@@ -224,7 +222,7 @@ class Settings(BaseSettings):
 
 
 def _read_file(settings_cls: type[BaseSettings]) -> dict[str, Any]:
-    """The settings in the file that the environment names; raises SettingsFileError."""
+    """The settings in the file named by the environment; raises SettingsFileError."""
     name = os.environ.get(FILE_VARIABLE, "")
     if not name:
         return {}
@@ -251,7 +249,7 @@ def available_cores() -> int:
 
 
 def default_database_path() -> Path:
-    """Where the database lies unless a setting says otherwise."""
+    """Default path of the database."""
     return Path(platformdirs.user_data_dir("sprag", appauthor=False)) / "sprag.sqlite3"
 
 

@@ -1,4 +1,4 @@
-"""What a killed process left behind: found by a lock that goes with its process, removed by the next one that comes."""
+"""Files left behind by killed processes: recognised by the missing lock of their process, removed by a later one."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
     from pathlib import Path
 
-#: Seconds for which nothing is stale: between its making and its lock a file looks like one.
+#: Minimum age of a stale file in s, because a new file is unlocked for a moment.
 YOUNG_SECONDS = 60.0
 
 
 def mark(descriptor: int) -> None:
-    """Mark an open file or folder as in use until it is closed, which the end of the process does."""
-    with suppress(OSError):  # some file systems have no locks: nothing is swept there
+    """Mark an open file or folder as in use until it is closed, at the latest by the end of the process."""
+    with suppress(OSError):  # some file systems have no locks; nothing is removed there
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
@@ -35,7 +35,7 @@ def marked(folder: Path) -> Iterator[None]:
 
 
 def sweep(candidates: Iterable[Path]) -> None:
-    """Remove those of the files and folders that nobody uses any more; what cannot be removed stays, without a word."""
+    """Remove the files and folders that are no longer in use; those that cannot be removed are silently kept."""
     for path in candidates:
         with suppress(OSError):
             _sweep(path)

@@ -6,8 +6,7 @@
     with sprag.Client("http://sprag.example:8000") as client:  # the base installation
         table = client.submit("study.toml").wait().table()
 
-Everything is loaded when it is asked for. What belongs to an extra that is not installed raises `MissingExtraError`,
-which names it.
+Everything is loaded on first use. Where an extra is missing, `MissingExtraError` names it.
 """
 
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""``python -m sprag``: the command line, whatever lies in the folder in which it is called."""
+"""``python -m sprag``: the command line, independent of the files in the current folder."""
 
 import os
 import sys
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def _leave_folder_out() -> None:
-    """Take the current folder off the path, which ``python -m`` puts first: a ``worker.py`` there is none of ours."""
+    """Remove the current folder from the path, where ``python -m`` puts it first; a ``worker.py`` there is not ours."""
     own = Path(__file__).resolve().parents[1]
     if sys.path and Path(sys.path[0] or os.curdir).resolve() == Path.cwd() != own:
         del sys.path[0]

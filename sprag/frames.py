@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ENGINE_VERSION", "Ending", "Run", "Span", "simulate"]
 
-#: The clutch law, of all pendulums or of one; the ranges are those of a spec.
+#: Parameters of a clutch law, common or of one pendulum; the ranges are those of a spec.
 _CLUTCH: Final = (
     Parameter("clutch.coefficients.K", "c_k", "N*m/rad^K", -1e30, 1e30, False, None, "clutch polynomial"),
     Parameter("clutch.windup_limit", "u_max", "rad", 0.0, math.inf, True, math.inf, "largest windup measured"),
@@ -56,7 +56,7 @@ def simulate(cases: Mapping[str, ArrayLike] | pd.DataFrame, run: Run | None = No
     Returns
     -------
     DataFrame
-        A row for each case, with the index of ``cases`` where that is a frame: how it ended, and its results, NaN where
+        A row for each case, with the index of ``cases`` where that is a frame: its ending and its results, NaN where
         one could not be computed. ``attrs["units"]`` has the unit of each result ("1" where it has none).
 
     Raises

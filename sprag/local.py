@@ -38,12 +38,11 @@ def run(
     ----------
     spec : mapping, str or path
         A spec, or the name of a JSON or TOML file with one.
-    processes : int, optional
-        Processes to run on; 0 is this one. By default one for each core, or this one where the study takes about a
-        second. A script that starts processes needs ``if __name__ == "__main__":`` around its own code.
-    database : str, optional
-        Database to keep the study in, as of ``sprag run --db``; what it has already is not run again, unless ``fresh``.
-        By default a temporary one.
+    processes : int, optional Number of processes; 0 runs the cases in this process. By default one per core, or 0 where
+        the study takes about a second. A script that starts processes needs ``if __name__ == "__main__":`` around its
+        own code.
+    database : str, optional Database that stores the study, as in ``sprag run --db``; cases that it already has are not
+        run again, unless ``fresh``. By default a temporary one.
     finish_by : datetime, optional
         An aware time at which the run ends with what is done, coarse to fine.
     on_progress : function, optional
@@ -54,12 +53,12 @@ def run(
     DataFrame
         A row for each case: ``case``, the parameters that vary, ``ending``, ``flags``, the results. Numbers are in SI
         units, and missing where a result could not be computed. ``attrs["units"]`` has the unit of each parameter and
-        result, ``attrs["warnings"]`` what is odd about the spec.
+        result, ``attrs["warnings"]`` the warnings about the spec.
 
     Raises
     ------
     SpecFileError, SpecError
-        About the file, and about the spec in it: every problem with pointer, value and allowed range.
+        For an unreadable file and for an invalid spec: every fault with pointer, value and allowed range.
     StoreError, ExecutorError
         When the database or a process fails.
     """

@@ -1,4 +1,4 @@
-"""Priorities of studies, and what a held study waits for by itself.
+"""Priorities of studies, and what a held study waits for.
 
 Self-contained: it must do the same on the day it is run as on the day it was written.
 """

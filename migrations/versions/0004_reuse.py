@@ -1,4 +1,4 @@
-"""What studies with a case in common share, whether a study wants every case run, and how many it took from others.
+"""The hash shared by studies with a common case, whether a study runs every case, and how many cases it reused.
 
 Self-contained: it must do the same on the day it is run as on the day it was written.
 """

@@ -1,4 +1,4 @@
-"""Schedules and the due times that they had.
+"""Schedules and their due times.
 
 Self-contained: it must do the same on the day it is run as on the day it was written.
 """

@@ -1,4 +1,4 @@
-"""Tokens by which clients may ask the service for something; only their digests are kept.
+"""Tokens of clients; only their digests are stored.
 
 Self-contained: it must do the same on the day it is run as on the day it was written.
 """

@@ -1,4 +1,4 @@
-"""The key that seals the sessions of browsers, and the sessions that were ended early.
+"""The signing key of browser sessions, and the sessions that were ended early.
 
 Self-contained: it must do the same on the day it is run as on the day it was written.
 """

@@ -1,6 +1,6 @@
-"""Which code, libraries and processor the rows of a study come from.
+"""The code, libraries and processor that computed the rows of a study.
 
-Of rows that are there already nobody can tell: they stay, and no other study takes them ("").
+For existing rows they are unknown (""): these rows are kept, but no other study reuses them.
 
 Self-contained: it must do the same on the day it is run as on the day it was written.
 """

@@ -1,4 +1,4 @@
-"""The last moment at which the worker believed the clock of its machine.
+"""The last time at which the worker trusted the clock of its machine.
 
 Self-contained: it must do the same on the day it is run as on the day it was written.
 """

@@ -1,4 +1,4 @@
-"""The idempotency key that a schedule was sent with.
+"""The idempotency key of the request that created a schedule.
 
 Self-contained: it must do the same on the day it is run as on the day it was written.
 """

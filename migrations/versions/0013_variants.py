@@ -1,4 +1,4 @@
-"""The variant of its model that a study is of, in place of the number of pendulums, which only one model has.
+"""The variant of a study's model, replacing the number of pendulums, which only one model has.
 
 Self-contained: it must do the same on the day it is run as on the day it was written.
 """

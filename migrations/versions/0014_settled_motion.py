@@ -1,7 +1,7 @@
-"""The results of settled studies of vibration drives, and what an open `run` of a stored spec means.
+"""The results of settled studies of vibration drives, and explicit durations in stored specs.
 
-A run without `duration` and `window` was one of 60 periods. From this revision on it is one until the motion is
-settled, so that stored specs are given the duration they meant.
+A run without `duration` and `window` used to last 60 periods. From this revision on it lasts until the motion is
+settled, so stored specs get the duration that applied to them.
 
 Self-contained: it must do the same on the day it is run as on the day it was written.
 """
@@ -131,7 +131,7 @@ def _create_results(pendulums: int) -> None:
 
 
 def _give_durations(name: str) -> None:
-    """Write the duration of 60 periods into every stored spec of a vibration drive that leaves it open."""
+    """Write the duration of 60 periods into every stored spec of a vibration drive that gives none."""
     table = sa.table(name, sa.column("number", sa.Integer), sa.column("spec", sa.Text))
     connection = op.get_bind()
     for number in connection.execute(sa.select(table.c.number)).scalars().all():

@@ -1,4 +1,4 @@
-"""An index by regime of the results of settled studies: how many cases have which, and which cases have one.
+"""An index by regime of the results of settled studies: for counting and selecting cases by regime.
 
 Self-contained: it must do the same on the day it is run as on the day it was written.
 """

@@ -1,5 +1,5 @@
-"""Shapes of the answers of the service, each written once: the service fills them, OpenAPI documents them, and they are
-the client's types. They are typed dictionaries, so that whoever reads them needs none of the server's libraries.
+"""Shapes of the service's answers, each defined once: the service fills them, OpenAPI documents them, the client uses
+them as types. They are typed dictionaries, so that clients do not need the server's libraries.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ A = TypeVar("A")
 
 
 class Doc(str):
-    """What a field means; OpenAPI's description of it."""
+    """The description of a field, for OpenAPI."""
 
     __slots__ = ()
 
@@ -36,10 +36,10 @@ Number = float | int | None
 
 
 def filled(shape: Callable[..., A], source: object, **given: Any) -> A:
-    """An answer of that shape: each field as ``given``, else the attribute of ``source`` of the same name.
+    """An answer of that shape: each field from ``given``, otherwise from the attribute of ``source`` of the same name.
 
-    Attributes become JSON data: times as texts, numbers that are not finite as None. Raises AttributeError where there
-    is none.
+    Attributes become JSON data: times as texts, numbers that are not finite as None. Raises AttributeError for a
+    missing attribute.
     """
     names = shape.__annotations__
     return shape(**{name: given[name] if name in given else _plain(getattr(source, name)) for name in names})

@@ -58,8 +58,8 @@ class Preset(TypedDict):
     name: str
     title: Annotated[str, Doc("the name of the study")]
     model: str
-    shows: Annotated[str, Doc("what to look at in it")]
-    values: Annotated[str, Doc("where its numbers come from")]
+    shows: Annotated[str, Doc("what it demonstrates")]
+    values: Annotated[str, Doc("source of its numbers")]
     cases: int
     spec: Annotated[dict[str, Any], Doc("its spec, which can be submitted")]
 

@@ -1,4 +1,4 @@
-"""Answers about results: cases, motions, curves, maps, what results depend on."""
+"""Answers about results: cases, motions, curves, maps, sensitivities."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Case(TypedDict):
 
 
 class CaseDetail(Case):
-    """One case with what its ending means."""
+    """One case with the meaning of its ending."""
 
     ending_meaning: str
     flag_meanings: dict[str, str]
@@ -38,7 +38,7 @@ class CasePage(TypedDict):
 
 
 class ValueAxis(TypedDict):
-    """What instantaneous values stand over."""
+    """The axis of instantaneous values."""
 
     name: Annotated[str, Doc("field of the document with its values: times or angles")]
     unit: str
@@ -98,7 +98,7 @@ class Curve(TypedDict):
 
 
 class CurvesData(TypedDict):
-    """Curves of results over one axis, whoever has drawn them."""
+    """Curves of results over one axis, without the study."""
 
     x: CurveAxis
     units: Annotated[dict[str, str], Doc("SI unit of every parameter in x, by and at")]
@@ -122,7 +122,7 @@ class MapResult(TypedDict):
 
 
 class MapData(TypedDict):
-    """One result over two axes, whoever has drawn it."""
+    """One result over two axes, without the study."""
 
     x: CurveAxis
     y: CurveAxis
@@ -141,20 +141,20 @@ class Map(MapData):
 
 
 class AxisEffect(TypedDict):
-    """What one axis does to one result."""
+    """The effect of one axis on one result."""
 
     paths: list[str]
     unit: str
-    values: Annotated[list[Number], Doc("values of the axis, or middles of groups of them, SI")]
+    values: Annotated[list[Number], Doc("values of the axis, or midpoints of groups of values, SI")]
     means: Annotated[list[Number], Doc("mean of the result at each of these values")]
-    first_order: Annotated[float | None, Doc("share of the variance that knowing this axis would take away")]
+    first_order: Annotated[float | None, Doc("share of the variance that would vanish if only this axis were fixed")]
     first_order_error: Annotated[float | None, Doc("half width of its 95 % interval; null where it is exact")]
-    total: Annotated[float | None, Doc("share that would stay if everything but this axis were known")]
+    total: Annotated[float | None, Doc("share that would remain if everything but this axis were fixed")]
     total_error: Annotated[float | None, Doc("half width of its 95 % interval; null where it is exact")]
 
 
 class ResultSensitivity(TypedDict):
-    """What one result depends on."""
+    """Sensitivity of one result."""
 
     result: str
     unit: str
@@ -163,7 +163,7 @@ class ResultSensitivity(TypedDict):
         str, Doc("grid: exact; saltelli: by the design for it; rbd-fast: from a sample; none: a note says why")
     ]
     cases: Annotated[int, Doc("cases that have the result")]
-    missing: Annotated[int, Doc("cases that have not")]
+    missing: Annotated[int, Doc("cases that do not have it")]
     mean: float | None
     variance: float | None
     effects: list[AxisEffect]
@@ -171,11 +171,11 @@ class ResultSensitivity(TypedDict):
 
 
 class SensitivityReport(TypedDict):
-    """What results depend on."""
+    """Sensitivity of results."""
 
     study: str
     results: list[ResultSensitivity]
-    warnings: Annotated[list[str], Doc("axes that change no result; told once the study has ended")]
+    warnings: Annotated[list[str], Doc("axes that change no result; given once the study has ended")]
 
 
 class EngagementRow(TypedDict):
@@ -188,7 +188,7 @@ class EngagementRow(TypedDict):
     torque_max: Annotated[float, Doc("largest torque, N*m")]
     work_shaft: Annotated[float, Doc("work that the clutch does on the shaft, J")]
     work_pendulum: Annotated[float, Doc("work that the pendulum does on the clutch, J")]
-    complete: Annotated[bool, Doc("false where it begins before or goes on after the part that is told")]
+    complete: Annotated[bool, Doc("false where it begins before or continues after the reported part")]
 
 
 class PeriodRow(TypedDict):
@@ -205,7 +205,7 @@ class EngagementTables(TypedDict):
 
     case: int
     parameters: dict[str, float]
-    start: Annotated[float, Doc("start of the part that the engagements are from, s")]
+    start: Annotated[float, Doc("start of the reported part, s")]
     end: Annotated[float, Doc("its end, s: after one turn of a periodic motion, or at the end of the window")]
     regime: Annotated[str | None, Doc("regime of the settled motion; null for a run of a given time")]
     engagements: list[EngagementRow]
@@ -223,7 +223,7 @@ class TimedValues(TypedDict):
 
 
 class Portrait(TypedDict):
-    """How one case comes to its motion: its state once in each excitation period, and the orbit it comes to."""
+    """How one case approaches its motion: its state once per excitation period, and its orbit."""
 
     case: int
     parameters: dict[str, float]

@@ -10,7 +10,7 @@ from sprag.service.answers import Doc, Moment
 
 
 class ScheduleRun(TypedDict):
-    """A due time of a schedule and what became of it."""
+    """A due time of a schedule and its outcome."""
 
     due: Moment
     state: Annotated[str, Doc("taken: about to be submitted; submitted; refused, see `problem`")]
@@ -18,21 +18,21 @@ class ScheduleRun(TypedDict):
     begun_at: Moment
     study: Annotated[str | None, Doc("id of its study; null where there is none, or it was deleted")]
     address: Annotated[str | None, Doc("address of the study")]
-    problem: Annotated[str | None, Doc("why no study came of it")]
+    problem: Annotated[str | None, Doc("why no study was submitted")]
 
 
 class ScheduleSummary(TypedDict):
-    """A study that is submitted by itself."""
+    """A study that is submitted on a schedule."""
 
     id: str
     name: str
-    cron: Annotated[str | None, Doc("when it is due again and again, on the wall clock of `zone`")]
+    cron: Annotated[str | None, Doc("when it is due repeatedly, on the wall clock of `zone`")]
     at: Annotated[Moment | None, Doc("when it is due once")]
     zone: str
     window: Annotated[list[str] | None, Doc("its studies run between these times of day only")]
     priority: int
     fresh: bool
-    finish_by: Annotated[str | None, Doc("when a run is held, whatever is done: a time of day, or a duration")]
+    finish_by: Annotated[str | None, Doc("deadline at which a study is held: a time of day, or a duration")]
     enabled: bool
     created_at: Moment
     next_due: Annotated[Moment | None, Doc("null when it is disabled or over")]

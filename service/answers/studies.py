@@ -17,7 +17,7 @@ class Interval(TypedDict):
 
 
 class Progress(TypedDict):
-    """How far a study is."""
+    """Progress of a study."""
 
     total: Annotated[int, Doc("cases of the study")]
     done: Annotated[int, Doc("cases with an ending")]
@@ -25,7 +25,7 @@ class Progress(TypedDict):
 
 
 class Passes(TypedDict):
-    """What of a study is complete that is run coarse to fine."""
+    """The complete part of a study that is run coarse to fine."""
 
     complete: Annotated[int, Doc("passes that are complete")]
     total: Annotated[int, Doc("passes of the study; the last is the whole study")]
@@ -34,17 +34,17 @@ class Passes(TypedDict):
 
 
 class FullProgress(Progress):
-    """How far a study is, how fast, and how long it will take."""
+    """Progress of a study, its rate and its time left."""
 
     endings: Annotated[dict[str, int], Doc("number of cases for each ending")]
     rate: Annotated[float | None, Doc("cases per second over the recent chunks; null when nothing runs")]
     seconds_left: Annotated[Interval | None, Doc("estimated time left in s; null when nothing runs")]
     in_time: Annotated[
         Literal["yes", "no", "unsure"] | None,
-        Doc("whether it will be finished by `finish_by`, from `seconds_left`; null when nothing is known"),
+        Doc("whether it will be finished by `finish_by`, from `seconds_left`; null when unknown"),
     ]
-    done_by_then: Annotated[int | None, Doc("cases that will be done at `finish_by`, about")]
-    passes: Annotated[Passes | None, Doc("of a study that is run coarse to fine: what is complete")]
+    done_by_then: Annotated[int | None, Doc("estimated number of cases done at `finish_by`")]
+    passes: Annotated[Passes | None, Doc("the complete part of a study that is run coarse to fine")]
 
 
 class _Study(TypedDict):
@@ -55,16 +55,16 @@ class _Study(TypedDict):
     state_meaning: Annotated[str, Doc("the state as a sentence")]
     reason: Annotated[str | None, Doc("why the study is held, waits or failed")]
     cases: Annotated[int, Doc("number of cases")]
-    reused: Annotated[int, Doc("cases whose rows were taken from other studies instead of being run")]
-    warnings: Annotated[list[str], Doc("what is allowed but probably not meant")]
+    reused: Annotated[int, Doc("cases whose rows were copied from other studies instead of being run")]
+    warnings: Annotated[list[str], Doc("warnings about what is allowed but probably unintended")]
     priority: Annotated[int, Doc("waiting studies with the highest priority run first")]
     created_at: Moment
     started_at: Moment | None
     finished_at: Moment | None
-    finish_by: Annotated[Moment | None, Doc("when the study is held, whatever is done then")]
-    time_over: Annotated[bool, Doc("it is held because `finish_by` came before its end")]
+    finish_by: Annotated[Moment | None, Doc("when the study is held, finished or not")]
+    time_over: Annotated[bool, Doc("whether it is held because `finish_by` has passed")]
     engine_version: str
-    links: Annotated[dict[str, str], Doc("addresses of what belongs to the study")]
+    links: Annotated[dict[str, str], Doc("URLs of the study's resources")]
 
 
 class StudySummary(_Study):
@@ -87,9 +87,9 @@ class StudyDetail(_Study):
     """A study with its spec and its progress."""
 
     progress: FullProgress
-    combine: Annotated[str, Doc("grid: every combination, the first axis slowest; zip: the axes go together")]
+    combine: Annotated[str, Doc("grid: every combination, the first axis slowest; zip: the axes side by side")]
     axes: list[AxisInfo]
-    physics_hash: Annotated[str, Doc("SHA-256 of what decides the numbers: equal for equal studies")]
+    physics_hash: Annotated[str, Doc("SHA-256 of everything that determines the results: equal for equal studies")]
     regimes: Annotated[dict[str, int], Doc("number of cases of each regime; empty where cases have none")]
     flags: Annotated[dict[str, int], Doc("number of cases that have each flag; only flags that some case has")]
     spec: Annotated[dict[str, Any], Doc("the spec as it was submitted")]
@@ -123,7 +123,7 @@ class ClutchFitReport(TypedDict):
     rms: Annotated[float, Doc("root mean square of the residuals, N*m")]
     max_residual: Annotated[float, Doc("largest residual, N*m")]
     residuals: Annotated[list[float], Doc("residual of each row, N*m")]
-    rows_in_backlash: Annotated[list[int], Doc("rows within the lost motion, left out of the fit")]
+    rows_in_backlash: Annotated[list[int], Doc("rows within the backlash, left out of the fit")]
     condition_number: Annotated[Number, Doc("of the normal matrix")]
     eigenvalues: Annotated[list[float], Doc("of the normal matrix")]
     rank: int
@@ -134,7 +134,7 @@ class ClutchFitReport(TypedDict):
 
 
 class Preview(TypedDict):
-    """What a study would be, without submitting it."""
+    """Preview of a study that is not submitted."""
 
     model: str
     name: str

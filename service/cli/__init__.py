@@ -1,4 +1,4 @@
-"""The command line: ``sprag``. Its entry is `main`; each module holds the commands of one subject."""
+"""The command line: ``sprag``. Its entry is `main`; each module contains the commands of one subject."""
 
 import signal
 import sys
@@ -7,8 +7,8 @@ from typing import NoReturn
 
 def main() -> NoReturn:
     """Run the command of the process' arguments and end the process with its exit code."""
-    # A termination and the end of the terminal end a command in order, as Ctrl-C does: files, processes and studies
-    # are cleared away. What nohup ignores stays ignored.
+    # SIGTERM and SIGHUP end a command cleanly, as Ctrl-C does: files, processes and studies are cleaned up. Signals
+    # ignored under nohup stay ignored.
     for name in ("SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is not signal.SIG_IGN:

@@ -1,4 +1,4 @@
-"""All commands together, and the one place where a failure becomes an exit code."""
+"""All commands, and the only place where failures become exit codes."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from sprag.service.cli.console import CommandFailureError, ExitCode, TroubleErro
 from sprag.service.extras import command_for
 from sprag.service.faults import Kind
 
-#: Set to anything to see where a fault of the program lies.
+#: Environment variable that shows the traceback of a bug.
 DEBUG_VARIABLE = "SPRAG_DEBUG"
 
 app = typer.Typer(
@@ -58,7 +58,7 @@ def _every_command(
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
-    """What stands before the name of a command; typer shows the application's own help instead of this."""
+    """Options before the name of a command; typer shows the application's own help instead of this text."""
 
 
 _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
@@ -104,9 +104,9 @@ app.add_typer(database.app, name="db", rich_help_panel="Run a service")
 
 
 def execute(arguments: Sequence[str]) -> int:
-    """Run one command; the exit code. Every failure has been said on standard error when this returns."""
+    """Run one command; returns the exit code. Every failure is reported on standard error."""
     for stream in (sys.stdout, sys.stderr):
-        # A terminal of another character set shows an escape rather than ending the command.
+        # A terminal with another character set shows an escape instead of ending the command.
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
     try:
@@ -115,7 +115,7 @@ def execute(arguments: Sequence[str]) -> int:
     except (BrokenPipeError, _PipeClosedError):
         _drop_output()
         code = ExitCode.PIPE_CLOSED
-    except OSError as error:  # a full disk, or no right to write where temporary files go
+    except OSError as error:  # a full disk, or no permission to write temporary files
         _drop_output()
         failure = TroubleError(
             "write-failed", f"{error.filename or 'standard output'}: {(error.strerror or str(error)).lower()}"
@@ -148,7 +148,7 @@ def _invoke(arguments: Sequence[str]) -> int:
     except OSError:
         raise
     except SystemExit as stop:
-        # typer turns a broken pipe into exit 1, which here would mean that some cases failed.
+        # typer turns a broken pipe into exit code 1, which here would mean that some cases failed.
         raise _PipeClosedError from stop
     except Exception as error:
         command = command_for(error) if isinstance(error, ModuleNotFoundError) else None
@@ -163,7 +163,7 @@ def _invoke(arguments: Sequence[str]) -> int:
 
 
 def _usage(error: typer.TyperException, as_json: bool) -> int:
-    """The command line itself is wrong."""
+    """Report an invalid command line."""
     context = getattr(error, "ctx", None)
     message = error.format_message().replace(": Value error, ", ": ")
     if as_json:
@@ -184,7 +184,7 @@ def _report(failure: CommandFailureError, as_json: bool) -> int:
 
 
 def _drop_output() -> None:
-    """Send what is still buffered for a closed pipe nowhere, so that the interpreter's end is silent."""
+    """Discard output buffered for a closed pipe, so that the interpreter exits silently."""
     with suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())

@@ -1,7 +1,7 @@
-"""What a command writes and where: data on standard output, progress and messages on standard error.
+"""Output of commands: data on standard output, progress and messages on standard error.
 
 Colours and bars appear only on a terminal. With ``--json`` the data are JSON and a failure is one JSON object on
-standard error, so that a program never has to read prose.
+standard error, so that programs never have to parse prose.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 #: Width of tables that do not go to a terminal: wide enough that no number is cut.
 _PLAIN_WIDTH = 160
 _WIDEST = 100_000
-#: How the service names the ending of a case that has none of the troubles; to ask the models would load the engine.
+#: Name of the normal ending of a case; asking the models would load the engine.
 OK: Final = "ok"
 
 
@@ -39,12 +39,12 @@ class ExitCode(IntEnum):
 
 
 class CommandFailureError(FaultError):
-    """A command cannot do what it was asked to; carries the exit code and everything that is to be said about it."""
+    """A command failed; carries the exit code and all messages."""
 
     exit_code = ExitCode.TROUBLE
 
     def lines(self) -> Iterator[str]:
-        """The message and every fault, one a line, for people."""
+        """The message and every fault, one per line."""
         yield self.detail
         for fault in self.faults:
             yield f"  {fault}"
@@ -68,23 +68,23 @@ class TroubleError(CommandFailureError):
 
 
 def write_json(data: object) -> None:
-    """One JSON document on standard output, in one piece and ended by a newline."""
+    """Write one JSON document and a newline to standard output, in one piece."""
     sys.stdout.write(json.dumps(data, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 def write_text(text: str) -> None:
-    """Text on standard output as it is."""
+    """Write text to standard output unchanged."""
     sys.stdout.write(text)
 
 
 def say(*lines: str) -> None:
-    """Messages for people, on standard error, a line each; never wrapped, never read as markup."""
+    """Write messages to standard error, one line each; never wrapped, never interpreted as markup."""
     for line in lines:
         sys.stderr.write(line + "\n")
 
 
 def console() -> Console:
-    """The console of standard output for people: colours on a terminal only."""
+    """The console of standard output: colours on a terminal only."""
     from rich.console import Console
 
     return Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH, soft_wrap=False, highlight=False)
@@ -106,7 +106,7 @@ def table(title: str, columns: Iterable[Column], rows: Iterable[Sequence[object]
     made = Table(title=Text(title) if title else None, title_justify="left", box=SIMPLE_HEAD, header_style="bold")
     texts = [[cell_text(cell) for cell in row] for row in rows]
     for index, (heading, numeric, *whole) in enumerate(columns):
-        # Half a number, or half an id, is worse than a wide table.
+        # Truncated numbers or ids would be worse than a wide table.
         longest = max((len(row[index]) for row in texts), default=0) if numeric or any(whole) else None
         made.add_column(Text(heading), justify="right" if numeric else "left", min_width=longest)
     for row in texts:
@@ -124,7 +124,7 @@ def show_table(title: str, columns: Iterable[Column], rows: Iterable[Sequence[ob
 
 
 def cell_text(cell: object) -> str:
-    """A cell as people read it: six significant digits, a dash for nothing."""
+    """The text of a cell: six significant digits, a dash for None."""
     if cell is None:
         return "-"
     if isinstance(cell, bool):
@@ -135,7 +135,7 @@ def cell_text(cell: object) -> str:
 
 
 def ending_lines(endings: Mapping[str, int]) -> Iterator[str]:
-    """A line for each ending but ok: how many cases ended so, and what it means."""
+    """A line for each ending except ok: its number of cases and its meaning."""
     from sprag.worker.models import ENDING_SENTENCES
 
     for name, count in endings.items():
@@ -144,7 +144,7 @@ def ending_lines(endings: Mapping[str, int]) -> Iterator[str]:
 
 
 def duration_text(seconds: float) -> str:
-    """A time as people say it: "0.4 s", "12 s", "3 min 20 s", "2 h 05 min"."""
+    """A duration for display: "0.4 s", "12 s", "3 min 20 s", "2 h 05 min"."""
     if seconds < 10:
         return f"{seconds:.1f} s"
     whole = round(seconds)
@@ -162,7 +162,7 @@ def progress_text(
     finish_by: str | None = None,
     in_time: str | None = None,
 ) -> str:
-    """How a study is going, beside its bar: state, cases per second, time left, and whether it will be in time."""
+    """Text beside a progress bar: state, cases per second, time left, and whether the deadline will be met."""
     parts = [str(state)]
     if rate:
         parts.append(f"{rate:.3g} cases/s")
@@ -177,7 +177,7 @@ def progress_text(
 
 @contextmanager
 def progress_bar(description: str) -> Iterator[Callable[[int, int, str], None]]:
-    """A bar on standard error while something runs; nothing at all where standard error is no terminal.
+    """Show a progress bar on standard error; nothing where standard error is not a terminal.
 
     Yields a function of (done, total, remark).
     """

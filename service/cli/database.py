@@ -22,7 +22,7 @@ app = typer.Typer(help="Upgrade, check and back up the database.", no_args_is_he
 
 @app.command()
 def upgrade(db: Database = None, as_json: JsonFlag = False) -> None:
-    """Bring the database to the revision this program needs; a new one is made ready."""
+    """Bring the database to the revision of this program, or create it."""
     from sprag.service.storage.maintenance import upgrade as bring_up
 
     with _opened(db, existing=False) as session:
@@ -37,7 +37,7 @@ def upgrade(db: Database = None, as_json: JsonFlag = False) -> None:
 
 @app.command()
 def check(db: Database = None, as_json: JsonFlag = False) -> None:
-    """Look the whole database over; takes minutes on a large one. Exit code 3 when something is wrong."""
+    """Check the whole database; takes minutes on a large one. Exit code 3 when something is wrong."""
     from sprag.service.storage.maintenance import check as look_over
 
     with _opened(db) as session:
@@ -57,7 +57,7 @@ def backup(
     db: Database = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Write a consistent copy of the database, while others go on working with it."""
+    """Write a consistent copy of the database while others continue to use it."""
     from sprag.service.storage.maintenance import backup as write_copy
 
     target = Path(file)
@@ -103,18 +103,18 @@ def prune(
 
 @contextmanager
 def _opened(db: str | None, *, existing: bool = True) -> Iterator[Session]:
-    """Connections to the database; with ``existing``, a mistyped name makes no new one."""
+    """Connections to the database; with ``existing``, a mistyped name creates no database."""
     from sqlalchemy.engine import make_url
     from sqlalchemy.exc import ArgumentError
 
     from sprag.service.storage.session import Session
 
     location = read_settings(database=db).database_url
-    with suppress(ArgumentError, ValueError):  # which the session tells better
+    with suppress(ArgumentError, ValueError):  # which the session reports better
         url = make_url(location)
         path = url.database if url.get_backend_name() == "sqlite" else None
         if existing and path and not Path(path).exists():
-            raise WrongInputError("invalid-file", f"{path}: there is no such database")
+            raise WrongInputError("invalid-file", f"{path}: no such database")
     session = Session(location)
     try:
         yield session
@@ -124,7 +124,7 @@ def _opened(db: str | None, *, existing: bool = True) -> Iterator[Session]:
 
 @app.command()
 def clock(db: Database = None) -> None:
-    """Say that the clock of this machine is right, after it jumped ahead or the worker was away for long."""
+    """Confirm the clock of this machine, after it jumped ahead or the worker was off for long."""
     from sprag.service.storage.store import Store
 
     with _opened(db) as session:

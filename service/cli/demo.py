@@ -1,4 +1,4 @@
-"""``sprag demo``: the example study end to end, over HTTP, as a user would do it."""
+"""``sprag demo``: the example study end to end, over HTTP."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ _BAR = 20
 
 
 def demo(
-    leave: Annotated[bool, typer.Option("--exit", help="Stop after the demonstration instead of serving on.")] = False,
+    leave: Annotated[bool, typer.Option("--exit", help="Stop the service after the demonstration.")] = False,
     folder: Annotated[str, typer.Option("--dir", metavar="FOLDER", help="Folder for database and picture.")] = "demo",
     as_json: JsonFlag = False,
 ) -> None:
-    """Run the example study end to end: start a service, submit over HTTP, show the curve, then serve on."""
+    """Run the example study end to end: start a service, submit over HTTP, show the curve, then keep serving."""
     target = Path(folder)
     try:
         target.mkdir(parents=True, exist_ok=True)
@@ -60,9 +60,9 @@ def demo(
 
 @contextmanager
 def _service(database: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
-    """A service on a free port of this machine; ended, with all its processes, when the block is left."""
+    """A service on a free port of this machine; ended with all its processes at the end of the block."""
     command = [sys.executable, "-m", "sprag.service.cli", "serve", "--json", "--port", "0", "--db", str(database)]
-    # Settings meant for a service that others use would keep the demonstration from its own.
+    # Settings of a shared service would prevent the demonstration from accessing its own.
     environment = {name: value for name, value in os.environ.items() if name not in ("SPRAG_TOKEN", "SPRAG_HOST")}
     process = subprocess.Popen(  # noqa: S603 - this program itself
         command, env=environment, stdout=subprocess.PIPE, start_new_session=True
@@ -74,7 +74,7 @@ def _service(database: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
 
 
 def _address(process: subprocess.Popen[bytes]) -> str:
-    """The address that the service tells once it listens."""
+    """The address that the service prints once it listens."""
     assert process.stdout is not None
     with process.stdout as output:
         line = output.readline()

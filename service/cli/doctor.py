@@ -1,4 +1,4 @@
-"""``sprag doctor``: whether this installation can be trusted with a study."""
+"""``sprag doctor``: checks of the installation."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from sprag.service.faults import Fault
 from sprag.worker.limits import MAX_TOLERANCE, MIN_TOLERANCE
 
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sqlalchemy", "fastapi", "uvicorn")
-#: The kernel that is printed unless its shape is given.
+#: Default shape of the kernel to print.
 _KERNEL = {"pendulums": 1, "coefficients": 4, "tolerance": 1e-9}
 #: Backups are made every night.
 _OLD_BACKUP = timedelta(hours=49)
-#: A study of a million cases of one pendulum takes about half of it.
+#: A study of a million cases of one pendulum takes about half of this.
 _LEAST_FREE_BYTES = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that was looked at. ``ok`` False means that something has to be done about it."""
+    """The result of one check. ``ok`` False means that the user must act."""
 
     subject: str
     ok: bool
@@ -51,7 +51,7 @@ def doctor(
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Look at versions, database, rights, disk, backups, kernels and known values; exit code 3 if one is wrong."""
+    """Check versions, database, permissions, disk, backups, kernels and known values; exit code 3 on any problem."""
     shape = {"pendulums": pendulums, "coefficients": coefficients, "tolerance": tolerance}
     given = {name: value for name, value in shape.items() if value is not None}
     if kernel:
@@ -92,11 +92,11 @@ def _show_kernel(shape: dict[str, Any], as_json: bool) -> None:
 
 
 def examine(db: str | None) -> Iterator[Finding]:
-    """Everything that is looked at, one finding each; a check that itself fails is a finding too."""
+    """Run all checks, with one finding each; a check that fails itself is a finding too."""
     for subject, look in _checks(db).items():
         try:
             ok, detail = look()
-        except Exception as error:  # whatever is broken, the other checks still go on
+        except Exception as error:  # the other checks continue, whatever is broken
             ok, detail = False, f"{type(error).__name__}: {error}"
         yield Finding(subject, ok, detail)
 
@@ -157,8 +157,8 @@ def _rights(file: Path) -> tuple[bool, str]:
     beside = [file.with_name(f"{file.name}{suffix}") for suffix in ("", "-wal", "-shm", ".lock", ".reserve")]
     shared = [str(path) for path in (*beside, *copies) if path.exists() and readable_by_others(path)]
     if shared:
-        return False, f"others may read {', '.join(shared)}: `chmod 600` keeps digests of tokens and designs private"
-    return True, "only their owner may read database and backups"
+        return False, f"others can read {', '.join(shared)}: `chmod 600` keeps digests of tokens and designs private"
+    return True, "only their owner can read database and backups"
 
 
 def _clock(url: str, file: Path | None) -> tuple[bool, str]:

@@ -1,4 +1,4 @@
-"""The command that tells the engagements of a case."""
+"""``sprag engagements``: the engagements of a case."""
 
 from __future__ import annotations
 
@@ -56,13 +56,11 @@ def engagements(
 
 
 def _require(study: Study, case: int) -> None:
-    """Raise WrongInputError for a number that no case has, or a machine without clutches."""
+    """Raise WrongInputError for an unknown case, or a machine without clutches."""
     from sprag.worker.models import VIBRATION_DRIVE, has_clutches
 
     if not has_clutches(study):
-        problem = Fault(
-            "/model", "wrong-type", "has no clutches, so that nothing engages", study.model, allowed=VIBRATION_DRIVE
-        )
+        problem = Fault("/model", "wrong-type", "has no clutches", study.model, allowed=VIBRATION_DRIVE)
         raise WrongInputError("invalid-parameter", "this study has no engagements", [problem])
     if case >= study.cases:
         problem = Fault("--case", "unknown-name", "there is no such case", case, allowed=f"0 .. {study.cases - 1}")

@@ -33,7 +33,7 @@ def extend(
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Submit a study with more values on the axes of an old one, or more cases; only what is new is run."""
+    """Submit a study with more values on the axes of an old one, or more cases; only new cases are run."""
     addition = _addition(axis or [], points)
     with connection(server, token) as client:
         old = client.study(study_id)
@@ -69,7 +69,7 @@ def longer(
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Submit a study of the cases of another that are not settled, with more time for each."""
+    """Submit a study of the unsettled cases of another, with more time for each."""
     with connection(server, token) as client:
         study = client.run_longer(study_id, regime, at_most)
         if wait:
@@ -80,7 +80,7 @@ def longer(
 
 
 def _what_is_new(old: Mapping[str, Any], study: Mapping[str, Any]) -> str:
-    """How many of the cases the old study has already."""
+    """How many of the cases are new."""
     new = study["cases"] - old["cases"]
     if not new:
         return f"nothing is new: {old['id']} has all of the {old['cases']} cases"

@@ -1,4 +1,4 @@
-"""Files that commands read and write; what is wrong with them is said in one sentence."""
+"""Files that commands read and write; each error is one sentence."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from sprag.worker.limits import MAX_BODY_BYTES
 if TYPE_CHECKING:
     from sprag.service.spec.document import ParsedSpec
 
-#: Largest measured-data file that is read: far more rows than any clutch test has.
+#: Largest file of measured data: far more rows than any clutch test has.
 MAX_DATA_BYTES = 16 * 1024 * 1024
-#: Fields of a spec that say what varies in it.
+#: Fields of a spec that describe what varies.
 DESIGN_FIELDS = ("axes", "combine", "exclude")
-#: Errors of the storage rather than of the name that was given.
+#: Errors of the storage rather than of the given name.
 _STORAGE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS}
 
 
 def file_failure(path: Path | str, error: OSError) -> CommandFailureError:
-    """The failure that an operating system's error on ``path`` means."""
+    """The failure for an operating system error on ``path``."""
     reason = (error.strerror or str(error)).lower()
     if error.errno in _STORAGE_ERRORS:
         return TroubleError("write-failed", f"{path}: {reason}")
@@ -74,7 +74,7 @@ def decode(path: str, data: bytes) -> str:
 
 
 def _format(path: str, data: bytes) -> Literal["json", "toml"]:
-    """By the ending of the name; where that tells nothing, by the first character."""
+    """The format by the ending of the name; where that is unknown, by the first character."""
     suffix = Path(path).suffix.lower()
     if suffix in (".json", ".toml"):
         return "json" if suffix == ".json" else "toml"
@@ -84,9 +84,8 @@ def _format(path: str, data: bytes) -> Literal["json", "toml"]:
 def read_spec(path: str, points: str | None = None, limit: int = MAX_DATA_BYTES) -> object:
     """The plain data of the spec in a JSON or TOML file, or standard input for "-".
 
-    The cases of the CSV file ``points``, where one is named, take the place of the spec's axes; it may have ``limit``
-    bytes.
-    Raises WrongInputError with every problem found.
+    The cases of the CSV file ``points``, if given, replace the spec's axes; it may have ``limit`` bytes. Raises
+    WrongInputError with every problem found.
     """
     from sprag.service.spec.text import load_spec
 
@@ -105,7 +104,7 @@ def read_spec(path: str, points: str | None = None, limit: int = MAX_DATA_BYTES)
 
 
 def read_study(path: str, points: str | None = None) -> ParsedSpec:
-    """The checked study of a spec file, of the cases in ``points`` where that is given (see `read_spec`).
+    """The checked study of a spec file, with the cases in ``points`` if given (see `read_spec`).
 
     Raises WrongInputError with every problem found.
     """
@@ -121,7 +120,7 @@ def read_study(path: str, points: str | None = None) -> ParsedSpec:
 
 @contextmanager
 def naming_points(points: str | None) -> Iterator[None]:
-    """Problems of axes become problems of the file that the axes are from, where they are from one."""
+    """Convert faults of axes to faults of the file of points, where the axes come from one."""
     try:
         yield
     except WrongInputError as failure:
@@ -135,7 +134,7 @@ def naming_points(points: str | None) -> Iterator[None]:
 
 
 def spec_failure(path: str, error: SpecError) -> WrongInputError:
-    """The failure a SpecError means: its problems, one a line."""
+    """The failure for a SpecError: its faults, one per line."""
     return WrongInputError("invalid-spec", f"{path}: the spec is not valid", error.faults)
 
 
@@ -144,10 +143,10 @@ Write = Callable[[bytes], None]
 
 @contextmanager
 def output(path: str | None) -> Iterator[Write]:
-    """A function that writes bytes to standard output (None and "-") or to a file that appears only when it is whole.
+    """A function that writes bytes to standard output (None and "-") or to a file that appears only when complete.
 
-    Whether the file can be written is found at the start, before anything is computed for it.
-    Raises WrongInputError or TroubleError when it cannot be written.
+    Whether the file can be written is checked at the start, before anything is computed. Raises WrongInputError or
+    TroubleError when it cannot be written.
     """
     if path is None or path == "-":
         sys.stdout.flush()
@@ -159,7 +158,7 @@ def output(path: str | None) -> Iterator[Write]:
     with _told(target):
         if target.is_dir():
             raise WrongInputError("invalid-file", f"{path}: is a directory")
-        through = target.exists() and not target.is_file()  # a device or a pipe is written to, never replaced
+        through = target.exists() and not target.is_file()  # devices and pipes are written to, never replaced
     if through:
         with _told(target):
             file = target.open("wb")
@@ -170,7 +169,7 @@ def output(path: str | None) -> Iterator[Write]:
 
 
 def to_file(path: str | None) -> bool:
-    """Whether `output` writes to a file, and standard output is free for what is said of it."""
+    """Whether `output` writes to a file, so that standard output is free for messages."""
     return path not in (None, "-")
 
 
@@ -194,7 +193,7 @@ def _replaced(target: Path) -> Iterator[Write]:
 
 @contextmanager
 def _told(path: Path | str) -> Iterator[None]:
-    """Errors of the operating system become failures that name the file; a closed pipe is nobody's failure."""
+    """Convert operating system errors to failures that name the file; a closed pipe is not a failure."""
     try:
         yield
     except BrokenPipeError:
@@ -207,7 +206,7 @@ def _told(path: Path | str) -> Iterator[None]:
 
 @contextmanager
 def _closed(file: IO[bytes], path: Path) -> Iterator[None]:
-    """Close the file at the end, also telling what only closing finds; after a failure, close it without a word."""
+    """Close the file at the end and report errors of closing; after a failure, close it silently."""
     try:
         yield
     except BaseException:

@@ -38,9 +38,9 @@ def fit(
     full: Annotated[bool, typer.Option("--full", help="Full polynomial: torque at zero windup allowed.")] = False,
     angles_include_backlash: Annotated[
         bool,
-        typer.Option("--angles-include-backlash", help="The measured angles count from the start of the lost motion."),
+        typer.Option("--angles-include-backlash", help="The measured angles include the backlash."),
     ] = False,
-    backlash: Annotated[str, typer.Option(help='Lost motion in the angles, in rad or with a unit ("0.3 deg").')] = "0",
+    backlash: Annotated[str, typer.Option(help='Backlash in the angles, in rad or with a unit ("0.3 deg").')] = "0",
     as_json: JsonFlag = False,
 ) -> None:
     """Fit the clutch polynomial of lowest degree that reaches the accuracy, and report on it.
@@ -50,7 +50,7 @@ def fit(
     lost_motion = _quantity("--backlash", backlash, "rad")
     if lost_motion and not angles_include_backlash:
         problem = Fault(
-            "--backlash", "not-used", "is taken off the angles only with --angles-include-backlash", backlash
+            "--backlash", "not-used", "is subtracted from the angles only with --angles-include-backlash", backlash
         )
         raise WrongInputError("invalid-parameter", "invalid option", [problem])
     measured = _measured(data)
@@ -108,7 +108,7 @@ def _fitted(measured: MeasuredData, *, accuracy: float, **options: Any) -> Clutc
 
 
 def _place(name: str, measured: MeasuredData) -> str:
-    """What the user calls the field: a line of the file, or an option."""
+    """The user's name of the field: a line of the file, or an option."""
     row = re.match(r"data\.(\d+)", name)
     if row is not None:
         return f"line {measured.lines[int(row[1])]}"
@@ -116,7 +116,7 @@ def _place(name: str, measured: MeasuredData) -> str:
 
 
 def _tried(degrees: Iterable[DegreeReport], accuracy: float) -> list[Fault]:
-    """Best residual of each degree that was tried, as problems."""
+    """Best residual of each degree that was tried, as faults."""
     return [
         Fault(
             f"degree {report.degree}",
@@ -130,7 +130,7 @@ def _tried(degrees: Iterable[DegreeReport], accuracy: float) -> list[Fault]:
 
 
 def law_text(coefficients: tuple[float, ...]) -> str:
-    """The law as people write it: ``T(u) = 200 u + 20000 u^3`` (N*m, u in rad)."""
+    """The law as a formula: ``T(u) = 200 u + 20000 u^3`` (N*m, u in rad)."""
     powers = ["", " u", *(f" u^{power}" for power in range(2, len(coefficients)))]
     terms = [(c, power) for c, power in zip(coefficients, powers, strict=False) if c != 0]
     if not terms:

@@ -49,12 +49,12 @@ class ValueFormat(StrEnum):
     JSON = "json"
 
 
-#: Rough time until the program and its pool of processes have started.
+#: Rough start time (s) of the program and its pool of processes.
 _START_SECONDS = 2.0
 
 
 def validate(spec: SpecFile, points: PointsFile = None, as_json: JsonFlag = False) -> None:
-    """Check a spec: everything that is wrong, and what is allowed but odd."""
+    """Check a spec: report all faults and warnings."""
     try:
         parsed = read_study(spec, points)
     except WrongInputError as failure:
@@ -85,13 +85,13 @@ def preview(
     spec: SpecFile,
     points: PointsFile = None,
     db: Annotated[
-        str | None, typer.Option("--db", metavar="URL", help="Database to look through for cases it has already.")
+        str | None, typer.Option("--db", metavar="URL", help="Database to search for cases that it already has.")
     ] = None,
     processes: Processes = None,
     finish_by: FinishBy = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Tell what a study would be: number of cases, time, size, first cases. Nothing is run."""
+    """Preview a study: number of cases, time, size, first cases. Nothing is run."""
     from sprag.service.jobs.preview import preview_json
     from sprag.worker.chunking import Chunking
 
@@ -122,7 +122,7 @@ def preview(
 
 
 def _reusable(settings: Settings, parsed: ParsedSpec) -> int:
-    """Cases that studies of the database have; none where there is no database yet."""
+    """Number of cases in the database; 0 where there is no database yet."""
     from sprag.service.storage.session import Session
     from sprag.service.storage.store import Store
 
@@ -206,7 +206,7 @@ def _trajectory_bytes(made: Trajectory, study: Study, case: int, as_json: bool) 
 
 def presets(
     name: Annotated[
-        str | None, typer.Argument(metavar="[NAME]", help="Study to print; without it: what each shows.")
+        str | None, typer.Argument(metavar="[NAME]", help="Study to print; by default, a description of each.")
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
@@ -288,7 +288,7 @@ def run(
         record, unaffecting = done.record, Unaffected().of(done.store, done.record)
         endings = done.store.progress(record.id).endings
     kept = f", kept as {record.id}" if db is not None else ""
-    known = f", {record.reused} of them known from before" if record.reused else ""
+    known = f", {record.reused} of them reused" if record.reused else ""
     say(*(f"warning: {text}" for text in unaffecting))
     seconds = time.monotonic() - start
     say(f"{record.done} of {record.cases} cases done{known}, {record.ok} ok, {seconds:.1f} s{kept}")
@@ -305,7 +305,7 @@ def run(
 
 @contextmanager
 def _telling_what_is_kept() -> Iterator[None]:
-    """Tell after Ctrl-C what became of the study, and how to go on with it."""
+    """After Ctrl-C, report the state of the study and how to continue it."""
     from sprag.service.jobs.local import RunInterruptedError
 
     try:
@@ -314,13 +314,13 @@ def _telling_what_is_kept() -> Iterator[None]:
         record = stop.record
         say(
             f"the study {record.id} is {record.state.value}: {record.done} of {record.cases} cases are kept, "
-            "and the same command without --fresh takes them from there"
+            "and the same command without --fresh reuses them"
         )
         raise
 
 
 def _finish(text: str | None) -> datetime | None:
-    """The deadline that an option names; WrongInputError when it cannot be kept."""
+    """The deadline of an option; WrongInputError when it is invalid."""
     from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
 
     try:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-#: Where `sprag serve` listens unless told otherwise.
+#: Default address of `sprag serve`.
 DEFAULT_SERVER = "http://127.0.0.1:8000"
 
 JsonFlag = Annotated[

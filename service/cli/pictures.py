@@ -24,7 +24,7 @@ _PICTURES = ("svg", "png", "pdf")
 
 
 def file_format(file: str, allowed: tuple[str, ...], what: str) -> str:
-    """The format that the name of ``file`` ends in; raises WrongInputError when it is none of ``allowed``."""
+    """The format given by the ending of ``file``; raises WrongInputError when it is not in ``allowed``."""
     form = file.rpartition(".")[2].lower()
     if form not in allowed:
         names = ", ".join(f".{name}" for name in allowed[:-1]) + f" or .{allowed[-1]}"
@@ -109,7 +109,7 @@ def sensitivity(
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Tell what results depend on: shares of their variance for every axis, and the range of its main effect."""
+    """Show what results depend on: the share of their variance for every axis, and the range of its main effect."""
     picture = "" if file is None else file_format(file, _PICTURES, "picture")
     query = [("y", name) for name in y]
     with connection(server, token) as client:
@@ -153,7 +153,7 @@ def show_curves(found: dict[str, Any]) -> None:
 
 
 def _held(values: Mapping[str, float], units: Mapping[str, str]) -> str:
-    """What is held at which value, with its unit."""
+    """The held parameters with their values and units."""
     texts = ((path, cell_text(value), units.get(path, "1")) for path, value in values.items())
     return ", ".join(f"{path} = {value}" + ("" if unit == "1" else f" {unit}") for path, value, unit in texts)
 

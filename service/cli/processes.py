@@ -25,7 +25,7 @@ def serve(
     chunk: ChunkCases = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Start the service and its worker; Ctrl-C ends both. With --json the address comes on standard output."""
+    """Start the service and its worker; Ctrl-C ends both. With --json the address is printed on standard output."""
     from sprag.service.http.server import AddressError
     from sprag.service.http.server import serve as run_service
     from sprag.service.settings import UnsafeSettingsError

@@ -43,7 +43,7 @@ from sprag.worker.states import TERMINAL, StudyState
 if TYPE_CHECKING:
     from sprag.service.client import Query, RefusedError, ServiceClient
 
-#: A parameter with its sign, as the service's messages write it: "by=", "at=shaft.load=0.2".
+#: A parameter as in the service's messages: "by=", "at=shaft.load=0.2".
 _PARAMETER_IN_TEXT = re.compile(r"(?<![\w.-])(x|y|by|at)=(?=(\w?))")
 
 PriorityOption = Annotated[
@@ -58,7 +58,7 @@ TableFormat = Literal[Format, ReportFormat]
 
 @contextmanager
 def connection(server: str, token: str | None) -> Iterator[ServiceClient]:
-    """A client of the service; its failures become failures of the command."""
+    """A client of the service; its errors become failures of the command."""
     from sprag.service.client import RefusedError, ServiceClient, StudyTimeoutError, UnreachableError
 
     try:
@@ -81,7 +81,7 @@ def connection(server: str, token: str | None) -> Iterator[ServiceClient]:
 
 
 def refusal(error: RefusedError) -> CommandFailureError:
-    """The failure of the command that the service's refusal means."""
+    """The failure of the command for a refusal of the service."""
     kind = cast("Kind", error.code)
     if error.status == 401:
         return TroubleError(kind, f"{error} Give the service's token with --token or in SPRAG_TOKEN.")
@@ -103,7 +103,7 @@ def refusal(error: RefusedError) -> CommandFailureError:
 
 
 def _option(parameter: object) -> str:
-    """A parameter of a request as the command line calls it."""
+    """The option for a parameter of a request."""
     return "--" + str(parameter).replace("_", "-")
 
 
@@ -141,9 +141,9 @@ def watch(
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Follow a study until it has ended, also over a restart of the service."""
+    """Follow a study until it has ended, even across restarts of the service."""
     with connection(server, token) as client:
-        client.study(study_id, timeout)  # a wrong address or id is told at once, not waited for
+        client.study(study_id, timeout)  # a wrong address or id fails immediately
         study = follow(client, study_id, timeout)
     show_study(study, as_json)
     exit_as(study)
@@ -152,10 +152,10 @@ def watch(
 def follow(
     client: ServiceClient, study_id: str, timeout: float | None = None, *, patient: bool = True
 ) -> dict[str, Any]:
-    """Wait until a study has ended or its time is over, with a bar on standard error; the study as it is then.
+    """Wait, with a bar on standard error, until a study has ended or reached its deadline; returns its final state.
 
-    A held study is not left by itself: its reason is said, and the watching goes on until it is resumed or cancelled.
-    So is a service that does not answer, unless ``patient`` is false: then that is the failure of the command.
+    For a held study the reason is printed, and watching continues until it is resumed or cancelled. The same applies to
+    a service that does not answer; with ``patient`` false, the command fails instead.
     """
     from sprag.service.client.waiting import Waiting, wait_for
 
@@ -181,14 +181,14 @@ def _remark(study: dict[str, Any]) -> str:
 
 
 def exit_as(study: dict[str, Any]) -> None:
-    """End with the code that tells whether every case ended ok."""
+    """Exit with the code that shows whether every case ended ok."""
     progress = study["progress"]
     if progress["ok"] != progress["total"]:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
 
 
 def show_study(study: dict[str, Any], as_json: bool) -> None:
-    """The study as it is now: its id and how far it is, or all of it as JSON."""
+    """Print the current study: its id and progress, or everything as JSON."""
     if as_json:
         write_json(study)
         return
@@ -207,7 +207,7 @@ def show_study(study: dict[str, Any], as_json: bool) -> None:
 
 
 def _is_due(study: dict[str, Any]) -> bool:
-    """Whether there is a deadline that is still to come for the study."""
+    """Whether the study has a future deadline."""
     return bool(study.get("finish_by")) and not (study["time_over"] or study["state"] in TERMINAL)
 
 
@@ -256,12 +256,12 @@ def _act(study_id: str, verb: str, server: str, token: str | None, as_json: bool
 
 
 def cancel(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
-    """Cancel a study; the cases that are done are kept."""
+    """Cancel a study; finished cases are kept."""
     _act(study_id, "cancel", server, token, as_json)
 
 
 def pause(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
-    """Hold a study: cases that are running are finished, no new ones are started."""
+    """Hold a study: running cases are finished, no new ones are started."""
     _act(study_id, "pause", server, token, as_json)
 
 
@@ -280,20 +280,20 @@ def retry(
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Run the cases of an ended study that did not end ok again, and no others."""
+    """Run only those cases of an ended study again that did not end ok."""
     _act(study_id, "retry", server, token, as_json, [("ending", name) for name in ending or ()])
 
 
 def prioritize(
     study_id: StudyId,
     priority: Annotated[
-        int, typer.Argument(min=-MAX_PRIORITY, max=MAX_PRIORITY, help="The new priority; 0 unless given before.")
+        int, typer.Argument(min=-MAX_PRIORITY, max=MAX_PRIORITY, help="The new priority; studies start with 0.")
     ],
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Give a study another priority: of the studies that wait, the highest goes first."""
+    """Change the priority of a study: among waiting studies the highest runs first."""
     _act(study_id, "prioritize", server, token, as_json, [("priority", str(priority))])
 
 
@@ -320,7 +320,7 @@ def export(
 
 
 def table_format(form: TableFormat | None, file: str | None, as_json: bool) -> Format | ReportFormat:
-    """The format that was asked for: by name, by the ending of the file's name, or by ``--json``; csv otherwise."""
+    """The requested format: by name, by the ending of the file's name, or by ``--json``; csv otherwise."""
     if form is not None:
         return form
     ending = (file or "").rpartition(".")[2].lower()

@@ -1,4 +1,4 @@
-"""``sprag schedule``: studies that the service submits by itself."""
+"""``sprag schedule``: studies that the service submits on a schedule."""
 
 from __future__ import annotations
 
@@ -65,13 +65,14 @@ def add(
     fresh: Fresh = False,
     finish_by: RunFinish = None,
     key: Annotated[
-        str | None, typer.Option("--key", metavar="KEY", help="Idempotency key: the same key keeps the schedule once.")
+        str | None,
+        typer.Option("--key", metavar="KEY", help="Idempotency key: the same key creates one schedule."),
     ] = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Keep a schedule for a study and print its id: with --cron again and again, with --at once."""
+    """Create a schedule for a study and print its id: recurring with --cron, once with --at."""
     fields: dict[str, Any] = {
         "spec": read_spec(spec),
         **_given(cron=cron, at=at, zone=zone, name=name, finish_by=finish_by, **_window(window)),
@@ -113,7 +114,7 @@ def list_schedules(server: Server = DEFAULT_SERVER, token: Token = None, as_json
 def show(
     schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False
 ) -> None:
-    """Show a schedule and what became of its latest due times; with --json also its spec."""
+    """Show a schedule and the outcome of its latest due times; with --json also its spec."""
     with connection(server, token) as client:
         schedule = client.schedule(schedule_id)
     if as_json:
@@ -147,16 +148,14 @@ def change(
     token: Token = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Change what is given of a schedule; the rest stays."""
+    """Change the given fields of a schedule; the others are kept."""
     fields = _given(
         cron=cron, at=at, zone=zone, name=name, priority=priority, fresh=fresh, finish_by=finish_by, **_window(window)
     )
     if spec is not None:
         fields["spec"] = read_spec(spec)
     if not fields:
-        raise WrongInputError(
-            "invalid-parameter", "nothing to change; `sprag schedule change --help` lists what can be"
-        )
+        raise WrongInputError("invalid-parameter", "nothing to change; `sprag schedule change --help` lists the fields")
     _change(schedule_id, fields, server, token, as_json)
 
 
@@ -164,7 +163,7 @@ def change(
 def enable(
     schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False
 ) -> None:
-    """Let a disabled schedule go on from now."""
+    """Enable a disabled schedule from now on."""
     _change(schedule_id, {"enabled": True}, server, token, as_json)
 
 
@@ -172,13 +171,13 @@ def enable(
 def disable(
     schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False
 ) -> None:
-    """Let a schedule rest: it is kept, and not due."""
+    """Disable a schedule: it is kept, but never due."""
     _change(schedule_id, {"enabled": False}, server, token, as_json)
 
 
 @app.command()
 def delete(schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None) -> None:
-    """Delete a schedule; studies that came of it stay."""
+    """Delete a schedule; its studies are kept."""
     with connection(server, token) as client:
         client.delete_schedule(schedule_id)
     say(f"{schedule_id} is deleted")
@@ -190,7 +189,7 @@ def _change(schedule_id: str, fields: Mapping[str, Any], server: str, token: str
 
 
 def _given(**fields: Any) -> dict[str, Any]:
-    """The fields that were given; an empty window or deadline takes it away."""
+    """The given fields; an empty window or deadline removes it."""
     given = {name: value for name, value in fields.items() if value is not None}
     if given.get("window") == []:
         given["window"] = None

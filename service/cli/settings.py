@@ -1,4 +1,4 @@
-"""The settings of a command: its options, else the environment, else the defaults."""
+"""The settings of a command: from its options, the environment, the defaults, in this order."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 
 def read_settings(**options: object) -> Settings:
-    """The settings, with every option that was given put over them.
+    """The settings, overridden by the given options.
 
-    Raises WrongInputError with every setting that is wrong, named as the environment variable or the option.
+    Raises WrongInputError with every invalid setting, named by its environment variable or option.
     """
     from pydantic import ValidationError
 

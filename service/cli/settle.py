@@ -1,4 +1,4 @@
-"""The command that finds settled motions."""
+"""``sprag settle``: the settled motions of cases."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from sprag.service.storage.records import RowBlock
     from sprag.worker.study import Study
 
-#: Cases that are settled side by side: enough to fill the engine, few enough to show progress.
+#: Cases that are settled together: enough to fill the engine, few enough to show progress.
 _BATCH = 512
 
 
@@ -66,17 +66,17 @@ def settle(
 
 
 def _settled(study: Study, at_most: int | None) -> Study:
-    """The study, run until it is settled; WrongInputError where its model has no motion that settles."""
+    """The study with settled runs; WrongInputError where its model has no settled motion."""
     from sprag.worker.models import VIBRATION_DRIVE, settled_study
 
     if study.model != VIBRATION_DRIVE:
-        problem = Fault("/model", "wrong-type", "has no motion that settles", study.model, allowed=VIBRATION_DRIVE)
+        problem = Fault("/model", "wrong-type", "has no settled motion", study.model, allowed=VIBRATION_DRIVE)
         raise WrongInputError("invalid-parameter", "this study cannot be settled", [problem])
     return settled_study(study, at_most)
 
 
 def _chosen(study: Study, asked: list[int] | None) -> list[int]:
-    """The cases to be settled; WrongInputError for a number that no case has."""
+    """The selected cases; WrongInputError for an unknown number."""
     if asked is None:
         return list(range(study.cases))
     problems = [
@@ -108,7 +108,7 @@ def _blocks(study: Study, cases: list[int]) -> list[RowBlock]:
 
 
 def _show(block: RowBlock) -> None:
-    """One case as a table for people, without what it has no value of."""
+    """One case as a table, without missing values."""
     from sprag.worker.models import ENDING_SENTENCES, OK, REGIME_SENTENCES
 
     (row,) = block.rows()

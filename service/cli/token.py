@@ -1,4 +1,4 @@
-"""``sprag token``: who may ask a service that needs tokens."""
+"""``sprag token``: create, list and revoke tokens."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from sprag.service.storage.tokens import TokenRecord
 
 app = typer.Typer(
-    help="Create, list and revoke tokens; without a command: make a secret for SPRAG_TOKEN.",
+    help="Create, list and revoke tokens; without a command: print a secret for SPRAG_TOKEN.",
     invoke_without_command=True,
     rich_markup_mode="rich",
 )
@@ -28,7 +28,7 @@ app = typer.Typer(
 
 @app.callback()
 def token(context: typer.Context, as_json: JsonFlag = False) -> None:
-    """Create, list and revoke tokens; without a further word: make a secret for SPRAG_TOKEN, which is kept nowhere."""
+    """Create, list and revoke tokens; without a command: print a secret for SPRAG_TOKEN, which is not stored."""
     if context.invoked_subcommand is not None:
         return
     made = secrets.token_urlsafe(32)
@@ -42,24 +42,24 @@ def token(context: typer.Context, as_json: JsonFlag = False) -> None:
 def create(
     name: Annotated[str, typer.Option("--name", help="Owner or purpose of the token.")],
     scope: Annotated[
-        TokenScope, typer.Option("--scope", help="read: look at everything; write: change it too.")
+        TokenScope, typer.Option("--scope", help="read: read everything; write: change it too.")
     ] = TokenScope.WRITE,
     db: Database = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Make a token that the service takes, and print it: it is stored as a digest, so this is the only time."""
+    """Create a token and print it; only its digest is stored, so it cannot be shown again."""
     with _store(db) as store:
         secret, record = store.create_token(name, scope)
     if as_json:
         write_json({"token": secret, **_json(record)})
     else:
         print(secret)
-        say(f"{record.id}: {record.name}, {record.scope}. It is shown this once; every request needs one from now on.")
+        say(f"{record.id}: {record.name}, {record.scope}. It is shown only once; every request now needs a token.")
 
 
 @app.command("list")
 def list_tokens(db: Database = None, as_json: JsonFlag = False) -> None:
-    """List the tokens that were created, newest first, without their secrets."""
+    """List all tokens, newest first, without their secrets."""
     with _store(db) as store:
         found = [_json(record) for record in store.tokens()]
     if as_json:
@@ -75,7 +75,7 @@ def revoke(
     db: Database = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Make a token worthless, and end the sessions of browsers that logged in with it; within two seconds."""
+    """Revoke a token and end the browser sessions that it started, within two seconds."""
     from sprag.service.storage.errors import TokenNotFound
 
     with _store(db) as store:

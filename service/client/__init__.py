@@ -1,4 +1,4 @@
-"""The service as a Python program uses it.
+"""The Python client of the service.
 
     from sprag.service.client import Client
 
@@ -7,8 +7,8 @@
         table = study.table()
         curves = study.curves("shaft.load", "shaft.speed.mean", by="excitation.frequency").to_xarray()
 
-`AsyncClient` has the same methods to be awaited. `UnreachableError` means nobody answered at the address;
-`RefusedError` carries the service's problem document. pandas and xarray are loaded only where they are asked for.
+`AsyncClient` has the same methods as coroutines. `UnreachableError` means that no service answered at the address;
+`RefusedError` carries the service's problem document. pandas and xarray are loaded only when they are used.
 """
 
 from sprag.service.client.aio import AsyncClient, AsyncStudy

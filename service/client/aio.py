@@ -108,7 +108,7 @@ class AsyncClient:
             raise UnreachableError(self.server, reason(error)) from error
 
     async def events(self, study_id: str) -> AsyncIterator[None]:
-        """One item for each sign of life of a study, until its stream ends; none where there is no stream."""
+        """One item for each event or keep-alive comment of a study's stream until it ends; none without a stream."""
         address = f"{API}{study_path(study_id)}/events"
         with suppress(httpx.HTTPError):
             async with self._http.stream("GET", address, timeout=EVENTS_TIMEOUT) as response:
@@ -118,7 +118,7 @@ class AsyncClient:
                             yield None
 
     async def preview(self, spec: Spec | str | PathLike[str]) -> Preview:
-        """What a study would be."""
+        """Preview of a study."""
         return cast("Preview", await self.request("POST", "/studies:preview", json=spec_of(spec)))
 
     async def submit(
@@ -169,7 +169,7 @@ class AsyncStudy:
         return await self._client.request("GET", self._path + part, params=list(query))
 
     async def detail(self) -> StudyDetail:
-        """The study as it is now."""
+        """The current state of the study."""
         return cast("StudyDetail", await self._get(""))
 
     async def wait(self, *, progress: bool | Progressing = False, timeout: float | None = None) -> AsyncStudy:
@@ -224,7 +224,7 @@ class AsyncStudy:
         return await self._client.request("GET", engagements_path(self.id, case))
 
     async def strobes(self, case: int) -> dict[str, Any]:
-        """The state of one case once in each excitation period, and its orbit, as `Study.strobes` gives them."""
+        """The state of one case once per excitation period, and its orbit, as `Study.strobes` gives them."""
         return await self._client.request("GET", strobes_path(self.id, case))
 
     async def table(self) -> pd.DataFrame:
@@ -240,7 +240,7 @@ class AsyncStudy:
         return await self._client.read(*self._rows(form))
 
     async def export(self, file: str | PathLike[str], form: str | None = None) -> Path:
-        """Write all rows, or a report, to a file; its ending tells the format unless it is given."""
+        """Write all rows, or a report, to a file; its ending determines the format unless ``form`` is given."""
         path = Path(file)
         async with self._client.pieces(*self._rows(form or form_of(path))) as pieces:
             with path.open("wb") as out:
@@ -275,7 +275,7 @@ class AsyncStudy:
         name: str | None = None,
         key: str | None = None,
     ) -> AsyncStudy:
-        """Submit a study that has this one's cases and more; the same ``key`` submits it once."""
+        """Submit a study with this one's cases and more; the same ``key`` submits it once."""
         addition, headers = extension(axes, cases, name), {"Idempotency-Key": key or uuid.uuid4().hex}
         made = await self._client.request("POST", f"{self._path}:extend", json=addition, headers=headers)
         return AsyncStudy(self._client, made["id"])
@@ -283,9 +283,10 @@ class AsyncStudy:
     async def run_longer(
         self, regime: str | None = None, at_most: int | None = None, *, key: str | None = None
     ) -> AsyncStudy:
-        """Submit a study of this one's cases that are not settled, with more excitation periods for each.
+        """Submit a study of this one's unsettled cases, with more excitation periods for each.
 
-        Of a settled study those of a regime, by default the unsettled ones; else those with the flag ``not_settled``.
+        For a settled study, the cases of a regime, by default the unsettled ones; otherwise those with the flag
+        ``not_settled``.
         """
         query = longer_query(regime, at_most)
         headers = {"Idempotency-Key": key or uuid.uuid4().hex}
@@ -293,5 +294,5 @@ class AsyncStudy:
         return AsyncStudy(self._client, made["id"])
 
     async def act(self, verb: str) -> StudySummary:
-        """Ask for "pause", "resume", "cancel" or "retry"."""
+        """Request "pause", "resume", "cancel" or "retry"."""
         return cast("StudySummary", await self._client.request("POST", f"{self._path}:{verb}"))

@@ -1,4 +1,4 @@
-"""How a request to the service can fail: nobody answered, or the service refused."""
+"""Errors of requests: no answer, or a refusal of the service."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from sprag.service.faults import CODES, Code, Fault, FaultError, Kind, Parameter
 
 
 class ServiceError(FaultError):
-    """The service did not do what it was asked to; ``code`` says the kind and is stable (docs/faults.md)."""
+    """A request failed; ``code`` gives the kind and is stable (docs/faults.md)."""
 
 
 class SpecFileError(ServiceError, ValueError):
-    """A spec was given as the name of a file, and there is none that can be read."""
+    """A spec was given as the name of a file that cannot be read."""
 
     def __init__(self, message: str) -> None:
         super().__init__("invalid-file", message)
 
 
 class UnreachableError(ServiceError):
-    """Nobody answered, or what answered is not the service. ``address`` is what was asked."""
+    """There was no answer, or not one of the service. ``address`` is the requested address."""
 
     def __init__(self, address: str, reason: str) -> None:
         super().__init__("unreachable", f"{address}: {reason}")
@@ -37,8 +37,7 @@ class RefusedError(ServiceError):
         HTTP status.
     code : str
         Kind of the problem, the last part of its type: "invalid-spec", "study-not-found".
-    faults : tuple of Fault
-        What is wrong with the input, place by place.
+    faults : tuple of Fault Faults of the input.
     problem : dict
         The problem document (RFC 9457): title, detail, and for wrong input ``errors``.
     """
@@ -52,13 +51,13 @@ class RefusedError(ServiceError):
 
     @property
     def errors(self) -> list[dict[str, Any]]:
-        """The problems of the input, each with pointer, message, value and allowed range where known."""
+        """Faults of the input, each with pointer, message, value and allowed range where known."""
         found = self.problem.get("errors")
         return [dict(error) for error in found if isinstance(error, Mapping)] if isinstance(found, list) else []
 
 
 def _fault(error: Mapping[str, Any]) -> Fault:
-    """What the service told of one place; a code that this version does not know is an invalid text."""
+    """A fault from the service's answer; a code unknown to this version becomes "invalid-text"."""
     code = cast("Code", error["code"] if error.get("code") in CODES else "invalid-text")
     made = ParameterFault if error.get("parameter") is not None else Fault
     where = error.get("parameter", error.get("pointer"))
@@ -67,7 +66,7 @@ def _fault(error: Mapping[str, Any]) -> Fault:
 
 
 class StudyTimeoutError(ServiceError):
-    """A study has not ended in the time it was given; it goes on. ``study`` is the study as it was then."""
+    """A study has not ended within the timeout; it continues. ``study`` is its state at that time."""
 
     def __init__(self, study: Mapping[str, Any], seconds: float) -> None:
         self.study = dict(study)

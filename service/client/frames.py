@@ -1,4 +1,4 @@
-"""Answers as pandas tables and xarray grids. Both libraries are loaded when they are asked for."""
+"""Answers as pandas tables and xarray grids. Both libraries are loaded on first use."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Curves:
         return {**self.data["units"], **{name: info["unit"] for name, info in self.data["results"].items()}}
 
     def to_pandas(self) -> pd.DataFrame:
-        """A row for each point: what tells curves apart, x, results (NaN for none), any regime, ending, case."""
+        """A row for each point: the parameters of its curve, x, results (NaN for none), any regime, ending, case."""
         with naming_extra("Curves.to_pandas", "tables"):
             import pandas as pd
 
@@ -51,13 +51,12 @@ class Curves:
         return table
 
     def to_xarray(self) -> xr.Dataset:
-        """A grid of the results over x and what tells the curves apart, with units as attributes.
+        """A grid of the results over x and the parameters of the curves, with units as attributes.
 
         ``ending`` has the codes of the NetCDF files (attributes ``flag_values`` and ``flag_meanings``, -1 pending), and
         ``case`` the number of the case, a coordinate; both are -1 where the grid has no point.
 
-        Raises ValueError when two points have the same parameters, as cases that go side by side can, or for an ending
-        that this client does not know.
+        Raises ValueError when two points have the same parameters, which zipped cases can, or for an unknown ending.
         """
         with naming_extra("Curves.to_xarray", "tables"):
             import xarray  # noqa: F401 - pandas uses it

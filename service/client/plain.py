@@ -39,8 +39,7 @@ class ServiceClient:
         Address such as "http://127.0.0.1:8000".
     token : str, optional
         Sent as a bearer token.
-    transport : httpx.BaseTransport, optional
-        What carries the requests, in the place of the network.
+    transport : httpx.BaseTransport, optional Replaces the network, for instance in tests.
 
     Raises
     ------
@@ -68,8 +67,8 @@ class ServiceClient:
     ) -> dict[str, Any]:
         """Submit a study; the same ``key`` submits it once, however often it is sent.
 
-        Of a ``fresh`` study every case is run, also those that other studies have already. With ``finish_by``, a time
-        with its offset or a duration such as "8 h", it is run coarse to fine and held then.
+        A ``fresh`` study runs every case, even those that other studies already have. With ``finish_by``, a time with
+        its offset or a duration such as "8 h", it is run coarse to fine and held then.
         """
         query = [("priority", str(priority))] if priority else []
         query += [("fresh", "true")] if fresh else []
@@ -86,7 +85,7 @@ class ServiceClient:
     def run_longer(
         self, study_id: str, regime: str | None = None, at_most: int | None = None, key: str | None = None
     ) -> dict[str, Any]:
-        """Submit a study of the cases of another that are not settled, with more time for each.
+        """Submit a study of the unsettled cases of another, with more time for each.
 
         The same ``key`` submits it once, however often it is sent.
         """
@@ -98,7 +97,7 @@ class ServiceClient:
         return self._json("POST", "/studies:preview", json=spec)
 
     def study(self, study_id: str, timeout: float | None = None) -> dict[str, Any]:
-        """One study with its state, progress and time left, asked for within ``timeout`` s."""
+        """One study with its state, progress and time left, requested with ``timeout`` s."""
         return self._json("GET", study_path(study_id), timeout=within(timeout))
 
     def studies(self, query: Query = ()) -> dict[str, Any]:
@@ -106,7 +105,7 @@ class ServiceClient:
         return self._json("GET", "/studies", params=list(query))
 
     def act(self, study_id: str, verb: str, query: Query = ()) -> dict[str, Any]:
-        """Ask for a change of a study: "cancel", "pause", "resume", "retry" or "prioritize"."""
+        """Request a change of a study: "cancel", "pause", "resume", "retry" or "prioritize"."""
         return self._json("POST", f"{study_path(study_id)}:{verb}", params=list(query))
 
     def curves(self, study_id: str, query: Query) -> dict[str, Any]:
@@ -122,7 +121,7 @@ class ServiceClient:
         return self._json("GET", engagements_path(study_id, case))
 
     def strobes(self, study_id: str, case: int) -> dict[str, Any]:
-        """The state of one case once in each excitation period, and its orbit."""
+        """The state of one case once per excitation period, and its orbit."""
         return self._json("GET", strobes_path(study_id, case))
 
     def download(self, path: str, query: Query = ()) -> Iterator[bytes]:
@@ -137,9 +136,9 @@ class ServiceClient:
             raise UnreachableError(self.server, reason(error)) from error
 
     def events(self, study_id: str) -> Iterator[None]:
-        """One item for each sign of life of a study, until its stream ends; none where there is no stream.
+        """One item for each event or keep-alive comment of a study's stream until it ends; none without a stream.
 
-        Why it ended does not matter: the next look at the study tells.
+        The reason of its end does not matter, because the next poll of the study shows it.
         """
         address = f"{API}{study_path(study_id)}/events"
         with suppress(httpx.HTTPError), self._http.stream("GET", address, timeout=EVENTS_TIMEOUT) as response:
@@ -167,7 +166,7 @@ class ServiceClient:
         return self._json("GET", f"{study_path(study_id)}/sensitivity", params=list(query))
 
     def sensitivity_picture(self, study_id: str, query: Query, form: str) -> Iterator[bytes]:
-        """The picture of it as "svg", "png" or "pdf"."""
+        """The picture of the sensitivity as "svg", "png" or "pdf"."""
         return self.download(f"{study_path(study_id)}/sensitivity", [*query, ("format", form)])
 
     def report(self, study_id: str, form: str) -> Iterator[bytes]:
@@ -183,7 +182,7 @@ class ServiceClient:
         return self._json("GET", schedule_path(schedule_id))
 
     def create_schedule(self, fields: Mapping[str, Any], key: str | None = None) -> dict[str, Any]:
-        """Keep a new schedule, a study that is submitted by itself; the same ``key`` keeps it once."""
+        """Create a schedule; the same ``key`` creates it once."""
         return self._json("POST", "/schedules", json=dict(fields), headers=_once(key))
 
     def change_schedule(self, schedule_id: str, fields: Mapping[str, Any]) -> dict[str, Any]:
@@ -191,7 +190,7 @@ class ServiceClient:
         return self._json("PATCH", schedule_path(schedule_id), json=dict(fields))
 
     def delete_schedule(self, schedule_id: str) -> None:
-        """Delete a schedule; its studies stay."""
+        """Delete a schedule; its studies are kept."""
         response = self._request("DELETE", schedule_path(schedule_id))
         if response.is_error:
             raise refusal(response)

@@ -1,4 +1,4 @@
-"""What a client asks for, as query parameters; and the little that waiting needs."""
+"""Query parameters of a client's requests, and helpers for waiting."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Progressing(Protocol):
     """Called with a study from time to time."""
 
     def __call__(self, study: StudyDetail, /) -> None:
-        """Take note of the study as it is now."""
+        """Receive the current study."""
 
 
 def spec_of(spec: Spec | str | PathLike[str]) -> Spec:
@@ -45,7 +45,7 @@ def spec_of(spec: Spec | str | PathLike[str]) -> Spec:
         return cast("Spec", json.loads(text))
     except ValueError as error:
         kind = "TOML" if path.suffix.lower() == ".toml" else "JSON"
-        raise SpecFileError(f"the file {str(path)!r} is no {kind}: {error}") from error
+        raise SpecFileError(f"the file {str(path)!r} is not a valid {kind}: {error}") from error
 
 
 def curve_query(
@@ -57,7 +57,7 @@ def curve_query(
 
 
 def longer_query(regime: str | None, at_most: int | None) -> list[tuple[str, str]]:
-    """Query of a study that is to be run longer; what is None is left to the service."""
+    """Query of a longer study; None leaves a parameter to the service."""
     given = (("regime", regime), ("at_most", at_most))
     return [(name, str(value)) for name, value in given if value is not None]
 
@@ -70,18 +70,18 @@ def result_query(y: str | Sequence[str]) -> list[tuple[str, str]]:
 def extension(
     axes: Sequence[Mapping[str, Any]] | None, cases: Sequence[Mapping[str, Any]] | None, name: str | None
 ) -> dict[str, Any]:
-    """What is added to a study."""
+    """Body of an extension of a study."""
     parts = {"axes": axes, "cases": cases, "name": name}
     return {key: value for key, value in parts.items() if value is not None}
 
 
 def finish_text(when: str | datetime) -> str:
-    """A deadline as the service reads it: a text as it is, an aware time in RFC 3339."""
+    """A deadline for the service: a text unchanged, an aware time in RFC 3339."""
     return when if isinstance(when, str) else when.isoformat()
 
 
 def form_of(path: Path) -> str:
-    """The format that the ending of a file's name tells; ValueError when it tells none."""
+    """The format by the ending of a file's name; ValueError for an unknown ending."""
     from sprag.service.formats import format_of
 
     ending = path.suffix[1:].lower()
@@ -97,7 +97,7 @@ def _listed(names: str | Sequence[str]) -> list[str]:
 
 @contextmanager
 def reporting(progress: bool | Progressing) -> Iterator[Progressing]:
-    """Where a wait tells how it goes: a bar on standard error for True, nowhere for False, else the function given."""
+    """The receiver of progress: a bar on standard error for True, none for False, otherwise the given function."""
     if callable(progress):
         yield progress
         return

@@ -1,4 +1,4 @@
-"""The service for scripts and notebooks: submit a study, wait for it, take its curves and tables."""
+"""The client for scripts and notebooks: submit a study, wait for it, get its curves and tables."""
 
 from __future__ import annotations
 
@@ -45,11 +45,10 @@ class Client:
         Its address; by default that in ``SPRAG_SERVER``, else ``http://127.0.0.1:8000``.
     token : str, optional
         Its token; by default that in ``SPRAG_TOKEN``.
-    transport : httpx.BaseTransport, optional
-        What carries the requests, in the place of the network.
+    transport : httpx.BaseTransport, optional Replaces the network, for instance in tests.
 
-    Every method may raise `UnreachableError` when nobody answers, and `RefusedError`, whose ``errors`` name each fault
-    with its field, value and allowed range.
+    Every method may raise `UnreachableError` when no service answers, and `RefusedError`, whose ``errors`` list each
+    fault with its field, value and allowed range.
     """
 
     def __init__(
@@ -69,7 +68,7 @@ class Client:
         self.plain.__exit__()
 
     def preview(self, spec: Spec | str | PathLike[str]) -> Preview:
-        """What a study would be: cases, how many of them are known already, time, size, warnings."""
+        """Preview of a study: cases, how many of them can be reused, time, size, warnings."""
         return cast("Preview", self.plain.preview(spec_of(spec)))
 
     def submit(
@@ -83,9 +82,9 @@ class Client:
     ) -> Study:
         """Submit a study: a spec, or the name of a JSON or TOML file with one.
 
-        The same ``key`` submits it once, however often it is sent. Of a ``fresh`` study every case is run, also those
-        that other studies have. With ``finish_by``, an aware time or a duration such as "8 h", it is run coarse to fine
-        and held then.
+        The same ``key`` submits it once, however often it is sent. A ``fresh`` study runs every case, even those that
+        other studies have. With ``finish_by``, an aware time or a duration such as "8 h", it is run coarse to fine and
+        held then.
         """
         finish = None if finish_by is None else finish_text(finish_by)
         return Study(self, self.plain.create_study(spec_of(spec), key, priority, fresh, finish)["id"])
@@ -117,21 +116,21 @@ class Study:
         return f"Study({self.id!r})"
 
     def detail(self) -> StudyDetail:
-        """The study as it is now, with its progress and its spec."""
+        """The current study, with its progress and its spec."""
         return cast("StudyDetail", self._client.plain.study(self.id))
 
     def wait(self, *, progress: bool | Progressing = False, timeout: float | None = None) -> Study:
-        """Wait until the study has ended, or its time is over; gives the study itself.
+        """Wait until the study has ended or reached its deadline; returns the study itself.
 
-        While the service does not answer, for instance because it is restarted, the waiting goes on; a warning in the
-        log (``sprag.service.client.waiting``) says so.
+        While the service does not answer, for instance during a restart, waiting continues with a warning in the log
+        (``sprag.service.client.waiting``).
 
         Parameters
         ----------
         progress : bool or callable
             True shows a bar on standard error; a function is called with the study from time to time.
-        timeout : float, optional
-            Seconds after which StudyTimeoutError is raised; the study goes on. NaN raises ValueError.
+        timeout : float, optional Seconds after which StudyTimeoutError is raised; the study continues. NaN raises
+            ValueError.
         """
         with reporting(progress) as tell:
             wait_for(self._client.plain, self.id, Waiting(tell, timeout))
@@ -162,11 +161,11 @@ class Study:
         return self._client.plain.engagements(self.id, case)
 
     def strobes(self, case: int) -> dict[str, Any]:
-        """The state of one case once in each excitation period ("strobes"), and its "orbit" if it has one."""
+        """The state of one case once per excitation period ("strobes"), and its "orbit" if it has one."""
         return self._client.plain.strobes(self.id, case)
 
     def table(self) -> pd.DataFrame:
-        """All rows with all results as a pandas table, NaN for what could not be computed."""
+        """All rows with all results as a pandas table, NaN for missing values."""
         return table_of(self.download("parquet"))
 
     def grid(self) -> xr.Dataset:
@@ -178,10 +177,10 @@ class Study:
         return b"".join(self._pieces(form))
 
     def export(self, file: str | PathLike[str], form: str | None = None) -> Path:
-        """Write all rows, or a report, to a file; its ending tells the format unless it is given."""
+        """Write all rows, or a report, to a file; its ending determines the format unless ``form`` is given."""
         path = Path(file)
         pieces = self._pieces(form or form_of(path))
-        first = next(pieces, b"")  # a refusal comes here, and leaves the file of before as it is
+        first = next(pieces, b"")  # a refusal is raised here and leaves an existing file unchanged
         with path.open("wb") as out:
             out.write(first)
             for piece in pieces:
@@ -215,19 +214,20 @@ class Study:
         name: str | None = None,
         key: str | None = None,
     ) -> Study:
-        """Submit a study that has this one's cases and more, of which only what is new is run.
+        """Submit a study with this one's cases and more, of which only the new ones are run.
 
         The same ``key`` submits it once, however often it is sent.
         """
         return Study(self._client, self._client.plain.extend(self.id, extension(axes, cases, name), key)["id"])
 
     def run_longer(self, regime: str | None = None, at_most: int | None = None, *, key: str | None = None) -> Study:
-        """Submit a study of this one's cases that are not settled, with more excitation periods for each.
+        """Submit a study of this one's unsettled cases, with more excitation periods for each.
 
-        Of a settled study those of a regime, by default the unsettled ones; else those with the flag ``not_settled``.
+        For a settled study, the cases of a regime, by default the unsettled ones; otherwise those with the flag
+        ``not_settled``.
         """
         return Study(self._client, self._client.plain.run_longer(self.id, regime, at_most, key)["id"])
 
     def act(self, verb: str) -> StudySummary:
-        """Ask for "pause", "resume", "cancel" or "retry"."""
+        """Request "pause", "resume", "cancel" or "retry"."""
         return cast("StudySummary", self._client.plain.act(self.id, verb))

@@ -1,7 +1,7 @@
-"""Waiting for a study: what to do after each look at it, whoever looks.
+"""Waiting for a study: the decisions after each poll, for both clients.
 
-A look follows each event of the study's stream of events, or, where no stream comes through, a short sleep. While the
-service does not answer, the waiting goes on: services are restarted, and their studies go on where they were.
+A poll follows each event of the study's stream or, where no stream gets through, a short sleep. While the service does
+not answer, waiting continues, because restarted services resume their studies.
 """
 
 from __future__ import annotations
@@ -22,25 +22,24 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 
 ENDED: Final = frozenset(state.value for state in TERMINAL)
-#: Seconds between two looks at a study: short at first, then longer, up to the last.
+#: Seconds between two polls of a study: short at first, then longer, up to the last.
 POLLS: Final = (0.1, 0.2, 0.3, 0.5, 1.0)
-#: Seconds between two tries while the service does not answer.
+#: Seconds between two attempts while the service does not answer.
 TRIES: Final = (0.5, 1.0, 2.0, 5.0)
-#: Statuses of a service that starts, ends or is too busy, and of a proxy in front of one.
+#: Statuses of a service that starts, stops or is too busy, and of a proxy in front of one.
 _TRANSIENT: Final = frozenset({429, 502, 503, 504})
 
 
 class Waiting:
-    """How one waiting goes.
+    """The state of one wait.
 
     Parameters
     ----------
     tell : callable
         Called with the study at every poll.
-    timeout : float, optional
-        Seconds after which StudyTimeoutError is raised; None waits without end. NaN raises ValueError.
-    patient : bool
-        Whether to wait while the service does not answer; otherwise the failure is raised.
+    timeout : float, optional Seconds after which StudyTimeoutError is raised; None waits indefinitely. NaN raises
+        ValueError.
+    patient : bool Whether to wait while the service does not answer; otherwise the error is raised.
     notify : callable
         Called with a sentence when the service stops answering, and when it answers again; by default the log.
     """
@@ -67,7 +66,7 @@ class Waiting:
         self._failure: ServiceError | None = None
 
     def over(self, study: Mapping[str, Any]) -> bool:
-        """Take note of the study as it is now; whether it has ended or its time is over."""
+        """Record the current study; whether it has ended or reached its deadline."""
         if self._failure is not None:
             self._notify("The service answers again.")
             self._failure, self._turn = None, 0
@@ -76,7 +75,7 @@ class Waiting:
         return study["state"] in ENDED or bool(study["time_over"])
 
     def failed(self, error: ServiceError) -> None:
-        """Take note that a look failed; raises the error when waiting does not help against it."""
+        """Record a failed poll; raises the error when waiting does not help."""
         busy = isinstance(error, RefusedError) and error.status in _TRANSIENT
         if not self._patient or not (busy or isinstance(error, UnreachableError)):
             raise error
@@ -86,7 +85,7 @@ class Waiting:
         self._failure = error
 
     def pause(self) -> float:
-        """Seconds to sleep before the next look; raises StudyTimeoutError when the time is up."""
+        """Seconds to sleep before the next poll; raises StudyTimeoutError when the time is up."""
         left = self.left()
         if left is not None and left <= 0:
             if self._study is None:
@@ -99,29 +98,29 @@ class Waiting:
         return step if left is None else min(step, left)
 
     def listens(self) -> bool:
-        """Whether to listen to the stream of events: it brings something, and its silence cannot outlast the time."""
+        """Whether to listen to the event stream: it works, and its silence cannot exceed the timeout."""
         left = self.left()
         return self._streams and (left is None or left > SILENCE)
 
     def listening(self) -> None:
-        """Take note that the stream is asked for."""
+        """Record that the stream was requested."""
         self._heard = False
 
     def heard(self) -> None:
-        """Take note that the stream brought something."""
+        """Record that the stream delivered something."""
         self._heard, self._turn = True, 0
 
     def listened(self) -> None:
-        """Take note that the stream has ended; one that brought nothing is not asked for again."""
+        """Record the end of the stream; one that delivered nothing is not requested again."""
         self._streams = self._heard
 
     def left(self) -> float | None:
-        """Seconds until the time is up, None without a limit; a look that hangs must not outlast them."""
+        """Seconds until the timeout, None without one; a hanging poll must not exceed them."""
         return None if self._end is None else self._end - time.monotonic()
 
 
 def wait_for(client: ServiceClient, study_id: str, waiting: Waiting) -> dict[str, Any]:
-    """Wait until a study has ended or its time is over; the study as it is then."""
+    """Wait until a study has ended or reached its deadline; returns its final state."""
     while True:
         try:
             for study in _looks(client, study_id, waiting):
@@ -133,7 +132,7 @@ def wait_for(client: ServiceClient, study_id: str, waiting: Waiting) -> dict[str
 
 
 def _looks(client: ServiceClient, study_id: str, waiting: Waiting) -> Iterator[dict[str, Any]]:
-    """The study now, and after each of its events while they come."""
+    """The current study, then the study after each event of its stream."""
     yield client.study(study_id, waiting.left())
     if not waiting.listens():
         return

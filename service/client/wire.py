@@ -1,4 +1,4 @@
-"""What every client of the service shares: addresses, time limits, and how an answer is read."""
+"""Common parts of all clients: addresses, timeouts, and the reading of answers."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ import httpx
 
 from sprag.service.client.errors import RefusedError, ServiceError, UnreachableError
 
-#: Seconds without a byte after which a stream of events is given up; the service sends one every 15 s.
+#: Seconds without a byte after which an event stream is abandoned; the service sends one every 15 s.
 SILENCE: Final = 30.0
 API: Final = "/api/v1"
 #: Seconds to wait for an answer; curves of a large study are read from disk first.
 TIMEOUT: Final = httpx.Timeout(60.0, connect=10.0)
-#: A whole study may take minutes to be written before its first byte comes.
+#: Writing a whole study can take minutes before its first byte arrives.
 FILE_TIMEOUT: Final = httpx.Timeout(None, connect=10.0)
-#: A stream of events is silent for so long at most.
+#: Longest silence of an event stream.
 EVENTS_TIMEOUT: Final = httpx.Timeout(SILENCE, connect=10.0)
 
 Query = Sequence[tuple[str, str]]
@@ -34,12 +34,12 @@ def connection_options(server: str, token: str | None) -> dict[str, Any]:
     if url.scheme not in ("http", "https") or not url.host:
         raise ValueError(f"{server!r} is not the address of a service, such as http://127.0.0.1:8000")
     headers = {"Authorization": f"Bearer {token}"} if token else {}
-    # A proxy of the environment never leads to this machine itself.
+    # A proxy from the environment is never used for this machine itself.
     return {"base_url": server, "headers": headers, "timeout": TIMEOUT, "trust_env": not is_loopback(url.host)}
 
 
 def within(seconds: float | None) -> httpx.Timeout:
-    """`TIMEOUT` for a request that is to be answered within ``seconds``, where they are given, or a second."""
+    """`TIMEOUT`, limited to ``seconds`` where given, but at least one second."""
     if seconds is None:
         return TIMEOUT
     seconds = max(seconds, 1.0)
@@ -47,7 +47,7 @@ def within(seconds: float | None) -> httpx.Timeout:
 
 
 def document(server: str, response: httpx.Response) -> dict[str, Any]:
-    """The JSON object that was answered; RefusedError for a problem, UnreachableError for anything else."""
+    """The JSON object of an answer; RefusedError for a problem, UnreachableError for anything else."""
     if response.is_error:
         raise refusal(response)
     try:
@@ -100,7 +100,7 @@ def schedule_path(schedule_id: str) -> str:
 
 
 def refusal(response: httpx.Response) -> ServiceError:
-    """The failure that an answer of status 400 or more means."""
+    """The error for an answer of status 400 or more."""
     try:
         problem = response.json()
     except ValueError:
@@ -111,7 +111,7 @@ def refusal(response: httpx.Response) -> ServiceError:
 
 
 def reason(error: httpx.HTTPError) -> str:
-    """Why nobody answered, in a few words."""
+    """Why there was no answer, in a few words."""
     if isinstance(error, httpx.ConnectError):
         return "cannot connect"
     if isinstance(error, httpx.TimeoutException):
@@ -130,5 +130,5 @@ def is_loopback(host: str) -> bool:
 
 
 def is_event(line: str) -> bool:
-    """Whether a line of a stream of events is an event's data, or the sign of life between events."""
+    """Whether a line of an event stream is an event's data or a keep-alive comment."""
     return line.startswith(("data:", ":"))

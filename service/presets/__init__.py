@@ -1,4 +1,4 @@
-"""Studies that come with the program: demonstrations, and a start for one's own."""
+"""Studies that come with the program: demonstrations and starting points."""
 
 from dataclasses import dataclass
 from importlib.resources import files
@@ -9,13 +9,13 @@ _FORMATS = (".json", ".toml")
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """What a study is for: ``shows`` what to look at in it, ``values`` where its numbers come from."""
+    """Description of a preset: ``shows``, what it demonstrates, and ``values``, the source of its numbers."""
 
     shows: str
     values: str
 
 
-#: What every study shows. Those of the machine shaft tell more at the head of their files.
+#: Descriptions of the presets. The files of machine shafts begin with further comments.
 ABOUT: Final[dict[str, About]] = {
     "one_pendulum": About(
         "the mechanical characteristic of a drive with one pendulum: speed, torque, power and efficiency against load, "
@@ -25,7 +25,7 @@ ABOUT: Final[dict[str, About]] = {
     ),
     "two_pendulums": About(
         "two pendulums of different stiffness on one shaft: one clutch drives while the other overruns",
-        "the rig of one_pendulum with a second, stiffer pendulum and clutches of 0.3 degrees of lost motion",
+        "the rig of one_pendulum with a second, stiffer pendulum and clutches with a backlash of 0.3 degrees",
     ),
     "press": About(
         "a crank press whose irregularity falls with the flywheel; too little inertia at low speed is an ending of its "
@@ -45,11 +45,11 @@ ABOUT: Final[dict[str, About]] = {
         "a workshop compressor of 100 mm bore and 80 mm stroke at 750 rpm",
     ),
     "conveyor": About(
-        "unevenness that comes from masses more than from work: a tray rocked to and fro",
+        "irregularity caused by masses more than by work: a tray that rocks back and forth",
         "an oscillating conveyor of 30 mm of stroke at 300 strokes a minute with 150 kg",
     ),
     "cam_machine": About(
-        "a cam that lifts a tool against a spring: work that goes to and fro",
+        "a cam that lifts a tool against a spring: work that flows back and forth",
         "a packaging machine of 120 strokes a minute with 40 mm of lift",
     ),
     "question_drive_inertia": About("irregularity against the inertia of the drive", "the crank press"),
@@ -65,11 +65,11 @@ def _files() -> dict[str, str]:
 
 
 def preset_names() -> tuple[str, ...]:
-    """Names of the studies, in the order in which they are best looked at."""
+    """Names of the presets in the recommended order."""
     return tuple(name for name in ABOUT if name in _files())
 
 
 def preset_text(name: str) -> tuple[str, str]:
-    """File name and text of a study's spec; KeyError when there is none of that name."""
+    """File name and text of a preset's spec; KeyError for an unknown name."""
     file = _files()[name]
     return file, (files(__name__) / file).read_text(encoding="utf-8")

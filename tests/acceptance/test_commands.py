@@ -270,7 +270,7 @@ def test_doctor_names_files_that_others_may_read(tmp_path: Path, sprag: Sprag) -
     file.chmod(0o640)
     done = sprag("doctor", "--db", file)
     assert done.code == 3
-    assert f"others may read {file}: `chmod 600`" in done.out
+    assert f"others can read {file}: `chmod 600`" in done.out
 
 
 def test_doctor_finds_a_database_of_another_program(tmp_path: Path, sprag: Sprag) -> None:

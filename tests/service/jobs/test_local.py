@@ -312,5 +312,5 @@ def test_ctrl_c_tells_what_is_kept_and_how_to_go_on(
         stopped = sprag("run", examples / "press.toml", "--db", tmp_path / "kept.sqlite3", "-o", tmp_path / "rows.csv")
     assert stopped.code == 130
     assert "is cancelled: 0 of" in stopped.err
-    assert "the same command without --fresh takes them from there" in stopped.err
+    assert "the same command without --fresh reuses them" in stopped.err
     assert not (tmp_path / "rows.csv").exists()

@@ -389,7 +389,7 @@ def test_the_setting_is_checked() -> None:
     for good in ("pool", "dask", "dask://head.example:8786", "dask://[::1]:8786"):
         assert Settings(executor=good).executor == good
     for wrong in ("dusk", "dask://", "dask://head.example", "dask://head.example:0", "tcp://head.example:8786"):
-        with pytest.raises(ValidationError, match="it is pool, dask, or dask://host:port"):
+        with pytest.raises(ValidationError, match="must be pool, dask, or dask://host:port"):
             Settings(executor=wrong)
 
 
