@@ -13,7 +13,7 @@ from sprag.engine.compile.jit import compiled, part
 from sprag.engine.machine_shaft import intervals as iv
 from sprag.engine.machine_shaft.expressions import Expression, Node
 from sprag.engine.machine_shaft.intervals import ORDERS
-from sprag.engine.machine_shaft.panels import POSITIONS, WEIGHTS
+from sprag.engine.machine_shaft.panels import POSITIONS, WEIGHTS, apply
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -35,14 +35,14 @@ _MOST_WHOLE = 64
 _SPARE = 4
 
 _LEGENDRE = (2 * np.arange(ORDERS)[:, None] + 1) / 2.0 * legendre.legvander(POSITIONS, ORDERS - 1).T * WEIGHTS
-_POWERS = np.array([np.pad(legendre.leg2poly(row), (0, ORDERS))[:ORDERS] for row in np.eye(ORDERS)])
+_POWERS = np.array([np.pad(legendre.leg2poly(row), (0, ORDERS))[:ORDERS] for row in np.eye(ORDERS)]).T.copy()
 
 
 def _series(values: Floats) -> Floats:
     """Coefficients of the polynomials through values (n, ORDERS) at the Gauss nodes of -1 .. 1, rounding left out."""
-    coefficients = values @ _LEGENDRE.T
+    coefficients = apply(_LEGENDRE, values)
     noise = 8.0 * np.finfo(float).eps * np.abs(values).max(axis=1, keepdims=True)
-    return np.asarray(np.where(np.abs(coefficients) > noise, coefficients, 0.0) @ _POWERS)
+    return apply(_POWERS, np.where(np.abs(coefficients) > noise, coefficients, 0.0))
 
 
 class Program:

@@ -14,16 +14,18 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from sprag.engine.machine_shaft import kernels
+from sprag.engine.machine_shaft.quadrature import gauss, product
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 #: Gauss nodes of a panel.
 NODES = 12
+POSITIONS, WEIGHTS = gauss(NODES)
 
 
 def _matrices() -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
-    x, w = legendre.leggauss(NODES)
+    x, w = POSITIONS, WEIGHTS
     degrees = np.arange(NODES)
     coefficients = (2 * degrees[:, None] + 1) / 2.0 * legendre.legvander(x, NODES - 1).T * w
     integral = np.zeros((NODES + 1, NODES))
@@ -34,13 +36,12 @@ def _matrices() -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
         if k:
             derivative[:k, k] = legendre.legder(unit[: k + 1])
     samples = np.concatenate([[-1.0], x, [1.0]])
-    running = legendre.legvander(x, NODES) @ integral @ coefficients
-    ends = legendre.legvander(np.array([-1.0, 1.0]), NODES - 1) @ coefficients
-    slopes = legendre.legvander(samples, NODES - 2) @ derivative @ coefficients
+    running = product(legendre.legvander(x, NODES), integral, coefficients)
+    ends = product(legendre.legvander(np.array([-1.0, 1.0]), NODES - 1), coefficients)
+    slopes = product(legendre.legvander(samples, NODES - 2), derivative, coefficients)
     return coefficients, integral, derivative, running, ends, slopes
 
 
-POSITIONS, WEIGHTS = legendre.leggauss(NODES)
 _SAMPLES = np.concatenate([[-1.0], POSITIONS, [1.0]])
 _COEFFICIENTS, _INTEGRAL, _DERIVATIVE, _RUNNING, _ENDS, _SLOPES = (np.ascontiguousarray(m) for m in _matrices())
 _TAIL = _COEFFICIENTS[-2:].copy()

@@ -3,15 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from sprag.engine.machine_shaft.panels import Extremes, Panels, Points
+from sprag.engine.machine_shaft.quadrature import gauss
 from sprag.engine.machine_shaft.spec import MeanSpeed
 
 Floats = NDArray[np.float64]
 
-_U, _U_WEIGHTS = legendre.leggauss(24)
+_U, _U_WEIGHTS = gauss(24)
 _ITERATIONS = 60
 
 
