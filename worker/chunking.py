@@ -1,4 +1,4 @@
-"""How a study is cut into chunks, the unit of claim and commit."""
+"""Division of a study into chunks, the unit of claim and commit."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ if TYPE_CHECKING:
 
     from sprag.worker.study import Study
 
-#: Work of one chunk on one core, in s: what a crash can cost, against what a commit costs.
+#: Work of one chunk on one core, in s: a compromise between the cost of a crash and of a commit.
 CHUNK_SECONDS = 1.0
-#: Share of the chunk's time limit that its estimated work may take: estimates are rough and machines differ.
+#: Largest share of the time limit for a chunk's estimated work, because estimates are rough and machines differ.
 TIMEOUT_SHARE = 0.1
-#: The same for chunks too short to fill the engine, of which a smaller part is hardly faster.
+#: The same for chunks too small to fill the engine, which would hardly get faster if smaller.
 SHORT_SHARE = 0.5
-#: The engine runs cases side by side; fewer than these waste it.
+#: The engine runs cases in parallel lanes; fewer cases than this waste them.
 MIN_CASES = 16
-#: Chunks for each process that a study is cut into if it has the cases, so that all processes end about together.
+#: Fewest chunks per process, if there are enough cases, so that all processes finish at about the same time.
 CHUNKS_PER_PROCESS = 4
-#: Chunks of one study are held in memory and listed in the database.
+#: Most chunks of one study, which are kept in memory and listed in the database.
 MAX_CHUNKS = 100_000
 
 
@@ -46,7 +46,7 @@ class Chunking:
         return chunk_cases(study.cases, seconds, self.processes, timeout=self.timeout)
 
     def warnings(self, study: Study) -> tuple[str, ...]:
-        """What is to be said of ``study`` before it is run: that a case of it may never come to its end."""
+        """Warnings about ``study`` before it runs: a single case may exceed the time limit."""
         seconds = models.estimate_seconds_per_case(study) * work_of(1)
         if seconds <= self.timeout:
             return ()
@@ -59,8 +59,7 @@ class Chunking:
 def work_of(cases: float) -> float:
     """Work of running that many cases together, in units of a case among many.
 
-    The engine's lanes cost about the same whether or not a case is in them: one case alone takes half as long as a full
-    set.
+    The engine's lanes cost about the same with or without a case: one case alone takes half as long as a full set.
     """
     return max(cases, 0.5 * (MIN_CASES + cases))
 
@@ -68,7 +67,7 @@ def work_of(cases: float) -> float:
 def chunk_cases(cases: int, seconds_per_case: float, processes: int, fixed: int = 0, timeout: float = math.inf) -> int:
     """Cases of one chunk of a study of ``cases`` cases: ``fixed``, or else by the time of one case (s).
 
-    The chunk then takes far less than ``timeout`` (s), if a single case does.
+    The chunk then takes far less than ``timeout`` (s), provided that a single case does.
     """
     least = math.ceil(cases / MAX_CHUNKS)
     if fixed:

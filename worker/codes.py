@@ -1,13 +1,13 @@
-"""Numbers of endings and flags wherever a format has no text for them: the same for ever, in every file.
+"""Numbers of endings and flags for formats without texts; they are stable in all files.
 
-A number that was given is never given again, also when its ending or flag is no longer used.
+A number is never assigned again, even when its ending or flag is no longer used.
 """
 
 from __future__ import annotations
 
 from typing import Final
 
-#: Name of a case that has not been run, where a table has a place for it.
+#: Ending of a case that has not been run, where a table needs one.
 PENDING: Final = "pending"
 
 #: Number of each ending: the engine's from 0, the worker's from 100.
@@ -31,7 +31,7 @@ ENDING_CODES: Final[dict[str, int]] = {
     "cancelled": 102,
 }
 
-#: Bit mask of each flag; the flags of a case are the sum of theirs.
+#: Bit of each flag; the flags of a case are their sum.
 FLAG_MASKS: Final[dict[str, int]] = {
     "windup_out_of_data": 1 << 0,
     "not_settled": 1 << 1,

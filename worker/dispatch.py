@@ -1,12 +1,14 @@
-"""What the dispatcher decides, without I/O: events in, instructions out.
+"""Decisions of the dispatcher, without I/O: events in, instructions out.
 
-A chunk whose process dies or runs out of time is run once more, then split until the case is found; a case that
-fails alone twice is given its ending and left aside, a crashed one only when a success or the end of the study shows
-that it was not the engine. Three chunks that share no case and crash with no success of the study between them show a
-fault of the engine, not of the cases, and so do cases that crash alone when nothing of the study ever came through.
-The first time everything is begun again with kernels compiled anew, since those in the cache may be damaged; the second
-time the study is held with the reason. Nobody is quarantined. Chunks that overlap count once, because one bad case
-explains the crash of every chunk around it.
+A chunk whose process dies or times out is run once more, then split until the faulty case is found. A case that fails
+alone twice is quarantined: it gets its ending and is not run again. A crashed case is quarantined only when a success
+or the end of the study shows that the engine works.
+
+Three chunks without a common case that crash with no success of the study between them indicate a fault of the engine,
+not of the cases; so do cases that crash alone when no chunk of the study ever succeeded. The first time, everything
+restarts with newly compiled kernels, because the cached ones may be damaged; the second time, the study is held with
+the reason. No case is quarantined then. Overlapping chunks count once, because one bad case explains the crash of every
+chunk that contains it.
 """
 
 from __future__ import annotations
@@ -22,19 +24,19 @@ from sprag.worker.ports import Chunk, Fate
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-#: Parts of a chunk that is split. A failure costs the start of a process, a part next to nothing.
+#: Number of parts of a split chunk. A failure costs the start of a process, a part almost nothing.
 PARTS = 8
-#: Failures of one chunk after which it is split, or quarantined when it is a single case.
+#: Failures after which a chunk is split, or quarantined if it is a single case.
 MAX_FAILURES = 2
-#: Chunks without a common case that crash in a row and so show an engine fault.
+#: Successive crashes of chunks without a common case that indicate an engine fault.
 FAULT_CRASHES = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Offered:
-    """A study may be run; ``chunks`` are those not done. Of two studies the one of higher ``priority`` goes first.
+    """A study may run; ``chunks`` are its unfinished ones. Studies of higher ``priority`` run first.
 
-    For a study that is being worked on it only ends a pause and tells the priority.
+    For an active study, this only ends a pause and updates the priority.
     """
 
     study: int
@@ -44,28 +46,28 @@ class Offered:
 
 @dataclass(frozen=True, slots=True)
 class Paused:
-    """No new chunks of the study; those in flight go on to their end."""
+    """Start no new chunks of the study; those in flight continue."""
 
     study: int
 
 
 @dataclass(frozen=True, slots=True)
 class Cancelled:
-    """The study is to end now."""
+    """The study must end now."""
 
     study: int
 
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """The store did not grant the claim of a chunk, so it was not started; the next poll tells why."""
+    """The store refused the claim of a chunk, so it was not started; the next poll shows why."""
 
     ticket: int
 
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """A chunk in flight came to its end."""
+    """A chunk in flight ended."""
 
     ticket: int
     fate: Fate
@@ -74,7 +76,7 @@ class Ended:
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """The kernel of a study cannot be had."""
+    """The kernel of a study cannot be loaded."""
 
     study: int
     reason: str
@@ -82,7 +84,7 @@ class Broken:
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """What is in flight is of no use any more: the store cannot take it. Every study has to be offered again."""
+    """The chunks in flight are useless because the store cannot accept them. Every study must be offered again."""
 
 
 Event = Offered | Paused | Cancelled | Refused | Ended | Broken | Lost
@@ -98,7 +100,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Commit:
-    """Store the rows of the chunk that was just done."""
+    """Store the rows of the finished chunk."""
 
     ticket: int
     chunk: Chunk
@@ -123,7 +125,7 @@ class Split:
 
 @dataclass(frozen=True, slots=True)
 class Quarantine:
-    """Give the chunk's single case that ending and leave it aside."""
+    """Give the chunk's single case that ending and do not run it again."""
 
     chunk: Chunk
     ending: WorkerEnding
@@ -132,7 +134,7 @@ class Quarantine:
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """Stop a chunk in flight; its outcome is of no use any more unless it is just through."""
+    """Stop a chunk in flight; its outcome is ignored unless it has just finished."""
 
     ticket: int
 
@@ -147,9 +149,9 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Renew:
-    """Begin everything again with new processes, and kernels compiled anew; every study has to be offered again.
+    """Restart with new processes and newly compiled kernels; every study must be offered again.
 
-    It is for the sake of ``study``, whose failures do not count; comes once for each study before its `Fault`.
+    It is caused by ``study``, whose failures are then reset, and occurs once per study before its `Fault`.
     """
 
     study: int
@@ -158,7 +160,7 @@ class Renew:
 
 @dataclass(frozen=True, slots=True)
 class Settle:
-    """Nothing of the study is waiting or in flight: bring it to its end."""
+    """No chunk of the study is waiting or in flight: end it."""
 
     study: int
 
@@ -168,22 +170,22 @@ Instruction = Run | Commit | PutBack | Split | Quarantine | Stop | Fault | Renew
 
 @dataclass(slots=True)
 class _Open:
-    """A study that is being worked on."""
+    """An active study."""
 
     waiting: deque[Chunk]
     priority: int = 0
     running: dict[int, Chunk] = field(default_factory=dict)
     held: bool = False
     cancelled: bool = False
-    #: Whether some chunk of it came through: then the engine works.
+    #: Whether any of its chunks succeeded, which shows that the engine works.
     proven: bool = False
     crashed: list[Chunk] = field(default_factory=list)
-    #: Cases to be quarantined as crashed once a success, or the end of the study, shows that it was not the engine.
+    #: Cases to be quarantined as crashed once a success, or the end of the study, shows that the engine works.
     suspects: list[Quarantine] = field(default_factory=list)
 
 
 def disjoint(chunks: Iterable[Chunk]) -> int:
-    """Largest number of chunks of one study no two of which share a case."""
+    """Largest number of chunks of one study that pairwise share no case."""
     count, end = 0, -1
     for chunk in sorted(chunks, key=lambda chunk: chunk.last):
         if chunk.first > end:
@@ -192,8 +194,8 @@ def disjoint(chunks: Iterable[Chunk]) -> int:
 
 
 def pieces(chunk: Chunk) -> tuple[Chunk, ...]:
-    """The chunk in parts of nearly the same size. One of several cases is split again at its next failure; a single
-    case fails twice.
+    """The chunk in parts of nearly equal size. Parts with several cases are split at their next failure; a single case
+    may fail twice.
     """
     count = min(PARTS, chunk.count)
     edges = [chunk.count * k // count for k in range(count + 1)]
@@ -204,28 +206,28 @@ def pieces(chunk: Chunk) -> tuple[Chunk, ...]:
 
 
 class Dispatch:
-    """The state machine. At most ``capacity`` chunks are in flight; every `Run` is answered by one Refused or Ended."""
+    """The state machine. At most ``capacity`` chunks are in flight; each `Run` is answered by one Refused or Ended."""
 
     def __init__(self, capacity: int) -> None:
         self.capacity = capacity
         self._open: dict[int, _Open] = {}
         self._study_of: dict[int, int] = {}
         self._next_ticket = 1
-        #: Studies for whose sake everything was begun again.
+        #: Studies that have caused a restart.
         self._renewed: set[int] = set()
 
     @property
     def in_flight(self) -> int:
-        """Chunks that were started and have not ended."""
+        """Number of chunks that were started and have not ended."""
         return len(self._study_of)
 
     @property
     def studies(self) -> frozenset[int]:
-        """Numbers of the studies being worked on."""
+        """Numbers of the active studies."""
         return frozenset(self._open)
 
     def handle(self, event: Event) -> list[Instruction]:
-        """Take one event; gives what is to be done, in order. Events about what is not known are ignored."""
+        """Process one event; returns the instructions in order. Events about unknown studies or chunks are ignored."""
         found: list[Instruction]
         match event:
             case Offered():
@@ -323,7 +325,7 @@ class Dispatch:
         return [Split(chunk, parts, event.detail)]
 
     def _fault(self, number: int, reason: str) -> list[Instruction]:
-        """The engine is at fault, not the cases: begin again, or the second time hold the study."""
+        """The engine is at fault, not the cases: restart, or hold the study the second time."""
         if number not in self._renewed:
             self._renewed.add(number)
             return [*self._drop_all(), Renew(number, reason)]
@@ -339,14 +341,16 @@ class Dispatch:
         return stops
 
     def _take(self, ticket: int) -> tuple[int, _Open, Chunk] | None:
-        """Take a ticket out of flight; None when its study is not worked on any more."""
+        """Remove a ticket from flight; None when its study is no longer active."""
         number = self._study_of.pop(ticket, None)
         known = None if number is None else self._open.get(number)
         chunk = None if known is None else known.running.pop(ticket, None)
         return None if number is None or known is None or chunk is None else (number, known, chunk)
 
     def _settled(self, number: int, known: _Open) -> list[Instruction]:
-        """Let go of a study with nothing in flight: for good when nothing waits, till it is offered again when held."""
+        """Release a study without chunks in flight: for good if none is waiting, or until it is offered again
+        if held.
+        """
         if known.running or (known.waiting and not known.held):
             return []
         if known.suspects and not (known.waiting or known.cancelled or known.proven) and number not in self._renewed:
@@ -359,9 +363,9 @@ class Dispatch:
         return [*quarantined, Settle(number)]
 
     def _fill(self) -> list[Instruction]:
-        """Start waiting chunks while there is room.
+        """Start waiting chunks while there is capacity.
 
-        Those of the highest priority; of equals the study with the fewest in flight; of equals the oldest.
+        Order: highest priority, then fewest chunks of the study in flight, then oldest study.
         """
         found: list[Instruction] = []
         while len(self._study_of) < self.capacity:

@@ -22,26 +22,26 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger(__name__)
 
-#: Seconds between two looks at the store for new studies and wishes; also the longest wait for the executor.
+#: Seconds between two polls of the store for new studies and requests; also the longest wait for the executor.
 POLL_SECONDS = 0.1
-#: The same where news of the store come by themselves; only what nobody tells of is found by looking.
+#: The same with notifications from the store; polling then finds only changes without a notification.
 QUIET_POLL_SECONDS = 2.0
 HEARTBEAT_SECONDS = 5.0
-#: Studies worked on side by side; the others wait in order of submission.
+#: Number of studies active at the same time; the others wait in order of submission.
 OPEN_STUDIES = 8
-#: Seconds that a study waits for its kernel before it says so: one that lies in the cache is there sooner.
+#: Seconds that a study waits for its kernel before this is reported; cached kernels load sooner.
 NOTE_SECONDS = 3.0
-#: Seconds before a store that took nothing is tried again: doubled each time, back to the first after a success.
+#: Seconds before a store that refused writes is retried: doubled each time, reset after a success.
 FULL_SECONDS = (2.0, 60.0)
-COMPILING = "The kernel of this study is being compiled, which happens once and can take a minute; other studies go on."
+COMPILING = "The kernel of this study is being compiled, once, which can take a minute; other studies continue."
 
 
 class Dispatcher:
     """Runs every study of a store, or only study number ``only``.
 
-    The caller sees to it that there is one dispatcher at a time (a lock); the epoch makes sure of it. ``renew`` gives a
-    new executor that compiles its kernels anew, in the place of one whose chunks all crash. With ``news`` the store is
-    looked at when it has changed, and seldom otherwise.
+    The caller ensures, by a lock, that there is one dispatcher at a time; the epoch enforces it. ``renew`` returns a
+    new executor that compiles its kernels anew, replacing one whose chunks all crash. With ``news`` the store is polled
+    when it has changed, and rarely otherwise.
     """
 
     def __init__(
@@ -65,16 +65,16 @@ class Dispatcher:
         self._machine = Dispatch(executor.capacity)
         self._studies: dict[int, Study] = {}
         self._ids: dict[int, str] = {}
-        #: Studies that wait for their kernels, and those that nobody can run at present; and when they began to.
+        #: Studies waiting for their kernels, and those that cannot run at present; with the time when this began.
         self._compiling: dict[int, float] = {}
         self._short: dict[int, float] = {}
-        #: What was noted on studies.
+        #: The reasons recorded on studies.
         self._notes: dict[int, str | None] = {}
         self._priorities: dict[int, int] = {}
-        #: By ticket: what of a chunk in flight the store has already; and outcomes of chunks of which it has all.
+        #: By ticket: cases of a chunk in flight that the store already has; and outcomes of chunks it has completely.
         self._known: dict[int, Known] = {}
         self._had_all: list[Outcome] = []
-        #: Why the store took nothing when it was last asked to; claims are still to be returned then.
+        #: Why the store refused the last write; claims must still be returned then.
         self._full: str | None = None
         self._full_delay = FULL_SECONDS[0]
         self._try_again = 0.0
@@ -83,7 +83,7 @@ class Dispatcher:
         self._next_beat = 0.0
 
     def run(self, stopping: Callable[[], bool]) -> None:
-        """Work until ``stopping()``; then stop the chunks in flight and hand their claims back.
+        """Work until ``stopping()``; then stop the chunks in flight and return their claims.
 
         Raises EpochLostError when another dispatcher took over, ExecutorError when nothing can be run.
         """
@@ -95,14 +95,14 @@ class Dispatcher:
             self._executor.close()
             if self._news is not None:
                 self._news.close()
-            # Whoever took over, or will, returns the claims.
+            # The dispatcher that has taken over, or the next one, returns the claims.
             with suppress(EpochLostError, StoreFullError):
                 self._store.release(self._epoch)
 
     def step(self) -> None:
-        """One turn: look for new studies and wishes when it is time, then take what the executor has done.
+        """One iteration: poll for new studies and requests when it is time, then process the executor's outcomes.
 
-        When the store takes nothing, what is in hand is dropped: it is computed again when there is room.
+        When the store refuses writes, unfinished work is dropped and computed again later.
         """
         now = self._clock.monotonic()
         try:
@@ -111,12 +111,12 @@ class Dispatcher:
                 self._next_beat = now + HEARTBEAT_SECONDS
             if now >= self._next_poll or (self._news is not None and self._news.wait(0.0)):
                 self._poll()
-                # A kernel that is being compiled, or room, is told of by nobody.
+                # There are no notifications about compiled kernels or free space.
                 quiet = self._news is not None and not self._compiling
                 self._next_poll = now + (QUIET_POLL_SECONDS if quiet else POLL_SECONDS)
             at_once, self._had_all = self._had_all, []
             if self._news is not None and not (at_once or self._compiling or self._machine.in_flight):
-                # Nothing can come from the executor.
+                # The executor has nothing to report.
                 if self._news.wait(POLL_SECONDS):
                     self._next_poll = now
                 return
@@ -138,7 +138,7 @@ class Dispatcher:
             self._forget(number)
 
     def _has_room(self, studies: Sequence[ActiveStudy]) -> bool:
-        """Hold every study while there is no room, and let them go on when there is; False when any has changed."""
+        """Hold all studies while there is no room, and resume them when there is; False when any has changed."""
         shortage = self._store.shortage()
         dropped = self._full is not None
         if dropped:
@@ -157,8 +157,8 @@ class Dispatcher:
         return True
 
     def _poll(self) -> None:
-        """Tell the state machine what the store says of every study; what it knows already changes nothing."""
-        self._machine.capacity = self._executor.capacity  # where workers join or leave, it changes
+        """Pass the state of every study in the store to the state machine; known facts change nothing."""
+        self._machine.capacity = self._executor.capacity  # changes as workers join and leave
         studies = self._store.active_studies()
         if not self._has_room(studies):
             studies = self._store.active_studies()
@@ -181,21 +181,21 @@ class Dispatcher:
                 self._handle(dispatch.Offered(study.number, priority=study.priority))
             elif self._may_open(study) and self._has_kernel(study):
                 chunks = self._store.open_chunks(study.number)
-                self._say("The study %s is taken up: %d cases in %d chunks to be run.", study.number,
+                self._say("The study %s starts: %d cases in %d chunks to be run.", study.number,
                     sum(chunk.count for chunk in chunks), len(chunks))  # fmt: skip
                 self._handle(dispatch.Offered(study.number, chunks, study.priority))
 
     def _time_is_over(self, number: int) -> None:
-        """The deadline of the study has come: what is in flight goes on to its end, then the study is held."""
+        """The deadline of the study has passed: chunks in flight finish, then the study is held."""
         self._compiling.pop(number, None)
         self._handle(dispatch.Paused(number))
         if number not in self._machine.studies:
             self._store.time_is_over(self._epoch, number)
-            self._say("The time of the study %s is over.", number)
+            self._say("The deadline of the study %s has passed.", number)
             self._forget(number)
 
     def _may_open(self, study: ActiveStudy) -> bool:
-        """Studies that wait for kernels, or have a lower priority, leave room for as many others."""
+        """Whether a study may become active; those that wait for kernels or have a lower priority do not count."""
         if study.number in self._compiling:
             return True
         rivals = (self._machine.studies, self._compiling)
@@ -205,7 +205,7 @@ class Dispatcher:
         )
 
     def _has_kernel(self, study: ActiveStudy) -> bool:
-        """Whether the study can be run now; if not, its kernel is on the way or the study is held."""
+        """Whether the study can run now; if not, its kernel is being loaded or the study is held."""
         number = study.number
         if number not in self._studies:
             self._studies[number] = self._store.study_of(number)
@@ -219,7 +219,7 @@ class Dispatcher:
         if ready:
             self._compiling.pop(number, None)
             self._notes.pop(number, None)
-            self._store.note(self._epoch, number, None)  # it may be that of a dispatcher before this one
+            self._store.note(self._epoch, number, None)  # the reason may come from an earlier dispatcher
             return True
         now = self._clock.monotonic()
         if now - self._compiling.setdefault(number, now) >= NOTE_SECONDS:
@@ -227,7 +227,7 @@ class Dispatcher:
         return False
 
     def _tell_shortage(self, number: int) -> None:
-        """Note on a study that is being worked on that nothing can be run, when that lasts."""
+        """Record on an active study that nothing can be run, when this persists."""
         shortage, now = self._executor.shortage, self._clock.monotonic()
         if shortage is None:
             self._short.pop(number, None)
@@ -241,14 +241,14 @@ class Dispatcher:
             self._notes[number] = note
 
     def _hold(self, number: int, reason: str) -> None:
-        """Hold a study for a fault that is not its cases', and let the log know."""
+        """Hold a study for a fault outside its cases, and log it."""
         self._store.fault(self._epoch, number, reason)
-        if self._only is None:  # who runs a single study is told by its state
+        if self._only is None:  # the state of a single study shows it
             _LOG.error("The study %s is held: %s", self._ids.get(number, number), reason)
         self._forget(number)
 
     def _say(self, text: str, number: int, *values: object) -> None:
-        """Let the log know what becomes of a study; who runs a single one sees it."""
+        """Log the progress of a study, except in the run of a single study."""
         if self._only is None:
             _LOG.info(text, self._ids.get(number, number), *values)
 
@@ -259,13 +259,13 @@ class Dispatcher:
             known.pop(number, None)
 
     def _begin_again(self, number: int, reason: str) -> None:
-        """New processes and new kernels: those in the cache may be damaged."""
+        """Restart with new processes and kernels, because the cached kernels may be damaged."""
         if self._renew is None:
             self._store.begin_again(self._epoch, number)
             self._handle(dispatch.Broken(number, reason))
             return
         _LOG.error(
-            "The study %s: %s. The kernels are compiled anew, and its cases run again.",
+            "The study %s: %s. Its kernels are compiled anew and its cases run again.",
             self._ids.get(number, number), reason,
         )  # fmt: skip
         self._executor.close()
@@ -277,7 +277,7 @@ class Dispatcher:
             self._forget(known)
 
     def _handle(self, event: dispatch.Event, result: ChunkResult | None = None) -> None:
-        """Give the event to the state machine and do what it says."""
+        """Pass the event to the state machine and carry out its instructions."""
         for starts, instructions in groupby(self._machine.handle(event), lambda item: isinstance(item, dispatch.Run)):
             if starts:
                 self._start([item for item in instructions if isinstance(item, dispatch.Run)])
@@ -286,7 +286,7 @@ class Dispatcher:
                     self._do(instruction, result)
 
     def _start(self, runs: Sequence[dispatch.Run]) -> None:
-        """Claim the chunks in one transaction and start those that were got."""
+        """Claim the chunks in one transaction and start those that were granted."""
         got: set[Chunk] = set(self._store.claim(self._epoch, [run.chunk for run in runs]))
         for run in runs:
             if run.chunk in got:
@@ -296,7 +296,7 @@ class Dispatcher:
                 self._handle(dispatch.Refused(run.ticket))
 
     def _submit(self, ticket: int, chunk: Chunk) -> None:
-        """Start what of the chunk has to be run: a case that another study has is not."""
+        """Start the cases of the chunk that no other study has."""
         study = self._studies[chunk.study]
         known = self._store.known(study, chunk)
         if known is None:
@@ -324,7 +324,7 @@ class Dispatcher:
             case dispatch.Stop(ticket=ticket):
                 self._executor.stop(ticket)
             case dispatch.Fault(study=number, reason=reason):
-                in_vain = "" if self._renew is None else "; it was so again with kernels compiled anew"
+                in_vain = "" if self._renew is None else "; the same happened with newly compiled kernels"
                 self._hold(number, f"{reason}{in_vain}")
             case dispatch.Renew(study=number, reason=reason):
                 self._begin_again(number, reason)

@@ -1,8 +1,8 @@
-"""What decides the bits of a result besides its parameters: code, libraries and processor of the computing process.
+"""What determines the bits of a result besides its parameters: code, libraries and processor of the process.
 
-Two processes with the same fingerprint give the same bits for the same case. A worker of a cluster whose fingerprint
-differs from the dispatcher's is refused, a process of the pool ends, and rows are reused only under the fingerprint
-they were computed with.
+Two processes with the same fingerprint give the same bits for the same case. If a fingerprint differs from the
+dispatcher's, a worker of a cluster is refused and a process of the pool exits. Rows are reused only under the
+fingerprint with which they were computed.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from sprag.worker import models
 _SOURCES: Final = "engine sources"
 _FEATURES: Final = "processor features"
 _PACKAGES: Final = ("sprag", "numpy", "numba", "llvmlite", "scipy")
-#: Settings of numba that do not change the code it makes, or are told by the processor features.
+#: Settings of numba that do not affect its code, or are covered by the processor features.
 _NUMBA_HARMLESS: Final = frozenset(
     {
         "NUMBA_CACHE_DIR",
@@ -33,9 +33,9 @@ _NUMBA_HARMLESS: Final = frozenset(
         "NUMBA_DISABLE_PERFORMANCE_WARNINGS",
     }
 )
-#: Where numba reads settings too, in the folder in which it is imported.
+#: File in the current folder from which numba also reads settings.
 _NUMBA_FILE: Final = Path(".numba_config.yaml")
-#: Differences of one subject that are named one by one.
+#: Most differences of one subject that are listed.
 _NAMED: Final = 6
 
 
@@ -43,14 +43,14 @@ def _sources() -> str:
     return models.source_hash(models.engine_folder(), Path(models.__file__).parent)[:16]
 
 
-# Of the files as this process began to import them. An upgrade under a running process changes the files, not its code.
+# Hash of the files when this process began to import them: an upgrade changes the files, not the running code.
 _AT_START: Final = _sources()
 
 
 def collect() -> dict[str, str]:
     """The fingerprint of this process, by subject.
 
-    Where the engine's files have changed since the process started it equals no other fingerprint.
+    Where the engine's files have changed since the process started, it differs from every other fingerprint.
     """
     now = _sources()
     changed = f", changed to {now} while process {os.getpid()} ran"
@@ -85,7 +85,7 @@ def _version(package: str) -> str:
 
 
 def _features() -> str:
-    """The processor features that numba compiles for, sorted; without AVX where its setting says so."""
+    """The processor features that numba compiles for, sorted; without AVX where numba's setting disables it."""
     chosen = os.environ.get("NUMBA_CPU_FEATURES")
     if chosen is not None:
         return " ".join(sorted(item[1:] for item in chosen.split(",") if item.startswith("+")))
@@ -99,7 +99,7 @@ def _features() -> str:
 
 @cache
 def own() -> Mapping[str, str]:
-    """The fingerprint of this process as it was when first asked for; `collect` looks again."""
+    """The fingerprint of this process, cached at the first call; `collect` computes it anew."""
     return collect()
 
 
@@ -113,9 +113,9 @@ def _digest(fingerprint: Mapping[str, str]) -> str:
 
 
 def differences(own: Mapping[str, str], other: object) -> str:
-    """In what another process differs from this one, as a clause; "" where in nothing.
+    """The differences of another process from this one, as a clause; "" where there are none.
 
-    ``other`` may be of any type: it comes from a process whose code is not known.
+    ``other`` may be of any type, because it comes from a process with unknown code.
     """
     if not isinstance(other, Mapping):
         return "it runs another version of Sprag, which does not tell its fingerprint"
@@ -139,7 +139,7 @@ def _named(names: set[str]) -> str:
 
 
 def prepare_as(expected: str) -> None:
-    """First thing a process of a pool does: load the engine. It ends where its fingerprint is not ``expected``."""
+    """First task of a pool process: load the engine. It exits where its fingerprint is not ``expected``."""
     _require(expected)
     models.prepare()
     _require(expected)  # the files may have changed while they were loaded

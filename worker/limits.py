@@ -1,14 +1,14 @@
-"""Every limit on what a study may ask for, in one place."""
+"""All limits on studies and requests."""
 
 from typing import Final
 
 #: Axes of one study.
 MAX_AXES: Final = 16
-#: Columns of a table of cases: parameters that vary side by side. Eight pendulums have some 70.
+#: Columns of a table of cases: parameters that vary side by side. Eight pendulums have about 70.
 MAX_COLUMNS: Final = 256
 #: Cases of one study.
 MAX_CASES: Final = 10_000_000
-#: Values on all axes of one study together (they are kept with the study).
+#: Values on all axes of one study together (they are stored with the study).
 MAX_AXIS_VALUES: Final = 1_000_000
 #: Paths tied to one axis.
 MAX_TIED_PATHS: Final = 256
@@ -21,14 +21,14 @@ MAX_DEPTH: Final = 32
 MAX_NAME_LENGTH: Final = 200
 #: Characters of one quantity with its unit ("0.01 N*m*s/rad").
 MAX_QUANTITY_LENGTH: Final = 80
-#: Decimal digits of an integer in a spec; none above about 308 fits into a double.
+#: Decimal digits of an integer in a spec; doubles end at about 308.
 MAX_INTEGER_DIGITS: Final = 400
-#: Problems reported about one spec; what comes after is only counted.
+#: Faults reported about one spec; further ones are only counted.
 MAX_PROBLEMS: Final = 100
 
 #: Excitation periods of any case of a study.
 MAX_RUN_PERIODS: Final = 1e6
-#: Excitation periods that a search for the settled motion may be given, and the largest order of an orbit.
+#: Excitation periods of a search for the settled motion, and the largest order of an orbit.
 MIN_SETTLED_PERIODS: Final = 100
 MAX_SETTLED_PERIODS: Final = 100_000
 MAX_ORBIT_PERIODS: Final = 64
@@ -44,7 +44,7 @@ MAX_CLUTCH_ROWS: Final = 10_000
 #: Different clutch laws of one study that are checked one by one.
 MAX_CLUTCH_LAWS: Final = 10_000
 
-#: Numbers in one answer of curves or of a map; more is what exports are for.
+#: Numbers in one answer of curves or of a map; exports have no such limit.
 MAX_CURVE_VALUES: Final = 1_000_000
 #: Studies or cases on one page.
 MAX_PAGE_SIZE: Final = 1_000
@@ -61,27 +61,27 @@ MAX_FINISH_DAYS: Final = 366
 MAX_WAITING_STUDIES: Final = 1_000
 #: Streams of events that are open at once.
 MAX_STREAMS: Final = 200
-#: Connections that are open at once; a further one is answered 503.
+#: Simultaneous connections; a further one is answered with 503.
 MAX_CONNECTIONS: Final = 800
-#: Seconds in which the head of a request, and then its body, must have come in.
+#: Seconds within which the head of a request, and then its body, must arrive.
 HEAD_SECONDS: Final = 20.0
 BODY_SECONDS: Final = 60.0
-#: Seconds in which a client must take something of what is sent to it.
+#: Seconds within which a client must read part of its answer.
 WRITE_SECONDS: Final = 60.0
-#: Schedules that are kept.
+#: Number of schedules.
 MAX_SCHEDULES: Final = 1_000
 
-#: Times its limit of processor time that a chunk may take by the clock on the wall: a crowded machine is slow.
+#: Factor of the elapsed-time limit of a chunk over its processor-time limit, because busy machines are slow.
 WALL_TIMES: Final = 10.0
 
-#: Seconds in which a kernel must be compiled: many times what the largest takes on a slow, busy machine.
+#: Seconds within which a kernel must be compiled: many times what the largest takes on a slow, busy machine.
 LOAD_SECONDS = 3600.0
 
-#: Checks of specs, fits and pictures of one token, and of all together, that may be there at once.
+#: Simultaneous checks of specs, fits and pictures of one token, and of all tokens together.
 MAX_CHECKS_EACH: Final = 32
 MAX_CHECKS: Final = 64
-#: Computations of one token, and of all together, that may be there at once.
+#: Simultaneous computations of one token, and of all tokens together.
 MAX_COMPUTATIONS_EACH: Final = 6
 MAX_COMPUTATIONS: Final = 8
-#: Bytes that a computation of the engine, or the compilation of a kernel, may take.
+#: Bytes that a computation of the engine, or the compilation of a kernel, may use.
 COMPUTATION_BYTES: Final = 2 * 1024**3

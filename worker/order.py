@@ -1,15 +1,15 @@
 """Coarse to fine: the order in which the cases of a study with a deadline are run.
 
-The first pass takes the two ends of every axis, the next their middles too, and so on: pass ``p`` takes the values
-whose rank (place among the values of the axis by size) is ``floor(j (n - 1) / 2^p)`` for some ``j = 0 .. 2^p``. Those
-of one pass are among those of the next, they lie evenly, and the ends are always with them. A pass is the complete grid
-of the values it takes, so that whatever is done when the time is over is a usable, coarser study. (The one-dimensional
-order is that of bisection; the radical inverse of van der Corput, 1935, without its permutation within a pass.)
+The first pass takes the two ends of every axis, the next one also the middles, and so on: pass ``p`` takes the values
+whose rank (position among the sorted values of the axis) is ``floor(j (n - 1) / 2^p)`` for some ``j = 0 .. 2^p``. The
+values of one pass are contained in those of the next, are evenly spaced and always include the ends. A pass is the
+complete grid of its values, so the finished part at a deadline is a usable, coarser study. (The one-dimensional order
+is that of bisection: the radical inverse of van der Corput, 1935, without its permutation within a pass.)
 
-Chunks of such a study are ranges of *positions* in this order. For a grid nothing is tabulated but the axes: the cases
-that a pass adds are boxes, one for each axis that comes to its new values first, and a position in a box is a number in
-mixed radix, as a case number is in the whole. Cases that are written out one by one (a zip) are sorted by the pass
-that takes all their values; of one pass they stay in the order they were given in, which for samples covers the ranges.
+Chunks of such a study are ranges of *positions* in this order. For a grid only the axes are tabulated: the cases that a
+pass adds form boxes, one for each axis that is the first with a new value, and a position in a box is a mixed-radix
+number, like a case number in the grid. Cases listed one by one (a zip) are sorted by the first pass that contains all
+their values; within a pass they keep their given order, which for samples covers the ranges.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class Order(Protocol):
 
     Attributes
     ----------
-    passes : tuple of int
-        Positions before each entry are one complete, coarser study; ascending, the last is the number of cases.
+    passes : tuple of int The positions before each entry form a complete, coarser study; ascending, the last is the
+        number of cases.
     """
 
     @property
@@ -47,14 +47,14 @@ class Order(Protocol):
         """Positions of the cases of those numbers, shape (m,)."""
 
     def values(self, passes: int) -> tuple[int, ...]:
-        """Values of each axis that the first ``passes`` passes take; () where cases are written out."""
+        """Number of values of each axis in the first ``passes`` passes; () where cases are listed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """What of a study is complete: ``complete`` of ``total`` passes, ``cases`` cases, a grid of so many ``values``.
+    """The complete part of a study: ``complete`` of ``total`` passes, ``cases`` cases, a grid of so many ``values``.
 
-    ``values`` has a number for each axis, none where the cases are written out.
+    ``values`` has a number for each axis, none where the cases are listed.
     """
 
     complete: int
@@ -70,7 +70,7 @@ class Coverage:
 
 
 def coverage(order: Order, reached: int) -> Coverage:
-    """What is complete when every position before ``reached`` is done."""
+    """The coverage when every position before ``reached`` is done."""
     complete = sum(size <= reached for size in order.passes)
     cases = order.passes[complete - 1] if complete else 0
     return Coverage(complete, len(order.passes), cases, order.values(complete) if complete else ())
@@ -103,7 +103,7 @@ def order_of(study: Study) -> Order:
 
 
 class ListOrder:
-    """Cases that are written out: sorted by their level (shape (cases,)), the given order kept within one."""
+    """Listed cases, sorted by level (shape (cases,)), in the given order within a level."""
 
     def __init__(self, level: Numbers) -> None:
         self._case = np.argsort(level, kind="stable").astype(np.int64)
@@ -112,7 +112,7 @@ class ListOrder:
         self.passes = tuple(np.cumsum(np.unique(level, return_counts=True)[1]).tolist())
 
     def values(self, passes: int) -> tuple[int, ...]:  # noqa: ARG002 - as of every order
-        """Nothing: there are no axes."""
+        """(): there are no axes."""
         return ()
 
     def cases(self, positions: Numbers) -> Numbers:
@@ -126,7 +126,9 @@ class ListOrder:
 
 @dataclass(frozen=True, slots=True)
 class _Box:
-    """Cases whose places on every axis (sorted by level) lie in ``low`` .. ``low + size - 1``; the last is fastest."""
+    """Cases whose positions on every axis (sorted by level) lie in ``low`` .. ``low + size - 1``; the last varies
+    fastest.
+    """
 
     start: int
     low: tuple[int, ...]
@@ -138,19 +140,19 @@ class GridOrder:
 
     def __init__(self, level: list[Numbers]) -> None:
         self._shape = tuple(one.size for one in level)
-        #: Place of an axis' values when they are sorted by level, and what stands at each place.
+        #: For each axis: position of its values when sorted by level, and the inverse.
         self._value = [np.argsort(one, kind="stable").astype(np.int64) for one in level]
         self._place = [np.argsort(value, kind="stable").astype(np.int64) for value in self._value]
         self._level = level
         self._boxes: list[_Box] = []
-        #: Which box is that of a pass and the first axis with a new value in it.
+        #: Index of the box by pass and first axis with a new value.
         self._box_of: dict[tuple[int, int], int] = {}
         ends = [self._cut(one) for one in range(1 + max(int(one.max()) for one in level))]
         self._starts = np.array([box.start for box in self._boxes], dtype=np.int64)
         self.passes = tuple(ends)
 
     def _cut(self, level: int) -> int:
-        """Append the boxes of a pass; gives the number of cases up to its end."""
+        """Append the boxes of a pass; returns the number of cases up to its end."""
         before = tuple(int((one < level).sum()) for one in self._level)
         until = tuple(int((one <= level).sum()) for one in self._level)
         start = math.prod(before)
@@ -165,7 +167,7 @@ class GridOrder:
         return start
 
     def values(self, passes: int) -> tuple[int, ...]:
-        """Values of each axis that the first ``passes`` passes take."""
+        """Number of values of each axis in the first ``passes`` passes."""
         return tuple(int((one < passes).sum()) for one in self._level)
 
     def cases(self, positions: Numbers) -> Numbers:

@@ -1,4 +1,4 @@
-"""What the dispatcher needs from the world: a store, an executor, a clock. Values only; no database, no pool."""
+"""Interfaces of the dispatcher: a store, an executor, a clock. Only values, without database or pool."""
 
 from __future__ import annotations
 
@@ -22,10 +22,9 @@ if TYPE_CHECKING:
 class Chunk:
     """Consecutive cases of one study, the unit of claim and commit.
 
-    They are consecutive in the order in which the study is run: by their numbers, or coarse to fine
-    (`sprag.worker.order`).
+    They are consecutive in the order in which the study runs: by number, or coarse to fine (`sprag.worker.order`).
     ``study`` is the study's number in order of submission. ``failures`` counts how often these cases, as one chunk,
-    took their process down or ran out of time.
+    crashed their process or timed out.
     """
 
     study: int
@@ -41,14 +40,13 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What is known of the cases of a chunk: which have to be run, and whose rows other studies have already.
+    """Partition of a chunk's cases: those to run, and those whose rows other studies already have.
 
     Attributes
     ----------
-    missing : int64 array
-        The cases of the chunk that have to be run, ascending.
-    cases, studies, there : int64 arrays of one length
-        The others, ascending; the number of the study that has each, and its case there.
+    missing : int64 array The cases of the chunk to run, ascending.
+    cases, studies, there : int64 arrays of one length The other cases, ascending; the number of the study that has
+        each, and its case number there.
     """
 
     missing: NDArray[np.int64]
@@ -59,10 +57,10 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class ActiveStudy:
-    """A study that has not come to its end, as the dispatcher's poll sees it.
+    """An unfinished study, as polled by the dispatcher.
 
-    Higher ``priority`` goes first. ``waits_for_room`` tells a paused study that goes on when there is room, ``goes_on``
-    one that goes on by itself for whatever it waits. No chunk is to be started after ``finish_by``.
+    Higher ``priority`` runs first. ``waits_for_room`` marks a paused study that resumes when there is room, ``goes_on``
+    one that resumes by itself for any reason. No chunk starts after ``finish_by``.
     """
 
     number: int
@@ -75,68 +73,68 @@ class ActiveStudy:
 
 
 class StoreError(Exception):
-    """The store refuses; the message is one plain sentence for a user, ``code`` says the kind and is stable."""
+    """An error of the store; the message is one sentence for a user, ``code`` is its stable kind."""
 
     code: str = "unavailable"
 
 
 class StoreFullError(StoreError):
-    """The store takes nothing more at present: no room, or its disk fails. It may be over later."""
+    """The store cannot write at present: no space, or a failing disk. This may be temporary."""
 
 
 class EpochLostError(StoreError):
-    """Another dispatcher has taken over: this one must give up by itself and commit nothing more."""
+    """Another dispatcher has taken over: this one must stop and commit nothing more."""
 
 
 class ExecutorError(Exception):
-    """The executor cannot run anything any more; the message is one plain sentence for a user."""
+    """The executor can no longer run anything; the message is one sentence for a user."""
 
     code: ClassVar[str] = "unavailable"
 
 
 class KernelError(Exception):
-    """The kernel of a study cannot be had; the message says why."""
+    """The kernel of a study cannot be loaded; the message states why."""
 
 
 class Store(Protocol):
-    """The dispatcher's side of the database. Every write is one short transaction that first checks the epoch.
+    """The dispatcher's view of the database. Every write is one short transaction that first checks the epoch.
 
     A method that takes ``epoch`` raises EpochLostError, and changes nothing, when the epoch is no longer the latest.
     Any method may raise StoreFullError, and has changed nothing then.
     """
 
     def take_over(self, owner: str) -> int:
-        """Raise the epoch, return every claim of an older one to waiting, and give the new epoch."""
+        """Increase the epoch, return every claim of an older one to waiting, and return the new epoch."""
 
     def heartbeat(self, epoch: int) -> None:
-        """Note that the dispatcher is alive. Raises alarms when missing, never decides ownership."""
+        """Record that the dispatcher is alive. A missing heartbeat raises alarms but never decides ownership."""
 
     def active_studies(self) -> list[ActiveStudy]:
-        """Studies that have not ended, those of the highest priority first, then in order of submission.
+        """Studies that have not ended, by priority and then in order of submission.
 
-        Without those that `time_is_over` held.
+        Those held by `time_is_over` are left out.
         """
 
     def study_of(self, number: int) -> Study:
         """The study to compute."""
 
     def open_chunks(self, number: int) -> list[Chunk]:
-        """Chunks of a study that are not done, in the order in which they are to be run."""
+        """Unfinished chunks of a study, in the order in which they will run."""
 
     def claim(self, epoch: int, chunks: Sequence[Chunk]) -> list[Chunk]:
-        """Claim waiting chunks of studies that are queued or running and in time; gives those that were got."""
+        """Claim waiting chunks of queued or running studies before their deadline; returns the claimed ones."""
 
     def known(self, study: Study, chunk: Chunk) -> Known | None:
-        """Which cases of a chunk of ``study`` have to be run, and which others have.
+        """Which cases of a chunk of ``study`` must be run, and which can be copied from other studies.
 
-        None where all have to be and they are those numbered ``chunk.first`` to ``chunk.last``.
+        None where all must be run and they are numbered ``chunk.first`` to ``chunk.last``.
         """
 
     def commit(self, epoch: int, chunk: Chunk, result: ChunkResult, known: Known | None = None) -> bool:
         """Insert the rows of a claimed chunk and mark it done. False, and no change, when it is not claimed by us.
 
-        With ``known`` the result is that of the missing cases only, and the other rows are copied; where one of them is
-        gone, the chunk is returned to waiting instead (False).
+        With ``known`` the result covers the missing cases only, and the other rows are copied; where one of them is
+        gone, the chunk returns to waiting instead (False).
         """
 
     def release(self, epoch: int) -> None:
@@ -152,19 +150,19 @@ class Store(Protocol):
         """Give every case of a claimed chunk ``ending`` without results and mark the chunk done."""
 
     def note(self, epoch: int, number: int, reason: str | None) -> None:
-        """Say why a queued or running study does not go on; None takes the note away."""
+        """Record why a queued or running study does not proceed; None removes the reason."""
 
     def fault(self, epoch: int, number: int, reason: str) -> None:
         """Hold the study with a reason and return its claims to waiting."""
 
     def time_is_over(self, epoch: int, number: int) -> None:
-        """Hold a study that is queued, running or would go on by itself, at its deadline; nothing is in flight."""
+        """Hold a study that is queued, running or would resume by itself at its deadline; no chunk is in flight."""
 
     def begin_again(self, epoch: int, number: int) -> None:
-        """Return every claim of this epoch to waiting, and take all blame from the study's chunks."""
+        """Return every claim of this epoch to waiting, and reset the failures of the study's chunks."""
 
     def shortage(self) -> str | None:
-        """Why there is no room for more rows, as a sentence; None where there is."""
+        """Why there is no room for more rows, as a sentence; None where there is room."""
 
     def hold(self, epoch: int, reason: str, *, returned: bool) -> None:
         """Pause every study that is queued or running, with the reason, until `let_go`.
@@ -173,14 +171,14 @@ class Store(Protocol):
         """
 
     def let_go(self, epoch: int) -> None:
-        """Queue again every study that `hold` paused and nobody has touched since."""
+        """Queue again every study that `hold` paused and nobody has changed since."""
 
     def settle(self, epoch: int, number: int) -> StudyState:
-        """Bring a study without open claims to its end: cancelled when that was asked for, else finished or failed."""
+        """End a study without open claims: as cancelled when that was requested, otherwise as finished or failed."""
 
 
 class Fate(StrEnum):
-    """How the run of a chunk came out."""
+    """Outcome of the run of a chunk."""
 
     DONE = "done"
     CRASHED = "crashed"
@@ -190,7 +188,7 @@ class Fate(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The end of one submitted chunk; ``result`` is there when the fate is DONE, else ``detail`` says what happened."""
+    """The end of one submitted chunk; ``result`` is given when the fate is DONE, otherwise ``detail`` explains it."""
 
     ticket: int
     fate: Fate
@@ -203,14 +201,14 @@ class Executor(Protocol):
 
     @property
     def capacity(self) -> int:
-        """Number of chunks worth having in flight at once."""
+        """Useful number of chunks in flight."""
 
     @property
     def shortage(self) -> str | None:
-        """Why nothing can be run at present, as a sentence; None where chunks can be, or where it will not last."""
+        """Why nothing can be run at present, as a sentence; None where chunks can run or the cause is short-lived."""
 
     def ready(self, study: Study) -> bool:
-        """Whether the kernel of ``study`` is loaded; begins to load it where it is not, and returns at once.
+        """Whether the kernel of ``study`` is loaded; otherwise starts loading it and returns immediately.
 
         Raises KernelError when it could not be compiled; the next call tries again.
         """
@@ -219,30 +217,30 @@ class Executor(Protocol):
         """Start a chunk of a study that is `ready`; returns at once."""
 
     def wait(self, timeout: float) -> list[Outcome]:
-        """Outcomes that have come in; waits for the first at most ``timeout`` s, gives [] when none came."""
+        """Available outcomes; waits at most ``timeout`` s for the first, and returns [] when there is none."""
 
     def stop(self, ticket: int) -> None:
-        """Stop a chunk, running or not; its outcome is STOPPED unless it was just through."""
+        """Stop a chunk, running or not; its outcome is STOPPED unless it has just finished."""
 
     def close(self) -> None:
-        """Stop everything and leave no process behind."""
+        """Stop everything and end all processes."""
 
 
 class News(Protocol):
-    """Tells of changes in the store as soon as they are made, wherever that is."""
+    """Notifications of changes in the store by any process."""
 
     def wait(self, timeout: float) -> bool:
-        """Whether something has changed since the last call, or may have; waits for it at most ``timeout`` s."""
+        """Whether something has or may have changed since the last call; waits at most ``timeout`` s."""
 
     def close(self) -> None:
         """Stop listening."""
 
 
 class Clock(Protocol):
-    """Time, so that tests can hold it still."""
+    """Source of time, replaced in tests."""
 
     def now(self) -> datetime:
-        """The present moment, aware, UTC."""
+        """The current time, aware, UTC."""
 
     def monotonic(self) -> float:
         """Seconds on a clock that never goes back."""

@@ -1,7 +1,7 @@
-"""Which cases of two studies are the same: equal parameters, equal run, one engine. No store here.
+"""Which cases of two studies are the same: equal parameters, equal run, same engine. Independent of the store.
 
-A case needs no hash of its own: its parameters follow from the study and its number. Studies whose cases could be the
-same have the same `kin_hash`; which cases are, `shared_cases` finds from the values of both studies' axes.
+A case needs no hash of its own, because its parameters follow from the study and its number. Studies that can share
+cases have the same `kin_hash`; `shared_cases` finds the shared ones from the values of both studies' axes.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     Cases = NDArray[np.int64]
     Values = NDArray[np.float64]
 
-#: Codes of cases stay below this, so that one more factor does not overflow.
+#: Upper limit of the codes of cases, so that one more factor does not overflow.
 _LARGEST_CODE: Final = 2**62
 
 
 def kin_hash(study: Study, engine_version: str) -> str:
-    """SHA-256 (hexadecimal) of what studies with a case in common share: model, engine, run and set of parameters.
+    """SHA-256 (hexadecimal) of what studies with a common case share: model, engine, run and set of parameters.
 
-    And the structure of the machine, where its model knows one.
+    It includes the structure of the machine, where the model has one.
     """
     paths = sorted({*study.base, *study.axis_paths})
     shared: dict[str, Any] = {"engine": engine_version, "model": study.model, "run": study.run, "paths": paths}
@@ -49,7 +49,7 @@ def kin_hash(study: Study, engine_version: str) -> str:
 
 
 class Wanted:
-    """The cases of a study, made ready to be looked for in many others."""
+    """The cases of a study, prepared for the search in many others."""
 
     def __init__(self, study: Study) -> None:
         self.study = study
@@ -57,7 +57,7 @@ class Wanted:
         self._unique: dict[int, Values] = {}
 
     def values(self, path: str) -> Values:
-        """The values (SI) that a parameter takes, ascending, each once."""
+        """The distinct values (SI) of a parameter, ascending."""
         axis = self.study.axis_of(path)
         if axis is None:
             return np.array([self.study.base[path]])
@@ -66,7 +66,7 @@ class Wanted:
         return self._unique[axis]
 
     def may_share(self, spans: Values) -> NDArray[np.bool_]:
-        """Which of many studies may have a case in common with this one, from the `span` of each.
+        """Which of many studies may share a case with this one, judged by their `span`.
 
         Parameters
         ----------
@@ -74,7 +74,7 @@ class Wanted:
 
         Returns
         -------
-        bool array, shape (studies,); a study that is not among them has none of the cases
+        bool array, shape (studies,); False means that the study has none of the cases
         """
         left = np.arange(len(spans))
         for column, path in enumerate(_paths(self.study)):
@@ -89,7 +89,7 @@ class Wanted:
         return found
 
     def cases_with(self, wanted: Sequence[tuple[int, Values]]) -> Cases:
-        """The cases, ascending, whose value on each of the axes named is among those given with it (ascending)."""
+        """The cases, ascending, whose value on each given axis is among those given with it (ascending)."""
         study = self.study
         if study.combine == "zip":
             return self._rows_with(wanted) if wanted else np.arange(study.cases, dtype=np.int64)
@@ -103,7 +103,7 @@ class Wanted:
         return cases
 
     def _rows_with(self, wanted: Sequence[tuple[int, Values]]) -> Cases:
-        """The same where the axes go together: only the rows of the axis that leaves the fewest are looked at."""
+        """The same for zipped axes: only the rows selected by the most restrictive axis are examined."""
         found: list[tuple[int, Cases, Cases, Cases]] = []
         for position, values in wanted:
             if position not in self._sorted:
@@ -122,9 +122,9 @@ class Wanted:
 
 
 def shared_cases(new: Study | Wanted, old: Study) -> tuple[Cases, Cases]:
-    """Numbers of the cases of ``new`` that ``old`` has too, ascending, and what their numbers are there.
+    """Numbers of the cases of ``new`` that ``old`` also has, ascending, and their numbers there.
 
-    The two must be of one `kin_hash`. Values are the same when they are the same doubles.
+    Both must have the same `kin_hash`. Values are equal when they are equal doubles.
     """
     ours, theirs = new if isinstance(new, Wanted) else Wanted(new), Wanted(old)
     nothing = np.empty(0, dtype=np.int64)
@@ -157,7 +157,7 @@ def span(study: Study) -> Values:
     Returns
     -------
     float64 array, shape (2, paths)
-        The paths in the order of their names, which is one for all studies of a `kin_hash`.
+        The paths are sorted by name, which is the same order for all studies of a `kin_hash`.
     """
     spans = {path: (value, value) for path, value in study.base.items()}
     for axis in study.axes:
@@ -170,12 +170,13 @@ def _paths(study: Study) -> list[str]:
 
 
 def _axis_pairs(new: Study, old: Study) -> list[str]:
-    """A path for each pair of an axis (or the base) of one study and that of the other; tied paths need one look."""
+    """One path for each pair of an axis (or the base) of one study and of the other; tied paths are compared once."""
     found: dict[tuple[int | None, int | None, object], str] = {}
     ours, theirs = _axes_of(new), _axes_of(old)
     for path in dict.fromkeys((*new.base, *new.axis_paths)):
         axes = (ours.get(path), theirs.get(path))
-        # What varies in neither is looked at one by one, as is what varies in one only and is another number here.
+        # Parameters constant in both studies are compared individually, as are those that vary in one study only and
+        # have another value here.
         constant = (axes[0] is None and new.base[path], axes[1] is None and old.base[path])
         found.setdefault((*axes, constant if None in axes else None), path)
     return list(found.values())
@@ -186,13 +187,13 @@ def _axes_of(study: Study) -> dict[str, int]:
 
 
 def _common(some: Values, others: Values) -> Values:
-    """What two ascending arrays have in common, ascending; the shorter is looked for in the longer."""
+    """Common values of two ascending arrays, ascending; the shorter is searched in the longer."""
     short, long = (some, others) if some.size <= others.size else (others, some)
     return short[_places(long, short) >= 0]
 
 
 def _places(ascending: Values, values: Values) -> Cases:
-    """Place of each value in an ascending array that is not empty; -1 where it is not in it."""
+    """Position of each value in a non-empty ascending array; -1 where it is missing."""
     place = np.searchsorted(ascending, values)
     place[place == ascending.size] = 0
     return np.where(ascending[place] == values, place, -1)
@@ -204,10 +205,10 @@ def _cases_with(side: Wanted, common: Sequence[tuple[str, Values]]) -> Cases:
 
 
 def _coded(study: Study, path: str, common: Values, cases: Cases, codes: Cases) -> Cases:
-    """The codes of cases, carried on by the place of their value of ``path`` among those in common."""
+    """The codes of cases, extended by the position of their value of ``path`` among the common ones."""
     position = study.axis_of(path)
     if position is None:
-        return codes * common.size  # the one value is the one in common
+        return codes * common.size  # the only value is the common one
     return codes * common.size + _places(common, study.axes[position].array[_positions(study, position, cases)])
 
 
@@ -220,7 +221,7 @@ def _positions(study: Study, axis: int, cases: Cases) -> Cases:
 
 
 def taken(study: Study, cases: Cases) -> Study:
-    """A study of just these cases of ``study``, in this order, numbered from 0."""
+    """A study of only these cases of ``study``, in this order, numbered from 0."""
     axes = tuple(Axis(axis.paths, axis.array[_positions(study, index, cases)]) for index, axis in enumerate(study.axes))
     return replace(study, axes=axes, combine="zip")
 

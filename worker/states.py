@@ -1,4 +1,4 @@
-"""The states of a study and the one table of what may follow what."""
+"""The states of a study and the table of their transitions."""
 
 from enum import StrEnum
 from typing import ClassVar
@@ -17,12 +17,12 @@ class StudyState(StrEnum):
 
     @property
     def terminal(self) -> bool:
-        """Whether the study has come to its end."""
+        """Whether the study has ended."""
         return self in TERMINAL
 
     @property
     def sentence(self) -> str:
-        """What the state means, for people."""
+        """Description of the state."""
         return _SENTENCES[self]
 
 
@@ -38,7 +38,7 @@ _SENTENCES = {
     StudyState.QUEUED: "Accepted; waits for a worker.",
     StudyState.RUNNING: "Cases are being run.",
     StudyState.PAUSED: "Held: finished cases are kept, no new ones are started until it is resumed.",
-    StudyState.CANCELLING: "Cancellation was asked for; the worker is stopping its cases.",
+    StudyState.CANCELLING: "Cancellation was requested; the worker is stopping its cases.",
     StudyState.CANCELLED: "Cancelled: finished cases are kept, the others will not be run.",
     StudyState.FINISHED: "Every case has an ending, at least one of them ok.",
     StudyState.FAILED: "Every case has an ending and none of them is ok.",
@@ -48,7 +48,7 @@ TERMINAL: frozenset[StudyState] = frozenset({StudyState.CANCELLED, StudyState.FI
 
 
 class StudyEvent(StrEnum):
-    """What can happen to a study. The first four are wishes, which the service writes; the rest is the dispatcher's."""
+    """Events of a study. The first four are requests, which the service writes; the others come from the dispatcher."""
 
     PAUSE = "pause"
     RESUME = "resume"
@@ -63,7 +63,7 @@ class StudyEvent(StrEnum):
 
 _S, _E = StudyState, StudyEvent
 
-#: From a state, by an event, to a state. What is not here cannot happen.
+#: (state, event) -> next state. Other transitions are impossible.
 TRANSITIONS: dict[tuple[StudyState, StudyEvent], StudyState] = {
     (_S.QUEUED, _E.PAUSE): _S.PAUSED,
     (_S.RUNNING, _E.PAUSE): _S.PAUSED,
@@ -77,7 +77,7 @@ TRANSITIONS: dict[tuple[StudyState, StudyEvent], StudyState] = {
     (_S.RUNNING, _E.FAULT): _S.PAUSED,
     (_S.QUEUED, _E.FAULT): _S.PAUSED,
     (_S.CANCELLING, _E.CANCEL_DONE): _S.CANCELLED,
-    # A chunk that was running when the wish came may be the last one: then the study is complete all the same.
+    # A chunk that was running at the time of the request may be the last one; the study is then complete anyway.
     (_S.QUEUED, _E.ALL_DONE): _S.FINISHED,
     (_S.RUNNING, _E.ALL_DONE): _S.FINISHED,
     (_S.PAUSED, _E.ALL_DONE): _S.FINISHED,
@@ -88,7 +88,7 @@ TRANSITIONS: dict[tuple[StudyState, StudyEvent], StudyState] = {
     (_S.CANCELLING, _E.NONE_OK): _S.FAILED,
 }
 
-#: Wishes that ask for what already holds: they change nothing and are no error.
+#: Requests for the current state, which change nothing and are not errors.
 ALREADY: frozenset[tuple[StudyState, StudyEvent]] = frozenset(
     {
         (_S.PAUSED, _E.PAUSE),
@@ -102,7 +102,7 @@ ALREADY: frozenset[tuple[StudyState, StudyEvent]] = frozenset(
 
 
 class TransitionError(Exception):
-    """The state of a study does not allow what was asked for."""
+    """The state of a study does not allow the request."""
 
     code: ClassVar[str] = "wrong-state"
 
@@ -113,7 +113,7 @@ class TransitionError(Exception):
 
 
 def follow(state: StudyState, event: StudyEvent) -> StudyState:
-    """The state after ``event``; raises TransitionError where the table has no such step."""
+    """The state after ``event``; raises TransitionError where the table has no such transition."""
     if (state, event) in ALREADY:
         return state
     try:

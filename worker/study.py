@@ -17,14 +17,14 @@ from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_COLUMN
 
 Combine = Literal["grid", "zip"]
 
-#: Two numbers closer than this (relative to the larger one) name the same value of an axis.
+#: Two numbers closer than this (relative to the larger one) count as the same value of an axis.
 SAME_VALUE = 1e-9
 #: Longer axes are stored as the bytes of their doubles: a million of them as decimals take half a second to read.
 _MOST_DECIMALS = 1000
 
 
 class Axis:
-    """Values that one parameter, or several tied ones, take in turn. Never changed once made.
+    """Values of one parameter, or of several tied ones. Immutable.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Axis:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """All values as Python numbers, made anew each time; `value` gives a single one."""
+        """All values as Python numbers, created at each call; `value` returns a single one."""
         return tuple(self.array.tolist())
 
     def value(self, index: int) -> float:
@@ -76,7 +76,7 @@ class Axis:
         return int(self.array.size)
 
     def index_of(self, value: float) -> int | None:
-        """Position of the axis' value that is ``value`` (SI) within `SAME_VALUE`; None when there is none."""
+        """Position of the value that equals ``value`` (SI) within `SAME_VALUE`; None when there is none."""
         if not math.isfinite(value):
             return None
         nearest = int(np.argmin(np.abs(self.array - value)))
@@ -85,7 +85,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Study:
-    """One study: everything that decides its numbers, and nothing else but its name.
+    """One study: everything that determines its results, and its name.
 
     Attributes
     ----------
@@ -99,16 +99,15 @@ class Study:
         ``{"duration": [60.0, "periods"], "window": [[40.0, "periods"], [60.0, "periods"]] or None, "tolerance": 1e-9,
         "reset": "contact"}``; times in "periods" or "s". Empty for a model without a run.
     axes : tuple of Axis
-    structure : dict or None
-        What is not a number in the machine, as plain JSON data, where its model has such (a machine shaft's mechanism,
-        tables and formulas); never changed.
-    combine : "grid" or "zip"
-        Grid: every combination, the first axis varies slowest. Zip: the axes go together, all of one length.
+    structure : dict or None The non-numeric part of the machine as plain JSON data, where the model has one (a machine
+        shaft's mechanism, tables and formulas); immutable.
+    combine : "grid" or "zip" Grid: every combination, the first axis varies slowest. Zip: the axes side by side, all of
+        one length.
 
     Raises
     ------
     ValueError
-        When the parts contradict each other (a path twice, unequal lengths, beyond `sprag.worker.limits`).
+        When the parts are inconsistent (a repeated path, unequal lengths) or exceed `sprag.worker.limits`.
     """
 
     model: str
@@ -124,7 +123,7 @@ class Study:
             raise ValueError(f"combine must be 'grid' or 'zip', not {self.combine!r}")
         paths = [path for axis in self.axes for path in axis.paths]
         if len(set(paths)) != len(paths):
-            raise ValueError("a path stands on two axes")
+            raise ValueError("a path is on two axes")
         if self.combine == "zip" and len({len(axis) for axis in self.axes}) > 1:
             raise ValueError("axes that are zipped must have equal lengths")
         most = MAX_AXES if self.combine == "grid" else MAX_COLUMNS
@@ -133,7 +132,7 @@ class Study:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Lengths of the directions in which cases are numbered: one for each axis of a grid, one in all for a zip."""
+        """Lengths of the dimensions in which cases are numbered: one per axis of a grid, a single one for a zip."""
         if not self.axes:
             return ()
         return tuple(map(len, self.axes)) if self.combine == "grid" else (len(self.axes[0]),)
@@ -185,7 +184,8 @@ class Study:
     def columns(self, cases: Sequence[int] | range | NDArray[np.integer[Any]]) -> dict[str, NDArray[np.float64]]:
         """Values of every varying path for the given cases: path -> array of shape (m,), SI.
 
-        What does not vary is not in it; a caller merges it over `base`. Raises IndexError as `indices` does.
+        Constant parameters are not included; the caller merges the columns over `base`. Raises IndexError as `indices`
+        does.
         """
         found: dict[str, NDArray[np.float64]] = {}
         for axis, index in zip(self.axes, self.indices(cases), strict=True):
@@ -198,7 +198,7 @@ class Study:
         return {path: float(column[0]) for path, column in self.columns([case]).items()}
 
     def case_number(self, indices: Sequence[int]) -> int:
-        """Number of the case at one position for each direction of `shape`; IndexError outside."""
+        """Number of the case at one position for each dimension of `shape`; IndexError outside."""
         if len(indices) != len(self.shape):
             raise IndexError(f"{len(self.shape)} positions are needed, not {len(indices)}")
         number = 0
@@ -211,7 +211,7 @@ class Study:
     def cases_at(self, fixed: Mapping[str, float]) -> NDArray[np.int64]:
         """Numbers of the cases in which every path in ``fixed`` has the given value (SI, within `SAME_VALUE`).
 
-        A path that does not vary matches when its base value does. Nothing is scanned but the axes of a zip.
+        A path that does not vary matches when its base value does. Only the axes of a zip are scanned.
 
         Returns
         -------
@@ -244,7 +244,7 @@ class Study:
     def _zipped_at(self, positions: Mapping[int, int]) -> NDArray[np.int64]:
         match = np.ones(self.cases, dtype=np.bool_)
         for at, index in positions.items():
-            # A zipped axis may repeat a value, so its position alone does not say which cases have it.
+            # A zipped axis may repeat a value, so a single position does not identify the cases.
             match &= self.axes[at].array == self.axes[at].array[index]
         return np.flatnonzero(match).astype(np.int64)
 
@@ -263,12 +263,12 @@ class Study:
             "run": dict(self.run),
             "axes": [{"paths": list(axis.paths), "values": axis.array.tolist()} for axis in self.axes],
             "combine": self.combine,
-            # Left out where there is none: studies of before it, and their hashes, stay as they are.
+            # Omitted where there is none, so that older studies and their hashes stay unchanged.
             **({} if self.structure is None else {"structure": self.structure}),
         }
 
     def to_text(self) -> str:
-        """The study as it is stored, JSON text; long axes are packed, so that reading them takes little time."""
+        """The study as stored JSON text; long axes are packed, so that they are read quickly."""
         axes = [{"paths": list(axis.paths), "values": _packed(axis.array)} for axis in self.axes]
         return json.dumps(replace(self, axes=()).to_json() | {"axes": axes}, allow_nan=False)
 
@@ -291,7 +291,9 @@ class Study:
         )
 
     def physics_hash(self, engine_version: str) -> str:
-        """SHA-256 (hexadecimal) of what decides the numbers: the study without its name, and the engine's version."""
+        """SHA-256 (hexadecimal) of what determines the results: the study without its name, and the engine's
+        version.
+        """
         physics = {key: value for key, value in self.to_json().items() if key != "name"}
         text = json.dumps(
             {"engine": engine_version, **physics},

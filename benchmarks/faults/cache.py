@@ -31,7 +31,7 @@ def cache(folder: Path, *, cases: int, size: int = 64) -> dict[str, Any]:
         study = service.submit(made)
         service.finish(study)
     log = service.log.read_text()
-    assert log.count("The kernels are compiled anew") == 1, log
+    assert log.count("Its kernels are compiled anew") == 1, log
     assert "is held" not in log, log
     harness.compare(service.database, study, made)
     mended = [file for file in _code(copy) if file.stat().st_size > size]

@@ -123,7 +123,7 @@ def cluster(
         "cases": cases,
         "kills": dict(killed),
         "missing, duplicate and wrong rows": 0,
-        "times the scheduler was found gone": log.count("is not there; it is tried again"),
+        "times the scheduler was found gone": log.count("cannot be reached; retrying"),
         "times kernels were compiled anew": log.count("compiles its kernels anew") + log.count("are compiled anew"),
         "seconds": round(seconds, 1),
     }

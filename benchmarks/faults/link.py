@@ -15,7 +15,7 @@ from sprag.worker.chunking import Chunking
 
 #: Seconds after which a connection counts as lost: the fewest that Dask takes, instead of 30.
 LOST_SECONDS = 11
-_MISSED = "is not there; it is tried again"
+_MISSED = "cannot be reached; retrying"
 _PARTS = ("SCHEDULER", "WORKER", "CLIENT")
 
 

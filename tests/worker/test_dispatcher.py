@@ -74,7 +74,7 @@ def test_the_log_tells_when_a_study_is_taken_up_and_how_it_ends(store: Store, ca
     with caplog.at_level("INFO", logger="sprag.worker"):
         work(store, InlineExecutor(fakes.run))
     assert caplog.messages == [
-        f"The study {record.id} is taken up: 10 cases in 3 chunks to be run.",
+        f"The study {record.id} starts: 10 cases in 3 chunks to be run.",
         f"The study {record.id} is finished.",
     ]
 
@@ -107,7 +107,7 @@ def test_kernels_are_compiled_anew_once_before_a_study_is_held(store: Store, cap
         lambda: not store.active_studies()
     )
     assert renewals == ["once"]
-    assert "The kernels are compiled anew" in caplog.messages[0]
+    assert "Its kernels are compiled anew" in caplog.messages[0]
     for study, cases in ((record, 20), (other, 8)):
         assert endings(store, study) == dict.fromkeys(range(cases), "ok")
         assert store.get_study(study.id).reason is None
@@ -119,7 +119,7 @@ def test_kernels_are_compiled_anew_once_before_a_study_is_held(store: Store, cap
     held = store.get_study(last.id)
     assert held.done == 0
     assert (held.reason or "").endswith(
-        "(ZeroDivisionError: no such thing); it was so again with kernels compiled anew"
+        "(ZeroDivisionError: no such thing); the same happened with newly compiled kernels"
     )
 
 

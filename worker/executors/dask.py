@@ -1,8 +1,8 @@
-"""Chunks run by the workers of a Dask cluster: one at a time on each of them, placed and counted here.
+"""Chunks run by the workers of a Dask cluster, one at a time on each worker.
 
-Dask starts processes, finds them and carries values. Which chunk runs where, how often and for how long is decided
-here: a task is bound to one worker that has nothing else to do, so a worker that dies takes exactly one chunk with it,
-and that chunk is the one to blame.
+Dask starts processes, finds them and transfers values. This module decides which chunk runs where, how often and for
+how long. Each task is bound to one idle worker, so a worker that dies takes exactly one chunk with it, and that chunk
+is the cause.
 """
 
 from __future__ import annotations
@@ -40,18 +40,18 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger(__name__)
 
-#: Seconds between two looks at who has joined and who has gone; between two tries to reach a scheduler that is gone.
+#: Seconds between two polls of the workers that joined or left; between two attempts to reach a lost scheduler.
 LOOK_SECONDS: Final = 0.5
-#: Seconds for which a scheduler may be away before the executor gives up.
+#: Seconds without a scheduler after which the executor gives up.
 SCHEDULER_SECONDS: Final = 60.0
-#: Seconds beyond a chunk's own after which a worker that should have ended itself counts as frozen.
+#: Seconds beyond a chunk's time limit after which a worker that should have exited counts as frozen.
 FROZEN_SECONDS: Final = 15.0
-#: Seconds that a stopped chunk gets to come to its end before its worker is ended; most are through sooner.
+#: Seconds that a stopped chunk gets to finish before its worker is ended; most finish sooner.
 STOP_SECONDS: Final = 5.0
-#: What is asked of every Dask process that is started here.
+#: Configuration of every Dask process that is started here.
 _CONFIG: Final = {
     "distributed.scheduler.allowed-failures": 0,
-    # No dashboard, and no pages of any kind.
+    # No dashboard or other pages.
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
     "distributed.worker.memory.target": False,
@@ -70,16 +70,12 @@ class DaskExecutor:
         ``dask://host:port`` of a scheduler; "" starts a cluster of ``processes`` workers on this machine, for this
         executor alone.
     processes : int
-    chunk_timeout : float
-        Seconds of processor time after which a chunk ends with its worker; `WALL_TIMES` as many on the wall.
-    run, load : functions
-        What a worker does with a chunk and with a new kernel; importable by name. Other than the engine's in tests.
-    expected : mapping, optional
-        Fingerprint that workers must have; default: that of this process.
-    scheduler_seconds : float
-        Seconds for which a scheduler may be away.
-    renew : bool
-        Whether every host throws its compiled kernels away first, since they may be damaged.
+    chunk_timeout : float Seconds of processor time after which a chunk ends with its worker; `WALL_TIMES` times as many
+        of elapsed time.
+    run, load : functions Called in a worker for a chunk and for a new kernel; importable by name. Replaced in tests.
+    expected : mapping, optional Fingerprint required of workers; default: that of this process.
+    scheduler_seconds : float Seconds without a scheduler after which the executor gives up.
+    renew : bool Whether every host first deletes its compiled kernels, because they may be damaged.
     """
 
     def __init__(
@@ -103,11 +99,11 @@ class DaskExecutor:
         self._lock = RLock()
         self._workers: dict[str, Worker] = {}
         self._waiting: deque[Waiting] = deque()
-        #: For each such text a host throws its compiled kernels away once: every host, and those where workers died.
+        #: Texts for which a host deletes its compiled kernels once: for every host, and for hosts where workers died.
         self._renew = uuid4().hex if renew else ""
         self._discards: dict[str, str] = {}
         self._failed_loads: Counter[tuple[str, models.KernelShape]] = Counter()
-        #: Hosts that cannot have a kernel, and kernels that none can have, with the reason.
+        #: Hosts that cannot load a kernel, and kernels that no host can load, with the reason.
         self._unable: set[tuple[str, models.KernelShape]] = set()
         self._broken: dict[models.KernelShape, str] = {}
         self._outcomes: SimpleQueue[Outcome | None] = SimpleQueue()
@@ -128,23 +124,23 @@ class DaskExecutor:
 
     @property
     def capacity(self) -> int:
-        """Number of chunks worth having in flight at once; it changes as workers come and go."""
+        """Useful number of chunks in flight; it changes as workers join and leave."""
         with self._lock:
             return sum(worker.usable for worker in self._workers.values()) + SPARE_CHUNKS
 
     @property
     def shortage(self) -> str | None:
-        """Why nothing can be run at present, as a sentence; None where chunks can be."""
+        """Why nothing can be run at present, as a sentence; None where chunks can run."""
         if self._gone_since is not None:
-            return f"The scheduler {self._link.address} is not there; it is tried again."
+            return f"The scheduler {self._link.address} cannot be reached; retrying."
         with self._lock:
             if any(worker.usable for worker in self._workers.values()):
                 return None
             why = refusals(self._workers.values())
-        return f"No usable worker has joined the scheduler {self._link.address}; the study goes on when one does.{why}"
+        return f"No usable worker has joined the scheduler {self._link.address}; the study waits for one.{why}"
 
     def ready(self, study: Study) -> bool:
-        """Whether some worker has loaded the kernel of ``study``; lets one begin to where none has."""
+        """Whether any worker has loaded the kernel of ``study``; otherwise one starts to load it."""
         shape = models.shape_of(study)
         self._look()
         with self._lock:
@@ -161,7 +157,7 @@ class DaskExecutor:
         return False
 
     def submit(self, ticket: int, study: Study, chunk: Chunk) -> None:
-        """Give the chunk to the next worker that is free; returns at once."""
+        """Give the chunk to the next free worker; returns immediately."""
         task = models.chunk_task(study, chunk.first, chunk.count)
         key = f"sprag-{chunk.study}-{chunk.first}-{chunk.count}-{chunk.failures}-{self._name}-{ticket}"
         with self._lock:
@@ -169,9 +165,9 @@ class DaskExecutor:
             self._fill()
 
     def wait(self, timeout: float) -> list[Outcome]:
-        """Outcomes that have come in; waits for the first at most ``timeout`` s, gives [] when none came.
+        """Available outcomes; waits at most ``timeout`` s for the first, and returns [] when there is none.
 
-        Raises ExecutorError when the scheduler stays away.
+        Raises ExecutorError when the scheduler stays unreachable.
         """
         self._look()
         found: list[Outcome] = []
@@ -184,7 +180,7 @@ class DaskExecutor:
         return found
 
     def stop(self, ticket: int) -> None:
-        """Stop a chunk. One that runs gets `STOP_SECONDS` to come to its end, then its worker is ended."""
+        """Stop a chunk. A running one gets `STOP_SECONDS` to finish, then its worker is ended."""
         with self._lock:
             kept = deque(waiting for waiting in self._waiting if waiting.ticket != ticket)
             running = [
@@ -200,7 +196,7 @@ class DaskExecutor:
             self._outcomes.put(Outcome(ticket, Fate.STOPPED, detail="stopped"))
 
     def close(self) -> None:
-        """Leave the cluster, and end it when it is this executor's own."""
+        """Leave the cluster, and end it if this executor started it."""
         with self._lock:
             self._waiting.clear()
         self._disconnect(timeout=5.0)
@@ -208,7 +204,7 @@ class DaskExecutor:
             self._cluster.close(timeout=5)
 
     def _look(self) -> None:
-        """Look, when it is time, at the scheduler and at who is there."""
+        """Poll the scheduler and its workers when it is time."""
         now = time.monotonic()
         if now < self._next_look:
             return
@@ -241,7 +237,7 @@ class DaskExecutor:
             self._link.end_worker(address)
 
     def _scheduler_is_gone(self, error: Exception) -> None:
-        """Hand back what was on its way; somebody may start the scheduler again."""
+        """Return the chunks in flight; the scheduler may be restarted."""
         now = time.monotonic()
         with self._lock:
             for worker in self._workers.values():
@@ -250,10 +246,10 @@ class DaskExecutor:
         self._disconnect(timeout=1.0)
         if self._gone_since is None:
             self._gone_since = now
-            _LOG.error("The scheduler %s is not there; it is tried again: %s", self._link.address, error)
+            _LOG.error("The scheduler %s cannot be reached; retrying: %s", self._link.address, error)
         elif now - self._gone_since > self._scheduler_seconds:
             raise ExecutorError(
-                f"the scheduler {self._link.address} was not there for {self._scheduler_seconds:g} s: {error}"
+                f"the scheduler {self._link.address} could not be reached for {self._scheduler_seconds:g} s: {error}"
             )
 
     def _disconnect(self, timeout: float) -> None:
@@ -269,13 +265,13 @@ class DaskExecutor:
             worker.job = None
 
     def _worker_is_frozen(self, worker: Worker) -> None:
-        _LOG.error("The worker %s does not answer; its nanny is asked to start another.", worker.address)
+        _LOG.error("The worker %s does not answer; its nanny must start another.", worker.address)
         job, worker.job, worker.usable = worker.job, None, False
         if job is not None:
             self._died(worker, job)
 
     def _died(self, worker: Worker, job: Job) -> None:
-        """The worker that was busy with ``job`` is gone."""
+        """Handle the death of a worker during ``job``."""
         if job.kind == "load" and job.shape is not None:
             self._died_of(worker.host, job.shape)
         elif job.kind == "chunk" and job.dropped is None:
@@ -287,14 +283,14 @@ class DaskExecutor:
             else:
                 self._outcomes.put(Outcome(job.ticket, Fate.CRASHED, detail="its worker died"))
         elif job.kind == "introduce":
-            _LOG.error("The worker %s was gone before it told its fingerprint.", worker.address)
+            _LOG.error("The worker %s left before it reported its fingerprint.", worker.address)
 
     def _died_of(self, host: str, shape: models.KernelShape) -> None:
-        """A worker died while it loaded a kernel: at the second time the one on its host's disk may be damaged."""
+        """Handle a death while loading a kernel: after the second one, the kernel on the host's disk may be damaged."""
         if any(other.host == host and shape in other.shapes for other in self._workers.values()):
             return
         if self._failed_loads[host, shape] == MAX_LOADS - 1:
-            _LOG.error("Workers of %s died of a kernel; their host compiles its kernels anew.", host)
+            _LOG.error("Workers of %s died while loading a kernel; their host compiles its kernels anew.", host)
             self._discards[host] = uuid4().hex
         self._load_failed(host, shape, "the worker that compiled its kernel died", MAX_LOADS + 1)
 
@@ -302,7 +298,7 @@ class DaskExecutor:
         return worker.job is not None and worker.job.kind == "load" and worker.job.shape == shape
 
     def _fill(self) -> None:
-        """Give waiting chunks to workers with nothing to do; on one host one worker compiles, the others load."""
+        """Give waiting chunks to idle workers; on each host one worker compiles and the others load."""
         for worker in self._workers.values():
             if not self._waiting:
                 return
@@ -328,19 +324,19 @@ class DaskExecutor:
 
     def _begin(self, worker: Worker, job: Job, key: str, function: Callable[..., Any], *given: Any) -> None:
         worker.job = job
-        # Where the connection is just being lost, the next look finds that out and takes the job back.
+        # Where the connection is being lost, the next poll detects it and takes the job back.
         job.future = self._link.submit(worker.address, key, partial(self._done, worker, job), function, *given)
 
     def _done(self, worker: Worker, job: Job, future: Future[Any]) -> None:
-        """In a thread of Dask's: note what came of a job, and give the worker its next one."""
+        """Runs in a thread of Dask: record the outcome of a job, and give the worker its next one."""
         with self._lock:
-            if worker.job is not job:  # given up, and the connection perhaps as well
+            if worker.job is not job:  # abandoned, and perhaps the connection as well
                 return
             self._link.begin_fetch()
         value, error = value_of(future)
         with self._lock:
             self._link.end_fetch()
-            if worker.job is not job:  # given up meanwhile
+            if worker.job is not job:  # abandoned in the meantime
                 return
             worker.job = None
             if isinstance(error, KilledWorker):
@@ -375,7 +371,7 @@ class DaskExecutor:
             self._load_failed(worker.host, shape, f"its kernel cannot be compiled ({type(error).__name__}: {error})", 1)
 
     def _load_failed(self, host: str, shape: models.KernelShape, reason: str, allowed: int) -> None:
-        """A host is asked for a kernel no more when it failed too often; when no other can have it, its chunks fail."""
+        """Record a failed load: after too many, the host is excluded; when no host remains, the chunks fail."""
         place = (host, shape)
         self._failed_loads[place] += 1
         if self._failed_loads[place] < allowed:

@@ -1,4 +1,4 @@
-"""What `sprag.worker.executors.dask` knows of its workers and of what they are busy with."""
+"""The workers of `sprag.worker.executors.dask` and their current jobs."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False, slots=True)
 class Job:
-    """What a worker is busy with: saying who it is, loading the kernel ``shape``, or the chunk ``ticket``.
+    """The job of a worker: its introduction, loading the kernel ``shape``, or the chunk ``ticket``.
 
-    What comes of a chunk that was ``dropped`` (then, on the monotonic clock, in s) is of no interest any more.
+    The outcome of a chunk that was ``dropped`` (time on the monotonic clock, s) is ignored.
     """
 
     kind: Literal["introduce", "load", "chunk"]
@@ -32,7 +32,7 @@ class Job:
 class Worker:
     """A worker of the cluster.
 
-    ``usable`` is False until it has said who it is, and for ever when that was wrong; ``refusal`` then says why.
+    ``usable`` is False until its introduction is accepted; for a refused worker ``refusal`` states why.
     """
 
     address: str
@@ -53,7 +53,7 @@ class Waiting:
 
 
 def refusals(workers: Iterable[Worker]) -> str:
-    """A sentence, with a blank before it, that says why workers are refused; "" where none is."""
+    """A sentence, after a blank, that states why workers are refused; "" where none is."""
     refused = [f"The worker {worker.address} is refused: {worker.refusal}" for worker in workers if worker.refusal]
     if not refused:
         return ""

@@ -1,4 +1,4 @@
-"""The connection of `sprag.worker.executors.dask` to a scheduler, which may be lost and found again."""
+"""The connection of `sprag.worker.executors.dask` to a scheduler, which may be lost and restored."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
     from distributed import Future, Security
 
-#: Seconds in which the scheduler has to answer.
+#: Seconds within which the scheduler must answer.
 ANSWER_SECONDS: Final = 5
-#: Seconds in which the value of a task that is through has to come.
+#: Seconds within which the value of a finished task must arrive.
 VALUE_SECONDS: Final = 15.0
-#: Seconds for which the connection is kept for values that are just being fetched.
+#: Seconds for which the connection is kept open for values being fetched.
 FETCH_SECONDS: Final = 5.0
 
 
@@ -31,9 +31,9 @@ def _is_news(record: logging.LogRecord) -> bool:
     return record.exc_info is None or not isinstance(record.exc_info[1], AllExit)
 
 
-# What Dask's client tells of lost connections, with tracebacks, is told here in a sentence; and a fetch of its own that
-# was given up, as the value was lost, is nothing that anybody has to know.
-for _name in ("distributed", "distributed.client"):  # Dask gives the second a level of its own
+# Dask's client logs lost connections with tracebacks, which are reported here in one sentence, and abandoned fetches of
+# lost values, which are irrelevant.
+for _name in ("distributed", "distributed.client"):  # Dask sets a separate level for the second
     logging.getLogger(_name).setLevel(logging.CRITICAL)
 logging.getLogger("asyncio").addFilter(_is_news)
 
@@ -46,17 +46,19 @@ class Link:
         self._security = security
         self._name = name
         self._client: Client | None = None
-        #: Threads of Dask's that fetch a value, over a connection that must stay till they are through.
+        #: Dask's threads that are fetching a value and need the connection.
         self._fetching = 0
         self._fetched = Condition(lock)
 
     def present(self) -> dict[str, dict[str, Any]]:
-        """The workers that the scheduler knows, by address. Raises OSError, TimeoutError or ValueError without it."""
+        """The workers that the scheduler knows, by address. Raises OSError, TimeoutError or ValueError without a
+        scheduler.
+        """
         if self._client is None:
             self._client = Client(
                 self.address, security=self._security, timeout=ANSWER_SECONDS, set_as_default=False, name=self._name
             )
-            # A death is counted here, once; the scheduler is not to try the chunk on another worker by itself.
+            # Deaths are counted here, once; the scheduler must not retry the chunk on another worker.
             self._tell(blame_at_once)
         if self._client.status != "running":
             raise OSError("the connection to the scheduler is lost")
@@ -68,7 +70,7 @@ class Link:
     def submit(
         self, address: str, key: str, done: Callable[[Future[Any]], None], function: Callable[..., Any], *given: Any
     ) -> Future[Any] | None:
-        """Have the worker at ``address`` call a function; None where the connection is being lost."""
+        """Call a function in the worker at ``address``; None where the connection is being lost."""
         if self._client is not None:
             with suppress(Exception):
                 future: Future[Any] = self._client.submit(
@@ -88,18 +90,18 @@ class Link:
         self._fetched.notify_all()
 
     def end_worker(self, address: str) -> None:
-        """Have the process of a worker ended; its nanny, where it has one, starts another."""
+        """End the process of a worker; its nanny, if any, starts another."""
         with suppress(Exception):
             self._tell(end_worker, address, wait=False)
 
     def _tell(self, function: Callable[..., Any], *given: Any, wait: bool = True) -> None:
-        """Have the scheduler call a function. What the client offers for that has no limit of time."""
+        """Call a function in the scheduler. The client's own method for this has no timeout."""
         if self._client is not None:
             tell: Any = self._client._run_on_scheduler
             self._client.sync(tell, function, *given, wait=wait, callback_timeout=ANSWER_SECONDS)
 
     def close(self, timeout: float) -> None:
-        """Close the connection when nobody fetches a value over it any more; every job was given up before."""
+        """Close the connection once no value is being fetched over it; all jobs have been abandoned before."""
         with self._fetched:
             client, self._client = self._client, None
             self._fetched.wait_for(lambda: not self._fetching, FETCH_SECONDS)
@@ -109,11 +111,11 @@ class Link:
 
 
 def value_of(future: Future[Any]) -> tuple[Any, BaseException | None]:
-    """The value of a future that is through, or why there is none."""
+    """The value of a finished future, or the reason why there is none."""
     try:
         error = future.exception(timeout=VALUE_SECONDS) if future.status != "finished" else None
         return (future.result(timeout=VALUE_SECONDS) if error is None else None), error
-    except Exception as trouble:  # the value was lost with its worker, or the scheduler
+    except Exception as trouble:  # the value was lost with its worker or the scheduler
         return None, CancelledError(str(trouble))
     except CancelledError as trouble:
         return None, trouble

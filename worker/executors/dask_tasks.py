@@ -1,4 +1,4 @@
-"""What Dask's processes are asked to do, and where the scheduler is. Everything here is importable by name."""
+"""Functions that run in Dask's processes, and the address of the scheduler. Everything here is importable by name."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 
-#: Seconds in which a nanny has to end a worker.
+#: Seconds within which a nanny must end a worker.
 END_SECONDS: Final = 20.0
-#: Kernels that this process, which is a worker, has in hand.
+#: Kernels that this worker process has loaded.
 _loaded: set[models.KernelShape] = set()
 
-#: Calls `introduce`, as an expression for ``eval``. A function is imported as soon as a message with it comes in; a
-#: worker that cannot import Sprag would end for that, be started again for ever, and never say why.
+#: Calls `introduce`, as an expression for ``eval``. A function would be imported as soon as its message arrives, so a
+#: worker that cannot import Sprag would exit and be restarted endlessly without reporting why.
 INTRODUCE: Final = "__import__('sprag.worker.executors.dask_tasks', fromlist=['']).introduce('{}')"
 
 
 def introduce(discard: str) -> dict[str, str]:
-    """Run by each worker that joins: its fingerprint, with the engine loaded.
+    """Runs in each worker that joins: loads the engine and returns its fingerprint.
 
-    With ``discard`` the compiled kernels of its host are thrown away first, once for each such text. A process that had
-    some of them in hand ends, and its nanny starts another.
+    With ``discard`` the compiled kernels of its host are deleted first, once for each such text. A process that had
+    loaded any of them exits, and its nanny starts another.
     """
     _discard_once(discard)
     if discard and _loaded:
@@ -46,7 +46,7 @@ def introduce(discard: str) -> dict[str, str]:
 
 
 def load_kernel(load: Callable[[models.KernelShape], None], shape: models.KernelShape, discard: str) -> None:
-    """Run by each worker before its first chunk of a shape; ``discard`` as in `introduce`."""
+    """Runs in each worker before its first chunk of a shape; ``discard`` as in `introduce`."""
     _discard_once(discard)
     _loaded.add(shape)
     _within(LOAD_SECONDS, partial(load, shape))
@@ -68,14 +68,14 @@ def _discard_once(token: str) -> None:
 def run_chunk(
     run: Callable[[models.ChunkTask], models.ChunkResult], task: models.ChunkTask, seconds: float, wall: float
 ) -> models.ChunkResult:
-    """Run by a worker for each chunk, for so many seconds of processor time and by the clock on the wall."""
+    """Runs in a worker for each chunk, with limits of processor time and elapsed time (s)."""
     return _within(wall, partial(within_processor_time, seconds, run, task))
 
 
 def _within(seconds: float, function: Callable[[], _T]) -> _T:
-    """The value of the function, or the end of this process after ``seconds``, whatever it is busy with.
+    """The value of the function; after ``seconds`` this process exits, whatever it is doing.
 
-    The watch needs no Python to go off, and neither the scheduler nor whoever submitted the chunk.
+    The timer works without Python code, the scheduler or the submitter of the chunk.
     """
     with open(os.devnull, "w", encoding="ascii") as nowhere:
         faulthandler.dump_traceback_later(seconds, exit=True, file=nowhere)
@@ -112,12 +112,12 @@ def _is_loopback(host: str) -> bool:
 
 
 def blame_at_once(dask_scheduler: Any) -> None:
-    """Run in the scheduler: a task whose worker dies has failed."""
+    """Runs in the scheduler: a task whose worker dies has failed."""
     dask_scheduler.allowed_failures = 0
 
 
 async def end_worker(address: str, dask_scheduler: Any) -> None:
-    """Run in the scheduler: end the process of a worker, whatever it is busy with, by its nanny."""
+    """Runs in the scheduler: end the process of a worker, whatever it is doing, through its nanny."""
     await dask_scheduler.restart_workers(
         [address], timeout=END_SECONDS, wait_for_workers=False, on_error="return", stimulus_id=f"sprag-end-{address}"
     )

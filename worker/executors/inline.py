@@ -1,4 +1,4 @@
-"""Chunks run one after the other in this process: for tests and for studies too small to start a pool for."""
+"""Chunks run one after the other in this process, for tests and for studies too small for a pool."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ class InlineExecutor:
 
     @property
     def capacity(self) -> int:
-        """One: more in flight would only wait."""
+        """Always 1: further chunks would only wait."""
         return 1
 
     @property
     def shortage(self) -> None:
-        """None: nobody has to join."""
+        """Always None: no workers have to join."""
         return None
 
     def ready(self, study: Study) -> bool:  # noqa: ARG002 - the first chunk compiles what it needs
-        """Always: nothing else could run meanwhile."""
+        """Always True: nothing else could run in the meantime."""
         return True
 
     def submit(self, ticket: int, study: Study, chunk: Chunk) -> None:
-        """Note the chunk; `wait` runs it."""
+        """Queue the chunk; `wait` runs it."""
         self._waiting.append((ticket, models.chunk_task(study, chunk.first, chunk.count)))
 
     def wait(self, timeout: float) -> list[Outcome]:
@@ -52,7 +52,7 @@ class InlineExecutor:
         ticket, task = self._waiting.popleft()
         try:
             return [Outcome(ticket, Fate.DONE, self._run(task))]
-        except Exception as error:  # a fault of the program, told like that of a process
+        except Exception as error:  # a bug, reported like the crash of a process
             return [Outcome(ticket, Fate.CRASHED, detail=f"{type(error).__name__}: {error}")]
 
     def stop(self, ticket: int) -> None:

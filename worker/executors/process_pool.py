@@ -1,4 +1,4 @@
-"""Chunks run in a pool of spawned processes: one that dies takes only its own chunk with it."""
+"""Chunks run in a pool of spawned processes; a process that dies affects only its own chunk."""
 
 from __future__ import annotations
 
@@ -23,35 +23,32 @@ if TYPE_CHECKING:
     from sprag.worker.pool.child_pool import Job
     from sprag.worker.study import Study
 
-#: Chunks beyond one for each process, so that a process that is through finds the next one waiting.
+#: Chunks in flight beyond one per process, so that a finished process finds the next one waiting.
 SPARE_CHUNKS = 2
-#: Starts of each process that may fail one after the other, with nothing done between, before the executor gives up.
+#: Successive failed starts per process, without any completed work, after which the executor gives up.
 MAX_FAILED_STARTS = 3
-#: Times that the compilation of a kernel may come to nothing before its studies are held.
+#: Failed compilations of a kernel after which its studies are held.
 MAX_LOADS = 2
 
 
 class ProcessPoolExecutor:
     """An `Executor` on a pool of ``processes`` processes.
 
-    A kernel is compiled by one process into the cache on disk, so that the others load it instead of all compiling the
-    same; at most half of the processes compile, and the others run chunks meanwhile.
+    One process compiles a kernel into the cache on disk, and the others load it. At most half of the processes compile,
+    while the others run chunks.
 
     Parameters
     ----------
     processes : int
         At least 1.
-    chunk_timeout : float
-        Seconds of processor time after which a chunk that is being run is killed with its process.
-    wall_timeout : float, optional
-        The same by the clock on the wall, for what hangs without using any; default: `WALL_TIMES` as long.
-    run, load, prepare : functions
-        What a process does with a chunk, with a new kernel, and when it starts; importable by name. Other than the
-        engine's in tests: its processes load the engine, and end where they are not of this process's fingerprint.
-    compiled : function
-        Whether a kernel lies in the cache on disk already, so that nobody has to wait for it.
-    load_timeout : float
-        Seconds after which the compilation of a kernel is given up.
+    chunk_timeout : float Seconds of processor time after which a running chunk is killed with its process.
+    wall_timeout : float, optional The limit of elapsed time, for chunks that hang without using the processor; default:
+        `WALL_TIMES` times as long.
+    run, load, prepare : functions Called for a chunk, for a new kernel, and at the start of a process; importable by
+        name. Replaced in tests. By default processes load the engine and exit where their fingerprint is not that of
+        this process.
+    compiled : function Whether a kernel is already in the cache on disk.
+    load_timeout : float Seconds after which the compilation of a kernel is abandoned.
     """
 
     def __init__(
@@ -83,16 +80,16 @@ class ProcessPoolExecutor:
 
     @property
     def capacity(self) -> int:
-        """Number of chunks worth having in flight at once."""
+        """Useful number of chunks in flight."""
         return self._processes + SPARE_CHUNKS
 
     @property
     def shortage(self) -> None:
-        """None: nobody has to join."""
+        """Always None: no workers have to join."""
         return None
 
     def ready(self, study: Study) -> bool:
-        """Whether the kernel of ``study`` is loaded; begins to load it where it is not."""
+        """Whether the kernel of ``study`` is loaded; starts loading it otherwise."""
         shape = models.shape_of(study)
         loading = self._loading.get(shape)
         if loading is not None and loading.future.done():
@@ -106,12 +103,12 @@ class ProcessPoolExecutor:
         return False
 
     def _take_load(self, shape: models.KernelShape, loading: Future[None]) -> None:
-        """Note a kernel that is there; raise KernelError when it failed too often."""
+        """Record a loaded kernel; raise KernelError when loading failed too often."""
         error = loading.exception()
         if error is None:
             self._loaded.add(shape)
             return
-        if isinstance(error, ProcessStartError):  # nobody tried
+        if isinstance(error, ProcessStartError):  # no attempt was made
             return
         self._failed_loads[shape] += 1
         if self._failed_loads[shape] < MAX_LOADS and isinstance(error, ProcessDiedError):
@@ -149,9 +146,9 @@ class ProcessPoolExecutor:
         return Outcome(ticket, Fate.CRASHED, detail=f"{type(error).__name__}: {error}")
 
     def wait(self, timeout: float) -> list[Outcome]:
-        """Outcomes that have come in; waits for the first at most ``timeout`` s, gives [] when none came.
+        """Available outcomes; waits at most ``timeout`` s for the first, and returns [] when there is none.
 
-        It also comes back when a kernel was loaded. Raises ExecutorError when no process can be started.
+        It also returns when a kernel is loaded. Raises ExecutorError when no process can be started.
         """
         self._pool.tend()
         found: list[Outcome] = []
@@ -173,5 +170,5 @@ class ProcessPoolExecutor:
             job.stop()
 
     def close(self) -> None:
-        """Kill what runs and leave no process behind."""
+        """Kill all processes."""
         self._pool.close()

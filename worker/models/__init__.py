@@ -1,7 +1,7 @@
-"""The one part of the worker that knows the engine: a study and a range of cases in, plain arrays out.
+"""The only part of the worker that imports the engine: a study and a range of cases in, plain arrays out.
 
-What is particular to a model stands in a module of its own, behind `Model`; the functions of this module look the
-model up by its name. The numerical kernels are imported where they are run, so reading a catalogue loads no compiler.
+Each model has its own module behind `Model`; the functions of this module look the model up by name. The numerical
+kernels are imported where they are run, so reading a catalogue loads no compiler.
 """
 
 from __future__ import annotations
@@ -149,68 +149,68 @@ OK = Ending.OK.value
 
 
 class WorkerEnding(StrEnum):
-    """Endings that the worker gives to a case, because the engine did not come back from it."""
+    """Endings given by the worker to cases from which the engine did not return."""
 
     CRASHED = "crashed"
     TIMED_OUT = "timed_out"
     CANCELLED = "cancelled"
 
 
-#: Every ending of a case, stored as its key, and the sentence a user reads.
+#: Every ending of a case, stored by its key, and its description for users.
 ENDING_SENTENCES: dict[str, str] = {
     **{ending.value: ending.sentence for ending in Ending},
     WorkerEnding.CRASHED.value: (
-        "The process that ran this case died, twice, with no other case beside it: the case is set aside and can be "
-        "run again."
+        "The process that ran this case alone died twice: the case is not run again by itself and can be run again."
     ),
-    WorkerEnding.TIMED_OUT.value: "The case did not come back within the time allowed for it, alone and twice.",
+    WorkerEnding.TIMED_OUT.value: "The case, run alone, exceeded its time limit twice.",
     WorkerEnding.CANCELLED.value: "The study was cancelled before this case was run.",
 }
 
 
 def endings_of(model: str) -> dict[str, str]:
-    """The endings that a case of ``model`` can have, with their sentences."""
+    """The endings that a case of ``model`` can have, with their descriptions."""
     own = {OK, *model_of(model).endings, *WorkerEnding}
     return {name: sentence for name, sentence in ENDING_SENTENCES.items() if name in own}
 
 
 def flags_of(model: str) -> dict[str, str]:
-    """The flags that a case of ``model`` can have, with their sentences."""
+    """The flags that a case of ``model`` can have, with their descriptions."""
     return dict(model_of(model).flags)
 
 
 def presentation_of(study: Study) -> Presentation:
-    """What people are shown of the model of ``study``."""
+    """The presentation of the model of ``study``."""
     return model_of(study.model).presentation
 
 
 def printed_symbol(text: str) -> tuple[str, str] | None:
-    """Base and index of a letter of some catalogue as books print it; None where no model has its own way of it."""
+    """Base and index of a symbol as in print; None where no model defines them."""
     found = (model.presentation.symbols.get(text) for model in all_models())
     return next(filter(None, found), None)
 
 
 def parameter_catalogue(model: str) -> tuple[Parameter, ...]:
-    """Every numeric parameter of ``model``: paths in a spec with letters for what counts.
+    """Every numeric parameter of ``model``: paths in a spec with placeholders.
 
-    ``N`` is a pendulum, ``K`` a coefficient or a step, ``NAME`` a constant. The two entries of the clutch stand under
-    ``clutch.``; they may also stand in each pendulum (``pendulums.N.clutch.``). Raises ValueError for an unknown model.
+    ``N`` is a pendulum, ``K`` a coefficient or a step, ``NAME`` a constant. The two entries of the clutch are listed
+    under ``clutch.``; each pendulum may have them too (``pendulums.N.clutch.``). Raises ValueError for an unknown
+    model.
     """
     return model_of(model).parameters()
 
 
 def parameters_of(study: Study) -> dict[str, Parameter]:
-    """The parameters of a study's own machine by flat path; empty where its model's catalogue says all."""
+    """The parameters of a study's own machine by flat path; empty where its model's catalogue is complete."""
     return model_of(study.model).parameters_of(study)
 
 
 def variants(model: str) -> tuple[str, ...]:
-    """The variants of ``model``: each has a set of results of its own."""
+    """The variants of ``model``, each with its own set of results."""
     return model_of(model).variants()
 
 
 def variant_of(study: Study) -> str:
-    """The variant of its model that ``study`` is of."""
+    """The variant of ``study``."""
     return model_of(study.model).variant_of(study)
 
 
@@ -220,7 +220,7 @@ def result_infos(model: str, variant: str) -> tuple[ResultInfo, ...]:
 
 
 def result_catalogue(model: str) -> tuple[ResultInfo, ...]:
-    """Every result of ``model``, with letters for what counts as in `parameter_catalogue`."""
+    """Every result of ``model``, with placeholders as in `parameter_catalogue`."""
     return model_of(model).result_catalogue()
 
 
@@ -230,7 +230,7 @@ def study_results(study: Study) -> tuple[ResultInfo, ...]:
 
 
 def regime_info(infos: Sequence[ResultInfo]) -> ResultInfo | None:
-    """The result that tells the kinds of motion apart; None where there is none."""
+    """The result that gives the kind of motion; None where there is none."""
     return next((info for info in infos if info.kind == "category"), None)
 
 
@@ -248,7 +248,7 @@ def chunk_task(study: Study, first: int, count: int) -> ChunkTask:
 def run_task(task: ChunkTask) -> ChunkResult:
     """Run the cases of a task.
 
-    A physical failure is an ending in the result, never an exception; what is raised here is a fault of the program.
+    A physical failure is an ending in the result, never an exception; an exception is a bug.
     """
     from sprag.engine.faults import inject
 
@@ -262,12 +262,12 @@ def run_chunk(study: Study, first: int, count: int) -> ChunkResult:
 
 
 def extent(study: Study, case: int) -> Extent:
-    """What the instantaneous values of a case go along: the time of its run, or the angle of its shaft."""
+    """The independent variable of a case's instantaneous values: the time of its run, or the angle of its shaft."""
     return model_of(study.model).extent(study, case)
 
 
 def run_trajectory(study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
-    """Instantaneous values of one case at ``points`` equally spaced places of its `extent`."""
+    """Instantaneous values of one case at ``points`` equally spaced points of its `extent`."""
     return model_of(study.model).trajectory(study, case, start, end, points)
 
 
@@ -277,7 +277,7 @@ def has_clutches(study: Study) -> bool:
 
 
 def run_engagements(study: Study, case: int) -> Engagements:
-    """What the clutches of one case do; ValueError where its machine has none."""
+    """Engagements of the clutches of one case; ValueError where its machine has none."""
     return model_of(study.model).engagements(study, case)
 
 
@@ -287,7 +287,7 @@ def has_strobes(study: Study) -> bool:
 
 
 def run_portrait(study: Study, case: int) -> Portrait:
-    """How one case comes to its motion, strobe by strobe; ValueError where its machine has no strobes."""
+    """How one case approaches its motion, strobe by strobe; ValueError where its machine has no strobes."""
     return model_of(study.model).portrait(study, case)
 
 
@@ -297,7 +297,7 @@ def estimate_seconds_per_case(study: Study) -> float:
 
 
 def estimate_compile_seconds(study: Study) -> float:
-    """Rough time until the kernel of ``study`` is there, in s; 0 where it lies compiled in the cache on disk."""
+    """Rough time (s) to compile the kernel of ``study``; 0 where it is in the cache on disk."""
     shape = shape_of(study)
     return 0.0 if is_compiled(shape) else model_of(study.model).estimate_compile_seconds(shape)
 
@@ -321,7 +321,7 @@ def is_compiled(shape: KernelShape) -> bool:
 
 
 def _mark(shape: KernelShape) -> Path:
-    # Code for one machine is none for another with the same home.
+    # Machines that share a home folder may need different code.
     parts = (shape.model, *shape.key, platform.node())
     return cache_folder() / f"{'-'.join(map(str, parts))}.ready"
 
@@ -332,7 +332,7 @@ def warm_up(study: Study) -> None:
 
 
 def cache_folder() -> Path:
-    """Folder of the compiled kernels, made if need be."""
+    """Folder of the compiled kernels; created if missing."""
     from sprag.engine.compile.cache import cache_folder as engine_cache_folder
 
     return engine_cache_folder()
@@ -346,14 +346,14 @@ def compiler() -> str:
 
 
 def discard_compiled() -> None:
-    """Throw away every compiled kernel of this engine that lies in the cache on disk, because some may be damaged."""
+    """Delete every compiled kernel of this engine from the cache on disk, because some may be damaged."""
     from sprag.engine.compile.cache import discard
 
     discard()
 
 
 def cache_is_wanted() -> bool:
-    """Whether that folder is the one the user wants, not the stand-in for one that cannot be written."""
+    """Whether that folder is the configured one, not the substitute for an unwritable one."""
     from sprag.engine.compile.cache import is_wanted
 
     return is_wanted(cache_folder())

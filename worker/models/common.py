@@ -1,4 +1,4 @@
-"""What tasks and results are, whichever model they are of."""
+"""Tasks and results of all models."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """What a run of consecutive cases gave.
+    """The result of a run of consecutive cases.
 
     Attributes
     ----------
@@ -41,15 +41,15 @@ class ChunkResult:
 
 
 def chunk_result(first: int, codes: NDArray[np.int8], flags: list[str], values: NDArray[np.float64]) -> ChunkResult:
-    """The result of cases that the engine has run: ``codes`` (count,) into its endings, ``values`` (count, results)."""
+    """The result from the engine's arrays: ``codes`` (count,) of its endings, ``values`` (count, results)."""
     endings = [ENDING_CODES[code].value for code in codes.tolist()]
-    # Adding zero makes a negative zero positive: databases do not keep its sign.
+    # Adding zero makes negative zeros positive, because databases do not preserve their sign.
     return ChunkResult(first, endings, flags, np.ascontiguousarray(values, dtype=np.float64) + 0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class KernelShape:
-    """What decides which compiled kernel a case needs: its model, and plain values that only the model reads."""
+    """Identifies the compiled kernel of a case: its model, and plain values that only the model interprets."""
 
     model: str
     key: tuple[int | float | str, ...] = ()
@@ -57,7 +57,7 @@ class KernelShape:
 
 @dataclass(frozen=True, slots=True)
 class ChunkTask:
-    """Consecutive cases as they travel to a process: their own columns only, however large the study is.
+    """Consecutive cases as sent to a process: only their own columns, however large the study is.
 
     ``columns`` maps flat spec paths to SI numbers, or to arrays of shape (count,) where they vary. ``run`` and
     ``structure`` are those of the study.
@@ -73,7 +73,7 @@ class ChunkTask:
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """What instantaneous values go along, from 0 to ``end``.
+    """The independent variable of instantaneous values, from 0 to ``end``.
 
     Attributes
     ----------
@@ -82,10 +82,8 @@ class Extent:
     unit : str
         Its SI unit.
     end : float
-    period : float
-        What "1 period" means in that unit.
-    begin : float
-        Where the part begins that is told by default.
+    period : float Length of "1 period" in that unit.
+    begin : float Start of the part that is returned by default.
     """
 
     along: str

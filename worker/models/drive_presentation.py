@@ -1,4 +1,4 @@
-"""What is shown of vibration drives."""
+"""Presentation of vibration drives."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def _pendulums(names: Sequence[str]) -> tuple[str, ...]:
-    """Beginnings of the variables of each pendulum, such as "pendulums.0"."""
+    """Prefixes of the variables of each pendulum, such as "pendulums.0"."""
     return tuple(name.removesuffix(".angle") for name in names if name.endswith(".angle") and name != "shaft.angle")
 
 
@@ -75,7 +75,7 @@ PRESENTATION: Final = Presentation(
     phases=_phases,
     portrait="Speed over angle of each pendulum",
     motion="Angles, speeds, torques and powers over time, and the states of clutches and shaft",
-    motion_note="States of the clutches: free; taking up the lost motion; engaged; beyond the measured data; locked. "
+    motion_note="States of the clutches: free; taking up the backlash; engaged; beyond the measured data; locked. "
     "The shaft is held by the load or rotating.",
     symbols={
         "nu/2pi": ("f", ""),

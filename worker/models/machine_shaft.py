@@ -1,4 +1,4 @@
-"""What is particular to machine shafts: how a study's structure and columns become a call of their engine."""
+"""The model of machine shafts: turns a study's structure and columns into a call of its engine."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ Structure = dict[str, Any]
 
 
 def spec_of(structure: Mapping[str, Any] | None) -> MachineSpec:
-    """The engine's structure of a study's plain data."""
+    """The engine's structure from a study's plain data."""
     if structure is None:
         raise ValueError("a machine shaft needs its structure")
     return MachineSpec.from_json(structure)
@@ -71,9 +71,9 @@ def spec_of(structure: Mapping[str, Any] | None) -> MachineSpec:
 
 @cache
 def catalogue() -> tuple[Parameter, ...]:
-    """Every parameter that some machine has, ``K`` for the number of a step and ``NAME`` for that of a constant.
+    """Every parameter of any machine, with ``K`` for the number of a step and ``NAME`` for the name of a constant.
 
-    Where the unit depends on the machine it is that of a force, or of the shaft's angle.
+    Where the unit depends on the machine, it is that of a force or of the shaft's angle.
     """
     kinds: tuple[MechanismKind, ...] = ("slider_crank", "four_bar", "quick_return", "cam")
     every: list[MachineSpec] = [MachineSpec(cycle=max(REVOLUTIONS), constants=("NAME",))]
@@ -103,7 +103,7 @@ _REMARKS = {
 
 def parameters_of(structure: Mapping[str, Any]) -> dict[str, Parameter]:
     """Every numeric parameter of a machine of this structure, by path."""
-    # Rows of tables are no parameters, and many.
+    # Rows of tables are not parameters.
     bare = {name: {**part, "table": None} if isinstance(part, dict) else part for name, part in structure.items()}
     return dict(_parameters(json.dumps(bare, sort_keys=True)))
 
@@ -114,21 +114,21 @@ def _parameters(structure: str) -> dict[str, Parameter]:
 
 
 def check_structure(structure: Mapping[str, Any]) -> None:
-    """Raise MachineError where the structure makes no machine."""
+    """Raise MachineError where the structure is not a valid machine."""
     from sprag.engine.machine_shaft.machine import check_structure as engine_check
 
     engine_check(spec_of(structure))
 
 
 def check(structure: Mapping[str, Any], values: Mapping[str, float]) -> None:
-    """Raise MachineError where the machine has no steady motion, with all that is known about why."""
+    """Raise MachineError, with the reason, where the machine has no steady motion."""
     from sprag.engine.machine_shaft.simulate import check as engine_check
 
     engine_check(spec_of(structure), values)
 
 
 def base_results(structure: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, float]:
-    """Results of the machine with these numbers, by name; NaN for those that it does not have."""
+    """Results of the machine with these numbers, by name; NaN for missing ones."""
     from sprag.engine.machine_shaft.simulate import simulate
 
     found = simulate(spec_of(structure), values, cases=1).values[0]
@@ -136,7 +136,7 @@ def base_results(structure: Mapping[str, Any], values: Mapping[str, float]) -> d
 
 
 def reachable_pressure(suction: ArrayLike, clearance: ArrayLike, exponent: ArrayLike) -> NDArray[np.float64]:
-    """Pressure in Pa to which a compressor can bring its gas."""
+    """Largest pressure (Pa) that a compressor reaches."""
     from sprag.engine.machine_shaft.operations import reachable_pressure as engine_pressure
 
     return engine_pressure(*(np.asarray(part, dtype=np.float64) for part in (suction, clearance, exponent)))

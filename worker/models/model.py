@@ -1,4 +1,4 @@
-"""What a model has to offer, and the registry of the models that there are."""
+"""The interface of a model, and the registry of models."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 class Model(Protocol):
-    """A model: how a study's columns become a call of the engine, and what comes back.
+    """A model: turns a study's columns into a call of the engine and its output into results.
 
-    A subclass says ``name`` and whatever has no body here.
+    A subclass must define ``name`` and every method without a body here.
     """
 
     @property
     def name(self) -> str:
-        """What a spec calls the model, such as "vibration-drive"."""
+        """Name of the model in specs, such as "vibration-drive"."""
         ...
 
     @property
@@ -34,24 +34,24 @@ class Model(Protocol):
 
     @property
     def flags(self) -> Mapping[str, str]:
-        """The flags that a case can have, with their sentences."""
+        """The flags that a case can have, with their descriptions."""
         return {}
 
     @property
     def presentation(self) -> Presentation:
-        """What people are shown of it."""
+        """Presentation of the model to users."""
         return Presentation()
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Every numeric parameter: paths in a spec, with letters for indices and names."""
+        """Every numeric parameter: paths in a spec, with placeholders for indices and names."""
         ...
 
     def parameters_of(self, study: Study) -> dict[str, Parameter]:
-        """The parameters of the study's own machine by path; empty where `parameters` says all."""
+        """The parameters of the study's own machine by path; empty where `parameters` is complete."""
         return {}
 
     def variants(self) -> tuple[str, ...]:
-        """Every variant; studies of one variant have the same results, and one table for them."""
+        """Every variant; studies of one variant have the same results and share a table."""
         return ("",)
 
     def variant_of(self, study: Study) -> str:
@@ -63,7 +63,7 @@ class Model(Protocol):
         ...
 
     def result_catalogue(self) -> tuple[ResultInfo, ...]:
-        """Every result as a catalogue lists it, with letters for indices."""
+        """Every result for a catalogue, with placeholders for indices."""
         return self.results(self.variants()[0])
 
     def shape_of(self, study: Study) -> KernelShape:
@@ -75,29 +75,29 @@ class Model(Protocol):
         ...
 
     def extent(self, study: Study, case: int) -> Extent:
-        """What the instantaneous values of a case go along."""
+        """The independent variable of the instantaneous values of a case."""
         ...
 
     def trajectory(self, study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
-        """Instantaneous values of one case at ``points`` equally spaced places of its `extent`."""
+        """Instantaneous values of one case at ``points`` equally spaced points of its `extent`."""
         ...
 
     @property
     def has_clutches(self) -> bool:
-        """Whether its machines have clutches, so that there are `engagements`."""
+        """Whether its machines have clutches, and therefore `engagements`."""
         return False
 
     def engagements(self, study: Study, case: int) -> Engagements:
-        """What the clutches of one case do; ValueError where there are none."""
+        """Engagements of the clutches of one case; ValueError where there are none."""
         raise ValueError(f"a machine of model {self.name} has no clutches")
 
     @property
     def has_strobes(self) -> bool:
-        """Whether its cases are looked at once in each period of an excitation, so that there is a `portrait`."""
+        """Whether its cases have strobes, one state per excitation period, and therefore a `portrait`."""
         return False
 
     def portrait(self, study: Study, case: int) -> Portrait:
-        """How one case comes to its motion; ValueError where there are no strobes."""
+        """How one case approaches its motion; ValueError where there are no strobes."""
         raise ValueError(f"a machine of model {self.name} has no strobes")
 
     def estimate_seconds_per_case(self, study: Study) -> float:
@@ -119,27 +119,27 @@ _MODELS: dict[str, Model] = {}
 
 
 def register(model: Model) -> None:
-    """Offer a model to every study. Raises ValueError where another one has its name."""
+    """Register a model. Raises ValueError where its name is taken."""
     if model.name in _MODELS:
         raise ValueError(f"there already is a model {model.name!r}")
     _MODELS[model.name] = model
 
 
 def unregister(name: str) -> None:
-    """Withdraw a model; KeyError where there is none."""
+    """Remove a model; KeyError for an unknown name."""
     del _MODELS[name]
 
 
 def model_of(name: str) -> Model:
-    """The model of that name; ValueError where there is none."""
+    """The model of that name; ValueError for an unknown name."""
     try:
         return _MODELS[name]
     except KeyError:
-        raise ValueError(f"unknown model {name!r}; there is: {', '.join(_MODELS)}") from None
+        raise ValueError(f"unknown model {name!r}; known models: {', '.join(_MODELS)}") from None
 
 
 def model_names() -> tuple[str, ...]:
-    """Names of the models that a study may ask for."""
+    """Names of all models."""
     return tuple(_MODELS)
 
 

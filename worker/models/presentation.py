@@ -1,4 +1,4 @@
-"""What pages, pictures and reports know about a model: what people are shown first, and in which words."""
+"""Presentation of a model on pages, in pictures and reports: what is shown first, and in which words."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One plot of a motion: its lines are pairs of a variable and what it is called."""
+    """One plot of a motion: its lines are pairs of a variable and its label."""
 
     title: str
     unit: str
@@ -28,23 +28,23 @@ def _no_phases(_: Sequence[str]) -> tuple[tuple[str, str, str], ...]:
 
 @dataclass(frozen=True, slots=True)
 class Presentation:
-    """What is shown of a model; names that a study does not have are passed over, and every field may be left out.
+    """Presentation of a model; names that a study does not have are skipped, and every field is optional.
 
     Attributes
     ----------
-    along, apart : paths of the axes to draw along, and of those told apart by colour, first choice first
+    along, apart : paths of the axes to draw along, and of those distinguished by colour, in order of preference
     drawn : results of the main curve
-    main : results that tell most of a machine; ``heading`` is what they are called together
+    main : the main results of a machine; ``heading`` is their common title
     columns : results that the table of cases shows first
-    operating_point : paths of parameters without which a picture tells nobody what it shows
-    checks : first parts of names of results that tell of the computation rather than of the machine
-    balance : rows of a balance of means: sign, result, words; ``residual`` is the result with what is left over
+    operating_point : paths of parameters that every picture must state
+    checks : first parts of the names of results that describe the computation rather than the machine
+    balance : rows of a balance of means: sign, result, label; ``residual`` is the result with the remainder
     panels : plots of a motion, from the names and units of its variables
-    states : how states look, colour and two patterns (plotly's, matplotlib's), so that either alone tells them
-    phases : lines of the phase portrait, from the names of the variables: (angle, speed, what it is of)
-    portrait : what the phase portrait shows; "" where there is none
-    motion, motion_note : what the plots show in a few words, and what a reader has to know of them
-    symbols : letter of the catalogue -> base and index as books print them
+    states : colour and two patterns (plotly's, matplotlib's) of each state; either alone distinguishes them
+    phases : lines of the phase portrait, from the names of the variables: (angle, speed, label)
+    portrait : description of the phase portrait; "" where there is none
+    motion, motion_note : short description of the plots, and a note for the reader
+    symbols : symbol of the catalogue -> base and index as in print
     """
 
     along: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""What is shown of machine shafts."""
+"""Presentation of machine shafts."""
 
 from __future__ import annotations
 

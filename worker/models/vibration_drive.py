@@ -1,4 +1,4 @@
-"""What is particular to vibration drives: how a study's columns become a call of their engine."""
+"""The model of vibration drives: turns a study's columns into a call of its engine."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ if TYPE_CHECKING:
 
 MODEL = "vibration-drive"
 
-#: Flag of a case some of whose clutches worked beyond the end of the measured data.
+#: Flag of a case with a clutch that worked beyond the end of the measured data.
 WINDUP_OUT_OF_DATA = "windup_out_of_data"
 #: Flag of a case whose window does not show the settled motion.
 NOT_SETTLED = "not_settled"
 FLAG_SENTENCES: dict[str, str] = {
     NOT_SETTLED: (
-        "The motion had not settled in the window: the settled mean speed (with the shaft held, the swing of a "
-        "pendulum) is another by more than 1 %. Results are not those of steady running."
+        "The motion had not settled in the window: the settled mean speed (or, with the shaft held, the swing of a "
+        "pendulum) differs by more than 1 %. Results are not those of steady running."
     ),
-    WINDUP_OUT_OF_DATA: "Some clutch was wound up beyond the measured data; its law was continued straight there.",
+    WINDUP_OUT_OF_DATA: "A clutch was wound up beyond the measured data, where its law was extrapolated linearly.",
     **REGIME_FLAGS,
 }
-#: What the variants of settled studies have behind the number of pendulums.
+#: Suffix of the variants of settled studies, after the number of pendulums.
 _SETTLED_VARIANT = "-settled"
 
 _PENDULUM = re.compile(r"pendulums\.(\d+)\.")
@@ -54,7 +54,7 @@ _COEFFICIENT = re.compile(r"(?:^|\.)clutch\.coefficients\.(\d+)$")
 
 
 class DriveKey(NamedTuple):
-    """What decides the kernel of a vibration drive."""
+    """Key of the kernel of a vibration drive."""
 
     pendulums: int
     coefficients: int
@@ -85,7 +85,7 @@ def _span(value: object) -> Span:
 def run_of(run: Mapping[str, Any]) -> Run:
     """The engine's settings of the run, from the plain data of a study.
 
-    Of a run until it is settled: those of a run for as long as it may take.
+    For a settled run: those of a timed run of its largest duration.
     """
     window = cast("list[object] | None", run.get("window"))
     return Run(
@@ -121,7 +121,7 @@ def _frequency(study: Study, case: int) -> float:
 
 
 def _mean_periods(study: Study) -> float:
-    """Excitation periods that are computed for a case, averaged over the cases of the study."""
+    """Computed excitation periods per case, averaged over the study."""
     if is_settled(study.run):
         return mean_periods(study.run)
     periods = run_of(study.run).duration.in_periods(float(np.mean(_frequencies(study))))
@@ -137,7 +137,7 @@ def _frequencies(study: Study) -> NDArray[np.float64]:
 
 
 def kernel_source(pendulums: int, coefficients: int, tolerance: float) -> str:
-    """Text of the generated kernel of vibration drives of that shape, for this machine; nothing is compiled."""
+    """Generated source of the kernel of that shape for this machine; nothing is compiled."""
     from sprag.engine.vibration_drive.kernel import lane_count, order_for, source
     from sprag.engine.vibration_drive.layout import make_layout
 
@@ -170,7 +170,7 @@ class VibrationDrive(Model):
         return settled_infos(number) if variant.endswith(_SETTLED_VARIANT) else result_infos(number)
 
     def result_catalogue(self) -> tuple[ResultInfo, ...]:
-        # One pendulum stands for all.
+        # One pendulum represents all.
         one = "pendulums.0."
         return tuple(replace(info, name=info.name.replace(one, "pendulums.N.")) for info in settled_infos(1))
 
@@ -193,7 +193,7 @@ class VibrationDrive(Model):
     def extent(self, study: Study, case: int) -> Extent:
         """The run of one case; its periods are those of the excitation.
 
-        Of a settled study, the run for as long as its search may take; what it comes to stands at the end.
+        For a settled study, the longest run of its search; the settled motion is at its end.
         """
         end, period = duration_seconds(study, case), 1.0 / _frequency(study, case)
         begin = end - study.run["max_period"] * period if is_settled(study.run) else 0.0
@@ -211,7 +211,7 @@ class VibrationDrive(Model):
         return True
 
     def engagements(self, study: Study, case: int) -> Engagements:
-        """Of a settled study those of one turn of its motion, else those in the window."""
+        """Those of one turn of the settled motion for a settled study, otherwise those in the window."""
         from sprag.engine.vibration_drive.engagements import engagements, settled_engagements
 
         columns = {**study.base, **study.case_parameters(case)}

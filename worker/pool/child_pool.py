@@ -1,4 +1,4 @@
-"""Functions run in several processes side by side: each thread looks after one `ChildProcess`."""
+"""Functions run in several processes; each thread manages one `ChildProcess`."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Job(Generic[R]):
         self._lock = threading.Lock()
 
     def stop(self) -> None:
-        """End it, with its process when it runs. What is just through stays done."""
+        """End the job, with its process if it is running. A job that has just finished stays done."""
         if self.future.cancel():
             return
         with self._lock:
@@ -48,7 +48,7 @@ class Job(Generic[R]):
                 self._child.kill()
 
     def _enter(self, child: ChildProcess) -> None:
-        """Have the process there that `stop` would kill."""
+        """Record the process that `stop` would kill."""
         with self._lock:
             if self._stopped:
                 raise JobStoppedError
@@ -56,21 +56,20 @@ class Job(Generic[R]):
             child.start()
 
     def _leave(self) -> bool:
-        """From now on the process is not this job's any more; whether it was stopped."""
+        """Release the process from this job; whether the job was stopped."""
         with self._lock:
             self._child = None
             return self._stopped
 
 
 class ChildPool:
-    """A number of processes, started at once; one that dies is replaced and costs only the function it ran.
+    """A number of processes, started immediately; one that dies is replaced and affects only the function it ran.
 
     Parameters
     ----------
     processes : int
         At least 1.
-    prepare : function
-        What a new process does first; importable by name.
+    prepare : function Called first in a new process; importable by name.
     """
 
     def __init__(self, processes: int, prepare: Callable[[], None]) -> None:
@@ -85,7 +84,7 @@ class ChildPool:
 
     @property
     def failed_starts(self) -> int:
-        """Processes that died before they were ready, one after the other with no function done between."""
+        """Number of successive processes that died before they were ready, without any completed function."""
         return self._failed_starts
 
     def schedule(self, timeout: float, function: Callable[[*Args], R], *args: *Args) -> Job[R]:
@@ -99,7 +98,7 @@ class ChildPool:
         try:
             return self._run_in(child, job, timeout, function, args)
         finally:
-            with suppress(ProcessStartError):  # the next job tries again, and tells
+            with suppress(ProcessStartError):  # the next job tries again and reports the error
                 child.start()
             self._idle.put(child)
 
@@ -125,11 +124,11 @@ class ChildPool:
         return value
 
     def tend(self) -> None:
-        """Put new processes in the place of those that died idle; to be called now and then."""
+        """Replace processes that died idle; must be called periodically."""
         for _ in self._children:
             try:
                 child = self._idle.get_nowait()
-            except Empty:  # all are at work
+            except Empty:  # all are busy
                 return
             try:
                 child.tend()
@@ -139,7 +138,7 @@ class ChildPool:
                 self._idle.put(child)
 
     def close(self) -> None:
-        """Kill what runs, drop what waits and leave no process behind."""
+        """Kill running jobs, drop waiting ones and end all processes."""
         self._closed = True
         self._threads.shutdown(wait=False, cancel_futures=True)
         for child in self._children:

@@ -1,7 +1,7 @@
-"""A spawned process that runs one function after the other for its owner, over a pipe that nobody else holds.
+"""A spawned process that runs one function after the other for its owner, over a private pipe.
 
-With a pipe of its own a process that dies can take neither a lock nor a message of another one with it, and the end of
-the pipe says at once whose work is lost. See docs/adr/0005.
+With a private pipe, a dying process cannot hold a lock or a message of another one, and the end of the pipe shows
+immediately whose work is lost. See docs/adr/0005.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 
 #: Seconds for a new process to import what it needs, on a machine that is busy and slow.
 START_SECONDS = 300.0
-#: Seconds for a killed process to be gone.
+#: Seconds to wait for a killed process to exit.
 KILL_SECONDS = 10.0
 
-#: What a process says before and after time that does not count.
+#: Messages of a process before and after uncounted time.
 _LOADING, _LOADED = "loading", "loaded"
 
-# multiprocessing collects dead children of any thread whenever one is started or joined, and is not made for two
-# threads doing so at once: the slower would find no exit code.
+# multiprocessing reaps the dead children of all threads whenever one is started or joined. Two threads must not do this
+# simultaneously, or the slower one finds no exit code.
 _FAMILY = threading.Lock()
 
 
@@ -52,14 +52,14 @@ class ProcessDiedError(Exception):
 
 
 class ProcessStartError(Exception):
-    """The process died, or came to nothing, before it could be given anything to do."""
+    """The process died or did not get ready before it received any work."""
 
 
 class ChildProcess:
-    """A process, and after its death the next one that `start` puts in its place.
+    """A process, replaced by `start` after its death.
 
-    One thread at a time may `run`; `kill` may come from any. On Linux the process also dies with the thread that
-    started it, so that thread has to live as long as its owner.
+    Only one thread at a time may `run`; any thread may `kill`. On Linux the process also dies with the thread that
+    started it, so that thread must live as long as its owner.
 
     Parameters
     ----------
@@ -94,10 +94,10 @@ class ChildProcess:
             self._process, self._pipe, self._is_ready = process, ours, False
 
     def run(self, function: Callable[..., Any], args: tuple[Any, ...], timeout: float) -> Any:
-        """The value of ``function(*args)``, computed by the process that was started; everything has to be picklable.
+        """The value of ``function(*args)``, computed by the process that was started; everything must be picklable.
 
-        Raises TimeoutError after ``timeout`` s without those of `uncounted`, when the process has been killed,
-        ProcessDiedError when it died, ProcessStartError when it died before it began, or what the function raised.
+        Raises TimeoutError after ``timeout`` s, not counting time in `uncounted` (the process is then killed),
+        ProcessDiedError when it died, ProcessStartError when it died before it began, or the function's exception.
         """
         pipe = self._give(pickle.dumps((function, args), protocol=pickle.HIGHEST_PROTOCOL))
         try:
@@ -111,7 +111,7 @@ class ChildProcess:
         return found
 
     def _answer_of(self, pipe: Connection, timeout: float) -> tuple[bool, Any]:
-        """What came of the function; raises TimeoutError, when the process has been killed, EOFError and OSError."""
+        """The outcome of the function; raises TimeoutError (the process is then killed), EOFError and OSError."""
         left = timeout
         while True:
             begun = time.monotonic()
@@ -128,7 +128,7 @@ class ChildProcess:
                 raise TimeoutError(f"not done within {timeout:g} s")
 
     def _give(self, message: bytes) -> Connection:
-        """Have the process begin with the function of ``message``; the pipe that its value comes through."""
+        """Send the function of ``message`` to the process; returns the pipe for its value."""
         pipe = self._pipe
         if pipe is None:
             raise ProcessStartError("there is no process")
@@ -137,14 +137,14 @@ class ChildProcess:
                 self._is_ready = wait([pipe], START_SECONDS) == [pipe] and pipe.recv() is True
             if self._is_ready:
                 pipe.send_bytes(message)
-                pipe.recv()  # it has the function: from here on a death is the function's
+                pipe.recv()  # the function was received: it is responsible for a death from here on
                 return pipe
         except (EOFError, OSError):
             pass
         raise ProcessStartError(f"exit code {self._bury()}")
 
     def _bury(self) -> int | None:
-        """Kill what is left of the process and close its pipe; its exit code."""
+        """Kill the process if it is still running and close its pipe; returns its exit code."""
         with self._lock:
             process, pipe = self._process, self._pipe
             self._process = self._pipe = None
@@ -159,9 +159,9 @@ class ChildProcess:
         return exitcode
 
     def tend(self) -> None:
-        """Put a new process in the place of one that died idle. Only when no thread runs anything in it.
+        """Replace a process that died idle. Only while no thread runs anything in it.
 
-        Raises ProcessStartError when it died before it was ready; the next one is on its way then, too.
+        Raises ProcessStartError when it died before it was ready; the next one is started in that case, too.
         """
         process, pipe = self._process, self._pipe
         if process is None or pipe is None:
@@ -178,19 +178,19 @@ class ChildProcess:
             raise ProcessStartError(f"exit code {exitcode}")
 
     def kill(self) -> None:
-        """Kill the process, whatever it does: `run` raises ProcessDiedError."""
+        """Kill the process, whatever it is doing; `run` then raises ProcessDiedError."""
         with self._lock:
             if self._process is not None:
                 self._process.kill()
 
     def close(self) -> None:
-        """Kill the process and let no other take its place."""
+        """Kill the process and do not replace it."""
         with self._lock:
             self._closed = True
         self.kill()
 
     def join(self) -> None:
-        """Leave nothing of the process behind. Only when no thread runs anything in it."""
+        """Wait for the end of the process and release it. Only while no thread runs anything in it."""
         self._bury()
 
 
@@ -199,9 +199,9 @@ _owner: Connection | None = None
 
 @contextmanager
 def uncounted() -> Iterator[None]:
-    """Loading what a process needs once, such as a library: its time does not count against the limits of the function.
+    """Exclude one-time work of a process, such as loading a library, from the time limits of the function.
 
-    Not to be nested. Changes nothing outside a `ChildProcess`.
+    Must not be nested. Has no effect outside a `ChildProcess`.
     """
     pipe = _owner
     if pipe is None:
@@ -217,7 +217,7 @@ def uncounted() -> Iterator[None]:
 
 
 def _serve(pipe: Connection, parent: int, prepare: Callable[[], None]) -> None:
-    """What the process does: take a function and its arguments, give back its value, until the pipe ends."""
+    """Main loop of the process: receive a function and its arguments, send its value, until the pipe is closed."""
     global _owner  # noqa: PLW0603 - there is one in a process
     _owner = pipe
     start_pool_process(parent, prepare)
@@ -230,7 +230,7 @@ def _serve(pipe: Connection, parent: int, prepare: Callable[[], None]) -> None:
 
 
 def _answer(message: bytes) -> bytes:
-    """The value of a function with True, or what it raised with False; pickled."""
+    """The value of a function with True, or its exception with False; pickled."""
     try:
         function, args = pickle.loads(message)  # noqa: S301 - it comes from the parent process
         return pickle.dumps((True, function(*args)), protocol=pickle.HIGHEST_PROTOCOL)

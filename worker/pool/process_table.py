@@ -1,11 +1,11 @@
-"""What Linux's table of processes tells of a process; elsewhere nothing is known."""
+"""Information about a process from Linux's /proc; nothing is known on other systems."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
 
-#: Fields of /proc/PID/stat after the name, which may hold blanks: processor time in user and system mode, start.
+#: Fields of /proc/PID/stat after the name, which may contain blanks: processor time in user and system mode, start.
 _USER, _SYSTEM, _START = 11, 12, 19
 
 
@@ -17,9 +17,10 @@ def _stat(pid: int) -> list[str]:
 
 
 def start_time(pid: int) -> int | None:
-    """Clock ticks from the machine's start to that of process ``pid``; with the id it names one process for ever.
+    """Clock ticks from the machine's start to that of process ``pid``; together with the id it identifies a process
+    uniquely.
 
-    None where there is no such process, or nobody can tell.
+    None where there is no such process or the time is unknown.
     """
     fields = _stat(pid)
     return int(fields[_START]) if fields else None

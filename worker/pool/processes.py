@@ -1,4 +1,4 @@
-"""Habits of the processes this program starts: one thread each, and never longer alive than their parent."""
+"""Common behaviour of the processes that this program starts: one thread each, and no survival of the parent."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _A = TypeVarTuple("_A")
 _R = TypeVar("_R")
 
-#: Libraries that would start threads of their own; the pool has a process for each core already.
+#: Variables of libraries that would start their own threads; the pool already has a process per core.
 _THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -26,34 +26,34 @@ _THREAD_VARIABLES = (
     "VECLIB_MAXIMUM_THREADS",
 )
 _PR_SET_PDEATHSIG = 1
-#: How much pool processes give way to others, to the process that answers requests above all.
+#: Nice value of pool processes, so that others, above all the one that answers requests, take precedence.
 NICENESS = 10
 
 
 def single_threaded_children() -> None:
-    """Processes started from now on compute with one thread, unless the user's environment says otherwise."""
+    """Limit processes started from now on to one thread, unless the user's environment sets another number."""
     for variable in _THREAD_VARIABLES:
         os.environ.setdefault(variable, "1")
 
 
 def end_with_parent(parent: int, number: signal.Signals) -> None:
-    """Have the kernel send this process ``number`` when its parent (process id ``parent``) dies; only Linux can."""
+    """Let the operating system send this process ``number`` when its parent (id ``parent``) dies; Linux only."""
     if sys.platform != "linux":
         return
     import ctypes
 
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, int(number), 0, 0, 0)
-    if os.getppid() != parent:  # it died before the line above
+    if os.getppid() != parent:  # the parent died before the line above
         os.kill(os.getpid(), number)
 
 
 @contextmanager
 def interrupts_held_back() -> Iterator[None]:
-    """Processes and threads started inside begin with SIGINT blocked: Ctrl-C reaches a child's imports too otherwise.
+    """Start processes and threads with SIGINT blocked, because Ctrl-C would also interrupt a child's imports.
 
-    The child calls `ignore_interrupts` when it has come so far.
+    The child calls `ignore_interrupts` once it runs.
     """
-    # It would lift the block when it starts, which is with the first child.
+    # The resource tracker would lift the block when it starts, which is with the first child.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -63,13 +63,13 @@ def interrupts_held_back() -> Iterator[None]:
 
 
 def ignore_interrupts() -> None:
-    """Interrupts at the terminal are the parent's to handle, which ends this process in order."""
+    """Ignore interrupts from the terminal; the parent handles them and ends this process cleanly."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 def start_pool_process(parent: int, prepare: Callable[[], None]) -> None:
-    """First thing a pool process does. A stop is at once."""
+    """First task of a pool process. A stop takes effect immediately."""
     ignore_interrupts()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     end_with_parent(parent, signal.SIGKILL)
@@ -79,7 +79,7 @@ def start_pool_process(parent: int, prepare: Callable[[], None]) -> None:
 
 
 def limit_memory(more: int) -> None:
-    """Let this process take ``more`` bytes beyond what it has now: what asks for more fails. Only on Linux."""
+    """Limit this process to ``more`` bytes beyond its current memory; larger allocations fail. Linux only."""
     if sys.platform != "linux":
         return
     import resource
@@ -93,7 +93,8 @@ def limit_memory(more: int) -> None:
 def within_processor_time(seconds: float, function: Callable[[*_A], _R], *args: *_A) -> _R:
     """The value of ``function(*args)``; the process ends by SIGPROF where that takes more processor time (s).
 
-    The kernel counts and ends it, also in compiled code that never comes back. No limit where ``seconds`` is infinite.
+    The operating system counts the time and ends the process, even in compiled code that never returns. There is no
+    limit where ``seconds`` is infinite.
     """
     signal.setitimer(signal.ITIMER_PROF, seconds if math.isfinite(seconds) else 0.0)
     try:

@@ -298,7 +298,7 @@ def test_damaged_kernels_are_compiled_anew(tmp_path: Path, caplog: pytest.LogCap
         damaged.parent.mkdir(parents=True, exist_ok=True)
         damaged.touch()
         assert {outcome.fate for outcome in run_all(executor, study, 20).values()} == {Fate.DONE}
-        assert caplog.text.count("died of a kernel; their host compiles its kernels anew") == 1
+        assert caplog.text.count("died while loading a kernel; their host compiles its kernels anew") == 1
         assert not damaged.exists()
         executor.close()
         # Every chunk crashes, of workers that have the damaged kernel in hand; nobody is quarantined.
@@ -313,7 +313,7 @@ def test_damaged_kernels_are_compiled_anew(tmp_path: Path, caplog: pytest.LogCap
         dispatcher.run(lambda: not store.active_studies())
         ended = store.get_study(record.id)
         assert (ended.state, ended.ok) == (StudyState.FINISHED, 80)
-        assert caplog.text.count("The kernels are compiled anew, and its cases run again.") == 1
+        assert caplog.text.count("Its kernels are compiled anew and its cases run again.") == 1
         assert not damaged.exists()
 
 
@@ -327,8 +327,8 @@ def test_other_machines_need_certificates(monkeypatch: pytest.MonkeyPatch) -> No
 def test_a_scheduler_that_stays_away_ends_the_executor_with_a_sentence() -> None:
     with clusters() as made:
         executor = DaskExecutor(made.url, 0, chunk_timeout=1.0, scheduler_seconds=0.0)
-        assert executor.shortage == f"The scheduler tcp://127.0.0.1:{made.port} is not there; it is tried again."
-        with pytest.raises(ExecutorError, match=rf"127.0.0.1:{made.port} was not there for 0 s"):
+        assert executor.shortage == f"The scheduler tcp://127.0.0.1:{made.port} cannot be reached; retrying."
+        with pytest.raises(ExecutorError, match=rf"127.0.0.1:{made.port} could not be reached for 0 s"):
             eventually(lambda: executor.wait(0.05))
         executor.close()
 
