@@ -31,7 +31,7 @@ class Regime(IntEnum):
 _SENTENCES = {
     Regime.NONE: "The case did not end ok.",
     Regime.PERIODIC: (
-        "The motion repeats itself after regime.order excitation periods, and disturbances of it die away."
+        "The motion repeats itself after a whole number of excitation periods, and disturbances of it die away."
     ),
     Regime.HELD: "The pendulums settle to a periodic motion, or to rest, and never turn the shaft.",
     Regime.COASTING: "Without a load the shaft turns steadily at the limit of a vanishing load.",

@@ -95,6 +95,11 @@ class Curve(TypedDict):
     y: dict[str, list[Number]]
     endings: list[str]
     regime: NotRequired[Annotated[list[str | None], Doc("regime of each case of a settled study; null: none")]]
+    order: NotRequired[
+        Annotated[
+            list[int | None], Doc("excitation periods after which the motion of each case repeats; null: it does not")
+        ]
+    ]
 
 
 class CurvesData(TypedDict):
@@ -132,6 +137,12 @@ class MapData(TypedDict):
     cases: list[list[int]]
     endings: list[list[str]]
     regime: NotRequired[Annotated[list[list[str | None]], Doc("regime of each case of a settled study; null: none")]]
+    order: NotRequired[
+        Annotated[
+            list[list[int | None]],
+            Doc("excitation periods after which the motion of each case repeats; null: it does not"),
+        ]
+    ]
 
 
 class Map(MapData):

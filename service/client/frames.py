@@ -28,7 +28,7 @@ class Curves:
         return {**self.data["units"], **{name: info["unit"] for name, info in self.data["results"].items()}}
 
     def to_pandas(self) -> pd.DataFrame:
-        """A row for each point: the parameters of its curve, x, results (NaN for none), any regime, ending, case."""
+        """A row for each point: the parameters of its curve, x, results (NaN for none), regime, order, ending, case."""
         with naming_extra("Curves.to_pandas", "tables"):
             import pandas as pd
 
@@ -40,6 +40,7 @@ class Curves:
                     x: curve["x"],
                     **{name: pd.Series(values, dtype="float64") for name, values in curve["y"].items()},
                     **({"regime": curve["regime"]} if "regime" in curve else {}),
+                    **({"order": pd.Series(curve["order"], dtype="Int64")} if "order" in curve else {}),
                     "ending": curve["endings"],
                     "case": curve["cases"],
                 }

@@ -7,15 +7,20 @@ reading and writing them takes seconds during which nobody else would be answere
 from __future__ import annotations
 
 from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.json_text import to_bytes
+from sprag.service.json_text import numbers, to_bytes
 from sprag.service.results import exports
-from sprag.service.results.curves import draw, draw_map, select
+from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.pictures import curves as pictures
+from sprag.service.results.pictures.maps import draw_map as draw_map_picture
+from sprag.service.results.regimes import kind_columns
 from sprag.worker import models
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from sprag.service.jobs.checks import Library
     from sprag.service.results.curves import CurveQuery, Curves, Map
 
@@ -36,23 +41,24 @@ def curves_json(library: Library, study_id: str, query: CurveQuery) -> bytes:
 
 
 def curves_csv(library: Library, study_id: str, query: CurveQuery) -> bytes:
-    """Every point of every curve as one row: fixed parameters, x, results, ending."""
+    """Every point of every curve as one row: fixed parameters, case, x, results, regime and its order, ending."""
     curves = curves_of(library, study_id, query)
-    first = curves.curves[0].line
-    paths = [*first.by, *first.at]
-    names = [info.name for info in curves.selection.results]
-    regime = [] if curves.selection.regime is None else [curves.selection.regime.name]
-    columns: list[list[Any]] = [[] for _ in range(len(paths) + 2 + len(names) + 1 + len(regime))]
+    names = kind_columns(curves.selection.regime)
+    columns: dict[str, list[Any]] = {}
     for curve in curves.curves:
-        held = {**curve.line.by, **curve.line.at}
         points = len(curve.endings)
-        parts: list[list[Any]] = [[held[path]] * points for path in paths]
-        parts += [curve.line.cases.tolist(), list(curve.line.x)]
-        parts += [curve.y[name].tolist() for name in names]
-        parts += [curve.regimes] if curve.regimes is not None else []
-        for column, part in zip(columns, [*parts, curve.endings], strict=True):
-            column.extend(part)
-    return exports.table_csv([*paths, "case", curves.selection.x, *names, *regime, "ending"], columns)
+        kinds: Iterable[tuple[str, list[Any]]] = zip(names, (curve.regimes or [], curve.orders or []), strict=False)
+        parts: dict[str, list[Any]] = {
+            **{path: [value] * points for path, value in {**curve.line.by, **curve.line.at}.items()},
+            "case": curve.line.cases.tolist(),
+            curves.selection.x: list(curve.line.x),
+            **{info.name: numbers(curve.y[info.name], info.kind == "count") for info in curves.selection.results},
+            **dict(kinds),
+            "ending": curve.endings,
+        }
+        for name, part in parts.items():
+            columns.setdefault(name, []).extend(part)
+    return exports.table_csv(list(columns), list(columns.values()))
 
 
 def curves_picture(library: Library, study_id: str, query: CurveQuery, title: str, form: pictures.Picture) -> bytes:
@@ -72,6 +78,26 @@ def map_json(library: Library, study_id: str, query: CurveQuery) -> bytes:
     return to_bytes({"study": study_id, **map_of(library, study_id, query).to_json()})
 
 
+def map_csv(library: Library, study_id: str, query: CurveQuery) -> bytes:
+    """Every point of the map as one row: fixed parameters, y, x, case, result, regime and its order, ending."""
+    drawn = map_of(library, study_id, query)
+    across, points = len(drawn.x_values), drawn.values.size
+    kinds = kind_columns(models.regime_info(models.study_results(library.store.study(study_id))))
+    columns: dict[str, list[Any]] = {
+        **{path: [value] * points for path, value in drawn.at.items()},
+        drawn.y: [y for y in drawn.y_values for _ in range(across)],
+        drawn.x: [*drawn.x_values] * len(drawn.y_values),
+        "case": drawn.cases.reshape(-1).tolist(),
+        drawn.result.name: numbers(drawn.values.reshape(-1), drawn.result.kind == "count"),
+        **{
+            name: list(chain.from_iterable(rows or ()))
+            for name, rows in zip(kinds, (drawn.regimes, drawn.orders), strict=False)
+        },
+        "ending": list(chain.from_iterable(drawn.endings)),
+    }
+    return exports.table_csv(list(columns), list(columns.values()))
+
+
 def map_picture(library: Library, study_id: str, query: CurveQuery, title: str, form: pictures.Picture) -> bytes:
     """The map as a picture."""
-    return pictures.draw_map(map_of(library, study_id, query), title, form)
+    return draw_map_picture(map_of(library, study_id, query), title, form)

@@ -1,14 +1,8 @@
-"""Curves and maps of a study: the cases of each point and their results, exactly as stored.
-
-`select` and `select_map` determine the drawn cases from the study alone and refuse ambiguous requests; `draw` and
-`draw_map` then fetch the results of these cases only. The HTTP interface and the command line both use them.
-"""
+"""Curves and maps of a study as data: the request, the cases of each point, and their results."""
 
 from __future__ import annotations
 
-import itertools
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -18,27 +12,13 @@ from numpy.typing import NDArray
 from sprag.service.answers import filled
 from sprag.service.answers.results import Curve as CurveData
 from sprag.service.answers.results import CurvesData, MapData, MapResult, ResultMeaning
-from sprag.service.faults import ParameterFault
 from sprag.service.json_text import numbers
-from sprag.service.results.selection import (
-    Fixed,
-    SelectionError,
-    axis_name,
-    held_text,
-    listed,
-    locate_axes,
-    require_axis,
-)
-from sprag.service.spec.catalogue import result_of, unit_of, unknown_result
-from sprag.worker import models
 from sprag.worker.codes import PENDING
-from sprag.worker.limits import MAX_CURVE_VALUES
-from sprag.worker.models import WorkerEnding, regime_info
+from sprag.worker.models import WorkerEnding
 
 if TYPE_CHECKING:
     from sprag.service.storage.records import CaseColumns
     from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
 
 #: Results of cases, aligned with them: (case numbers, result names) -> columns.
 Fetch = Callable[[NDArray[np.int64], Sequence[str]], "CaseColumns"]
@@ -85,12 +65,16 @@ class Selection:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """One curve: a line of cases with their results (NaN where there is none), endings, and regimes if any."""
+    """One curve: a line of cases with their results (NaN where there is none) and endings.
+
+    Of a settled study also with their regimes, and the excitation periods after which their motions repeat.
+    """
 
     line: Line
     y: dict[str, NDArray[np.float64]]
     endings: list[str]
     regimes: list[str | None] | None = None
+    orders: list[int | None] | None = None
 
     def run(self) -> NDArray[np.intp]:
         """Indices of the cases that were run, ascending, which a picture joins; of a coarser study, its own points."""
@@ -106,7 +90,9 @@ class Curve:
             "y": {info.name: numbers(self.y[info.name], info.kind == "count") for info in results},
             "endings": self.endings,
         }
-        return data if self.regimes is None else {**data, "regime": self.regimes}
+        if self.regimes is None or self.orders is None:
+            return data
+        return {**data, "regime": self.regimes, "order": self.orders}
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +134,7 @@ class Map:
     values: NDArray[np.float64]
     endings: list[list[str]]
     regimes: list[list[str | None]] | None = None
+    orders: list[list[int | None]] | None = None
 
     def to_json(self) -> MapData:
         """The map as JSON data; ``z.values[j][i]`` belongs to ``y.values[j]`` and ``x.values[i]``."""
@@ -162,7 +149,9 @@ class Map:
             "cases": self.cases.tolist(),
             "endings": self.endings,
         }
-        return data if self.regimes is None else {**data, "regime": self.regimes}
+        if self.regimes is None or self.orders is None:
+            return data
+        return {**data, "regime": self.regimes, "order": self.orders}
 
     def run(self) -> Map:
         """The part of the map whose cases were all run; the map itself where none was.
@@ -181,6 +170,7 @@ class Map:
             values=self.values[np.ix_(rows, columns)],
             endings=[[self.endings[row][column] for column in columns] for row in rows],
             regimes=self.regimes and [[self.regimes[row][column] for column in columns] for row in rows],
+            orders=self.orders and [[self.orders[row][column] for column in columns] for row in rows],
         )
 
 
@@ -202,202 +192,3 @@ def _complete(missing: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.
 def _not_run(endings: NDArray[np.object_]) -> NDArray[np.bool_]:
     """Which cases have no ending of their own, either yet or ever; shape as ``endings``."""
     return np.asarray((endings == PENDING) | (endings == WorkerEnding.CANCELLED.value), dtype=np.bool_)
-
-
-def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Selection:
-    """Select the cases of the curves of ``query``.
-
-    Raises
-    ------
-    SelectionError
-        For an unknown path or result, a value that is not on its axis, an open axis, or too many numbers.
-    """
-    results = _results(infos, "y", query.y)
-    x_axis = require_axis(study, "x", query.x)
-    fixed = locate_axes(study, query.at)
-    by_axes = {path: require_axis(study, "by", path) for path in dict.fromkeys(query.by)}
-    _no_axis_twice({query.x: x_axis}, "by", by_axes, fixed)
-    chooser = _zip_lines if study.combine == "zip" else _grid_lines
-    x_values, lines = chooser(study, x_axis, by_axes, fixed, len(results))
-    made = tuple(lines)
-    units = {path: unit_of(study, path) for path in (query.x, *made[0].by, *made[0].at)}
-    names = {path: axis_name(study, path) for path in (query.x, *made[0].by)}
-    return Selection(query.x, units, names, _held(study, made[0]), x_values, results, made, regime_info(infos))
-
-
-def _held(study: Study, line: Line) -> tuple[str, ...]:
-    """The fixed axes, then the constant parameters of the operating point."""
-    point, varying = models.presentation_of(study).operating_point, study.axis_paths
-    always = [path for path in point if path in study.base and path not in varying]
-    fixed = [*line.at.items(), *((path, study.base[path]) for path in always)]
-    return tuple(held_text(study, path, value) for path, value in fixed)
-
-
-def draw(selection: Selection, fetch: Fetch) -> Curves:
-    """Fetch the results of the selected cases in one query."""
-    names = [info.name for info in selection.results]
-    columns = fetch(np.concatenate([line.cases for line in selection.lines]), _with(names, selection.regime))
-    endings, regimes = [ending or PENDING for ending in columns.endings], _regimes(columns, selection.regime)
-    curves, start = [], 0
-    for line in selection.lines:
-        part = slice(start, start + line.cases.size)
-        y = {name: columns.values[name][part] for name in names}
-        curves.append(Curve(line, y, endings[part], regimes and regimes[part]))
-        start = part.stop
-    return Curves(selection, tuple(curves))
-
-
-def _with(names: list[str], regime: ResultInfo | None) -> list[str]:
-    return names if regime is None else [*names, regime.name]
-
-
-def _regimes(columns: CaseColumns, regime: ResultInfo | None) -> list[str | None] | None:
-    """The name of the regime of each case; None for cases without one, and for all of them where there is none."""
-    if regime is None:
-        return None
-    return [None if name is None else str(name) for name in map(regime.cell, columns.values[regime.name].tolist())]
-
-
-def draw_map(
-    study: Study, infos: Sequence[ResultInfo], x: str, y: str, z: str, at: Sequence[tuple[str, str]], fetch: Fetch
-) -> Map:
-    """One result over two axes of a grid; raises SelectionError as `select` does."""
-    (result,) = _results(infos, "z", (z,))
-    if study.combine == "zip":
-        raise SelectionError(
-            [ParameterFault("x", "not-a-grid", "a map needs a grid; the axes of this study go together (zip)")]
-        )
-    x_axis, y_axis = require_axis(study, "x", x), require_axis(study, "y", y)
-    fixed = locate_axes(study, at)
-    _no_axis_twice({x: x_axis}, "y", {y: y_axis}, fixed)
-    x_values, lines = _grid_lines(study, x_axis, {y: y_axis}, fixed, 1, way_out="give")
-    rows = list(lines)
-    cases = np.stack([row.cases for row in rows])
-    regime = regime_info(infos)
-    columns = fetch(cases.reshape(-1), _with([z], regime))
-    endings, regimes = [ending or PENDING for ending in columns.endings], _regimes(columns, regime)
-    width = len(x_values)
-    starts = range(0, len(endings), width)
-    return Map(
-        x,
-        y,
-        (unit_of(study, x), unit_of(study, y)),
-        (axis_name(study, x), axis_name(study, y)),
-        _held(study, rows[0]),
-        x_values,
-        tuple(row.by[y] for row in rows),
-        rows[0].at,
-        {path: unit_of(study, path) for path in rows[0].at},
-        result,
-        cases,
-        columns.values[z].reshape(cases.shape),
-        [endings[start : start + width] for start in starts],
-        None if regimes is None else [regimes[start : start + width] for start in starts],
-    )
-
-
-def _results(infos: Sequence[ResultInfo], parameter: str, names: Sequence[str]) -> tuple[ResultInfo, ...]:
-    names = tuple(dict.fromkeys(names))
-    faults = [
-        ParameterFault(
-            parameter, "unknown-name", unknown_result(infos, name), value=name, allowed=listed(i.name for i in infos)
-        )
-        for name in names
-        if result_of(infos, name) is None
-    ]
-    faults += [
-        ParameterFault(
-            parameter, "not-numeric", "is a category, which comes with every point", value=name, allowed="a number"
-        )
-        for name in names
-        if (info := result_of(infos, name)) is not None and info.kind == "category"
-    ]
-    if faults:
-        raise SelectionError(faults)
-    return tuple(info for name in names if (info := result_of(infos, name)) is not None)
-
-
-def _no_axis_twice(x: dict[str, int], second: str, others: dict[str, int], fixed: Fixed) -> None:
-    taken: dict[int, str] = {}
-    uses = [("x", path, axis) for path, axis in x.items()] + [(second, path, axis) for path, axis in others.items()]
-    uses += [("at", path, axis) for axis, (path, _) in fixed.items()]
-    for parameter, path, axis in uses:
-        if axis in taken:
-            message = f"the axis is already taken by {taken[axis]}; one axis can have one role only"
-            raise SelectionError([ParameterFault(parameter, "repeated", message, value=path)])
-        taken[axis] = f"{parameter}={path}"
-
-
-def _check_size(points: int, results: int) -> None:
-    if points * results > MAX_CURVE_VALUES:
-        message = f"{points} points of {results} results are requested; select fewer with at=, or export the results"
-        raise SelectionError([ParameterFault("at", "too-many", message, allowed=f"<= {MAX_CURVE_VALUES} numbers")])
-
-
-def _grid_lines(
-    study: Study, x_axis: int, by: dict[str, int], fixed: Fixed, results: int, way_out: str = "name it in by=, or give"
-) -> tuple[tuple[float, ...], Iterator[Line]]:
-    axes = study.axes
-    named = {x_axis, *by.values(), *fixed}
-    faults = [
-        ParameterFault(
-            "at",
-            "not-fixed",
-            f"the axis {axis.paths[0]} is left open: {way_out} its value as at={axis.paths[0]}=VALUE",
-            allowed=listed(axis.values),
-            unit=unit_of(study, axis.paths[0]),
-        )
-        for position, axis in enumerate(axes)
-        if position not in named and len(axis) > 1
-    ]
-    if faults:
-        raise SelectionError(faults)
-    _check_size(math.prod([len(axes[i]) for i in (x_axis, *by.values())]), results)
-
-    strides = [math.prod(study.shape[i + 1 :]) for i in range(len(axes))]
-    at = {path: axes[i].value(index) for i, (path, index) in fixed.items()}
-    at |= {axes[i].paths[0]: axes[i].value(0) for i in range(len(axes)) if i not in named}
-    origin = sum(index * strides[i] for i, (_, index) in fixed.items())
-    x_order = np.argsort(axes[x_axis].array, kind="stable")
-    x_values = tuple(axes[x_axis].array[x_order].tolist())
-
-    def lines() -> Iterator[Line]:
-        orders = [np.argsort(axes[i].array, kind="stable").tolist() for i in by.values()]
-        for indices in itertools.product(*orders):
-            chosen = list(zip(by.items(), indices, strict=True))
-            first = origin + sum(index * strides[i] for (_, i), index in chosen)
-            values = {path: axes[i].value(index) for (path, i), index in chosen}
-            yield Line(values, at, x_values, (first + x_order * strides[x_axis]).astype(np.int64))
-
-    return x_values, lines()
-
-
-def _zip_lines(
-    study: Study, x_axis: int, by: dict[str, int], fixed: Fixed, results: int
-) -> tuple[tuple[float, ...], Iterator[Line]]:
-    axes = study.axes
-    chosen = np.ones(study.cases, dtype=np.bool_)
-    for i, (_, index) in fixed.items():
-        chosen &= axes[i].array == axes[i].value(index)
-    cases = np.flatnonzero(chosen).astype(np.int64)
-    if cases.size == 0:
-        message = "no case has all these values together"
-        raise SelectionError(
-            [ParameterFault("at", "unknown-value", message, value=listed(p for p, _ in fixed.values()))]
-        )
-    _check_size(cases.size, results)
-    at = {path: axes[i].value(index) for i, (path, index) in fixed.items()}
-    x_all = axes[x_axis].array
-
-    def lines() -> Iterator[Line]:
-        if not by:
-            yield Line({}, at, tuple(x_all[cases].tolist()), cases)
-            return
-        keys = np.stack([axes[i].array[cases] for i in by.values()], axis=1)
-        groups, member = np.unique(keys, axis=0, return_inverse=True)
-        order = np.argsort(member.reshape(-1), kind="stable")
-        parts = np.split(cases[order], np.cumsum(np.bincount(member.reshape(-1)))[:-1])
-        for values, part in zip(groups.tolist(), parts, strict=True):
-            yield Line(dict(zip(by, values, strict=True)), at, tuple(x_all[part].tolist()), part)
-
-    return tuple(x_all[cases].tolist()), lines()

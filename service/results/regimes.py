@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from sprag.worker.models import ResultInfo
 
+#: The result with the number of excitation periods after which a motion repeats.
+ORDER: Final = "regime.order"
 #: Regime of points that no line joins, because they do not show settled motion.
 UNSETTLED: Final = "unsettled"
 #: Regimes that a line may join: a drive without a load coasts, as the limit of a vanishing load.
@@ -66,7 +68,7 @@ def stretches(regimes: Sequence[str | None] | None, points: int) -> list[NDArray
 
 def kind_columns(regime: ResultInfo | None) -> list[str]:
     """Names of the results for the kind of motion of a case: its regime, and the order of its orbit."""
-    return [] if regime is None else [regime.name, f"{regime.name}.order"]
+    return [] if regime is None else [regime.name, ORDER]
 
 
 def kinds_of(

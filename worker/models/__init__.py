@@ -230,7 +230,10 @@ def study_results(study: Study) -> tuple[ResultInfo, ...]:
 
 
 def regime_info(infos: Sequence[ResultInfo]) -> ResultInfo | None:
-    """The result that gives the kind of motion; None where there is none."""
+    """The result that gives the kind of motion; None where there is none.
+
+    Where there is one, ``regime.order`` is the number of excitation periods after which a motion repeats.
+    """
     return next((info for info in infos if info.kind == "category"), None)
 
 

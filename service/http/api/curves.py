@@ -30,8 +30,7 @@ router = APIRouter(prefix="/studies/{study_id:study}", tags=["results"], depende
 
 _PICTURES: dict[str, str] = {str(picture): media for picture, media in pictures.MEDIA_TYPES.items()}
 _JSON = {"json": "application/json"}
-_CURVE_FORMATS = _JSON | {"csv": exports.MEDIA_TYPES["csv"]} | _PICTURES
-_MAP_FORMATS = _JSON | _PICTURES
+_FORMATS = _JSON | {"csv": exports.MEDIA_TYPES["csv"]} | _PICTURES
 _PROBLEMS = ("invalid-parameter", "invalid-selection", "study-not-found", "not-acceptable", *CHECK_PROBLEMS)
 
 _REPORT_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; sandbox allow-modals"
@@ -50,7 +49,7 @@ Fixed = Annotated[
     "/curves",
     response_model=m.Curves,
     responses={
-        **files("Curves, as JSON, a table or a picture.", _CURVE_FORMATS.values()),
+        **files("Curves, as JSON, a table or a picture.", _FORMATS.values()),
         **problems(*_PROBLEMS),
         **documented_304(),
     },
@@ -72,10 +71,10 @@ async def get_curves(
         ),
     ] = None,
     at: Fixed = None,
-    form: Annotated[str | None, format_query(_CURVE_FORMATS)] = None,
+    form: Annotated[str | None, format_query(_FORMATS)] = None,
 ) -> Response:
     """Results against one axis. An axis of several values that is neither x nor in `by` needs its value in `at`."""
-    chosen = choose_format(request, form, _CURVE_FORMATS)
+    chosen = choose_format(request, form, _FORMATS)
     query = CurveQuery(x, tuple(y), tuple(by or ()), _pairs(at))
 
     def make(record: StudyRecord) -> Response | Drawing:
@@ -84,7 +83,7 @@ async def get_curves(
             return placed(context, Drawing(answers.curves_json, asked, JSON))
         if chosen == "csv":
             headers = attached(f"{study_id}-curves.csv")
-            return placed(context, Drawing(answers.curves_csv, asked, _CURVE_FORMATS["csv"], headers))
+            return placed(context, Drawing(answers.curves_csv, asked, _FORMATS["csv"], headers))
         return picture(answers.curves_picture, picture_of(chosen), *asked, title)
 
     return await conditional(context, work, request, study_id, chosen, make)
@@ -94,7 +93,7 @@ async def get_curves(
     "/map",
     response_model=m.Map,
     responses={
-        **files("A map, as JSON or a picture.", _MAP_FORMATS.values()),
+        **files("A map, as JSON, a table or a picture.", _FORMATS.values()),
         **problems(*_PROBLEMS),
         **documented_304(),
     },
@@ -108,15 +107,18 @@ async def get_map(
     y: Annotated[str, Query(description="path of the other axis", examples=["excitation.frequency"])],
     z: Annotated[str, Query(description="the result", examples=["shaft.speed.mean"])],
     at: Fixed = None,
-    form: Annotated[str | None, format_query(_MAP_FORMATS)] = None,
+    form: Annotated[str | None, format_query(_FORMATS)] = None,
 ) -> Response:
     """One result over two axes."""
-    chosen = choose_format(request, form, _MAP_FORMATS)
+    chosen = choose_format(request, form, _FORMATS)
 
     def make(record: StudyRecord) -> Response | Drawing:
         asked = (context.library, study_id, CurveQuery(x, (z,), (y,), _pairs(at)))
         if chosen == "json":
             return placed(context, Drawing(answers.map_json, asked, JSON))
+        if chosen == "csv":
+            headers = attached(f"{study_id}-map.csv")
+            return placed(context, Drawing(answers.map_csv, asked, _FORMATS["csv"], headers))
         return picture(answers.map_picture, picture_of(chosen), *asked, record.name or record.model)
 
     return await conditional(context, work, request, study_id, chosen, make)

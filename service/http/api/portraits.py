@@ -18,7 +18,6 @@ from sprag.service.http.respond import choose_format
 from sprag.service.http.work import Attended
 from sprag.service.results.exports import MEDIA_TYPES, Format
 from sprag.service.results.pictures import curves as pictures
-from sprag.service.results.pictures.portrait import draw_portrait
 from sprag.service.results.portraits import TABLES, Table, portrait_file, require_strobes
 from sprag.worker import models
 
@@ -72,7 +71,7 @@ async def get_strobes(
         made = await work.compute(models.run_portrait, study, case)
         title = f"{study.name}, case {case}"
         return await picture(
-            draw_portrait, picture_of(chosen), made, models.presentation_of(study), title
+            pictures.draw_portrait, picture_of(chosen), made, models.presentation_of(study), title
         ).response(work)  # fmt: skip
     written: Format = "csv" if chosen == "csv" else "json"
     content = await work.compute(portrait_file, study, case, asked, written)

@@ -21,7 +21,8 @@ from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.study import fixed_choices
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
-from sprag.service.results.curves import CurveQuery, Curves, draw, select
+from sprag.service.results.curve_cases import draw, select
+from sprag.service.results.curves import CurveQuery, Curves
 from sprag.service.results.defaults import main_query
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.pictures.curves import draw_compare

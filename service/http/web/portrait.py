@@ -10,7 +10,7 @@ from starlette.responses import Response
 
 from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
 from sprag.service.http.respond import entity_tag, json_response, not_modified, tagged
-from sprag.service.http.web.figures.portrait import portrait_figure
+from sprag.service.http.web.figures.answers import strobes_figure
 from sprag.service.http.work import Attended
 from sprag.service.results.portraits import require_strobes
 from sprag.worker import models
@@ -43,4 +43,4 @@ async def strobes(
     if unchanged := not_modified(request, tag):
         return unchanged
     await work.load(models.shape_of(study))
-    return tagged(json_response(await work.compute(portrait_figure, study, case, columns)), tag)
+    return tagged(json_response(await work.compute(strobes_figure, study, case, columns)), tag)

@@ -14,10 +14,11 @@ from sprag.service.http.drawing import Drawing, conditional, placed
 from sprag.service.http.respond import JSON, json_response
 from sprag.service.http.web.choice import MapQuery, curve_query, map_query, pairs_of, varying_axes
 from sprag.service.http.web.figures import answers
-from sprag.service.http.web.study import fixed_choices, study_frame
+from sprag.service.http.web.study import fixed_choices, orders_address, study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
-from sprag.service.results.curves import CurveQuery, select
+from sprag.service.results.curve_cases import select
+from sprag.service.results.curves import CurveQuery
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.selection import SelectionError
 from sprag.service.spec.catalogue import unit_of
@@ -69,6 +70,8 @@ def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
         figure=f"/studies/{study_id}/figures/curves?{urlencode(pairs)}",
         files=f"{views.study_address(study_id)}/curves?{urlencode(pairs)}",
         pictured=values <= pictures.MAX_PICTURE_POINTS,
+        settled=models.is_settled(study.run),
+        orders=orders_address(study, study_id),
         held=held,
     )
 

@@ -10,6 +10,7 @@ from urllib.parse import urlencode
 import numpy as np
 from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import QueryParams
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.http import views
@@ -23,12 +24,12 @@ from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import timestamp
 from sprag.service.results import exports
-from sprag.service.results.curves import select
+from sprag.service.results.curve_cases import select
 from sprag.service.results.defaults import caption, drawn_numbers
 from sprag.service.results.exports.inputs import inputs as every_input
 from sprag.service.results.exports.inputs import run_inputs
 from sprag.service.results.pictures import curves as pictures
-from sprag.service.results.regimes import DOUBTFUL
+from sprag.service.results.regimes import DOUBTFUL, ORDER
 from sprag.service.results.selection import SelectionError
 from sprag.service.spec.catalogue import parameter_of, unit_of
 from sprag.service.spec.numbers import parse_number
@@ -38,8 +39,6 @@ from sprag.worker.states import TRANSITIONS, StudyEvent, StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from starlette.datastructures import QueryParams
 
     from sprag.service.answers.studies import ClutchFitReport
     from sprag.service.http.web.figures.fit import FitChart
@@ -108,6 +107,7 @@ def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[Clutch
         figure=None if query is None else f"/studies/{study_id}/figures/curves?{urlencode([*pairs, ('columns', '2')])}",
         picture=None if query is None or too_many else f"{address}/curves?{urlencode([*pairs, ('format', 'svg')])}",
         curves=f"/studies/{study_id}/curves?{urlencode(pairs)}",
+        orders=orders_address(study, study_id),
         only_row=None if first is None else first.results.items(),
         units={info.name: info.unit for info in models.study_results(study)},
         inputs=inputs(study, frame["study"]["spec"]),
@@ -233,7 +233,9 @@ def _plain(text: str | None) -> float | None:
     return None if text is None else parse_number(text)
 
 
-def map_address(study: Study, given: QueryParams, study_id: str) -> str | None:
-    """URL of the map for the choices of ``given``; None where there is none."""
-    query = map_query(study, models.study_results(study), given)
-    return None if query is None else f"/studies/{study_id}/map?{urlencode(pairs_of(query))}"
+def orders_address(study: Study, study_id: str) -> str | None:
+    """URL of the map of the periods after which motions repeat; None where there is none."""
+    query = map_query(study, models.study_results(study), QueryParams({"z": ORDER}))
+    if query is None or not models.is_settled(study.run):
+        return None
+    return f"/studies/{study_id}/map?{urlencode(pairs_of(query))}"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.results.figures.figure import Figure, Line, Marks, Panel, Quantity, line_colours
+from sprag.service.results.figures.orders import TITLE, order_map, strip_of
 from sprag.service.results.regimes import DOUBTFUL, MARKED, regimes_of, stretches
 from sprag.service.results.wording import number, unit_text
 from sprag.worker.codes import PENDING
@@ -53,7 +54,21 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1, *, by_u
         styles = tuple(info.name for info in infos) if len(infos) > 1 else ()
         panels.append(Panel(y, parts, tuple(_marks(lines, infos, regimes)), styles))
     most = min(max(_MOST_POINTS // len(lines), _LEAST_POINTS), _LINE_POINTS)
-    return Figure(x, tuple(panels), columns, family, len(drawn), regimes, chosen.held, most=most, note=_nothing(drawn))
+    spans, looks = strip_of(drawn[0][1].curves) if len(drawn) == 1 else ({}, {})
+    return Figure(
+        x,
+        tuple(panels),
+        columns,
+        family,
+        len(drawn),
+        regimes,
+        chosen.held,
+        spans,
+        TITLE,
+        looks,
+        most=most,
+        note=_nothing(drawn),
+    )
 
 
 def _lines(
@@ -124,8 +139,8 @@ def map_quantities(drawn: Map) -> tuple[Quantity, Quantity, Quantity]:
 
 
 def doubtful_marks(drawn: Map) -> Iterator[Marks]:
-    """The points of a map whose motion is not periodic."""
-    for name in DOUBTFUL:
+    """The points of a map whose motion is not periodic; none of a map whose colours say so."""
+    for name in () if order_map(drawn) else DOUBTFUL:
         places = [
             (row, column)
             for row, regimes in enumerate(drawn.regimes or ())

@@ -35,9 +35,12 @@ class Line:
     key : common to the lines that belong together in all panels
     colour, style : colour, and number of the dash
     cases : int64 array, shape (m,), optional
-        The case of each point; a line without cases is drawn without markers.
+        The case of each point; a joined line without cases is drawn without markers.
     stretches : indices of the points that are joined, each ascending; None for all points
     joined : whether y is a function of x; otherwise only points are drawn
+    shades : float64 array, shape (m,), optional
+        Numbers that colour the points; the panel has a scale for them.
+    ring : whether the points are large and open
     """
 
     name: str
@@ -51,6 +54,8 @@ class Line:
     cases: NDArray[np.int64] | None = None
     stretches: tuple[NDArray[np.int64], ...] | None = None
     joined: bool = True
+    shades: NDArray[np.float64] | None = None
+    ring: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,12 +70,16 @@ class Marks:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One plot. ``styles`` explains the dashes where they distinguish results."""
+    """One plot. ``styles`` explains the dashes where they distinguish results.
+
+    ``x`` is the quantity of its own x axis; without one, the panel has the x axis of the figure.
+    """
 
     y: Quantity
     lines: tuple[Line, ...]
     marks: tuple[Marks, ...] = ()
     styles: tuple[str, ...] = ()
+    x: Quantity | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +91,11 @@ class Figure:
     family : what distinguishes the lines of a study; ``studies`` is the number of studies
     regimes : names of the kinds of motion that occur, where not all are periodic
     spans : for each row of the strip below the panels, its states: (state, begin, end)
-    looks : colour and two patterns of each state
+    states : what the states are, for the legend
+    looks : colour and two patterns of each state, in the order of the legend
     motion : whether it shows a motion, whose lines are read at one x
+    heading : a sentence above the panels
+    scale : the quantity of the numbers that colour points
     most : most points of a drawn line, where there are more than can be distinguished
     note : a sentence, where there is nothing to draw
     """
@@ -96,15 +108,30 @@ class Figure:
     regimes: tuple[str, ...] = ()
     held: tuple[str, ...] = ()
     spans: Mapping[str, tuple[tuple[str, float, float], ...]] = field(default_factory=dict)
+    states: str = "States"
     looks: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
     motion: bool = False
+    heading: str = ""
+    scale: str = ""
     most: int = 6_000
     note: str = ""
+
+    @property
+    def apart(self) -> bool:
+        """Whether every panel has an x axis of its own."""
+        return any(panel.x for panel in self.panels)
 
     @property
     def rows(self) -> int:
         """Rows of panels."""
         return -(-len(self.panels) // self.columns)
+
+    @property
+    def shown_looks(self) -> dict[str, tuple[str, str, str]]:
+        """The states that occur with their looks, in the order of the legend."""
+        occurring = {state: None for spans in self.spans.values() for state, _, _ in spans}
+        known = [state for state in self.looks if state in occurring]
+        return {state: self.looks.get(state, OTHER_LOOK) for state in dict.fromkeys([*known, *occurring])}
 
     @property
     def listed(self) -> list[Line]:

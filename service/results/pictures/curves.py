@@ -1,4 +1,4 @@
-"""Pictures of figures and maps: SVG, PNG and PDF through matplotlib, the same bytes for the same numbers."""
+"""Pictures of figures: SVG, PNG and PDF through matplotlib, the same bytes for the same numbers."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ from contextlib import contextmanager
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
-import numpy as np
-
 from sprag.service.faults import ParameterFault
-from sprag.service.results.figures.curves import curves_figure, doubtful_marks, map_quantities
-from sprag.service.results.figures.figure import OTHER_LOOK, PALETTE, shortened
+from sprag.service.results.figures.curves import curves_figure
+from sprag.service.results.figures.figure import PALETTE, shortened
 from sprag.service.results.figures.motion import motion_figure
+from sprag.service.results.figures.portrait import portrait_figure
 from sprag.service.results.regimes import MARKS
 from sprag.service.results.selection import SelectionError
 from sprag.service.results.wording import words
@@ -25,10 +24,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sprag.service.results.curves import Curves, Map
+    from sprag.service.results.curves import Curves
     from sprag.service.results.figures.figure import Figure as Described
     from sprag.service.results.figures.figure import Line, Marks, Panel, Quantity
-    from sprag.worker.models import Presentation, Trajectory
+    from sprag.worker.models import Portrait, Presentation, Trajectory
 
 Picture = Literal["svg", "png", "pdf"]
 PICTURES: Final[tuple[Picture, ...]] = get_args(Picture)
@@ -46,13 +45,13 @@ _STYLES: Final[tuple[tuple[Literal["-", "--", ":", "-."], str], ...]] = (
     (":", "^"),
     ("-.", "D"),
 )
+#: Columns of the legend of a strip of states.
+_MOST_STATES: Final = 8
 #: Columns of the legend of several studies, and the characters that fit in each.
 _COLUMNS: Final = 2
 _MOST_LABEL: Final = 52
 #: Characters on a line of a title.
 _TITLE_WIDTH: Final = 100
-#: Most points of a map that are marked individually.
-_MARKED_POINTS: Final = 600
 _STYLE: Final[dict[Any, Any]] = {
     "svg.hashsalt": "sprag",
     "svg.fonttype": "path",
@@ -94,6 +93,11 @@ def draw_motion(made: Trajectory, shown: Presentation, title: str, picture: Pict
     return draw_figure(motion_figure(made, shown), title, picture)
 
 
+def draw_portrait(made: Portrait, shown: Presentation, title: str, picture: Picture) -> bytes:
+    """Orbit and strobes of one case, beside the strobes period by period."""
+    return draw_figure(portrait_figure(made, shown), title, picture)
+
+
 def require_drawable(drawn: Sequence[Curves]) -> None:
     """Raise SelectionError when there are more curves or points than one picture can show."""
     lines = [curve for curves in drawn for curve in curves.curves]
@@ -105,58 +109,30 @@ def require_drawable(drawn: Sequence[Curves]) -> None:
 def draw_figure(figure: Described, title: str, picture: Picture) -> bytes:
     """Any described figure as a picture."""
     legend = 0.24 * len(figure.listed) / _COLUMNS if figure.studies > 1 else 0.5 * len(figure.spans)
-    size = (8.0, 1.2 + (2.1 if figure.motion else 3.6) * figure.rows + legend)
+    size = (8.0 if figure.columns == 1 else 11.0, 1.2 + (2.1 if figure.motion else 3.6) * figure.rows + legend)
     return render(partial(paint_figure, drawn=figure, title=title), picture, size)
 
 
 def paint_figure(figure: Figure, drawn: Described, title: str) -> None:
     """Draw a described figure into an empty one; for use inside `painting`."""
-    heights = [3.0] * drawn.rows + ([0.45 * len(drawn.spans) + 0.3] if drawn.spans else [])
-    grid = figure.subplots(len(heights), drawn.columns, sharex=True, height_ratios=heights, squeeze=False)
+    strip = (0.45 if drawn.motion else 0.2) * len(drawn.spans)
+    heights = [3.0] * drawn.rows + ([strip + 0.3] if drawn.motion else [strip + 0.15]) * bool(drawn.spans)
+    together = not drawn.apart
+    grid = figure.subplots(len(heights), drawn.columns, sharex=together, height_ratios=heights, squeeze=False)
     plots: list[Axes] = list(grid.reshape(-1))
     for axes, panel in zip(plots, drawn.panels, strict=False):
-        _paint_panel(axes, panel, motion=drawn.motion)
-    if drawn.spans:
-        _paint_states(plots[-1], drawn)
-    for axes in plots[len(drawn.panels) + bool(drawn.spans) :]:
+        _paint_panel(figure, axes, panel, drawn)
+    for axes in plots[len(drawn.panels) : drawn.rows * drawn.columns]:
         axes.set_visible(False)
-    for axes in plots[-drawn.columns :]:
+    for axes in plots[drawn.rows * drawn.columns :]:
+        _paint_states(axes, drawn)
+    for axes in plots[-drawn.columns :] if together else ():
         axes.set_xlabel(quantity_label(drawn.x))
     if not drawn.motion:
         (_explain if drawn.studies == 1 else _explain_studies)(figure, plots, drawn)
-        _explain_regimes(figure, drawn.regimes, "lower" if drawn.studies == 1 else "upper")
-    head(figure, title, drawn.held if drawn.studies == 1 else ())
-
-
-def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
-    """A map as a picture: colours over two axes, cases without a result left blank; SelectionError when too large."""
-    check_size("points", drawn.values.size, MAX_PICTURE_POINTS)
-    drawn = drawn.run()
-    x, y, z = map_quantities(drawn)
-
-    def paint(figure: Figure) -> None:
-        axes = figure.subplots()
-        mesh = axes.pcolormesh(
-            _edges(drawn.x_values), _edges(drawn.y_values), np.ma.masked_invalid(drawn.values), cmap="viridis"
-        )
-        axes.grid(visible=False)
-        axes.set_facecolor("0.85")
-        if drawn.values.size <= _MARKED_POINTS:
-            points = np.meshgrid(drawn.x_values, drawn.y_values)
-            axes.plot(*(part.reshape(-1) for part in points), ".", color="0.3", markersize=2.5, clip_on=False)
-        for axis, values in ((axes.xaxis, drawn.x_values), (axes.yaxis, drawn.y_values)):
-            if len(values) == 1:
-                axis.set_ticks(values)
-        axes.set_xlabel(quantity_label(x))
-        axes.set_ylabel(quantity_label(y))
-        figure.colorbar(mesh, label=quantity_label(z))
-        doubtful = list(doubtful_marks(drawn))
-        _paint_marks(axes, doubtful, clipped=False)
-        _explain_regimes(figure, [marks.regime for marks in doubtful])
-        missing = int(np.isnan(drawn.values).sum())
-        head(figure, title, (*drawn.held, f"grey: {missing} cases without a result") if missing else drawn.held)
-
-    return render(paint, picture, (8.0, 6.0))
+        explain_regimes(figure, drawn.regimes, "lower" if drawn.studies == 1 else "upper")
+    held = drawn.held if drawn.studies == 1 else ()
+    head(figure, title, (drawn.heading, *held) if drawn.heading else held)
 
 
 def check_size(what: str, count: int, most: int) -> None:
@@ -200,25 +176,26 @@ def render(paint: Callable[[Figure], None], picture: Picture, size: tuple[float,
     return buffer.getvalue()
 
 
-def _paint_panel(axes: Axes, panel: Panel, *, motion: bool) -> None:
+def _paint_panel(figure: Figure, axes: Axes, panel: Panel, drawn: Described) -> None:
     from matplotlib.lines import Line2D
 
+    shaded = None
     for line in panel.lines:
-        style, marker = _STYLES[line.style % len(_STYLES)]
-        for stretch in line.stretches or (slice(None),):
-            axes.plot(
-                line.x[stretch],
-                line.y[stretch],
-                color=line.colour,
-                linestyle=style if line.joined else "none",
-                marker="" if line.cases is None else marker,
-                markersize=3.0 if line.joined else 4.5,
-                linewidth=1.1 if motion else 1.4,
-                label=line.name,
-            )
-    _paint_marks(axes, panel.marks)
+        if line.shades is not None and line.x.size:
+            marker = _STYLES[line.style % len(_STYLES)][1]
+            shaded = axes.scatter(line.x, line.y, c=line.shades, cmap="viridis", s=12.0, marker=marker, zorder=2.1)
+        elif line.shades is None:
+            _paint_line(axes, line, thin=drawn.motion or drawn.apart)
+    if shaded is not None:
+        figure.colorbar(shaded, ax=axes, label=drawn.scale)
+    paint_marks(axes, panel.marks)
     axes.set_ylabel(quantity_label(panel.y))
-    if motion and len(panel.lines) > 1:
+    if panel.x is not None:
+        axes.set_xlabel(quantity_label(panel.x))
+        named = [line for line in panel.lines if line.listed]
+        if len(named) > 1:
+            axes.legend([_handle(line) for line in named], [line.name for line in named], fontsize=8)
+    if drawn.motion and len(panel.lines) > 1:
         axes.legend(fontsize=8, loc="upper right", framealpha=0.8)
     if panel.styles:
         handles = [
@@ -237,7 +214,23 @@ def _paint_panel(axes: Axes, panel: Panel, *, motion: bool) -> None:
         )
 
 
-def _paint_marks(axes: Axes, every: Sequence[Marks], *, clipped: bool = True) -> None:
+def _paint_line(axes: Axes, line: Line, *, thin: bool) -> None:
+    style, marker = _STYLES[line.style % len(_STYLES)]
+    for stretch in line.stretches or (slice(None),):
+        axes.plot(
+            line.x[stretch],
+            line.y[stretch],
+            color=line.colour,
+            linestyle=style if line.joined else "none",
+            marker="" if line.joined and line.cases is None else marker,
+            markersize=9.0 if line.ring else 3.0 if line.joined or thin else 4.5,
+            markerfacecolor="none" if line.ring else None,
+            linewidth=1.1 if thin else 1.4,
+            label=line.name,
+        )
+
+
+def paint_marks(axes: Axes, every: Sequence[Marks], *, clipped: bool = True) -> None:
     for marks in every:
         look = MARKS[marks.regime]
         if marks.x.size:
@@ -251,17 +244,31 @@ def _paint_states(axes: Axes, drawn: Described) -> None:
     """A strip of states over time: a row for each part of the machine."""
     from matplotlib.patches import Patch
 
-    shown: dict[str, Patch] = {}
+    styles: dict[str, dict[str, Any]] = {
+        state: {"facecolor": colour, "hatch": hatch, "edgecolor": "#333333", "linewidth": 0.0}
+        for state, (colour, _, hatch) in drawn.shown_looks.items()
+    }
     for row, spans in enumerate(drawn.spans.values()):
         for state, begin, end in spans:
-            colour, _, hatch = drawn.looks.get(state, OTHER_LOOK)
-            style: dict[str, Any] = {"facecolor": colour, "hatch": hatch, "edgecolor": "#333333", "linewidth": 0.0}
-            axes.broken_barh([(begin, end - begin)], (row - 0.4, 0.8), **style)
-            shown.setdefault(state, Patch(label=words(state).lower(), **style))
+            axes.broken_barh([(begin, end - begin)], (row - 0.4, 0.8), **styles[state])
     axes.set_yticks(range(len(drawn.spans)), list(drawn.spans))
     axes.grid(visible=False)
+    # What regimes look like is told with their marks.
+    listed = [
+        Patch(label=words(state).lower(), **style) for state, style in styles.items() if state not in drawn.regimes
+    ]
+    if not listed:
+        return
     axes.legend(
-        handles=list(shown.values()), fontsize=7, ncols=len(shown), loc="upper center", bbox_to_anchor=(0.5, -0.6)
+        handles=listed,
+        title="" if drawn.motion else drawn.states,
+        fontsize=7,
+        title_fontsize=7,
+        ncols=min(len(listed), _MOST_STATES),
+        loc="upper center",
+        bbox_to_anchor=(0.5, 0.0),
+        # Below the numbers and the name of the axis, whatever the height of the strip.
+        borderaxespad=5.0,
     )
 
 
@@ -270,6 +277,7 @@ def _handle(line: Line) -> Artist:
     from matplotlib.lines import Line2D
 
     style, marker = _STYLES[line.style % len(_STYLES)]
+    marker = "" if line.joined and line.cases is None else marker
     return Line2D([], [], color=line.colour, linestyle=style, marker=marker, markersize=3.0)
 
 
@@ -321,7 +329,7 @@ def _explain_studies(figure: Figure, _plots: list[Axes], drawn: Described) -> No
     )  # fmt: skip
 
 
-def _explain_regimes(figure: Figure, regimes: Sequence[str], edge: Literal["upper", "lower"] = "lower") -> None:
+def explain_regimes(figure: Figure, regimes: Sequence[str], edge: Literal["upper", "lower"] = "lower") -> None:
     """Explain the marks of points at an edge of the picture; nothing where all motions are periodic."""
     from matplotlib.lines import Line2D
 
@@ -385,15 +393,3 @@ def writable(text: str, family: str | None = None) -> str:
 
     glyphs = get_font(findfont(FontProperties(family=family))).get_charmap()
     return "".join(c if c == "\n" or ord(c) in glyphs else "\N{WHITE SQUARE}" for c in text)
-
-
-def _edges(values: tuple[float, ...]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Borders of the cells around ascending values, one more than values.
-
-    The outer cells end at the outer values, so that nothing is drawn where nothing was computed.
-    """
-    middle = np.array(values)
-    if middle.size == 1:
-        half = abs(float(middle[0])) * 0.05 or 0.5
-        return np.array([middle[0] - half, middle[0] + half])
-    return np.concatenate([middle[:1], (middle[1:] + middle[:-1]) / 2.0, middle[-1:]])

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.results.curves import Curves, Fetch, draw, select
+from sprag.service.results.curve_cases import draw, select
+from sprag.service.results.curves import Curves, Fetch
 from sprag.service.results.defaults import main_query
 from sprag.service.results.exports.inputs import Input, inputs, run_inputs
 from sprag.service.results.exports.source import given_texts

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.results.curves import select
+from sprag.service.results.curve_cases import select
 from sprag.service.results.defaults import caption, drawn_numbers, main_query, query_pairs
 from sprag.service.spec.document import parse_spec
 from sprag.worker import models

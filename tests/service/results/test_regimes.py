@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from sprag.service.http.web.figures.plotly import map_figure, plotly_figure
-from sprag.service.results.curves import CurveQuery, Curves, draw, draw_map, select
+from sprag.service.results.curve_cases import draw, draw_map, select
+from sprag.service.results.curves import CurveQuery, Curves
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.pictures.curves import draw_compare, draw_curves
-from sprag.service.results.pictures.curves import draw_map as paint_map
+from sprag.service.results.pictures.maps import draw_map as paint_map
 from sprag.service.results.regimes import MARKS, counted, regimes_of, stretches
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.records import CaseColumns
@@ -19,6 +20,8 @@ from sprag.worker import models
 from sprag.worker.study import Study
 from tests.service.spec_sample import changed
 
+#: Periods after which the motion repeats, for each of `REGIMES`.
+ORDERS = [1.0, 2.0, 1.0, np.nan, 4.0, np.nan, np.nan, np.nan]
 REGIMES = ["coasting", "periodic", "periodic", "irregular", "periodic", "unsettled", "unsettled", None]
 
 
@@ -54,7 +57,10 @@ def fetched(cases: np.ndarray[tuple[int], np.dtype[np.int64]], names: list[str])
     places = [REGIMES[case % 8] for case in cases.tolist()]
     codes = [np.nan if name is None else list(models.REGIME_SENTENCES).index(name) for name in places]
     columns = {name: np.array(codes) if name == "regime" else cases.astype(float) for name in names}
-    columns["shaft.speed.mean"][[name is None for name in places]] = np.nan
+    if "regime.order" in columns:
+        columns["regime.order"] = np.array([ORDERS[case % 8] for case in cases.tolist()])
+    for column in columns.values():
+        column[[name is None for name in places]] = np.nan
     return CaseColumns(cases, ["ok" if name else "chatter" for name in places], columns)
 
 
@@ -65,21 +71,23 @@ def drawn() -> Curves:
 
 def test_a_figure_breaks_lines_and_marks_regimes() -> None:
     figure = plotly_figure(curves_figure([("", drawn())]))
-    line, *marks = figure["data"]
+    line, *marks = [trace for trace in figure["data"] if trace["type"] == "scatter"]
     assert line["customdata"] == [0, 1, 2, None, 3, None, 4, None, 5, None, 6]
     assert line["connectgaps"] is False
     assert {trace["name"]: trace["customdata"] for trace in marks} == {
         "periodic": [None], "coasting": [0], "irregular": [3], "unsettled": [5, 6],
     }  # fmt: skip
     assert figure["layout"]["showlegend"]
-    transient = replace(drawn(), curves=tuple(replace(curve, regimes=None) for curve in drawn().curves))
+    plain = (replace(curve, regimes=None, orders=None) for curve in drawn().curves)
+    transient = replace(drawn(), curves=tuple(plain))
     (line,) = plotly_figure(curves_figure([("", transient)]))["data"]
     assert line["customdata"] == list(range(8))
 
 
 def test_a_picture_names_the_regimes_that_occur() -> None:
     with_marks = draw_curves(drawn(), "", "svg")
-    periodic = replace(drawn(), curves=tuple(replace(curve, regimes=["periodic"] * 8) for curve in drawn().curves))
+    plain = (replace(curve, regimes=["periodic"] * 8, orders=[1] * 8) for curve in drawn().curves)
+    periodic = replace(drawn(), curves=tuple(plain))
     assert with_marks.count(MARKS["unsettled"].colour.encode()) > 0
     assert MARKS["unsettled"].colour.encode() not in draw_curves(periodic, "", "svg")
 
@@ -102,4 +110,5 @@ def test_a_map_marks_what_is_not_periodic(name: str) -> None:
     marks = {trace["name"]: trace["customdata"] for trace in map_figure(found, contour=False)["data"][1:]}
     assert marks[name] == [case for case in range(16) if REGIMES[case % 8] == name]
     assert found.to_json()["regime"][1] == REGIMES
+    assert found.to_json()["order"][1] == [None if np.isnan(order) else int(order) for order in ORDERS]
     assert MARKS[name].colour.encode() in paint_map(found, "", "svg")

@@ -37,6 +37,7 @@ def rows_of(study: Study) -> ChunkResult:
     column = [info.name for info in models.study_results(study)].index("regime")
     rows.values[:] = np.abs(np.random.default_rng(3).normal(size=rows.values.shape))
     rows.values[:, column] = [0 if name is None else Regime[name.upper()] for name in REGIMES]
+    rows.values[:, column + 1] = [1 if name == "periodic" else np.nan for name in REGIMES]
     rows.values[2] = np.nan
     endings = ["ok" if name else "chatter" for name in REGIMES]
     flags = [name if name in {"irregular", "unsettled"} else "" for name in map(str, REGIMES)]
@@ -106,11 +107,35 @@ def test_curves_have_the_regime_of_every_point(service: Service, study_id: str) 
     curves = f"/studies/{study_id}/curves"
     (curve,) = service.get(curves, x="shaft.load", y="shaft.speed.mean")["curves"]
     assert curve["regime"] == REGIMES
+    orders = [service.get(f"/studies/{study_id}/cases/{case}")["results"]["regime.order"] for case in curve["cases"]]
+    assert curve["order"] == orders
     text = service.http.get(API + curves, params={"x": "shaft.load", "y": "shaft.speed.mean", "format": "csv"}).text
-    assert [row["regime"] or None for row in csv.DictReader(io.StringIO(text))] == REGIMES
+    rows = list(csv.DictReader(io.StringIO(text)))
+    assert [row["regime"] or None for row in rows] == REGIMES
+    assert [row["regime.order"] for row in rows] == ["" if order is None else str(order) for order in orders]
     response = service.http.get(API + curves, params={"x": "shaft.load", "y": "regime"})
     assert response.status_code == 422
     assert "category" in response.text
+
+
+def test_maps_have_the_order_of_every_point(service: Service) -> None:
+    axes = [{"path": "excitation.frequency", "values": [20, 25]}, {"path": "shaft.load", "values": [0.2, 0.7]}]
+    two = service.submit(changed({"/run": {"until": "settled"}, "/axes": axes}))
+    query = {"x": "shaft.load", "y": "excitation.frequency", "z": "shaft.speed.mean"}
+    found = service.get(f"/studies/{two}/map", **query)
+    assert found["order"] == found["regime"] == [[None, None], [None, None]]
+    text = service.http.get(f"{API}/studies/{two}/map", params={**query, "format": "csv"}).text
+    rows = list(csv.DictReader(io.StringIO(text)))
+    head = ["excitation.frequency", "shaft.load", "case", "shaft.speed.mean", "regime", "regime.order", "ending"]
+    assert list(rows[0]) == head
+    assert [(row["excitation.frequency"], row["shaft.load"], row["case"], row["ending"]) for row in rows] == [
+        ("20.0", "0.2", "0", "pending"), ("20.0", "0.7", "1", "pending"),
+        ("25.0", "0.2", "2", "pending"), ("25.0", "0.7", "3", "pending"),
+    ]  # fmt: skip
+    address = f"/studies/{two}/map?x=shaft.load&amp;y=excitation.frequency&amp;z=regime.order"
+    for page in (f"/studies/{two}", f"/studies/{two}/curves"):
+        assert (address in service.http.get(page).text) == page.endswith("curves")  # nothing has settled yet
+    assert "format=csv" in service.http.get(address.replace("&amp;", "&")).text
 
 
 def test_transient_studies_have_no_regime(service: Service) -> None:

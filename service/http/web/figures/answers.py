@@ -9,6 +9,7 @@ from sprag.service.jobs.answers import curves_of, map_of
 from sprag.service.json_text import to_bytes
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.motion import motion_figure, phase_figure
+from sprag.service.results.figures.portrait import portrait_figure
 from sprag.service.results.wording import number
 from sprag.worker import models
 
@@ -40,6 +41,12 @@ def motion_figures(study: Study, case: int, start: float, end: float) -> dict[st
         return {"motion": told, **({"phase": told} if shown.portrait else {})}
     figures = {"motion": motion_figure(made, shown), **({"phase": phase_figure(made, shown)} if shown.portrait else {})}
     return {name: plotly_figure(figure) for name, figure in figures.items()}
+
+
+def strobes_figure(study: Study, case: int, columns: int) -> Data:
+    """The strobes and the orbit of a case that is run again for them. For the computing process."""
+    made = models.run_portrait(study, case)
+    return plotly_figure(portrait_figure(made, models.presentation_of(study), columns))
 
 
 def _no_motion(study: Study, case: int, ending: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -10,11 +11,14 @@ import numpy as np
 from sprag.service.http.web.figures.thinning import thin
 from sprag.service.json_text import numbers
 from sprag.service.results.figures.curves import doubtful_marks, map_quantities
-from sprag.service.results.figures.figure import OTHER_LOOK, PALETTE, shortened
+from sprag.service.results.figures.figure import PALETTE, shortened
+from sprag.service.results.figures.orders import TITLE, OrderMap, order_map
 from sprag.service.results.regimes import MARKS
 from sprag.service.results.wording import unit_text, words
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from sprag.service.results.curves import Map
@@ -29,13 +33,27 @@ _DASHES: Final = ("solid", "dash", "dot", "dashdot")
 _MARKED: Final = 60
 #: Characters of the name of a study in a legend.
 _MOST_LABEL: Final = 60
-#: Pixels of a panel, alone and among others, of what lies between two rows of panels, and of a row of states.
+#: Characters on a line of a heading above one column of panels.
+_NARROW_HEADING: Final = 44
+#: Pixels of a panel, alone and among others, of what lies between two rows of panels, of a row of states, and of one
+#: of orders.
 _ALONE: Final = 360
 _PANEL_HEIGHT: Final = 230
 _ROW_GAP: Final = 45
+#: Pixels between rows of panels each of which has its own x axis.
+_OWN_AXIS_GAP: Final = 85
 _STATES_HEIGHT: Final = 45
+_ORDERS_HEIGHT: Final = 26
+#: Name and place of the legend that tells of motions: below the panels, over the whole width.
+_MOTIONS: Final = "legend2"
+_BELOW: Final[Data] = {
+    "orientation": "h", "x": 0, "xanchor": "left", "y": 0, "yref": "container", "yanchor": "bottom", "tracegroupgap": 0,
+}  # fmt: skip
 #: Share of the width between two panels side by side.
 _GAP: Final = 0.1
+#: Shares for a scale, and between it and its panel.
+_SCALE: Final = 0.09
+_BAR_GAP: Final = 0.005
 
 
 def plotly_figure(figure: Figure) -> Data:
@@ -43,42 +61,76 @@ def plotly_figure(figure: Figure) -> Data:
     if figure.note:
         return {"data": [], "layout": {}, "note": figure.note}
     rows = figure.rows
-    panels = _ALONE if rows == 1 and not figure.motion else rows * _PANEL_HEIGHT + (rows - 1) * _ROW_GAP
-    strip = len(figure.spans) * _STATES_HEIGHT
+    gap = _OWN_AXIS_GAP if figure.apart else _ROW_GAP
+    height = _ALONE if figure.apart or (rows == 1 and not figure.motion) else _PANEL_HEIGHT
+    panels = rows * height + (rows - 1) * gap
+    strip = len(figure.spans) * (_STATES_HEIGHT if figure.motion else _ORDERS_HEIGHT)
     inner = panels + (strip + _ROW_GAP if strip else 0)
-    marked = any(panel.marks for panel in figure.panels)
-    named = len(figure.listed) > 1 or marked or bool(strip)
+    named = len(figure.listed) > 1 or figure.motion
     beside = len(figure.listed) > len(PALETTE) or any(line.heading for line in figure.listed)
-    margin = {"t": 60 if named and not beside else 20, "r": 20, "b": 60, "l": 70}
+    margin = {"t": 60 if (named and not beside) or figure.heading else 20, "r": 20, "b": 60, "l": 70}
     layout: Data = {
         "height": inner + margin["t"] + margin["b"],
         "margin": margin,
         "hovermode": "x" if figure.motion else "closest",
-        "showlegend": named,
+        "showlegend": named or bool(figure.regimes or strip),
         "legend": _legend(figure, beside=beside),
+        _MOTIONS: {**_BELOW, "title": {"text": _motion_title(figure), "side": "top"}},
         "uirevision": "keep",
     }
+    if figure.heading:
+        # A narrow picture has one column, and no room for a long line.
+        lines = wrap(figure.heading, _NARROW_HEADING) if figure.columns == 1 else [figure.heading]
+        layout["title"] = {"text": "<br>".join(map(_escaped, lines)), "font": {"size": 14}, "x": 0, "xref": "paper"}
     traces: list[Data] = []
-    first = 1 if strip else 0  # the strip has the first pair of axes, and its x axis is that of all panels
+    first = figure.columns if strip else 0  # strips have the first axes, and their x axes are those of the panels above
     for index, panel in enumerate(figure.panels):
-        suffix = "" if index + first == 0 else str(index + first + 1)
-        low, high = _domain(index // figure.columns, rows, panels, inner)
-        x_axis = "" if strip else suffix
+        suffix = _suffix(index + first)
+        top = inner - index // figure.columns * (height + gap)
+        low, high = max((top - height) / inner, 0.0), top / inner
+        x_axis = _suffix(index % figure.columns) if strip else suffix
         axes = {"xaxis": f"x{x_axis}", "yaxis": f"y{suffix}"}
         layout[f"yaxis{suffix}"] = _y_axis(panel, figure, (low, high), axes["xaxis"])
         if not strip:
             layout[f"xaxis{suffix}"] = _x_axis(figure, index, axes["yaxis"])
         headings: set[str] = set()
         for line in panel.lines:
-            traces.append(_line_trace(line, panel, figure, headings) | axes)
-        traces += [_marks_trace(marks, panel.y, index, place) | axes for place, marks in enumerate(panel.marks)]
-    if strip:
-        traces += _states(figure)
-        layout |= {"barmode": "overlay", "bargap": 0.25, "xaxis": _x_axis(figure, len(figure.panels), "y")}
-        layout["yaxis"] = {"domain": [0.0, strip / inner], "fixedrange": True, "zeroline": False, "showgrid": False}
+            trace = _line_trace(line, panel, figure, headings) | axes
+            if line.shades is not None:
+                right = _across(figure, index)[1] + _BAR_GAP
+                trace["marker"]["colorbar"] |= {"x": right, "y": (low + high) / 2.0, "len": high - low}
+            traces.append(trace | {"showlegend": line.listed and named})
+        traces += [_marks_trace(marks, panel.y, listed=index == 0) | axes for marks in panel.marks]
+    for column in range(first):
+        suffix = _suffix(column)
+        axes = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
+        traces += [trace | axes for trace in _states(figure, listed=column == 0)]
+        layout[f"xaxis{suffix}"] = _x_axis(figure, rows * figure.columns + column, axes["yaxis"])
+        layout[f"yaxis{suffix}"] = {
+            "domain": [0.0, strip / inner],
+            "anchor": axes["xaxis"],
+            "type": "category",
+            "ticks": "",
+            "fixedrange": True,
+            "zeroline": False,
+            "showgrid": False,
+        }
+        layout |= {"barmode": "overlay", "bargap": 0.25}
     over_time = figure.motion and figure.x.unit == "s"
     cases = any(line.cases is not None for panel in figure.panels for line in panel.lines)
     return {"data": traces, "layout": layout, **({"zoom": True} if over_time else {"cases": True} if cases else {})}
+
+
+def _motion_title(figure: Figure) -> str:
+    """What the legend of marks and strips is about."""
+    if not figure.regimes:
+        return figure.states
+    return f"Regime; {figure.states.lower()}" if figure.spans else "Regime"
+
+
+def _suffix(number: int) -> str:
+    """What the names of the axes of that number end in."""
+    return "" if number == 0 else str(number + 1)
 
 
 def axis_title(quantity: Quantity) -> str:
@@ -92,26 +144,30 @@ def _escaped(text: str) -> str:
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
-def _domain(row: int, rows: int, panels: int, inner: int) -> tuple[float, float]:
-    """Lower and upper end of a row of panels; the height of a panel does not depend on their number."""
-    height = (panels - (rows - 1) * _ROW_GAP) / rows
-    top = inner - row * (height + _ROW_GAP)
-    return max((top - height) / inner, 0.0), top / inner
-
-
 def _y_axis(panel: Panel, figure: Figure, domain: tuple[float, float], anchor: str) -> Data:
     axis: Data = {"domain": list(domain), "anchor": anchor, "title": {"text": axis_title(panel.y)}}
-    return axis | ({"zeroline": True} if figure.motion else {"zeroline": False, "rangemode": "tozero"})
+    return axis | ({"zeroline": True} if figure.motion or figure.apart else {"zeroline": False, "rangemode": "tozero"})
 
 
 def _x_axis(figure: Figure, index: int, anchor: str) -> Data:
-    """The x axis of a panel, or of all of them; all x axes zoom together."""
-    width = (1.0 - _GAP * (figure.columns - 1)) / figure.columns
-    left = (index % figure.columns) * (width + _GAP)
+    """The x axis of a panel, or of all of them; all x axes zoom together, unless they are of different quantities."""
+    across = _across(figure, index)
     title = axis_title(figure.x) if index + figure.columns >= len(figure.panels) else ""
-    axis: Data = {"domain": [left, left + width], "anchor": anchor, "zeroline": False, "title": {"text": title}}
+    if figure.apart:
+        own = figure.panels[index].x or figure.x
+        return {"domain": across, "anchor": anchor, "zeroline": False, "title": {"text": axis_title(own)}}
+    axis: Data = {"domain": across, "anchor": anchor, "zeroline": False, "title": {"text": title}}
     axis |= {"dtick": 60} if figure.x.unit == "°" else {}
     return axis | ({"matches": "x"} if anchor != "y" else {})
+
+
+def _across(figure: Figure, index: int) -> list[float]:
+    """Left and right end of a panel; beside panels with a scale there is room for it."""
+    scaled = any(line.shades is not None for panel in figure.panels for line in panel.lines)
+    gap, edge = (_GAP + _SCALE, 0.0 if figure.columns > 1 else _SCALE) if scaled else (_GAP, 0.0)
+    width = (1.0 - edge - gap * (figure.columns - 1)) / figure.columns
+    left = (index % figure.columns) * (width + gap)
+    return [left, left + width]
 
 
 def _legend(figure: Figure, *, beside: bool) -> Data:
@@ -134,7 +190,7 @@ def _line_trace(line: Line, panel: Panel, figure: Figure, headings: set[str]) ->
     heading, name = (_escaped(shortened(text, _MOST_LABEL)) for text in (line.heading, line.name))
     title = "" if heading in headings else heading
     headings.add(heading)
-    marked = line.cases is not None and (kept.size <= _MARKED or not line.joined)
+    marked = not line.joined or (line.cases is not None and kept.size <= _MARKED)
     trace: Data = {
         "type": "scatter",
         "mode": "+".join(["lines"] * line.joined + ["markers"] * marked),
@@ -148,13 +204,29 @@ def _line_trace(line: Line, panel: Panel, figure: Figure, headings: set[str]) ->
         "line": {"color": line.colour, "width": 1.8, "dash": _DASHES[line.style % len(_DASHES)]},
     }
     if line.cases is None:
-        return trace
+        return trace if line.joined else trace | _points(line, kept, panel, figure.scale)
     told = ", ".join(text for text in (heading, name) if text) or _escaped(words(panel.y.name))
     return trace | {
         "customdata": [None if place is None else int(line.cases[place]) for place in places],
         "marker": {"color": line.colour, "symbol": SYMBOLS[int(line.key) % len(SYMBOLS)], "size": 6},
         "hovertemplate": _hover(panel.y, told),
     }
+
+
+def _points(line: Line, kept: NDArray[np.int64], panel: Panel, scale: str) -> Data:
+    """Points that are no cases: open ones, or in the colours of numbers, with the scale of these."""
+    x = unit_text(panel.x.unit if panel.x else "")
+    where = f"%{{x:.5g}} {x}, %{{y:.6g}} {unit_text(panel.y.unit)}<extra>{_escaped(line.name)}</extra>"
+    symbol = SYMBOLS[line.style % len(SYMBOLS)]
+    if line.ring:
+        marker: Data = {"symbol": f"{symbol}-open", "size": 12, "color": line.colour, "line": {"width": 2}}
+        return {"marker": marker, "hovertemplate": where}
+    if line.shades is None:
+        return {"marker": {"symbol": symbol, "size": 5, "color": line.colour}, "hovertemplate": where}
+    numbers = line.shades[kept].tolist()
+    marker = {"symbol": symbol, "size": 6, "color": numbers, "colorscale": "Viridis", "showscale": line.style == 0}
+    marker["colorbar"] = {"title": {"text": words(scale), "side": "right"}, "thickness": 12}
+    return {"customdata": numbers, "marker": marker, "hovertemplate": f"{scale} %{{customdata}}: {where}"}
 
 
 def _hover(y: Quantity, told: str) -> str:
@@ -172,15 +244,15 @@ def _with_gaps(kept: NDArray[np.int64], stretches: tuple[NDArray[np.int64], ...]
     return drawn
 
 
-def _marks_trace(marks: Marks, y: Quantity, panel: int, place: int) -> Data:
+def _marks_trace(marks: Marks, y: Quantity, *, listed: bool) -> Data:
     """The points of a regime; a regime without points appears in the legend only."""
     return {
         "type": "scatter",
         "mode": "markers",
         "name": marks.regime,
+        "legend": _MOTIONS,
         "legendgroup": f"regime {marks.regime}",
-        "legendgrouptitle": {"text": "" if place else "Regime"},
-        "showlegend": panel == 0,
+        "showlegend": listed,
         "x": marks.x.tolist() or [None],
         "y": numbers(marks.y) or [None],
         "customdata": marks.cases.tolist() or [None],
@@ -189,15 +261,14 @@ def _marks_trace(marks: Marks, y: Quantity, panel: int, place: int) -> Data:
     }
 
 
-def _states(figure: Figure) -> Iterator[Data]:
-    """States over time: a row for each part of the machine, a colour and a pattern for each state."""
+def _states(figure: Figure, *, listed: bool) -> Iterator[Data]:
+    """States along x: a row for each part of the machine or curve, a colour and a pattern for each state."""
     bars: dict[str, list[tuple[float, float, str]]] = {}
     for row, spans in figure.spans.items():
         for state, begin, end in spans:
             bars.setdefault(state, []).append((begin, end - begin, row))
-    for state, found in bars.items():
-        colour, pattern, _ = figure.looks.get(state, OTHER_LOOK)
-        begins, widths, rows = map(list, zip(*found, strict=True))
+    for place, (state, (colour, pattern, _)) in enumerate(figure.shown_looks.items()):
+        begins, widths, rows = map(list, zip(*bars[state], strict=True))
         yield {
             "type": "bar",
             "orientation": "h",
@@ -205,8 +276,8 @@ def _states(figure: Figure) -> Iterator[Data]:
             "x": widths,
             "y": rows,
             "name": words(state).lower(),
-            "legendgroup": "states",
-            "legendgrouptitle": {"text": "States"},
+            **_state_group(figure, state, first=place == 0),
+            "showlegend": listed and state not in figure.regimes,
             "marker": {
                 "color": colour,
                 "pattern": {"shape": pattern, "fgcolor": "#333333", "bgcolor": colour, "size": 6},
@@ -216,10 +287,23 @@ def _states(figure: Figure) -> Iterator[Data]:
         }
 
 
+def _state_group(figure: Figure, state: str, *, first: bool) -> Data:
+    """Which legend a state is in: beside a motion one block, otherwise the legend of motions."""
+    if figure.motion:
+        return {"legendgroup": "states", "legendgrouptitle": {"text": figure.states if first else ""}}
+    return {"legend": _MOTIONS, "legendgroup": f"state {state}"}
+
+
 def map_figure(drawn: Map, contour: bool) -> Data:
     """A map as a figure: colours, or lines of equal value with their numbers; gaps where there is no result."""
     drawn = drawn.run()
     x, y, z = map_quantities(drawn)
+    orders = order_map(drawn)
+    contour = contour and orders is None
+    where = (
+        f"{_escaped(words(drawn.x))} %{{x:.5g}} {unit_text(x.unit)}<br>"
+        f"{_escaped(words(drawn.y))} %{{y:.5g}} {unit_text(y.unit)}"
+    )
     trace: Data = {
         "type": "contour" if contour else "heatmap",
         "x": list(drawn.x_values),
@@ -229,24 +313,53 @@ def map_figure(drawn: Map, contour: bool) -> Data:
         "colorscale": "Viridis",
         "colorbar": {"title": {"text": axis_title(z), "side": "right"}},
         "hoverongaps": False,
-        "hovertemplate": (
-            f"{_escaped(words(drawn.x))} %{{x:.5g}} {unit_text(x.unit)}<br>"
-            f"{_escaped(words(drawn.y))} %{{y:.5g}} {unit_text(y.unit)}<br>"
-            f"%{{z:.5g}} {unit_text(z.unit)}<br>case %{{customdata}}<extra></extra>"
-        ),
+        "hovertemplate": f"{where}<br>%{{z:.5g}} {unit_text(z.unit)}<br>case %{{customdata}}<extra></extra>",
     }
     if contour:
         trace |= {"contours": {"showlabels": True}, "line": {"width": 1}, "connectgaps": False}
-    doubtful = [_marks_trace(marks, y, 0, 1) for marks in doubtful_marks(drawn)]
+    if orders is not None:
+        trace |= _orders(orders) | {"hovertemplate": f"{where}<br>%{{text}}<br>case %{{customdata}}<extra></extra>"}
+    blocks = [] if orders is None else list(_blocks(orders))
+    doubtful = [_marks_trace(marks, y, listed=True) | {"cliponaxis": False} for marks in doubtful_marks(drawn)]
     return {
-        "data": [trace, *doubtful],
+        "data": [trace, *doubtful, *blocks],
         "layout": {
             "height": 520,
-            "margin": {"t": 40 if doubtful else 20, "r": 20, "b": 60, "l": 70},
-            "showlegend": bool(doubtful),
-            "legend": {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom"},
-            "xaxis": {"title": {"text": axis_title(x)}},
-            "yaxis": {"title": {"text": axis_title(y)}},
+            "margin": {"t": 20, "r": 20, "b": 60, "l": 70},
+            "showlegend": bool(doubtful or blocks),
+            _MOTIONS: {**_BELOW, "title": {"text": TITLE if blocks else "Regime", "side": "top"}},
+            # A field ends where nothing further was computed.
+            "xaxis": {"title": {"text": axis_title(x)}, **_whole(drawn.x_values)},
+            "yaxis": {"title": {"text": axis_title(y)}, **_whole(drawn.y_values)},
         },
         "cases": True,
     }
+
+
+def _orders(orders: OrderMap) -> Data:
+    """Blocks of colour in the place of a scale."""
+    count = max(len(orders.looks), 1)
+    edges = [place / count for place in range(count + 1)]
+    scale = [[edge, colour] for place, colour in enumerate(orders.colours) for edge in edges[place : place + 2]]
+    return {
+        "z": [numbers(row) for row in orders.places],
+        "text": [[name or "" for name in row] for row in orders.names],
+        "colorscale": scale or "Viridis",
+        "zmin": -0.5,
+        "zmax": count - 0.5,
+        "showscale": False,
+    }
+
+
+def _blocks(orders: OrderMap) -> Iterator[Data]:
+    """The entries of the legend of such a map."""
+    for name, (colour, _, _) in orders.looks.items():
+        yield {
+            "type": "scatter", "mode": "markers", "name": name, "legend": _MOTIONS, "x": [None], "y": [None],
+            "showlegend": True, "marker": {"color": colour, "symbol": "square", "size": 11}, "hoverinfo": "skip",
+        }  # fmt: skip
+
+
+def _whole(values: Sequence[float]) -> Data:
+    """An axis that shows all of the values, and no more."""
+    return {"range": [values[0], values[-1]]} if len(values) > 1 else {}

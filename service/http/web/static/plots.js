@@ -13,18 +13,38 @@ sprag.figures = new Map();
 sprag.colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 // Widths of a picture (px) below which its panels stand one under the other, and its legend under them.
-const NARROW = 600, ENTRY = 110, LINE = 20;
+const NARROW = 600, ENTRIES = { legend: 110, legend2: 130 }, LINE = 20, SCALE = 80;
 
-// What a narrow picture has in the place of the server's layout: beside the panels a legend would leave no room for them.
-sprag.fitted = (figure, width) => {
-  const layout = figure.layout, shown = figure.data.filter((trace) => trace.showlegend !== false).length;
-  if (width >= NARROW || !layout.showlegend) return layout;
-  const rows = Math.ceil(shown / Math.max(Math.floor(width / ENTRY), 1)) + 1;
-  const bottom = 70 + rows * LINE, margin = { ...layout.margin, t: 20, l: 60, b: bottom };
-  const height = layout.height - layout.margin.t - layout.margin.b + margin.t + bottom;
-  const legend = { ...layout.legend, orientation: "h", x: 0, xanchor: "left", y: 0, yref: "container", yanchor: "bottom" };
-  return { ...layout, height, margin, legend };
+const hasScale = (figure) => figure.data.some((trace) => trace.colorbar && trace.showscale !== false);
+
+// Pixels that a legend takes over the whole width.
+const legendHeight = (figure, name, width) => {
+  const shown = figure.data.filter((trace) => trace.showlegend !== false && (trace.legend || "legend") === name).length;
+  return shown && (Math.ceil(shown / Math.max(Math.floor(width / ENTRIES[name]), 1)) + 1) * LINE;
 };
+
+// Room for the legends below the panels. In a narrow picture all are there: beside the panels they would leave no room for them.
+sprag.fitted = (figure, width) => {
+  const layout = figure.layout;
+  if (!layout.showlegend && !hasScale(figure)) return layout;
+  const narrow = width < NARROW, second = legendHeight(figure, "legend2", width), first = narrow ? legendHeight(figure, "legend", width) : 0;
+  const { t, b } = layout.margin, scale = narrow && hasScale(figure) ? SCALE : 0;
+  const bottom = b + scale + (first + second ? first + second + 10 : 0);
+  const margin = { ...layout.margin, b: bottom, ...(narrow ? { t: layout.title ? 60 : 20, l: 60 } : {}) };
+  const height = layout.height - t - b + margin.t + bottom;
+  if (!narrow) return { ...layout, height, margin };
+  const below = { orientation: "h", x: 0, xref: "container", xanchor: "left", yref: "container", yanchor: "bottom" };
+  const title = { ...layout.legend?.title, font: { size: 11 } };
+  const legends = { legend: { ...layout.legend, ...below, title, y: second / height }, legend2: { ...layout.legend2, ...below, y: 0 } };
+  return { ...layout, height, margin, ...legends };
+};
+
+// The scale of a map stands below a narrow one, above its legend.
+sprag.traces = (figure, width, layout) => width >= NARROW ? figure.data : figure.data.map((trace) => {
+  if (!trace.colorbar) return trace;
+  const y = legendHeight(figure, "legend2", width) / layout.height, title = { ...trace.colorbar.title, side: "bottom" };
+  return { ...trace, colorbar: { ...trace.colorbar, title, orientation: "h", x: 0.5, y, yref: "container", yanchor: "bottom" } };
+});
 
 sprag.themed = (figure, width) => {
   const layout = sprag.fitted(figure, width);
@@ -33,7 +53,7 @@ sprag.themed = (figure, width) => {
     ...layout, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: getComputedStyle(document.body).fontFamily, size: 13, color: ink }, dragmode: layout.dragmode || "zoom",
     hoverlabel: { bgcolor: sprag.colour("--tint"), bordercolor: line, font: { color: ink } },
-    legend: { bgcolor: "rgba(0,0,0,0)", ...layout.legend },
+    legend: { bgcolor: "rgba(0,0,0,0)", ...layout.legend }, legend2: { bgcolor: "rgba(0,0,0,0)", ...layout.legend2 },
   };
   for (const [key, axis] of Object.entries(layout)) {
     if (/^[xy]axis\d*$/.test(key)) {
@@ -66,7 +86,8 @@ sprag.show = async (element, figure) => {
   const first = !sprag.figures.has(element);
   if (first) element.replaceChildren();
   sprag.figures.set(element, figure);
-  await Plotly.react(element, figure.data, sprag.themed(figure, element.clientWidth), sprag.config);
+  const width = element.clientWidth, layout = sprag.themed(figure, width);
+  await Plotly.react(element, sprag.traces(figure, width, layout), layout, sprag.config);
   element.dataset.drawn = String(Number(element.dataset.drawn || 0) + 1);
   if (first && figure.cases && element.dataset.study) {
     element.on("plotly_click", (event) => {
@@ -97,8 +118,8 @@ sprag.drawAll = (root) => Promise.all([...root.querySelectorAll("[data-figure]")
 const PAPER = 690;
 const redraw = (width) => {
   for (const [element, figure] of sprag.figures) {
-    const layout = sprag.themed(figure, width || element.clientWidth);
-    Plotly.react(element, figure.data, width ? { ...layout, width } : layout, sprag.config);
+    const shown = width || element.clientWidth, layout = sprag.themed(figure, shown);
+    Plotly.react(element, sprag.traces(figure, shown, layout), width ? { ...layout, width } : layout, sprag.config);
   }
 };
 window.addEventListener("beforeprint", () => redraw(PAPER));

@@ -9,7 +9,8 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from sprag.service.http.web.figures.plotly import plotly_figure
-from sprag.service.results.curves import CurveQuery, draw, select
+from sprag.service.results.curve_cases import draw, select
+from sprag.service.results.curves import CurveQuery
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.figure import PALETTE
 from sprag.service.results.figures.motion import motion_figure, phase_figure

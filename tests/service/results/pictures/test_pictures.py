@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from sprag.service.results.curves import CurveQuery, draw, draw_map, select
+from sprag.service.results.curve_cases import draw, draw_map, select
+from sprag.service.results.curves import CurveQuery
 from sprag.service.results.pictures import curves as pictures
+from sprag.service.results.pictures import maps
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.records import CaseColumns
 from sprag.worker import models
@@ -33,7 +35,8 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
         drawn[-1].draw_without_rendering()
         return b""
 
-    monkeypatch.setattr(pictures, "render", render)
+    for module in (pictures, maps):
+        monkeypatch.setattr(module, "render", render)
     return drawn
 
 
@@ -114,7 +117,7 @@ def test_a_map_ends_where_its_values_end(spec: dict[str, Any], figures: list[Fig
     infos = models.study_results(study)
     for y in ("excitation.frequency", "excitation.amplitude_x"):
         held = at if y == "excitation.frequency" else (("excitation.frequency", "20 Hz"),)
-        pictures.draw_map(draw_map(study, infos, "shaft.load", y, SPEED, held, fetch), "A study", "png")
+        maps.draw_map(draw_map(study, infos, "shaft.load", y, SPEED, held, fetch), "A study", "png")
     axes, bar = figures[0].axes
     assert axes.collections[0].get_datalim(axes.transData).extents.tolist() == [0.0, 20.0, 1.6, 35.0]
     assert figures[0].get_suptitle() == "A study\nexcitation.amplitude_x = excitation.amplitude_y = 0.002 m"
@@ -129,6 +132,6 @@ def test_cases_without_a_result_are_grey(spec: dict[str, Any], figures: list[Fig
     spec["axes"] = [{"path": "shaft.load", "values": [0, 1]}, {"path": "excitation.frequency", "values": [25]}]
     study = parse_spec(spec).study
     made = draw_map(study, models.study_results(study), "shaft.load", "excitation.frequency", SPEED, (), nothing)
-    pictures.draw_map(made, "", "png")
+    maps.draw_map(made, "", "png")
     assert figures[0].get_suptitle().endswith(" = 0.002 m; grey: 2 cases without a result")
     assert figures[0].axes[0].get_yticks().tolist() == [25.0]

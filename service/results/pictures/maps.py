@@ -1,0 +1,85 @@
+"""Pictures of maps, through matplotlib as those of figures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sprag.service.results.figures.curves import doubtful_marks, map_quantities
+from sprag.service.results.figures.orders import TITLE, OrderMap, edges, order_map
+from sprag.service.results.pictures.curves import (
+    MAX_PICTURE_POINTS,
+    Picture,
+    check_size,
+    explain_regimes,
+    head,
+    paint_marks,
+    quantity_label,
+    render,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from sprag.service.results.curves import Map
+
+#: Points of a map that are marked each.
+_MARKED_POINTS: Final = 600
+
+
+def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
+    """A map as a picture: colours over two axes, cases without a result left blank; SelectionError when too large."""
+    check_size("points", drawn.values.size, MAX_PICTURE_POINTS)
+    drawn = drawn.run()
+    x, y, z = map_quantities(drawn)
+    orders = order_map(drawn)
+
+    def paint(figure: Figure) -> None:
+        axes = figure.subplots()
+        borders = edges(drawn.x_values), edges(drawn.y_values)
+        if orders is None:
+            mesh = axes.pcolormesh(*borders, np.ma.masked_invalid(drawn.values), cmap="viridis")
+            figure.colorbar(mesh, label=quantity_label(z))
+        else:
+            _paint_orders(axes, borders, orders)
+        axes.grid(visible=False)
+        axes.set_facecolor("0.85")
+        if drawn.values.size <= _MARKED_POINTS:
+            points = np.meshgrid(drawn.x_values, drawn.y_values)
+            axes.plot(*(part.reshape(-1) for part in points), ".", color="0.3", markersize=2.5, clip_on=False)
+        for axis, values in ((axes.xaxis, drawn.x_values), (axes.yaxis, drawn.y_values)):
+            if len(values) == 1:
+                axis.set_ticks(values)
+        axes.set_xlabel(quantity_label(x))
+        axes.set_ylabel(quantity_label(y))
+        doubtful = list(doubtful_marks(drawn))
+        paint_marks(axes, doubtful, clipped=False)
+        explain_regimes(figure, [marks.regime for marks in doubtful])
+        missing = int(np.isnan(drawn.values if orders is None else orders.places).sum())
+        head(figure, title, (*drawn.held, f"grey: {missing} cases without a result") if missing else drawn.held)
+
+    return render(paint, picture, (8.0, 6.0))
+
+
+def _paint_orders(axes: Axes, borders: tuple[NDArray[np.float64], NDArray[np.float64]], orders: OrderMap) -> None:
+    """A colour for each number of periods, and one for each regime without, named above the map."""
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
+    colours = ListedColormap(orders.colours or ["none"])
+    mesh = axes.pcolormesh(
+        *borders, np.ma.masked_invalid(orders.places), cmap=colours, vmin=-0.5, vmax=len(orders.looks) - 0.5
+    )
+    mesh.set_edgecolor("face")
+    axes.legend(
+        handles=[Patch(facecolor=colour, label=name) for name, (colour, _, _) in orders.looks.items()],
+        title=TITLE,
+        fontsize=8,
+        title_fontsize=8,
+        loc="center left",
+        bbox_to_anchor=(1.0, 0.5),
+        frameon=False,
+    )
