@@ -1,6 +1,6 @@
 """The numerical engine: arrays of parameters in, arrays of characteristics and endings out.
 
-It knows physics only, in SI units and radians. It imports the standard library, numpy, scipy and numba, nothing else.
+It contains only physics, in SI units and radians, and imports only the standard library, numpy, scipy and numba.
 """
 
 from importlib import import_module
@@ -9,7 +9,7 @@ from typing import Any
 from sprag.engine.endings import Ending
 from sprag.engine.run import Run, Span
 
-#: Changes whenever a change of the engine can change a stored number.
+#: Increased whenever a change of the engine can change a stored number.
 ENGINE_VERSION = "3"
 
 __all__ = ["ENGINE_VERSION", "Ending", "Run", "Span"]

@@ -1,4 +1,4 @@
-"""What every model says of its numbers: the parameters that it takes and the results that it gives."""
+"""Catalogue entries of all models: parameters and results."""
 
 import math
 from dataclasses import dataclass
@@ -13,10 +13,9 @@ Kind = Literal["real", "count", "category"]
 class Parameter:
     """One numeric parameter.
 
-    ``path`` is the spec path with letters for indices and names, such as ``N`` for a pendulum's index. ``symbol`` is
-    as in docs/theory.md. The range is
-    ``low`` .. ``high`` in ``unit``; an open end excludes the bound itself. ``default`` None means the value is
-    required.
+    ``path`` is the spec path with placeholders for indices and names, such as ``N`` for a pendulum's index. ``symbol``
+    is that of docs/theory.md. The range is ``low`` .. ``high`` in ``unit``; an open end excludes the bound itself.
+    ``default`` None means the value is required.
     """
 
     path: str
@@ -29,7 +28,7 @@ class Parameter:
     help: str
 
     def range_text(self) -> str:
-        """The allowed range as people write it."""
+        """The allowed range for display."""
         unit = "" if self.unit == "1" else f" {self.unit}"
         low = "" if self.low == -math.inf else f"{'>' if self.low_open else '>='} {self.low:g}{unit}"
         high = "" if self.high == math.inf else f"<= {self.high:g}{unit}"
@@ -51,10 +50,9 @@ class ResultInfo:
     unit : str
         SI unit; "1" where it has none.
     description : str
-    kind : {"real", "count", "category"}
-        What its numbers are; of a category they are places in ``categories``.
-    categories : tuple of str
-        Names of a category's values. A name keeps its place for ever: the numbers are stored.
+    kind : {"real", "count", "category"} Kind of its numbers; those of a category are indices into ``categories``.
+    categories : tuple of str Names of a category's values. A name never changes its position, because the numbers are
+        stored.
     """
 
     name: str
@@ -69,7 +67,7 @@ class ResultInfo:
         return self.name.replace(".", "_")
 
     def cell(self, value: float) -> float | int | str | None:
-        """A stored number as people and programs read it: a category by its name, NaN as None."""
+        """A stored number for display and JSON: a category by its name, NaN as None."""
         if math.isnan(value):
             return None
         if self.kind == "real":

@@ -1,6 +1,4 @@
-"""How a case can end, each with the sentence a user reads. A physical failure is a stored result, never an
-exception.
-"""
+"""Endings of cases, each with a sentence for users. A physical failure is a stored result, never an exception."""
 
 from enum import StrEnum
 
@@ -34,7 +32,7 @@ class Ending(StrEnum):
 _SENTENCES = {
     Ending.OK: "The run reached its end.",
     Ending.ACCURACY_NOT_REACHED: (
-        "The step size the tolerance asks for fell under the floor of double precision: some rate (a spring, the "
+        "The step size that the tolerance requires fell below the limit of double precision: some rate (a spring, the "
         "clutch or a very small inertia) is too fast for the rest of the machine, or the tolerance is too tight."
     ),
     Ending.CHATTER: (
@@ -45,11 +43,11 @@ _SENTENCES = {
         "The step budget was used up before the end of the run: shorten the run or loosen the tolerance."
     ),
     Ending.DIVERGED: (
-        "An angle or a speed grew beyond every bound (or was no number): the parameters describe no steady machine."
+        "An angle or a speed grew without bound (or became NaN): the parameters do not describe a steady machine."
     ),
     Ending.INERTIA_INSUFFICIENT: (
-        "The inertia is insufficient for the mean speed asked for: the shaft would stop, or all but stop, within the "
-        "cycle. The result least_mean_speed tells the speed that has to be exceeded; a mean over time may have to by "
+        "The inertia is insufficient for the required mean speed: the shaft would stop, or nearly stop, within the "
+        "cycle. The result least_mean_speed is the speed that must be exceeded; a mean over time may have to by "
         "far."
     ),
     Ending.UNBALANCED_WORK: (
@@ -57,7 +55,7 @@ _SENTENCES = {
         "let it be constant, or correct the torques."
     ),
     Ending.CANNOT_ASSEMBLE: (
-        "The mechanism cannot be assembled at every angle of the shaft: the result assembly.angle tells the first "
+        "The mechanism cannot be assembled at every angle of the shaft: the result assembly.angle is the first "
         "angle at which its links do not reach each other, or its motions take more than a revolution."
     ),
     Ending.NEGATIVE_INERTIA: "The reduced inertia is not positive at every angle of the shaft.",
@@ -66,7 +64,7 @@ _SENTENCES = {
         "inertia."
     ),
     Ending.QUADRATURE_NOT_REACHED: (
-        "A torque or the inertia changes too abruptly for its integral to be found to 1e-10: split a formula where it "
+        "A torque or the inertia changes too abruptly to be integrated to 1e-10: split a formula where it "
         "jumps or widen its peaks, or smooth a table; an inertia may not jump at all."
     ),
     Ending.MOTOR_OVERRUN: (
@@ -74,8 +72,8 @@ _SENTENCES = {
         "and the shaft runs away. Choose a motor with a larger breakdown torque, or correct the load's sign."
     ),
     Ending.NEAR_SINGULAR: (
-        "The mechanism passes so near to a singular position (links all but in line, or a pivot all but on the crank's "
-        "circle) that double precision cannot resolve its inertia or its way: change the dimensions."
+        "The mechanism passes so close to a singular position (links nearly in line, or a pivot nearly on the crank's "
+        "circle) that double precision cannot resolve its inertia or its motion: change the dimensions."
     ),
 }
 

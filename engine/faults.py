@@ -1,6 +1,6 @@
-"""Faults on purpose, to show what the program makes of them: cases that crash their process, cases that never return.
+"""Deliberate faults for tests: cases that crash their process and cases that never return.
 
-Nothing of this happens unless the environment of the process has both variables::
+They occur only if the environment of the process has both variables::
 
     SPRAG_FAULTS_ALLOWED=yes
     SPRAG_FAULTS="crash shaft.load=0.25,0.75; hang shaft.load=0.5"
@@ -23,7 +23,7 @@ _PRECISION = 1e-12
 
 
 def inject(columns: Mapping[str, ArrayLike], cases: int) -> None:
-    """Crash or hang this process if the environment asks for it and one of the cases is named there.
+    """Crash or hang this process if the environment requests it for one of the cases.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def inject(columns: Mapping[str, ArrayLike], cases: int) -> None:
     Raises
     ------
     ValueError
-        If the environment asks for faults in words that are not understood.
+        If the variable cannot be parsed.
     """
     wanted = os.environ.get(FAULTS_VARIABLE)
     if not wanted or os.environ.get(ALLOWED_VARIABLE) != "yes":
@@ -50,7 +50,7 @@ def _parsed(clause: str) -> tuple[str, str, list[float]]:
     fault, _, rest = clause.strip().partition(" ")
     path, _, values = rest.partition("=")
     if fault not in ("crash", "hang"):
-        raise ValueError(f"{FAULTS_VARIABLE}: {clause!r} is no fault; one looks like 'crash shaft.load=0.25,0.75'")
+        raise ValueError(f"{FAULTS_VARIABLE}: {clause!r} is not a fault such as 'crash shaft.load=0.25,0.75'")
     return fault, path.strip(), [float(value) for value in values.split(",")]
 
 

@@ -1,4 +1,4 @@
-"""What every model gives: the results of a batch of cases, and the instantaneous values of one case."""
+"""Results that all models return: those of a batch of cases, and the instantaneous values of one case."""
 
 from dataclasses import dataclass
 
@@ -30,9 +30,8 @@ class Trajectory:
 
     Attributes
     ----------
-    times : float64 array, shape (points,)
-        Times, or angles of the shaft: whatever ``along`` says, in its SI unit. Those that were
-        reached: all asked for unless the case ended early, none where it has no motion.
+    times : float64 array, shape (points,) Times, or angles of the shaft, according to ``along``, in SI units. Only
+        reached ones: all requested ones unless the case ended early, none where it has no motion.
     names, units : tuples, length V
         Name and SI unit of each variable.
     values : float64 array, shape (points, V)
@@ -58,7 +57,7 @@ class Trajectory:
 
 @dataclass(frozen=True, slots=True)
 class Portrait:
-    """How one case comes to its motion: its state at the strobes, one excitation period apart, and the orbit.
+    """How one case approaches its motion: its states at the strobes, one excitation period apart, and the orbit.
 
     Attributes
     ----------
@@ -71,8 +70,7 @@ class Portrait:
     orbit : Trajectory
         Whole turns of the settled motion, equally spaced, the first point again at the end; no points where there is
         no orbit. Its times count from the start of an excitation period.
-    points : int
-        Points of the orbit in one excitation period: every so many of them is a strobe.
+    points : int Points of the orbit per excitation period; every such number of points there is a strobe.
     ending : Ending
         Of the run to the settled motion, or of the given time.
     """
@@ -101,8 +99,8 @@ class Engagement:
         Largest torque, in N*m.
     work_shaft, work_pendulum : float
         Work in J that the clutch does on the shaft, and that its pendulum does on the clutch.
-    complete : bool
-        Whether it begins and ends in the part of the run that was looked at; else only that part of it is told.
+    complete : bool Whether it begins and ends within the examined part of the run; otherwise only its part within is
+        given.
     """
 
     clutch: int
@@ -137,12 +135,11 @@ class PeriodMeans:
 
 @dataclass(frozen=True, slots=True)
 class Engagements:
-    """What the clutches of one case do, one after the other.
+    """The engagements of one case, in order.
 
     Attributes
     ----------
-    start, end : float
-        The part of the run that the table is about, in s.
+    start, end : float The examined part of the run, in s.
     regime : str
         Name of the settled motion's regime; "" for a run of a given time.
     rows : tuple of Engagement

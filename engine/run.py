@@ -1,4 +1,4 @@
-"""How long a case runs, which part of it is evaluated, and how accurately."""
+"""Settings of a run: its length, the evaluated part, and the accuracy."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -35,8 +35,8 @@ class Run:
         Part of the run over which the characteristics are taken; by default the last third.
     tolerance : float
         Local relative error of a step, 1e-14 .. 1e-4.
-    reset : {"contact", "literal"}
-        Reading of equation (5) while torque is transmitted (docs/theory.md, "The automaton").
+    reset : {"contact", "literal"} Interpretation of equation (5) while torque is transmitted (docs/theory.md, "The
+        automaton").
     max_steps : int, optional
     max_events_per_period : int
         Budgets that end a case as ``step_budget`` or ``chatter`` instead of letting it hang.
@@ -64,7 +64,7 @@ class Run:
         return self.window[0].in_periods(frequency), self.window[1].in_periods(frequency)
 
 
-#: Excitation periods that a search needs for the means of a motion that never repeats itself, and their intervals.
+#: Excitation periods that a search needs for the means and intervals of irregular motion.
 MEANS_FROM_PERIODS = 940
 
 

@@ -1,4 +1,4 @@
-"""A hash of source files: which code a process runs, and which compiled code belongs to it."""
+"""A hash of source files, which identifies the code of a process and its compiled code."""
 
 import hashlib
 from pathlib import Path

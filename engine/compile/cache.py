@@ -1,7 +1,8 @@
-"""Where generated kernels and all machine code are kept: one per-user folder for each state of the engine's source.
+"""Cache of generated kernels and machine code: one per-user folder for each state of the engine's sources.
 
-numba notices when the file of a cached function changes, but not when a function it calls does. A folder named by a
-hash of all of the engine's sources (and of the compiler's version and way) makes old code unreachable instead.
+numba notices when the file of a cached function changes, but not when a function that it calls does. Therefore the
+folder's name is a hash of all of the engine's sources and of the compiler's version and way, which makes old code
+unreachable.
 """
 
 import contextlib
@@ -38,9 +39,9 @@ def _writable(folder: Path) -> bool:
 
 @cache
 def cache_folder() -> Path:
-    """The folder, made if need be: under ``SPRAG_KERNEL_CACHE``, else under the user's cache folder.
+    """The folder, created if missing: under ``SPRAG_KERNEL_CACHE``, otherwise under the user's cache folder.
 
-    Where that cannot be written it is one of the user's own under the temporary folder, the same for every process.
+    Where that is not writable, it is a private folder under the temporary folder, the same for every process.
     """
     chosen = os.environ.get(CACHE_VARIABLE)
     base = os.environ.get("XDG_CACHE_HOME")
@@ -50,9 +51,10 @@ def cache_folder() -> Path:
 
 
 def discard() -> None:
-    """Remove everything that lies in the cache; it is made again where it is needed.
+    """Delete the contents of the cache; they are created again when needed.
 
-    The folders stay, since other processes may be about to write into them. What cannot be removed stays too.
+    The folders are kept, because other processes may be about to write into them. Files that cannot be deleted are kept
+    too.
     """
     for folder, _folders, files in os.walk(cache_folder()):
         for name in files:
@@ -61,12 +63,12 @@ def discard() -> None:
 
 
 def is_wanted(folder: Path) -> bool:
-    """Whether a cache folder is the one the user wants, not the stand-in for one that cannot be written."""
+    """Whether a cache folder is the configured one, not the substitute for an unwritable one."""
     return not folder.is_relative_to(Path(tempfile.gettempdir()) / _TEMPORARY_NAME)
 
 
 def _own_temporary_folder() -> Path:
-    """A folder that nobody else can write to: what lies in it is run."""
+    """A folder that nobody else can write to, because its contents are executed."""
     root = Path(tempfile.gettempdir()) / _TEMPORARY_NAME
     with contextlib.suppress(FileExistsError):
         root.mkdir(mode=0o700)

@@ -1,4 +1,4 @@
-"""The decorators of the way ``programs``; they keep the signature for the type checker."""
+"""The decorators of the way ``programs``; they preserve signatures for the type checker."""
 
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar, cast
@@ -18,19 +18,19 @@ R = TypeVar("R")
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile ``function`` on first call and keep the machine code in numba's on-disk cache.
 
-    Strict arithmetic: division by zero gives infinities as in numpy, nothing is contracted or reordered. So a function
-    that several others call gives the same bits from each of the copies that are optimised with them.
+    Strict arithmetic: division by zero gives infinities as in numpy, and nothing is contracted or reordered. So all
+    inlined copies of a function return the same bits.
     """
     return _compiled(function, ProgramCompiler)
 
 
 def part(function: Callable[P, R]) -> Callable[P, R]:
-    """The same for a function that only compiled code calls: it is compiled as part of that (``program``)."""
+    """The same for a function that only compiled code calls: it is compiled as part of its caller (``program``)."""
     return cast(Callable[P, R], _without_entry(_compiled(function, PartCompiler)))
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
-    """A short part: its callers take its code in instead of passing it their many arrays."""
+    """A short part that is inlined, so that its callers need not pass their many arrays."""
     return cast(Callable[P, R], _without_entry(_compiled(function, PartCompiler, forceinline=True)))
 
 
@@ -42,10 +42,10 @@ def _compiled(
 
 
 def _for_any_number(dispatcher: Any) -> Any:
-    """Have compiled callers that pass a constant use the code for any number of its type.
+    """Make compiled callers that pass a constant use the code for any number of its type.
 
-    numba would compile one more copy of the function, and of all that it calls with that constant, for every constant:
-    that was half of the time of the first start.
+    Otherwise numba compiles another copy of the function, and of everything that it calls with the constant, for every
+    constant, which took half of the time of the first start.
     """
     find = dispatcher.get_call_template
 
@@ -59,7 +59,7 @@ def _for_any_number(dispatcher: Any) -> Any:
 
 
 def _without_entry(dispatcher: Any) -> Any:
-    """Have calls from Python raise TypeError: there is no code for them, neither compiled nor loaded from the cache."""
+    """Make calls from Python raise TypeError: no code for them is compiled or loaded from the cache."""
 
     def refuse(*_arguments: Any, **_named: Any) -> None:
         raise TypeError(f"{dispatcher.py_func.__name__} is for compiled callers only")

@@ -1,8 +1,8 @@
-"""Where lane loops use fused multiply-adds: decided here, by what is written, and not by LLVM's back end.
+"""Placement of fused multiply-adds in lane loops: decided here, from the source, and not by LLVM's back end.
 
-A back end that is allowed to contract fuses as suits its instructions, and each processor's differs. So nothing may be
-contracted, and a product that stands as an operand of a sum or a difference is fused with it, the right one of two:
-the newest term of a sum comes last, and what is before it is known by then. All other products are rounded.
+A back end that may contract chooses according to its instructions, which differ between processors. So contraction is
+disabled, and a product that is an operand of a sum or difference is fused with it; of two products, the right one. The
+newest term of a sum comes last, and the terms before it are known by then. All other products are rounded.
 """
 
 import ast
@@ -37,7 +37,7 @@ def _fma(a: ast.expr, b: ast.expr, c: ast.expr) -> ast.expr:
 
 
 def fused(text: str) -> ast.Module:
-    """The statements of ``text`` with ``fma(a, b, c)``, which is ``a*b + c`` rounded once, wherever the rule has it."""
+    """The statements of ``text`` with ``fma(a, b, c)``, which is ``a*b + c`` rounded once, according to the rule."""
     tree = _Fuse().visit(ast.parse(text))
     assert isinstance(tree, ast.Module)
     return tree

@@ -1,4 +1,4 @@
-"""The one door to numba: decorators and lane loops of the way that this process takes (``ways``)."""
+"""The only access to numba: decorators and lane loops of the way that this process uses (``ways``)."""
 
 import numba
 

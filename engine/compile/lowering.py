@@ -1,13 +1,13 @@
-"""From the text of lane loops straight to LLVM: a compiler for the arithmetic that ``straight`` writes.
+"""Compiler from the text of lane loops directly to LLVM, for the arithmetic that ``straight`` writes.
 
-The loops are thousands of assignments; numba's type inference alone takes longer over them than everything else
-together, although all of it is double precision. Here each statement becomes the LLVM instructions it means, inside the
-numba function that calls the loops (measured in benchmarks/start.py; docs/adr/0002).
+The loops consist of thousands of assignments. numba's type inference alone would take longer for them than everything
+else together, although all values are doubles. Here each statement is translated to LLVM instructions inside the numba
+function that calls the loops (measured in benchmarks/start.py; docs/adr/0002).
 
-The language is a subset of Python: ``for lane in range(N)``, of which the call runs as many groups as it is told,
+The language is a subset of Python: ``for lane in range(N)``, of which each call runs the requested number of groups,
 around assignments to names and to ``W[k + lane]``; ``+ - * /``, comparisons, ``or``, ``a if c else b``, ``abs``, and
-the two views of a double's bits of ``straight.log2`` and ``exp2``. Nothing is contracted or reordered: which products
-are fused with sums is decided in ``fused``.
+the two views of a double's bits of ``straight.log2`` and ``exp2``. Nothing is contracted or reordered; ``fused``
+decides which products are fused with sums.
 """
 
 import ast
@@ -120,7 +120,8 @@ def lane_loops(text: str, first: str, second: str) -> Callable[[Any, float, floa
     def run(typing_context: Any, W: Any, a: Any, b: Any, groups: Any) -> Any:  # noqa: ARG001
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             array = context.make_array(signature.args[0])(context, builder, arguments[0])
-            # Vectors that find no register go to the stack, which is aligned for the smallest of them only.
+            # Vectors without a register are spilled to the stack, which by default is aligned only for the smallest of
+            # them.
             builder.function.attributes.alignstack = _STACK_ALIGNMENT
             builder.function.attributes.add("nounwind")  # llvmlite writes no alignment alone
             numbers = {first: arguments[1], second: arguments[2]}
@@ -178,7 +179,7 @@ lowest = cast(Callable[[int], int], _lowest)
 def constant_record(record: Any) -> Callable[[Any], Any]:
     """A function for compiled code that gives, for a record of the same type, this one as a constant.
 
-    What is computed from its fields alone is then computed by the compiler: places in arrays, lengths of loops.
+    The compiler then evaluates everything that depends only on its fields: array indices, lengths of loops.
     """
     data = bytearray(record.tobytes())
 

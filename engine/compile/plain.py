@@ -1,7 +1,7 @@
-"""The plain way: everything by ``numba.njit`` and ``numba.extending``, nothing by numba's inside.
+"""The plain way: everything through ``numba.njit`` and ``numba.extending``, without numba's private parts.
 
-The lane loops are compiled as the Python they are, with the same fused multiply-adds as in ``lowering``; these,
-selections and the views of a double's bits are instructions.
+The lane loops are compiled as ordinary Python, with the same fused multiply-adds as in ``lowering``; these, selections
+and the views of a double's bits are intrinsics.
 """
 
 import ast
@@ -26,7 +26,7 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     return cast(Callable[P, R], numba.njit(cache=True, error_model="numpy")(function))
 
 
-#: Functions that compiled code calls are no different here.
+#: Functions called by compiled code need no special treatment here.
 part = inlined = compiled
 
 

@@ -1,10 +1,10 @@
-"""Whole programs instead of many small ones: how functions that only compiled code calls become part of their caller.
+"""Whole-program compilation: functions that only compiled code calls become part of their caller.
 
-numba makes every function a library of its own: optimised, turned into machine code, wrapped for calls from Python, and
-then linked into every caller, where all that is done again. For the event code of a kernel, sixty functions deep, that
-was most of the first start. A ``Part`` goes no further than LLVM's intermediate code. The ``Program`` that Python calls
-takes all its parts in, makes them private to itself and optimises once: what is called from one place is taken in
-there, what is the same at every call becomes a constant, and nothing is compiled that is not called.
+numba makes every function a separate library: it is optimised, compiled to machine code, wrapped for calls from Python,
+and linked into every caller, where all this is repeated. For the event code of a kernel, sixty functions deep, that
+took most of the first start. A ``Part`` is translated to LLVM's intermediate code only. The ``Program`` that Python
+calls links all its parts, makes them private and optimises once: functions with a single caller are inlined, arguments
+that are equal in all calls become constants, and unused functions are not compiled.
 """
 
 # mypy: allow-untyped-calls
@@ -20,11 +20,11 @@ from numba.core.compiler_lock import require_global_compiler_lock
 
 
 def _with_room(work: Callable[[], Any]) -> Any:
-    """Do deeply nested work without a system call at every border of Python's stack.
+    """Do deeply nested work without system calls at the chunk boundaries of Python's stack.
 
-    Python keeps its frames in pieces of 16 KB, mapped when a call needs one and unmapped when that call returns. Calls
-    that go to and fro over such a border cost numba's nested compilations a fifth of their time. A frame this large
-    gets a piece of 1 MB, and the calls below it find room in the rest of that.
+    Python stores its frames in chunks of 16 KB, mapped when a call needs one and unmapped when that call returns. Calls
+    that repeatedly cross such a boundary took a fifth of the time of numba's nested compilations. A frame this large
+    gets a chunk of 1 MB, and the calls below it fit into the rest of that.
     """
     return work()
 
@@ -33,7 +33,7 @@ _with_room.__code__ = _with_room.__code__.replace(co_stacksize=70_000)
 
 
 class Part(JITCodeLibrary):
-    """The code of a function without entry from Python, and of all that it calls, not yet optimised."""
+    """The unoptimised code of a function without an entry point for Python, and of everything that it calls."""
 
     def finalize(self) -> None:
         require_global_compiler_lock()
@@ -46,7 +46,7 @@ class Part(JITCodeLibrary):
 
     @property
     def codegen(self) -> Any:
-        """What numba tells the address of the function's environment, which only entries from Python use."""
+        """The hook through which numba sets the function's environment, which only entry points for Python use."""
         return self
 
     def set_env(self, name: str, environment: Any) -> None:
@@ -92,7 +92,7 @@ class ProgramCompiler(PartCompiler):
     library = Program
 
     def _compile_core(self) -> Any:
-        # A tenth of the time went to Python's collector, which finds next to nothing here.
+        # Python's garbage collector took a tenth of the time and finds almost nothing here.
         collects = gc.isenabled()
         gc.disable()
         try:

@@ -1,19 +1,19 @@
-"""How wide the vectors of compiled code are: as wide as the processor's, not as LLVM's tuning for a name has it."""
+"""Width of the vectors of compiled code: that of the processor, not that of LLVM's tuning for its name."""
 
 from typing import Any
 
 import llvmlite.binding as llvm
 import numba
 
-#: A feature of processors that keep their clock under 512-bit arithmetic: Ice Lake, Zen 4 and later.
+#: A feature of processors that do not reduce their clock for 512-bit arithmetic: Ice Lake, Zen 4 and later.
 _KEEPS_ITS_CLOCK = "avx512vbmi2"
 
 
 def use_full_vectors() -> None:
-    """Have numba compile for vectors of 512 bits where the processor computes faster with them (docs/adr/0009).
+    """Make numba compile for vectors of 512 bits where the processor is faster with them (docs/adr/0009).
 
-    LLVM halves the vectors of processors that it takes for one of Intel's. What the user has said of processor or
-    features stands. Nothing changes for a process in which numba has compiled before.
+    LLVM halves the vectors for processors that it treats as Intel's. The user's settings of processor or features take
+    precedence. There is no effect in a process in which numba has already compiled.
     """
     config: Any = numba.config  # numba does not declare its settings
     if config.CPU_NAME is not None or config.CPU_FEATURES is not None or not config.ENABLE_AVX:

@@ -1,14 +1,14 @@
-"""The two ways from Python to machine code, and which one this process takes.
+"""The two ways from Python to machine code, and the choice of this process.
 
-``programs`` (``program``, ``lowering``) compiles in seconds and uses what numba does not promise to keep. ``plain``
-(``plain``) uses nothing but numba's documented interface, compiles for a minute or more, and gives the same bits: the
-reference for the other one, and what is left while a new numba is not supported yet (docs/porting-numba.md).
+``programs`` (``program``, ``lowering``) compiles in seconds and uses private parts of numba. ``plain`` (``plain``) uses
+only numba's documented interface, takes a minute or more, and gives the same bits: it is the reference for the other
+way, and the fallback while a new numba version is not supported yet (docs/porting-numba.md).
 """
 
 import os
 from typing import Final
 
-#: Environment variable that chooses.
+#: Environment variable that selects the way.
 COMPILER_VARIABLE: Final = "SPRAG_COMPILER"
 PROGRAMS, PLAIN = WAYS = ("programs", "plain")
 #: Lanes that are always computed together: the doubles of the largest vector.

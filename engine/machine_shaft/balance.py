@@ -1,4 +1,4 @@
-"""Steady motion needs zero work over a cycle: what becomes of a driving torque that does not give it."""
+"""Balance of the work over a cycle, which steady motion requires to be zero."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from sprag.engine.machine_shaft.spec import Balance
 
 Floats = NDArray[np.float64]
 
-#: Work left over, against the largest work within the cycle, that still counts as none.
+#: Residual work, relative to the largest work within the cycle, that still counts as zero.
 TOLERANCE = 1e-3
 
 
@@ -22,8 +22,7 @@ class Balanced:
     ----------
     drive : array, shape (cases, panels, nodes)
         M_d in N*m.
-    wrong : array of bool, shape (cases,)
-        Where the works cannot be balanced in the way asked for.
+    wrong : array of bool, shape (cases,) Where the works cannot be balanced in the requested way.
     drive_work, resistance_work : arrays, shape (cases,)
         Works over a cycle in J of the torques as given.
     """
@@ -46,9 +45,9 @@ def largest_work(panels: Panels, *torques: Floats) -> Floats:
 def balanced(balance: Balance, panels: Panels, cycle: float, drive: Floats, resistance: Floats) -> Balanced:
     """Balance the works over a cycle by scaling the drive, making it constant, or not at all.
 
-    "constant" puts M_d = -(1/cycle) * integral of M_r in place of whatever was given. "scale" multiplies M_d by the
-    factor that makes the works opposite; it cannot where they have the same sign or the drive does no work. "refuse"
-    takes the torques as they are if the work left over is at most TOLERANCE of the largest work within the cycle.
+    "constant" replaces the given torque by M_d = -(1/cycle) * integral of M_r. "scale" multiplies M_d by the factor
+    that makes the works opposite, which is impossible where they have the same sign or the drive does no work. "refuse"
+    accepts the torques unchanged if the residual work is at most TOLERANCE of the largest work within the cycle.
     """
     drive_work, resistance_work = panels.integral(drive), panels.integral(resistance)
     none = np.zeros(len(drive), dtype=np.bool_)

@@ -33,7 +33,7 @@ LAWS: Mapping[CamLaw, _Law] = {"cycloidal": _cycloidal, "polynomial_345": _polyn
 
 
 class Cam(Mechanism):
-    """A follower that a cam on the shaft lifts and lets down once a revolution, sliding in a straight guide.
+    """A follower in a straight guide that a cam on the shaft raises and lowers once per revolution.
 
     From the shaft's angle ``start`` it rises by ``lift`` within ``rise_angle``, dwells for ``dwell_angle``, falls
     within ``fall_angle`` and dwells for the rest. The forward stroke is the rise. A spring of ``spring_rate`` and
@@ -76,7 +76,7 @@ class Cam(Mechanism):
         return values["start"], top, falling, falling + values["fall_angle"]
 
     def margin(self, values: Values, phi: Floats) -> Floats:
-        """See Mechanism; the cam fails at the end of the revolution if the follower is not down again by then."""
+        """See Mechanism; assembly fails at the end of the revolution if the follower is not down by then."""
         used = values["rise_angle"] + values["dwell_angle"] + values["fall_angle"]
         late = np.where(phi >= 2.0 * np.pi, 2.0 * np.pi - used, 1.0)
         return np.asarray(np.where(late >= -1e-12, 1.0, -1.0))

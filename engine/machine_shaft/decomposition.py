@@ -1,4 +1,4 @@
-"""The motion over a cycle, its decomposition into four signed squares of the speed, and everything told about it.
+"""The motion over a cycle, its decomposition into four signed squares of the speed, and the results from it.
 
 With T the kinetic energy, A_d and A_r the works of drive and resistance since an angle phi_c at which T is its mean,
 
@@ -63,16 +63,16 @@ class Decomposition:
         self.mean_energy = start + self.mean_work
         self.least_energy = start + self.work_extremes.lowest
         self.largest_energy = start + self.work_extremes.highest
-        # Works that cancel at every angle leave rounding, whose angles mean nothing.
+        # Works that cancel at every angle leave rounding errors, whose angles are meaningless.
         most = np.maximum(self.drive.largest(panels), self.resistance.largest(panels))
         even = self.work_extremes.highest - self.work_extremes.lowest <= 1e-12 * most
         level = np.where(even, np.inf, self.mean_work)
         self.crossings = panels.crossings(self.total.torque, self.total.nodes, self.total.ends, level)
 
     def reference(self, chosen: int | None) -> tuple[Points, Floats]:
-        """phi_c of every case and how many there are; by default the first at which T rises.
+        """phi_c of every case and the number of candidates; by default the first at which T rises.
 
-        Where T never leaves its mean, phi_c is 0. Where there is no such angle as the one chosen it is NaN.
+        Where T is always at its mean, phi_c is 0. Where the chosen angle does not exist, it is NaN.
         """
         cases = len(self.start)
         panel, t = np.zeros(cases, dtype=np.int64), np.full(cases, -1.0)
@@ -106,7 +106,7 @@ class Decomposition:
 
 
 def characteristics(d: Decomposition, phi_c: int | None) -> dict[str, Floats]:
-    """Results that follow from the motion alone, by SPEC name, each (cases,)."""
+    """Results that follow from the motion alone, by name, each (cases,)."""
     panels, out = d.panels, {}
     with np.errstate(invalid="ignore", divide="ignore"):
         speed = panels.extremes(d.squares)

@@ -1,6 +1,6 @@
-"""Enclosures of formulas over intervals of the angle: how well a polynomial can stand for a formula there.
+"""Enclosures of formulas over intervals of the angle: how well polynomials approximate a formula there.
 
-Samples cannot tell that nothing stands between them; interval arithmetic can (R. E. Moore, Interval Analysis, 1966).
+Samples cannot exclude features between them; interval arithmetic can (R. E. Moore, Interval Analysis, 1966).
 """
 
 from collections.abc import Sequence
@@ -29,9 +29,9 @@ _KINDS = (
     _MAX, _IF, _LESS, _LESS_EQUAL, _MORE, _MORE_EQUAL,
 ) = range(len(_KINDS))  # fmt: skip
 _CODES = {kind: code for code, kind in enumerate(_KINDS)}
-#: Largest whole exponent that is multiplied out.
+#: Largest integer exponent that is evaluated by multiplication.
 _MOST_WHOLE = 64
-#: Rows of the stack that operations use beside their operands.
+#: Rows of the stack that operations use besides their operands.
 _SPARE = 4
 
 _LEGENDRE = (2 * np.arange(ORDERS)[:, None] + 1) / 2.0 * legendre.legvander(POSITIONS, ORDERS - 1).T * WEIGHTS
@@ -89,7 +89,7 @@ class Program:
         self._most = max(self._most, self._depth)
 
     def over(self, low: Floats, high: Floats, constants: Floats, ways: Floats | None) -> tuple[Floats, Floats]:
-        """How well polynomials stand for the formula on intervals.
+        """How well polynomials approximate the formula on intervals.
 
         Parameters
         ----------
@@ -101,11 +101,9 @@ class Program:
 
         Returns
         -------
-        errors : array, shape (n,)
-            On each interval some polynomial of a degree below ORDERS is as near to the formula as this; infinite where
-            that is not known.
-        least : array, shape (n,)
-            The formula is at least of this size all over the interval.
+        errors : array, shape (n,) Bound of the error of the best polynomial of degree below ORDERS on each interval;
+            infinite where unknown.
+        least : array, shape (n,) Lower bound of the formula's modulus on the interval.
         """
         errors, least = np.empty(len(low)), np.empty(len(low))
         series = np.zeros((1, ORDERS)) if ways is None else _series(ways)
@@ -130,7 +128,7 @@ class Program:
 
 
 def _whole(node: Node) -> int | None:
-    """The whole number that an exponent is, if it is one."""
+    """The exponent as an integer, if it is one."""
     if node.kind == "negative":
         inner = _whole(node.parts[0])
         return None if inner is None else -inner
@@ -140,14 +138,14 @@ def _whole(node: Node) -> int | None:
 
 @part
 def _way(low: Floats, high: Floats, row: int, series: Floats) -> None:
-    """The fraction of the stroke from its polynomial, whose last entries tell what it leaves out."""
+    """The fraction of the stroke from its polynomial, whose last entries bound the truncation error."""
     tail = abs(series[ORDERS - 1]) + abs(series[ORDERS - 2])
     for j in range(ORDERS):
         spread, binomial = 2.0**-10 * tail, 1.0
         for i in range(j + 1, ORDERS):
             binomial = binomial * i / (i - j)
             spread += binomial * abs(series[i])
-        # A few dozen operations, each right to a unit in the last place.
+        # A few dozen operations, each accurate to one unit in the last place.
         spread = iv.up(spread, 64.0)
         low[row, j], high[row, j] = iv.down(series[j] - spread, 1.0), iv.up(series[j] + spread, 1.0)
     low[row, 0], high[row, 0] = max(low[row, 0], 0.0), min(high[row, 0], 1.0)
@@ -213,10 +211,10 @@ def _stepped(low: Floats, high: Floats, u: int, code: int) -> None:
 
 @part
 def _floors(a: float, b: float) -> tuple[float, float]:
-    """Floors of a number within a .. b, as numbers with a point.
+    """Floors of a number within a .. b, as floats.
 
-    An interval that begins or ends at a jump does so to rounding only: what is that near to a whole number belongs to
-    the other side, where the rest of the interval lies.
+    An interval begins or ends at a jump only up to rounding: an end that close to an integer is assigned to the side on
+    which the rest of the interval lies.
     """
     margin = min(8.0 * 2.0**-52 * max(abs(a), abs(b)), 0.25 * (b - a))
     return float(np.floor(a + margin)), float(np.floor(b - margin))
@@ -377,5 +375,5 @@ def _enclose(
         least[n] = max(a, -b, 0.0) if a <= b else 0.0
         errors[n] = np.inf
         for k in range(ORDERS):
-            # Entries that are no numbers do not count.
+            # NaN entries are ignored.
             errors[n] = min(errors[n], iv.up(np.fmin(0.5 * (high[top, k] - low[top, k]), np.inf), 1.0))

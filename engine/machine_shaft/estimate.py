@@ -1,14 +1,14 @@
-"""How long a case of a machine takes, from what the machine consists of (benchmarks/machine_shaft.py measures it)."""
+"""Estimated time of a case from the structure of its machine (measured by benchmarks/machine_shaft.py)."""
 
 from sprag.engine.machine_shaft.expressions import Expression
 from sprag.engine.machine_shaft.simulate import PANELS
 from sprag.engine.machine_shaft.spec import MachineSpec
 
-#: Times of a case by the benchmark, over that with the mean as midrange.
+#: Measured times of a case relative to that with the midrange as mean.
 _COST = {"midrange": 1.0, "angle": 2.2, "time": 1.7}
-#: What a formula adds: one that all cases share, one with constants, and one with jumps or kinks.
+#: Additional time of a formula: shared by all cases, with constants, and with jumps or kinks.
 _FORMULA, _OWN, _SWITCHES = 0.1, 0.7, 1.0
-#: What a formula adds that may have a narrow peak: 0 where its peak is wide, 16 with one of half a degree.
+#: Additional time of a formula that may have a narrow peak: 0 for a wide peak, 16 for one of half a degree.
 _PEAK = 6.0
 _SHARP = frozenset({"exp", "tanh", "sinh", "cosh", "atan"})
 

@@ -1,4 +1,4 @@
-"""Formulas of the shaft's angle: read by a parser of our own, never by the language's.
+"""Formulas of the shaft's angle, read by a parser of our own, never by Python's.
 
 Grammar, loosest first (``^`` and ``**`` are the same and bind to the right)::
 
@@ -9,7 +9,7 @@ Grammar, loosest first (``^`` and ``**`` are the same and bind to the right)::
     power      := atom ["^" sign]
     atom       := number | name | name "(" comparison {"," comparison} ")" | "(" comparison ")"
 
-A formula is evaluated together with its derivative by its first variable.
+A formula is evaluated together with its derivative with respect to its first variable.
 """
 
 import re
@@ -23,7 +23,7 @@ from sprag.engine.machine_shaft.problems import ExpressionError
 
 Floats = NDArray[np.float64]
 Value = Floats | float
-#: Value and derivative; a derivative that is the float 0.0 is known to vanish.
+#: Value and derivative; a derivative that is the float 0.0 vanishes identically.
 Dual = tuple[Value, Value]
 
 MAX_LENGTH = 2_000
@@ -40,7 +40,7 @@ _TOKEN = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """One step of a formula: what it does, to which nodes, and where it stands in the text."""
+    """One operation of a formula: its kind, its operands, and its position in the text."""
 
     kind: str
     position: int
@@ -106,7 +106,7 @@ _SMOOTH: Mapping[str, tuple[Callable[[Value], Value], Callable[[Value], Value]]]
     "floor": (np.floor, lambda u: 0.0 * u),
     "step": (lambda u: np.where(np.asarray(u) >= 0.0, 1.0, 0.0), lambda u: 0.0 * u),
 }
-#: Functions of more variables: fewest and most arguments.
+#: Functions of several variables: fewest and most arguments.
 _ARITY: Mapping[str, tuple[int, int]] = {
     **dict.fromkeys(_SMOOTH, (1, 1)),
     "atan2": (2, 2),
@@ -134,7 +134,7 @@ class _Parser:
         while position < end:
             match = _TOKEN.match(text, position)
             if match is None:
-                raise ExpressionError(f"{text[position:].lstrip()[:1]!r} means nothing here", self._bare(position))
+                raise ExpressionError(f"{text[position:].lstrip()[:1]!r} has no meaning here", self._bare(position))
             kind = match.lastgroup or ""
             self.tokens.append((kind, match.group(kind), match.start(kind)))
             position = match.end()
@@ -234,7 +234,7 @@ class _Parser:
                 wanted = str(fewest) if fewest == most else f"{fewest} to {most}"
                 raise ExpressionError(f"{name} takes {wanted} arguments, not {len(parts)}", position)
             if name in {"min", "max"}:
-                # Equal arguments are tied everywhere, which is neither a jump nor a kink.
+                # Equal arguments are identical everywhere, which is neither a jump nor a kink.
                 parts = list({_content(part): part for part in reversed(parts)}.values())[::-1]
                 if len(parts) == 1:
                     return parts[0]
@@ -260,7 +260,7 @@ class Expression:
     Raises
     ------
     ExpressionError
-        If it cannot be read; tells where.
+        If it cannot be read, with the position.
     """
 
     def __init__(self, text: str, names: Iterable[str] = ("phi",)) -> None:
@@ -271,14 +271,14 @@ class Expression:
         self.root = parser.comparison()
         if parser.index < len(parser.tokens):
             raise ExpressionError(f"{parser.peek()!r} is not expected here", parser.position())
-        #: The variables that it has.
+        #: The variables that it uses.
         self.used = frozenset(_names(self.root))
         self._switches: list[Callable[[Mapping[str, Dual]], Value]] = []
         self._find_switches(self.root)
 
     @property
     def switch_count(self) -> int:
-        """How many quantities there are whose change of sign is a jump or a kink of the formula."""
+        """Number of quantities whose change of sign is a jump or a kink of the formula."""
         return len(self._switches)
 
     @property
@@ -314,13 +314,13 @@ class Expression:
         if node.kind in {"abs", "sign", "step"}:
             self._switches.append(lambda v: _evaluate(parts[0], v)[0])
         elif node.kind in {"floor", "mod"}:
-            # Each whole turn of the quotient is a change of sign of its sine.
+            # The sine of the scaled quotient changes sign at each integer.
             self._switches.append(lambda v: np.sin(np.pi * _evaluate(parts[0], v)[0] / _divisor(parts, v)))
         elif node.kind in _COMPARE:
             self._switches.append(lambda v: _evaluate(parts[0], v)[0] - _evaluate(parts[1], v)[0])
         elif node.kind in {"min", "max"}:
-            # Each argument against the extreme of those before it: a kink of any pair that shows is a kink of one of
-            # these, and their number grows with the arguments, not with their square.
+            # Each argument is compared with the extreme of the previous ones: any visible kink of a pair is a kink of
+            # one of these, and their number grows linearly with the arguments, not quadratically.
             for count in range(1, len(parts)):
                 self._switches.append(_lead(parts[:count], parts[count], larger=node.kind == "max"))
         elif node.kind == "atan2":
@@ -330,7 +330,7 @@ class Expression:
 
 
 def _content(node: Node) -> tuple[object, ...]:
-    """What a node says, wherever it stands in the text."""
+    """The content of a node, independent of its position in the text."""
     return (node.kind, node.number, *map(_content, node.parts))
 
 

@@ -1,4 +1,4 @@
-"""The inertia a drive needs for a wanted irregularity."""
+"""The drive inertia required for a given irregularity."""
 
 from dataclasses import replace
 
@@ -15,9 +15,9 @@ Floats = NDArray[np.float64]
 def required_inertia(mechanism: Shape, torque: Floats, kind: MeanSpeed, mean: Floats, wanted: Floats) -> Floats:
     """Inertia of the drive, in kg*m^2, with which (omega_max - omega_min)/mean is ``wanted`` at the mean ``mean``.
 
-    For given omega_max and omega_min, 2 (T_0 + A) = omega^2 (J + I'') has to be touched from below by the one and from
-    above by the other, which are two linear equations for T_0 and J. Half their sum being the mean, that is all; for
-    the other means omega_min is a bracketed root.
+    For given omega_max and omega_min, the curve 2 (T_0 + A) must touch omega^2 (J + I'') from below with omega_max and
+    from above with omega_min. These are two linear equations for T_0 and J. Where the mean is half the sum of both,
+    this is the solution; for the other means omega_min is a bracketed root.
 
     Parameters
     ----------
@@ -31,8 +31,8 @@ def required_inertia(mechanism: Shape, torque: Floats, kind: MeanSpeed, mean: Fl
     Returns
     -------
     array, shape (cases,)
-        Not less than 0: where less would do, none is required. NaN where the machine with that inertia could not run
-        at this mean speed.
+        At least 0: a negative solution means that none is required. NaN where the machine with that inertia could not
+        run at this mean speed.
     """
     panels, work, inertia = mechanism.panels, mechanism.work, mechanism.inertia
 
@@ -54,7 +54,7 @@ def required_inertia(mechanism: Shape, torque: Floats, kind: MeanSpeed, mean: Fl
 
         low, high = np.maximum(mean * (1.0 - wanted), 1e-9 * mean), mean * 1.0
         slowest = bracketed_roots(excess, low, high, -np.ones_like(mean), np.ones_like(mean))
-        # The ends of the bracket need not be of the signs taken for granted: no machine that runs is so uneven.
+        # The ends of the bracket may not have the expected signs, but then no machine can run so unevenly.
         attained = np.abs(excess(slowest)) <= 1e-6 * mean
     drive = solve(slowest)[0]
     return np.where(_runs(mechanism, torque, kind, mean, drive, attained), np.maximum(drive, 0.0), np.nan)
@@ -63,7 +63,7 @@ def required_inertia(mechanism: Shape, torque: Floats, kind: MeanSpeed, mean: Fl
 def _runs(
     mechanism: Shape, torque: Floats, kind: MeanSpeed, mean: Floats, drive: Floats, attained: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Whether the machine with the inertia ``drive``, or none where that is less, runs at the mean speed."""
+    """Whether the machine with the drive inertia ``drive``, at least 0, runs at the mean speed."""
     whole = replace(mechanism, inertia=mechanism.inertia + np.maximum(drive, 0.0)[:, None, None])
     least = whole.panels.extremes(whole.inertia).lowest
     runs = (least > 1e-12 * whole.panels.largest(whole.inertia)) & np.where(drive > 0.0, attained, True)

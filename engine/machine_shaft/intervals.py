@@ -1,11 +1,11 @@
 """Interval arithmetic on truncated Taylor series, compiled: the operations under ``enclosures``.
 
 A series is a row of two arrays ``low`` and ``high`` of shape (rows, ORDERS): entry k encloses the function's k-th
-Taylor coefficient about every place of an interval, times the k-th power of the interval's half width. Entry 0
-encloses the function itself. A function that is not smooth on the interval has entries without bounds after the first.
+Taylor coefficient about every point of an interval, times the k-th power of the interval's half width. Entry 0 encloses
+the function itself. For a function that is not smooth on the interval, the entries after the first are unbounded.
 
-Every operation is rounded outward: sums, products and quotients by a unit in the last place, which is twice their
-error, functions of the mathematical library by more than they are known to be wrong.
+Every operation is rounded outward: sums, products and quotients by one unit in the last place, which is twice their
+error; functions of the mathematical library by more than their known error.
 """
 
 import math
@@ -21,25 +21,25 @@ Floats = NDArray[np.float64]
 ORDERS = 12
 #: Distance of 1 to the next number, and the least number above 0.
 _ULP, _LEAST = 2.0**-52, 5e-324
-#: Units in the last place by which functions of the mathematical library may be wrong; glibc's are within 2.
+#: Assumed error of functions of the mathematical library in units in the last place; glibc's are within 2.
 _LIBRARY = 4.0
 
 
 @part
 def down(x: float, ulps: float) -> float:
-    """A number below ``x`` by so many units in its last place; 0, infinities and what is no number stay."""
+    """``x`` decreased by a number of units in the last place; 0, infinities and NaN are unchanged."""
     return x - (ulps * _ULP * abs(x) + _LEAST) if 0.0 < abs(x) < math.inf else x
 
 
 @part
 def up(x: float, ulps: float) -> float:
-    """A number above ``x`` by so many units in its last place; 0, infinities and what is no number stay."""
+    """``x`` increased by a number of units in the last place; 0, infinities and NaN are unchanged."""
     return x + (ulps * _ULP * abs(x) + _LEAST) if 0.0 < abs(x) < math.inf else x
 
 
 @part
 def _product(a: float, b: float) -> float:
-    """``a b``, where nothing times anything is nothing, and a product that is too small for a number is not."""
+    """``a b``, where 0 times anything is 0, and a product that underflows is not 0."""
     if a == 0.0 or b == 0.0:
         return 0.0
     c = a * b
@@ -48,7 +48,7 @@ def _product(a: float, b: float) -> float:
 
 @part
 def _exactly(a: float, b: float, c: float) -> bool:
-    """Whether ``a b`` is ``c`` without rounding (T. J. Dekker, 1971); False where that is not known."""
+    """Whether ``a b`` is exactly ``c`` (T. J. Dekker, 1971); False where this is unknown."""
     if c == 0.0 or not 1e-250 < abs(c) < 1e250 or not max(abs(a), abs(b)) < 1e250:
         return c == 0.0 and (a == 0.0 or b == 0.0)
     p, q = a * 134217729.0, b * 134217729.0
@@ -59,7 +59,7 @@ def _exactly(a: float, b: float, c: float) -> bool:
 
 @part
 def lower_sum(a: float, b: float) -> float:
-    """``a + b`` or a number below it; itself where it is not rounded (D. E. Knuth's TwoSum)."""
+    """A lower bound of ``a + b``, exact where the sum is not rounded (D. E. Knuth's TwoSum)."""
     c = a + b
     d = c - a
     return c if (a - (c - d)) + (b - d) >= 0.0 else down(c, 1.0)
@@ -67,13 +67,13 @@ def lower_sum(a: float, b: float) -> float:
 
 @part
 def upper_sum(a: float, b: float) -> float:
-    """``a + b`` or a number above it."""
+    """An upper bound of ``a + b``."""
     return -lower_sum(-a, -b)
 
 
 @part
 def times(a: float, b: float, c: float, d: float) -> tuple[float, float]:
-    """Product of the intervals a .. b and c .. d; nothing times anything, even infinite, is nothing."""
+    """Product of the intervals a .. b and c .. d; 0 times anything, even infinity, is 0."""
     if (a == 0.0 and b == 0.0) or (c == 0.0 and d == 0.0):
         return 0.0, 0.0
     if a == b and c == d and _exactly(a, c, a * c):
@@ -84,7 +84,7 @@ def times(a: float, b: float, c: float, d: float) -> tuple[float, float]:
 
 @part
 def over(a: float, b: float, c: float, d: float) -> tuple[float, float]:
-    """Quotient of the intervals a .. b and c .. d; without bounds where the second has a zero."""
+    """Quotient of the intervals a .. b and c .. d; unbounded where the second contains 0."""
     if not (c > 0.0 or d < 0.0):
         return -math.inf, math.inf
     if a == b and c == d and _exactly(a / c, c, a):
@@ -94,7 +94,7 @@ def over(a: float, b: float, c: float, d: float) -> tuple[float, float]:
 
 @part
 def _passes(a: float, b: float, place: float, period: float) -> bool:
-    """Whether ``place``, or one whole periods from it, may lie in a .. b."""
+    """Whether ``place``, or a point whole periods from it, may lie in a .. b."""
     margin = 4.0 * _ULP * (abs(a) + abs(b) + period)
     return math.floor((b + margin - place) / period) > math.floor((a - margin - place) / period)
 
@@ -114,7 +114,7 @@ def wave_range(a: float, b: float, at_a: float, at_b: float, crest: float) -> tu
 
 @part
 def constant(low: Floats, high: Floats, row: int, a: float, b: float) -> None:
-    """Let ``row`` be a number within a .. b."""
+    """Set ``row`` to a constant within a .. b."""
     low[row, 0], high[row, 0] = a, b
     for k in range(1, ORDERS):
         low[row, k] = high[row, k] = 0.0
@@ -122,7 +122,7 @@ def constant(low: Floats, high: Floats, row: int, a: float, b: float) -> None:
 
 @part
 def rough(low: Floats, high: Floats, row: int, a: float, b: float) -> None:
-    """Let ``row`` be a function within a .. b that is not smooth."""
+    """Set ``row`` to a non-smooth function within a .. b."""
     low[row, 0], high[row, 0] = a, b
     for k in range(1, ORDERS):
         low[row, k], high[row, k] = -math.inf, math.inf
@@ -130,7 +130,7 @@ def rough(low: Floats, high: Floats, row: int, a: float, b: float) -> None:
 
 @part
 def copy(low: Floats, high: Floats, source: int, row: int) -> None:
-    """Let ``row`` be what ``source`` is."""
+    """Copy ``source`` to ``row``."""
     for k in range(ORDERS):
         low[row, k], high[row, k] = low[source, k], high[source, k]
 

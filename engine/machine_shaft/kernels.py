@@ -1,6 +1,6 @@
-"""Compiled loops under the panels: products with small matrices, Legendre series, their roots and highest values.
+"""Compiled loops for the panels: products with small matrices, Legendre series, their roots and largest values.
 
-Arrays are C-contiguous float64. One case's numbers never depend on another's.
+Arrays are C-contiguous float64. The results of a case never depend on other cases.
 """
 
 import numpy as np
@@ -26,7 +26,7 @@ def product(matrix: Floats, values: Floats, out: Floats) -> None:
 
 @compiled
 def integrals(values: Floats, half: Floats, weights: Floats, out: Floats) -> None:
-    """Integral over each case's panels, summed in their order; panels of no length are not looked at."""
+    """Integral over each case's panels, summed in their order; panels of zero length are skipped."""
     for case in range(len(values)):
         row = case if len(half) > 1 else 0
         total = 0.0
@@ -101,22 +101,21 @@ def highest(
     panel: Integers,
     t: Floats,
 ) -> None:
-    """Highest value of ``sign * values`` over each case's panels, their ends and the hills within them.
+    """Largest value of ``sign * values`` over each case's panels: at their ends and at the maxima within them.
 
     Parameters
     ----------
     values : array, shape (cases, panels, nodes)
     sign : float
         1, or -1 for the lowest.
-    half : array, shape (cases or 1, panels)
-        Half lengths; panels of no length are not looked at.
+    half : array, shape (cases or 1, panels) Half lengths; panels of zero length are skipped.
     places : array, shape (nodes + 2,)
         Ends and nodes within -1 .. 1.
     ends, slopes, to_series, to_slope : arrays
         Matrices from the nodes' values to the ends' values, the slopes at ``places``, the Legendre series, and from
         that to the series of its derivative.
-    value, panel, t : arrays, shape (cases,), written
-        The value (with its own sign), and where it is; NaN for a case with a value that is no number.
+    value, panel, t : arrays, shape (cases,), written The value (with its own sign), and its position; NaN for a case
+        with a NaN among its values.
     """
     cases, panels, nodes = values.shape
     samples = np.empty(nodes + 2)
@@ -161,7 +160,7 @@ def highest(
                     samples[0] = sign * total
                 else:
                     samples[i] = sign * values[case, p, i - 1]
-                # A hill cannot rise above its tangent; those that cannot reach the best so far are left out.
+                # A maximum cannot exceed its tangents; those that cannot reach the best value so far are skipped.
                 if not samples[i] + slope[i] * (places[i + 1] - places[i]) > best:
                     continue
                 for k in range(nodes):

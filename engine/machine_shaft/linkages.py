@@ -110,11 +110,11 @@ def _slider_margin(radius: Floats, values: Values, theta: Floats) -> Floats:
 
 
 def _slider_fold(arm: str, part: str, values: Values) -> str | None:
-    """What is wrong where the rod, pulled in farthest, is exactly long enough: it lies on its arm; None otherwise."""
+    """The fault where the rod folds onto its arm at full retraction; None otherwise."""
     length, rod = number_of(values, arm) + abs(number_of(values, "offset")), number_of(values, "rod")
     if abs(length - rod) > 1e-9 * rod:
         return None
-    return f"the rod folds onto the {part} there, and the ram could go on either way"
+    return f"the rod folds onto the {part} there, and the ram could continue either way"
 
 
 class FourBar(Mechanism):
@@ -188,9 +188,9 @@ class FourBar(Mechanism):
         if not short:
             sizes = sorted(number_of(values, name) for name in ("crank", "coupler", "rocker", "frame"))
             folds = abs(sizes[0] + sizes[3] - sizes[1] - sizes[2]) <= 1e-9 * sizes[3]
-            return "all its links lie in one line there, and the rocker could go on either way" if folds else None
+            return "all its links lie in one line there, and the rocker could continue either way" if folds else None
         told = " and ".join(f"the {name} ({number_of(values, name):.6g} m)" for name in short)
-        return f"the crank ({crank:.6g} m) of a crank-rocker is shorter than {told}, here it is not"
+        return f"the crank ({crank:.6g} m) of a crank-rocker must be shorter than {told}"
 
     def worst_angles(self, values: Values) -> Sequence[Floats]:
         """See Mechanism."""
@@ -259,8 +259,8 @@ class Whitworth(_QuickReturn):
         if crank > distance:
             return _slider_fold("link_arm", "link", values)
         return (
-            f"the pivot_distance ({distance:.6g} m) of a whitworth is less than the crank ({crank:.6g} m), its pivot "
-            "lying within the crank's circle, and here it is not"
+            f"the pivot_distance ({distance:.6g} m) of a whitworth must be less than the crank ({crank:.6g} m): its "
+            "pivot lies within the crank's circle"
         )
 
     def worst_angles(self, values: Values) -> Sequence[Floats]:
@@ -282,7 +282,7 @@ class CrankShaper(_QuickReturn):
         """See Mechanism."""
         theta = self._link(values, phi)[0]
         rod = _slider_margin(values["link_arm"], values, theta)
-        # Rod and link in one line are a dead centre of the rod itself: the ram would turn back within a stroke.
+        # Rod and link in one line are a dead centre of the rod: the ram would reverse within a stroke.
         straight = np.sin(theta + np.arcsin(self._slider(values, theta).sin_b))
         swing = (values["pivot_distance"] - values["crank"]) / values["pivot_distance"]
         return np.asarray(np.minimum(np.minimum(rod, swing), straight))
@@ -293,18 +293,18 @@ class CrankShaper(_QuickReturn):
         if distance > crank:
             return self._rod_at_fault(values)
         return (
-            f"the pivot_distance ({distance:.6g} m) of a crank_shaper is more than the crank ({crank:.6g} m), its "
-            "pivot lying outside the crank's circle, and here it is not"
+            f"the pivot_distance ({distance:.6g} m) of a crank_shaper must be more than the crank ({crank:.6g} m): "
+            "its pivot lies outside the crank's circle"
         )
 
     def _rod_at_fault(self, values: Values) -> str | None:
-        """What is wrong where the link swings as it should; None where the rod does not reach the ram's line."""
+        """The fault where the link swings correctly; None where the rod does not reach the ram's line."""
         theta = np.stack([self._link(values, phi)[0] for phi in self.worst_angles(values)])
         reach = float(_slider_margin(values["link_arm"], values, theta).min())
         if abs(reach) <= 1e-9:
-            return "the rod stands square to the ram's line there, and the ram could go on either way"
+            return "the rod is perpendicular to the ram's line there, and the ram could continue either way"
         if reach > 0.0:
-            return "the link_arm and the rod come into one line there, and the ram would turn back within a stroke"
+            return "the link_arm and the rod are in line there, and the ram would reverse within a stroke"
         return None
 
     def worst_angles(self, values: Values) -> Sequence[Floats]:

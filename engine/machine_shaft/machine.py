@@ -1,4 +1,4 @@
-"""A machine's structure and numbers put together: its inertia and torques at any angles, for a block of cases."""
+"""A machine with its structure and numbers: inertia and torques at any angles, for a block of cases."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -89,7 +89,7 @@ def _mechanism_curve(spec: MachineSpec) -> Curve | None:
         if row[0] == following[0]:
             raise TableError(
                 f"Rows {number} and {number + 1} of the inertia both have {row[0]:g} rad, with {row[1]:g} and "
-                f"{following[1]:g} kg*m^2: an inertia does not jump, only a torque may."
+                f"{following[1]:g} kg*m^2: only a torque may jump, not an inertia."
             )
     within_one = len(table.rows) > 0 and table.rows[-1][0] - table.rows[0][0] <= _TURN * (1.0 + 1e-9)
     return periodic(table, _TURN if within_one else _TURN * spec.cycle)
@@ -97,13 +97,13 @@ def _mechanism_curve(spec: MachineSpec) -> Curve | None:
 
 def _check_form(part: str, form: str, has_table: bool, has_formula: bool) -> None:
     if form == "table" and not has_table:
-        raise StructureError(f"{part} is to be a table, but there is none.")
+        raise StructureError(f"{part} needs a table, but none is given.")
     if form == "formula" and not has_formula:
-        raise StructureError(f"{part} is to be a formula, but there is none.")
+        raise StructureError(f"{part} needs a formula, but none is given.")
 
 
 def check_structure(spec: MachineSpec) -> None:
-    """Refuse a structure that makes no machine.
+    """Refuse a structure that is not a valid machine.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def check_structure(spec: MachineSpec) -> None:
         raise StructureError(f"A machine has at most {MAX_CONSTANTS} constants.")
     taken = sorted((RESERVED | {"phi", "x"}) & set(spec.constants))
     if taken:
-        raise StructureError(f"A constant may not be called {taken[0]}: that name has a meaning in formulas.")
+        raise StructureError(f"A constant cannot be named {taken[0]}: that name has a meaning in formulas.")
     _check_form("The inertia of the mechanism", kind, spec.mechanism.table is not None, bool(spec.mechanism.formula))
     if spec.balance != "motor":
         _check_form("The driving torque", spec.drive.form, spec.drive.table is not None, bool(spec.drive.formula))
@@ -135,7 +135,7 @@ def check_structure(spec: MachineSpec) -> None:
             "A force, a gas or a diagram over the stroke needs a mechanism with dimensions: slider_crank, four_bar, "
             "quick_return or cam."
         )
-    # The parts are made once with numbers that do for all, so that tables and formulas are read.
+    # The parts are built once with arbitrary valid numbers, so that tables and formulas are read.
     columns = {p.path: p.default if p.default is not None else 1.0 for p in parameters(spec)}
     Machine(spec, Columns.of(spec, columns, 1))
 
@@ -148,8 +148,7 @@ class Fields:
     ----------
     inertia, slope : arrays
         I in kg*m^2 and dI/dphi.
-    drive, resistance : arrays
-        M_d as given and M_r in N*m; M_d is zero where it has yet to be found.
+    drive, resistance : arrays M_d as given and M_r in N*m; M_d is zero where it is still to be determined.
     """
 
     inertia: Floats
@@ -197,7 +196,7 @@ class Machine:
         return np.broadcast_to(self.mechanism.unassembled(self.mechanism_values), (self.columns.cases,))
 
     def broken_rule(self) -> str | None:
-        """What the dimensions of the first case break, None where its links only do not reach each other."""
+        """The condition that the dimensions of the first case violate; None where its links are merely too short."""
         return None if self.mechanism is None else self.mechanism.broken_rule(self.mechanism_values)
 
     def _environment(self, phi: Floats) -> dict[str, tuple[Floats, Floats | float]]:
@@ -223,7 +222,7 @@ class Machine:
         return breaks
 
     def formulas(self) -> list[Formula]:
-        """The formulas that the fields are made of. A drive that balancing replaces is none of them."""
+        """The formulas of the fields, except a drive that balancing replaces."""
         own: list[tuple[Part, Expression | None]] = [
             ("inertia", self._inertia_formula),
             ("drive", None if self.spec.balance == "constant" else self._drive_formula),
@@ -260,7 +259,7 @@ class Machine:
         if self._drive_curve is not None:
             return np.asarray(scale * self._drive_curve(phi))
         if self._drive_formula is None:
-            raise AssertionError("a drive that is no constant has a table or a formula")
+            raise AssertionError("a drive that is not constant has a table or a formula")
         return np.asarray(scale * self._drive_formula.evaluate(self._environment(phi))[0])
 
     def _carried(self, motion: Motion | None) -> Floats:
@@ -298,7 +297,7 @@ class Machine:
                 angle = found[:, column][:, None, None]
                 closing = np.minimum(angle, self.cycle - angle) < 1e-6
                 before, after = self._limits(np.where(closing, self.cycle, angle), np.where(closing, 0.0, angle))
-                # What is smooth is compared as it is; a root has an infinite slope beside a kink, and no jump.
+                # Smooth parts are compared directly; a root has an infinite slope at a kink, but no jump.
                 apart = np.abs(exact[..., :1] - exact[..., 1:]) > 1e-9 * np.abs(exact[..., :1])
                 least = np.where(closing & apart, 1e-9, 1e-6)
                 jump = np.abs(after - before) > least * np.maximum(np.abs(before), np.abs(after))
@@ -334,7 +333,7 @@ class Machine:
         raise ExpressionError(f"{what} (the drive's with it). Only a torque may jump.", None, "mechanism")
 
     def check_finite(self) -> None:
-        """Refuse a formula that gives no number somewhere in the cycle (of the first case).
+        """Refuse a formula whose value is not finite somewhere in the cycle (of the first case).
 
         Raises
         ------
@@ -350,4 +349,4 @@ class Machine:
             wrong = ~np.isfinite(values[0, 0])
             if wrong.any():
                 angle = float(np.degrees(phi[0, 0, int(np.argmax(wrong))]))
-                raise ExpressionError(f"The {name} is no finite number at {angle:.4g} deg.", None, part)
+                raise ExpressionError(f"The {name} is not a finite number at {angle:.4g} deg.", None, part)

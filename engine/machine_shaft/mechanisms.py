@@ -1,8 +1,8 @@
-"""What a mechanism is to the main shaft: an inertia that depends on the angle, and a way of its working part.
+"""Mechanisms reduced to the main shaft: an inertia that depends on the angle, and the travel of the working part.
 
-Each mechanism gives, at angles of the shaft, the kinetic energy of its bodies as a reduced inertia I''(phi) with its
-derivative, and the way x of its working part (ram, rocker pin, follower) from where the forward stroke starts, with
-dx/dphi: the ratio by which a force on the working part becomes a torque on the shaft.
+For angles of the shaft, each mechanism returns the kinetic energy of its bodies as a reduced inertia I''(phi) with its
+derivative, and the travel x of its working part (ram, rocker pin, follower) from the start of the forward stroke, with
+dx/dphi: the factor that converts a force on the working part to a torque on the shaft.
 """
 
 from abc import ABC, abstractmethod
@@ -26,7 +26,9 @@ def number_of(values: Values, name: str) -> float:
 
 
 class Body(NamedTuple):
-    """A body in plane motion: first and second derivatives of its centre and its angle by the shaft's angle."""
+    """A body in plane motion: first and second derivatives of its centre and angle with respect to the shaft's
+    angle.
+    """
 
     mass: Floats
     inertia: Floats
@@ -46,8 +48,8 @@ class Motion:
     ----------
     inertia, inertia_slope : arrays
         I'' in kg*m^2 and dI''/dphi.
-    way, way_slope : arrays
-        Way of the working part from the start of its forward stroke, in m, and its derivative, in m/rad.
+    way, way_slope : arrays Travel of the working part from the start of its forward stroke, in m, and its derivative,
+        in m/rad.
     """
 
     inertia: Floats
@@ -69,14 +71,14 @@ def reduced(bodies: Sequence[Body]) -> tuple[Floats, Floats]:
 class Mechanism(ABC):
     """Base of the mechanisms: one period is one revolution of the shaft."""
 
-    #: Name of the parameter that is the mass of the working part; None where it has no straight way.
+    #: Name of the parameter with the mass of the working part; None where its path is not straight.
     ram_mass: str | None = None
-    #: Whether there are positions near which its motion has no bound: links in line, a pivot on the crank's circle.
+    #: Whether it has singular positions with unbounded motion nearby: links in line, a pivot on the crank's circle.
     has_singular_positions = True
 
     @abstractmethod
     def motion(self, values: Values, phi: Floats) -> Motion:
-        """Inertia and way at ``phi`` (rad)."""
+        """Inertia and travel at ``phi`` (rad)."""
 
     @abstractmethod
     def dead_centres(self, values: Values) -> tuple[Floats, Floats]:
@@ -91,21 +93,17 @@ class Mechanism(ABC):
         """Angles of which one has the smallest margin."""
 
     def breaks(self, values: Values) -> Sequence[Floats]:
-        """Angles at which the inertia or the way has a kink, of the parameters' shape."""
+        """Angles at which the inertia or the travel has a kink, of the parameters' shape."""
         del values
         return ()
 
     def return_stroke(self, values: Values) -> tuple[Floats, Floats] | tuple[None, None]:
-        """Angle at which the return stroke starts and how much it takes, in rad; None where it is all but the forward
-        stroke.
-        """
+        """Start and length of the return stroke, in rad; None where it is everything outside the forward stroke."""
         del values
         return None, None
 
     def broken_rule(self, values: Values) -> str | None:
-        """Why the dimensions of a case cannot be assembled, as half a sentence; None where links are too short to reach
-        each other.
-        """
+        """Why the dimensions of a case cannot be assembled, as a clause; None where links are merely too short."""
         del values
         return None
 

@@ -1,4 +1,4 @@
-"""A motor whose torque depends on its speed, and the limit cycle it brings a machine to."""
+"""A motor whose torque depends on its speed, and the resulting limit cycle of a machine."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from sprag.engine.machine_shaft.spec import Motor
 Floats = NDArray[np.float64]
 
 _MAX_ITERATIONS = 80
-#: Cycles of a march that tells whether a shaft stops: what peaks stop, they stop in the first few.
+#: Cycles of the simulation that decides whether a shaft stops: load peaks stop it within the first few.
 _CYCLES = 20
 
 
@@ -38,7 +38,7 @@ def steady_speed(motor: Motor, values: Mapping[str, Floats], torque: Floats) -> 
         return np.asarray(values["no_load_speed"] * (1.0 - torque / values["stall_torque"]))
     most, critical = values["breakdown_torque"], values["breakdown_slip"]
     share = np.clip(torque / most, -1.0, 1.0)
-    # The root of s^2 - 2 s s_k/share + s_k^2 nearer to no slip, in a form that is right for no torque too.
+    # The root of s^2 - 2 s s_k/share + s_k^2 closer to zero slip, in a form that is valid for zero torque too.
     slip = critical * share / (1.0 + np.sqrt(1.0 - share**2))
     return np.asarray(values["synchronous_speed"] * (1.0 - slip))
 
@@ -66,12 +66,12 @@ class LimitCycle:
 def limit_cycle(
     motor: Motor, values: Mapping[str, Floats], panels: Panels, cycle: float, inertia: Floats, resistance: Floats
 ) -> LimitCycle:
-    """The periodic motion that the machine comes to with a motor.
+    """The periodic motion that a machine with a motor approaches.
 
-    Marching T' = M(omega) + M_r(phi), omega^2 = 2 T/I, from cycle to cycle leads to a periodic T. It is found at
-    once: the equation is linearised about the last T, the periodic solution of the linear one (collocation at the
-    nodes, panel after panel) is the next, and so on, which converges quadratically. It attracts if the mean of dM/dT
-    is negative; only then would marching come to it.
+    Integrating T' = M(omega) + M_r(phi), omega^2 = 2 T/I, over many cycles leads to a periodic T, which is computed
+    directly: the equation is linearised about the last T, and the periodic solution of the linear equation (collocation
+    at the nodes, panel after panel) is the next iterate. This converges quadratically. The solution is attracting if
+    the mean of dM/dT is negative; only then would integration approach it.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def limit_cycle(
             kept = np.maximum(found, 0.1 * last)
             change = own_panels.largest(kept - last) / own_panels.largest(kept)
         energy[active] = kept
-        # Quadratic until rounding: a small change that no longer falls is rounding.
+        # Convergence is quadratic down to rounding: a small change that no longer decreases is rounding error.
         rounding = (change < 1e-11) & (change >= 0.5 * previous[active])
         previous[active] = change
         active = active[~((change < 1e-15) | rounding | ~np.isfinite(change))]
@@ -127,10 +127,10 @@ def _overruns(
 ) -> NDArray[np.bool_]:
     """Whether the load makes those of the ``cases`` run away that have no steady cycle, and does not stop them.
 
-    The braking torque of a linear motor grows with the speed without bound, and a load that takes energy over a cycle
-    slows every fast shaft down: neither is overrun. Kloss's motor is by a load that gives more than the motor can take
-    at most; between these, a shaft that starts at the synchronous speed is followed.
-    """  # fmt: skip
+    The braking torque of a linear motor grows with the speed without bound, and a load that absorbs energy over a cycle
+    slows down every fast shaft: neither is overrun. Kloss's motor is overrun by a load that supplies more than the
+    motor can absorb. In between, a shaft that starts at the synchronous speed is simulated.
+    """
     out = np.zeros(len(inertia), dtype=np.bool_)
     if motor == "linear":
         return out
@@ -147,9 +147,9 @@ def _overruns(
 
 
 def _runs_away(motor: Motor, values: Mapping[str, float], steps: Floats, inertia: Floats, resistance: Floats) -> bool:
-    """March one case from the synchronous speed, from node to node; False where the shaft stops.
+    """Integrate one case from the synchronous speed, from node to node; False where the shaft stops.
 
-    The steps are implicit in the motor's torque where that falls with the speed, so that a stiff motor is no trouble.
+    The steps are implicit in the motor's torque where that falls with the speed, to handle stiff motors.
     """
     fast = values["synchronous_speed"] * (1.0 + values["breakdown_slip"])
     own = {name: np.asarray(value) for name, value in values.items()}
@@ -164,7 +164,7 @@ def _runs_away(motor: Motor, values: Mapping[str, float], steps: Floats, inertia
             if not energy > 0.0:
                 return False
         if slowest > fast and energy > before:
-            # Beyond its largest braking torque the motor brakes the less the faster the shaft is.
+            # Beyond its largest braking torque, the motor brakes less at higher speed.
             return True
     return True
 

@@ -1,4 +1,4 @@
-"""The resistance of the operation, and the weight and spring that a mechanism carries, as torques on the shaft."""
+"""The resistance of the operation, and the weight and spring of a mechanism, as torques on the shaft."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -15,20 +15,19 @@ from sprag.engine.machine_shaft.tables import Curve, over_stroke, periodic
 Floats = NDArray[np.float64]
 
 _TURN = 2.0 * np.pi
-#: Samples of a revolution in which a formula's changes of sign are looked for.
+#: Samples per revolution in the search for sign changes of a formula.
 _SAMPLES = 720
 
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """The strokes of a mechanism with certain values.
+    """The strokes of a mechanism.
 
     Attributes
     ----------
     start, end : arrays, shape (cases or 1, 1, 1)
         Angles at which the forward stroke starts and ends, ``end`` within a revolution after ``start``.
-    length : array of that shape
-        Way of a stroke in m.
+    length : array of that shape Length of a stroke in m.
     """
 
     mechanism: Mechanism
@@ -39,7 +38,7 @@ class Stroke:
 
     @classmethod
     def of(cls, mechanism: Mechanism, values: Values) -> "Stroke":
-        """The strokes of ``mechanism``; not numbers where it cannot be assembled."""
+        """The strokes of ``mechanism``; NaN where it cannot be assembled."""
         with np.errstate(all="ignore"):
             start, end = mechanism.dead_centres(values)
             end = start + np.mod(end - start, _TURN)
@@ -91,7 +90,7 @@ def formula_breaks(
 ) -> list[Floats]:
     """Angles at which a formula jumps or has a kink, arrays of shape (cases or 1, n), NaN where a case has fewer."""
     count = _SAMPLES * revolutions
-    # Shifted a little, so that no sample falls on a round angle.
+    # Shifted slightly, so that no sample lies at a round angle.
     grid = (np.linspace(0.0, _TURN * revolutions, count + 1) + 1e-4)[None, None, :]
     breaks = []
     for index in range(expression.switch_count):
@@ -118,13 +117,13 @@ def formula_breaks(
 
 
 def reachable_pressure(suction: Floats, clearance: Floats, exponent: Floats) -> Floats:
-    """Pressure in Pa to which a compressor brings the gas at its head; without clearance it is without bound."""
+    """Pressure (Pa) that a compressor reaches at its head; infinite without clearance."""
     with np.errstate(divide="ignore", over="ignore"):
         return np.asarray(suction * ((1.0 + clearance) / clearance) ** exponent)
 
 
 class Operation:
-    """The operation's resistance made ready.
+    """The prepared resistance of the operation.
 
     Parameters
     ----------
@@ -223,7 +222,7 @@ class Operation:
         low, clearance, n = (v[f"gas.{name}"] for name in ("suction_pressure", "clearance", "exponent"))
         high = self._delivered()
         x = stroke.fraction(phi)
-        # Without clearance the pressure at the head is 0/0: the other bound holds there.
+        # Without clearance the pressure at the head is 0/0; the other bound applies there.
         with np.errstate(divide="ignore", invalid="ignore"):
             expanding = np.fmax(low, high * (clearance / (clearance + x)) ** n)
             compressing = np.fmin(high, low * ((1.0 + clearance) / (clearance + x)) ** n)
@@ -231,10 +230,10 @@ class Operation:
         return np.asarray((pressure - v["gas.back_pressure"]) * v["gas.piston_area"])
 
     def _delivered(self) -> Floats:
-        """Highest pressure in the cylinder, in Pa: that of discharge where the compressor reaches it.
+        """Highest pressure in the cylinder, in Pa: the discharge pressure where the compressor reaches it.
 
-        Otherwise the valves stay shut, and what is compressed expands again on the same line. Below the suction the
-        gas flows through without work.
+        Otherwise the valves stay closed, and the compressed gas expands along the same curve. Below the suction
+        pressure the gas flows through without work.
         """
         v = self._values
         low, high = v["gas.suction_pressure"], v["gas.discharge_pressure"]
@@ -242,7 +241,7 @@ class Operation:
 
     @property
     def expression(self) -> Expression | None:
-        """The formula of its diagram, if that is one."""
+        """The formula of its diagram, if any."""
         return None if self._choice.quantity in {"none", "gas"} else self._expression
 
     def breaks(self) -> list[Floats]:

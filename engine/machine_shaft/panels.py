@@ -1,9 +1,9 @@
 """Gauss-Legendre panels over a cycle: integrals, running integrals, extrema and crossings of many cases at once.
 
-A cycle is cut into panels at every jump and kink, so that within a panel everything is smooth and is known by its
-values at the panel's Gauss nodes. No node lies on a cut, so no value is taken at a jump. Sums are written out term by
-term (``kernels``) instead of being left to a matrix product, whose rounding would depend on how many cases are
-computed together.
+A cycle is divided into panels at every jump and kink, so that all functions are smooth within a panel and are
+represented by their values at its Gauss nodes. No node lies on a cut, so no value is taken at a jump. Sums are computed
+term by term (``kernels``) instead of by a matrix product, whose rounding would depend on the number of cases computed
+together.
 """
 
 from collections.abc import Sequence
@@ -65,7 +65,7 @@ def series(coefficients: Floats, t: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Points:
-    """Places in the cycle, one a case: panel, position -1 .. 1 within it, and angle in rad; all of shape (cases,)."""
+    """Points in the cycle, one per case: panel, position -1 .. 1 within it, and angle in rad; all of shape (cases,)."""
 
     panel: Integers
     t: Floats
@@ -93,14 +93,13 @@ class Extremes:
 class Panels:
     """Panels of a block of cases.
 
-    How many panels of no length a case has depends on the other cases of its block, so nothing looks at what stands at
-    their nodes: a case's numbers must not.
+    The number of zero-length panels of a case depends on the other cases of its block. Values at their nodes are
+    ignored, so that results do not depend on other cases.
 
     Attributes
     ----------
-    cuts : array, shape (cases, panels + 1)
-        Ends of the panels in rad, from 0 to the cycle. Panels of no length are allowed and count for nothing. A first
-        axis of 1 means that all cases share them.
+    cuts : array, shape (cases, panels + 1) Ends of the panels in rad, from 0 to the cycle. Panels of zero length are
+        allowed and ignored. A first axis of length 1 means that all cases share them.
     angles : array, shape (cases, panels, NODES)
         Gauss nodes in rad.
     """
@@ -118,7 +117,7 @@ class Panels:
         rows = max(part.shape[0] for part in parts)
         cuts = np.concatenate([np.broadcast_to(part, (rows, part.shape[1])) for part in parts], axis=1)
         cuts = np.sort(np.clip(cuts, 0.0, cycle), axis=1)
-        # Two cuts meant to be one: a sliver between them would hold a jump that its polynomial cannot follow.
+        # Two cuts at almost the same angle are merged: the sliver between them would contain an unresolvable jump.
         for column in range(1, cuts.shape[1]):
             close = cuts[:, column] - cuts[:, column - 1] < 1e-11 * cycle
             cuts[:, column] = np.where(close, cuts[:, column - 1], cuts[:, column])
@@ -161,7 +160,9 @@ class Panels:
         return energy, start
 
     def roughness(self, values: Floats) -> Floats:
-        """Sizes of the two last Legendre coefficients in each panel, (cases, panels): how badly it is resolved."""
+        """Sizes of the last two Legendre coefficients in each panel, (cases, panels), as a measure of its
+        resolution.
+        """
         tail = np.abs(apply(_TAIL, values)).sum(axis=2)
         return np.asarray(np.where(self.half > 0.0, tail, 0.0))
 
@@ -199,7 +200,7 @@ class Panels:
         return self.at_rows(values, np.arange(len(points.t)), points)
 
     def at_rows(self, values: Floats, cases: Integers, points: Points) -> Floats:
-        """Values at any number of ``points``, each of the case told by ``cases``."""
+        """Values at any number of ``points``, each for the case given by ``cases``."""
         return series(apply(_COEFFICIENTS, self._rows(values, cases, points.panel)), points.t)
 
     def running_at(self, values: Floats, ends: Floats, points: Points) -> Floats:
@@ -207,7 +208,7 @@ class Panels:
         return self.running_at_rows(values, ends, np.arange(len(points.t)), points)
 
     def running_at_rows(self, values: Floats, ends: Floats, cases: Integers, points: Points) -> Floats:
-        """The same at any number of ``points``, each of the case told by ``cases``."""
+        """The same at any number of ``points``, each for the case given by ``cases``."""
         start = self._rows(ends, cases, points.panel)
         rows = apply(_INTEGRAL, apply(_COEFFICIENTS, self._rows(values, cases, points.panel)))
         return start + self._half_at(cases, points.panel) * series(rows, points.t)
@@ -215,8 +216,7 @@ class Panels:
     def extremes(self, values: Floats) -> Extremes:
         """Largest and smallest value over the cycle, of the continuous function and not of its nodes.
 
-        A panel's ends count with the values they have within that panel. A case with a value that is no number has
-        no extremes.
+        The ends of a panel count with their values within that panel. A case with a NaN has no extremes.
         """
         high, at_high = self._highest(values, 1.0)
         low, at_low = self._highest(values, -1.0)

@@ -157,7 +157,14 @@ def parameters(spec: MachineSpec) -> tuple[Parameter, ...]:
         Parameter("gravity", "g", "m/s^2", 0.0, 1e3, False, STANDARD_GRAVITY, "gravitational acceleration"),
         Parameter("drive.inertia", "I'", "kg*m^2", 0.0, 1e12, False, None, "inertia that turns with the shaft"),
         Parameter(
-            "wanted_irregularity", "delta", "1", 0.0, 2.0, True, _INF, "irregularity that required_inertia is to give"
+            "wanted_irregularity",
+            "delta",
+            "1",
+            0.0,
+            2.0,
+            True,
+            _INF,
+            "irregularity that determines required_inertia",
         ),
         *_drive(spec),
         *MECHANISM_PARAMETERS[spec.mechanism.kind],

@@ -1,7 +1,8 @@
-"""Pieces of the cycle on which formulas are known to be as smooth as their samples make them look.
+"""Pieces of the cycle on which formulas are verified to be as smooth as their samples suggest.
 
-A cycle is cut until each formula is, on every piece, a polynomial of a degree below the number of Gauss nodes, up to an
-error that its enclosure bounds. Panels that agree with a formula at the nodes of such pieces agree with it everywhere.
+A cycle is subdivided until, on every piece, each formula is a polynomial of a degree below the number of Gauss nodes,
+up to an error bounded by its enclosure. Panels that agree with a formula at the nodes of such pieces agree with it
+everywhere.
 """
 
 from collections.abc import Callable, Mapping
@@ -23,13 +24,13 @@ Integers = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Part = Literal["inertia", "drive", "resistance"]
 
-#: Error of a piece, over the integral of the formula's size, or for an inertia over its size.
+#: Allowed error of a piece relative to the integral of the formula's modulus, or for an inertia to its value.
 _PRECISION = 1e-11
-#: The same for what is left when pieces can be cut no further.
+#: The same for pieces that cannot be subdivided further.
 _DOUBT = 1e-8
-#: Pieces of a revolution and a case, and the shortest, over the cycle.
+#: Most pieces per revolution and case, and the shortest relative length.
 _MOST, _SHORTEST = 4096, 2e-15
-#: How near to a cut pieces come, over the cycle: it is known no better.
+#: Closest distance of pieces to a cut relative to the cycle, which is the accuracy of the cut.
 _ROUNDING = 4e-16
 _ROUNDS = 64
 
@@ -45,8 +46,7 @@ class Formula:
     expression : Expression
     constants : mapping
         Values of its names beside ``phi`` and ``x``, each of shape (cases or 1, 1, 1).
-    stroke : Stroke or None
-        What ``x`` is the fraction of.
+    stroke : Stroke or None The stroke of which ``x`` is the fraction.
     """
 
     part: Part
@@ -63,7 +63,7 @@ class Formula:
         return max(sizes, default=1)
 
     def ways(self, cases: Integers, phi: Floats) -> Floats | None:
-        """``x`` at ``phi`` (n, 1, m) of the case told for each row; None if there is none."""
+        """``x`` at ``phi`` (n, 1, m) for the case of each row; None if there is none."""
         return None if self.stroke is None else self.stroke.take(cases).fraction(phi)
 
     def variables(self, cases: Integers, phi: Floats) -> dict[str, tuple[Floats, Floats | float]]:
@@ -81,7 +81,7 @@ def _rows(values: Floats, cases: Integers) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Pieces:
-    """Pieces of the cycle for one formula, shortest where it is least smooth; those that are whole panels left out.
+    """Pieces of the cycle for one formula, shortest where it is least smooth, without those that are whole panels.
 
     Attributes
     ----------
@@ -90,8 +90,7 @@ class Pieces:
         0 throughout where all cases share the formula.
     low, high : arrays, shape (n,)
         Ends in rad.
-    breaks : array, shape (cases or 1, m)
-        Jumps and kinks that the panels are not cut at, in rad; NaN where a case has fewer.
+    breaks : array, shape (cases or 1, m) Jumps and kinks inside panels, in rad; NaN where a case has fewer.
     unknown : array of bool, shape (cases or 1,)
         Where the formula cannot be enclosed.
     """
@@ -115,7 +114,7 @@ class Pieces:
 
 
 def pieces(formula: Formula, panels: Panels, cycle: float) -> Pieces:
-    """Cut the panels' cycle until ``formula`` is known on every piece."""
+    """Subdivide the panels' cycle until ``formula`` is verified on every piece."""
     rows = max(formula.cases, len(panels.cuts))
     program = Program(formula.expression, list(formula.constants))
     case, panel = np.nonzero(np.broadcast_to(panels.half > 0.0, (rows, panels.half.shape[1])))
@@ -170,7 +169,7 @@ def _nodes(low: Floats, high: Floats) -> Floats:
 def _judge(
     formula: Formula, error: Floats, least: Floats, case: Integers, length: Floats, done: Floats
 ) -> tuple[Bools, Floats]:
-    """Which pieces are known well enough, and each case's size of the formula as far as it is known."""
+    """Which pieces are verified, and each case's size of the formula as far as it is known."""
     size = done.copy()
     if formula.part == "inertia":
         np.maximum.at(size, case, least)
@@ -180,7 +179,7 @@ def _judge(
 
 
 def _left(formula: Formula, case: Integers, low: Floats, high: Floats, error: Floats) -> Floats:
-    """What pieces that can be cut no further may hide; a pole is judged by the values beside it."""
+    """Bound of the error of pieces that cannot be subdivided further; a pole is judged by the values beside it."""
     length = 1.0 if formula.part == "inertia" else high - low
     phi = _nodes(low, high)
     values = np.broadcast_to(np.abs(formula.expression.evaluate(formula.variables(case, phi))[0]), phi.shape)
@@ -221,18 +220,16 @@ def missed(
     exact: Callable[[Integers, Floats], Floats],
     largest: Floats,
 ) -> Bools:
-    """Panels whose polynomials are not what they stand for, shape (cases, panels).
+    """Panels whose polynomials do not represent their function, shape (cases, panels).
 
     Parameters
     ----------
     own : Pieces
-    rows : array, shape (cases,)
-        The cases that the panels are of, among those that the pieces were made for.
+    rows : array, shape (cases,) The cases of the panels, among those of the pieces.
     panels : Panels
     values : array, shape (cases, panels, NODES)
         The field that the formula enters, at the panels' nodes.
-    exact : callable
-        Gives that field for places in ``rows`` (n,) at angles (n, 1, m).
+    exact : callable Returns that field for indices into ``rows`` (n,) at angles (n, 1, m).
     largest : array, shape (cases,)
         Largest size of the field if that is the inertia, else the largest work.
     """
@@ -247,7 +244,7 @@ def missed(
     truth = np.broadcast_to(exact(place, phi), phi.shape)[:, 0, :]
     points, cases = _located(panels, place, phi[:, 0, :])
     error = truth - panels.at_rows(values, cases, points).reshape(truth.shape)
-    # The angle itself is rounded, and a steep formula shows it.
+    # The angle itself is rounded, which matters for a steep formula.
     rounding = np.abs(np.diff(truth, axis=1)).sum(axis=1) * np.finfo(float).eps * panels.cuts[0, -1]
     panel = points.panel.reshape(truth.shape)
     if own.formula.part == "inertia":

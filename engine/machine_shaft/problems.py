@@ -1,4 +1,4 @@
-"""What can be wrong with a machine. A base machine raises these; one case of a grid stores the ending instead."""
+"""Faults of machines. A base machine raises these; a case of a grid stores the ending instead."""
 
 import math
 
@@ -6,19 +6,19 @@ from sprag.engine.endings import Ending
 
 
 class MachineError(ValueError):
-    """Something is wrong with a machine; ``str`` is a plain sentence.
+    """A fault of a machine; ``str`` is a sentence for users.
 
     Attributes
     ----------
-    ending : Ending or None
-        What a case of a grid with the same fault is stored as; None for faults that no numeric parameter mends.
+    ending : Ending or None Ending of a case of a grid with the same fault; None for faults that no numeric parameter
+        can remove.
     """
 
     ending: Ending | None = None
 
 
 class StructureError(MachineError):
-    """The parts named do not make a machine (a missing table, a force without a mechanism, an unknown kind)."""
+    """The named parts do not form a machine (a missing table, a force without a mechanism, an unknown kind)."""
 
 
 class TableError(MachineError):
@@ -26,14 +26,12 @@ class TableError(MachineError):
 
 
 class ExpressionError(MachineError):
-    """A formula cannot be read or gives no number.
+    """A formula cannot be read, or its value is not a number.
 
     Attributes
     ----------
-    position : int or None
-        Where in the text, from 0; None where it is no single place.
-    part : str
-        "mechanism", "drive" or "operation"; "" where the text alone was looked at.
+    position : int or None Position in the text, from 0; None where there is no single position.
+    part : str "mechanism", "drive" or "operation"; "" where only the text was checked.
     """
 
     def __init__(self, message: str, position: int | None, part: str = "") -> None:
@@ -42,15 +40,14 @@ class ExpressionError(MachineError):
 
 
 class RelationError(MachineError):
-    """A number does not go together with others.
+    """A number contradicts others.
 
     Attributes
     ----------
     path : str
         Of the number.
     value : float
-    allowed : str
-        Its range beside the others, with the unit.
+    allowed : str Its range given the others, with the unit.
     """
 
     def __init__(self, path: str, value: float, message: str, allowed: str) -> None:
@@ -59,7 +56,7 @@ class RelationError(MachineError):
 
 
 class AssemblyError(MachineError):
-    """The mechanism cannot be assembled at ``angle`` (rad); ``rule`` says what its dimensions break, if known."""
+    """The mechanism cannot be assembled at ``angle`` (rad); ``rule`` states the violated condition, if known."""
 
     ending = Ending.CANNOT_ASSEMBLE
 
@@ -86,7 +83,7 @@ class NegativeInertiaError(MachineError):
 
 
 class UnbalancedWorkError(MachineError):
-    """Drive and resistance do not do opposite work over the cycle, and the balance asked for cannot mend it."""
+    """Drive and resistance do not do opposite work over the cycle, and the requested balance cannot correct it."""
 
     ending = Ending.UNBALANCED_WORK
 
@@ -99,9 +96,9 @@ class UnbalancedWorkError(MachineError):
 
 
 class InsufficientInertiaError(MachineError):
-    """The shaft would stop at the mean speed asked for; ``least_mean_speed`` (rad/s) is the least feasible one.
+    """The shaft would stop at the required mean speed; ``least_mean_speed`` (rad/s) is the least feasible one.
 
-    A mean over time can lie above that and still ask for a shaft that stands nearly still.
+    A mean over time can exceed this and still require a shaft that nearly stops.
     """
 
     ending = Ending.INERTIA_INSUFFICIENT
@@ -109,7 +106,7 @@ class InsufficientInertiaError(MachineError):
     def __init__(self, asked: float, least_mean_speed: float) -> None:
         stops = f"The inertia is insufficient for a mean speed of {asked:.6g} rad/s: the shaft would "
         if asked > least_mean_speed:
-            more = "all but stop within the cycle. Ask for a higher mean speed, or give the drive more inertia."
+            more = "nearly stop within the cycle. Choose a higher mean speed, or give the drive more inertia."
         else:
             more = (
                 f"stop within the cycle. The least feasible mean speed is {least_mean_speed:.6g} rad/s "
@@ -138,7 +135,7 @@ class MotorOverrunError(MachineError):
 
 
 class NearSingularError(MachineError):
-    """The mechanism passes a position so near to a singular one that its motion is not resolved."""
+    """The mechanism passes so close to a singular position that its motion is not resolved."""
 
     ending = Ending.NEAR_SINGULAR
 
@@ -147,7 +144,7 @@ class NearSingularError(MachineError):
 
 
 class QuadratureError(MachineError):
-    """Torque or inertia is too rough for its integral to be found to 1e-10."""
+    """Torque or inertia is too rough to be integrated to 1e-10."""
 
     ending = Ending.QUADRATURE_NOT_REACHED
 

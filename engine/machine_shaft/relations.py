@@ -1,4 +1,4 @@
-"""Numbers that are each in range and do not go together: what a base machine is refused for before it is solved."""
+"""Checks of numbers that are individually in range but contradict each other; done before a base machine is solved."""
 
 from sprag.engine.machine_shaft.machine import Columns
 from sprag.engine.machine_shaft.operations import reachable_pressure
@@ -7,7 +7,7 @@ from sprag.engine.machine_shaft.spec import MachineSpec
 
 
 def check_relations(spec: MachineSpec, row: Columns) -> None:
-    """Refuse numbers of the first case that do not go together.
+    """Refuse contradictory numbers of the first case.
 
     Raises
     ------
@@ -23,8 +23,8 @@ def check_relations(spec: MachineSpec, row: Columns) -> None:
             if last < first:
                 raise RelationError(
                     f"operation.steps.{k}.to", last,
-                    f"a step over the stroke ends where it begins or later: this one begins at {first:.6g} and would "
-                    "never act; `during` tells the stroke",
+                    f"a step over the stroke cannot end before it begins: this one begins at {first:.6g} and would "
+                    "never act; `during` selects the stroke",
                     f">= {first:.6g} and <= 1",
                 )  # fmt: skip
 
@@ -37,10 +37,10 @@ def _check_gas(row: Columns) -> None:
     if least <= wanted <= most:
         return
     message = (
-        "is below the pressure of suction: nothing would be compressed"
+        "is below the suction pressure: nothing would be compressed"
         if wanted < least
         else f"cannot be reached: at the end of the stroke a clearance of {clearance[0]:.6g} times the displaced "
-        f"volume is left, and the gas comes to {most:.6g} Pa at most"
+        f"volume is left, and the gas reaches {most:.6g} Pa at most"
     )
     allowed = f">= {least:.6g} Pa" + (f" and <= {most:.6g} Pa" if most < float("inf") else "")
     raise RelationError("operation.gas.discharge_pressure", wanted, message, allowed)

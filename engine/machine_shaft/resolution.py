@@ -1,4 +1,4 @@
-"""Whether panels resolve what they stand for: torques, inertia, speed."""
+"""Whether panels resolve torques, inertia and speed."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ Bools = NDArray[np.bool_]
 def rough_panels(d: Decomposition) -> tuple[Bools, Bools]:
     """Panels that do not resolve their torques or inertia, and those that do not resolve a speed near to rest."""
     panels, still = d.panels, np.isnan(d.start)[:, None]
-    # A case without motion is judged by what was given.
+    # A case without motion is judged by the given torques and inertia.
     drive = np.where(still[..., None], d.fields.drive, d.drive.torque)
     torque = panels.roughness(drive) + panels.roughness(d.fields.resistance)
     scale = largest_work(panels, drive, d.fields.resistance)[:, None]
@@ -31,7 +31,7 @@ def rough_panels(d: Decomposition) -> tuple[Bools, Bools]:
 
 
 def rough_pace(d: Decomposition) -> Bools:
-    """Panels in which the shaft turns so slowly that the time is not resolved."""
+    """Panels in which the shaft turns too slowly for the time to be resolved."""
     with np.errstate(invalid="ignore", divide="ignore"):
         fine = _resolved(d.panels, 1.0 / np.sqrt(d.squares), 1e-6)
     return np.asarray(~(fine | np.isnan(d.start)[:, None]))
@@ -50,9 +50,9 @@ def near_singular(machine: Machine, d: Decomposition, rough: Bools) -> Bools:
 
 
 def linkage_unresolved(machine: Machine, panels: Panels, cases: int, most: float) -> Bools:
-    """Cases whose linkage's own motion ``most`` panels do not resolve, (cases,); for formulas that tell nothing.
+    """Cases whose linkage motion ``most`` panels do not resolve, (cases,); for formulas that cannot be enclosed.
 
-    The panels are halved for the linkage alone, as they are for everything else in a case with formulas that do.
+    The panels are halved for the linkage alone; in other cases they are halved for everything.
     """
     if machine.mechanism is None or not machine.mechanism.has_singular_positions:
         return np.zeros(cases, dtype=np.bool_)
@@ -87,9 +87,9 @@ def _resolved(panels: Panels, values: Floats, limit: float) -> Bools:
 def compare(
     spec: MachineSpec, columns: Columns, rows: NDArray[np.int64], found: list[Pieces], d: Decomposition, rough: Bools
 ) -> None:
-    """Mark in ``rough`` (cases, panels) the panels of the cases ``rows`` that miss something of a formula.
+    """Mark in ``rough`` (cases, panels) the panels of the cases ``rows`` that miss features of a formula.
 
-    Cases with panels that are rough as they are wait for finer ones.
+    Cases that already have rough panels are checked once these are refined.
     """
     ready = np.nonzero(~rough.any(axis=1))[0]
     panels = d.panels.take(ready)

@@ -53,7 +53,7 @@ MACHINE_RESULTS: tuple[ResultInfo, ...] = (
     _R("drive_torque.min", "N*m", "smallest driving torque"),
     _R("work.drive", "J", "work of the drive over a cycle"),
     _R("work.resistance", "J", "work of the resistance over a cycle"),
-    _R("balance.work", "1", "work left over from a cycle / largest work within it"),
+    _R("balance.work", "1", "residual work of a cycle / largest work within it"),
     _R("least_mean_speed", "rad/s", "mean speed at which the smallest speed would reach 0: none lower is feasible"),
     _R("assembly.angle", "rad", "first angle at which the mechanism cannot be assembled"),
 )  # fmt: skip

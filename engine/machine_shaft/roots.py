@@ -20,8 +20,8 @@ def bracketed_roots(
 ) -> Floats:
     """Roots of ``function`` between ``low`` and ``high``, elementwise.
 
-    Regula falsi with the Illinois weight and a bisection every fourth step, so that it ends whatever the function does.
-    An element that is done no longer changes: its root does not depend on the others.
+    Regula falsi with the Illinois weight and a bisection every fourth step, so that it terminates for any function. A
+    converged element no longer changes, so its root does not depend on the others.
 
     Parameters
     ----------
@@ -31,8 +31,7 @@ def bracketed_roots(
         Brackets.
     f_low, f_high : arrays of that shape
         Values there; of opposite signs, or zero at the root itself.
-    iterations : int
-        At most so many evaluations.
+    iterations : int Largest number of evaluations.
     precision : float
         Width of the bracket, over the larger of 1 and its ends' size, at which an element is done.
 
@@ -57,7 +56,7 @@ def bracketed_roots(
         exact = fx == 0.0
         fa_next = np.where(across, fb, 0.5 * fa)
         a_next = np.where(across, b, a)
-        # A bracket kept on one side with a halved weight: the true sign is what matters, and it stays.
+        # Halving the weight of a retained end keeps its sign, which is all that matters.
         a, fa = np.where(done, a, a_next), np.where(done, fa, fa_next)
         b, fb = np.where(done, b, x), np.where(done, fb, fx)
         root = np.where(done, root, x)

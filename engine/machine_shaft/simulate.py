@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]
 Bools = NDArray[np.bool_]
 
-#: Panels of a revolution to begin with, and with how many a case is given up.
+#: Initial panels per revolution, and the number at which a case is abandoned.
 PANELS, MAX_PANELS = 16, 600
 MAX_ATTEMPTS = 48
 #: Cases computed together: few enough for their arrays to stay in the processor's cache.
@@ -44,7 +44,7 @@ BLOCK = 64
 
 _NAMES = tuple(info.name for info in result_infos())
 _OF_TIME = np.array([_NAMES.index("omega.mean_time"), _NAMES.index("irregularity.time")])
-#: Beginnings of the names of results that a case without motion does not have.
+#: Prefixes of results that a case without motion does not have.
 _OF_MOTION = ("omega.", "irregularity", "acceleration.", "s1.", "s2.", "power.", "energy.m")
 #: The same for a motor that has no steady torque.
 _OF_MOTOR = ("drive_torque.", "work.drive", "balance.work", "energy.", "s3.", "s4.", "phi_c")
@@ -61,11 +61,11 @@ class Solved:
     results : dict
         Every result but the angle of assembly by name, each (cases,).
     endings : int8 array, shape (cases,)
-    rough, slow, rough_pace : arrays of bool, shape (cases, panels)
-        Panels that do not resolve their torques or inertia; those in which the shaft is too near to rest for the
-        speed, or its mean over time where that is asked for, to be resolved; and those that do not resolve 1/omega.
-    unknown : array of bool, shape (cases,)
-        Cases with a formula that may hide something between any two angles.
+    rough, slow, rough_pace : arrays of bool, shape (cases, panels) Panels that do not resolve their torques or inertia;
+        those in which the shaft is too close to rest to resolve the speed, or its mean over time where that is
+        required; and those that do not resolve 1/omega.
+    unknown : array of bool, shape (cases,) Cases with a formula that cannot be enclosed and may have hidden features
+        between any two angles.
     """
 
     decomposition: Decomposition
@@ -78,9 +78,9 @@ class Solved:
 
 
 def attempts(spec: MachineSpec, columns: Columns) -> Iterator[tuple[NDArray[np.int64], Solved]]:
-    """Solve assembled cases, again and again with those panels halved that were too rough.
+    """Solve assembled cases repeatedly, halving the panels that are too rough.
 
-    Yields the numbers of the cases and what was found for them; the last time a case is there is what counts.
+    Yields case numbers with their attempts; the last attempt of a case counts.
     """
     rows = np.arange(columns.cases)
     cuts = np.empty((rows.size, 0))
@@ -108,9 +108,9 @@ def attempts(spec: MachineSpec, columns: Columns) -> Iterator[tuple[NDArray[np.i
 
 
 def _mark_unreached(spec: MachineSpec, columns: Columns, solved: Solved) -> None:
-    """Mark cases whose mean speed is not the required one, as far as these panels tell.
+    """Mark cases whose mean speed on these panels differs from the required one.
 
-    A low mean over time can need the shaft to stand nearer to rest than numbers can tell.
+    A low mean over time can require the shaft to come closer to rest than doubles can resolve.
     """
     if spec.balance == "motor":
         return
@@ -121,7 +121,7 @@ def _mark_unreached(spec: MachineSpec, columns: Columns, solved: Solved) -> None
 
 
 def _stop(solved: Solved, cases: Bools) -> None:
-    """Let ``cases`` end for want of inertia, without what only a motion has."""
+    """End ``cases`` for insufficient inertia, without the results of a motion."""
     solved.endings[cases] = _CODE[Ending.INERTIA_INSUFFICIENT]
     for name, values in solved.results.items():
         if name.startswith(_OF_MOTION):
@@ -129,10 +129,10 @@ def _stop(solved: Solved, cases: Bools) -> None:
 
 
 def settle(spec: MachineSpec, columns: Columns, solved: Solved) -> Bools:
-    """Say how the cases end whose last attempt this was; True for those that were not resolved.
+    """Set the endings of the cases whose last attempt this was; True for those that were not resolved.
 
-    Torques and inertia being resolved, only a shaft that all but stops has a speed that is not. A formula that
-    gives an inertia with a jump gives no motion at all.
+    Where torques and inertia are resolved, only a shaft that nearly stops has an unresolved speed. A formula for the
+    inertia with a jump allows no motion.
     """
     ok = solved.endings == _CODE[Ending.OK]
     slow = ok & solved.slow.any(axis=1)
@@ -142,9 +142,9 @@ def settle(spec: MachineSpec, columns: Columns, solved: Solved) -> Bools:
     negative = solved.endings == _CODE[Ending.NEGATIVE_INERTIA]
     singular = np.zeros_like(lost)
     if (lost | negative).any():
-        # Beside a singular position an inertia is so large that any other looks like nothing but rounding.
+        # Close to a singular position the inertia is so large that any other looks like rounding error.
         singular = near_singular(Machine(spec, columns), solved.decomposition, solved.rough)
-        # Nothing was halved where a formula is unknown, which may be what the linkage makes of it.
+        # No panels were halved for unknown formulas, whose variation may come from the linkage.
         rows = np.nonzero(solved.unknown)[0]
         if rows.size:
             panels = solved.decomposition.panels.take(rows)
@@ -165,7 +165,7 @@ def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
         fields = machine.fields(panels.angles)
     endings = np.full(columns.cases, _CODE[Ending.OK])
     least_inertia = panels.extremes(fields.inertia).lowest
-    # An inertia of nothing but rounding lets the speed be anything.
+    # With an inertia at rounding level the speed is arbitrary.
     negative = ~(least_inertia > 1e-12 * panels.largest(fields.inertia))
     endings[negative] = _CODE[Ending.NEGATIVE_INERTIA]
     if spec.balance == "motor":
@@ -230,7 +230,7 @@ def _started(
 
 
 def _by_definition(spec: MachineSpec, d: Decomposition, out: dict[str, Floats]) -> None:
-    """Results that depend on which mean is meant, and the balance of works."""
+    """Results that depend on the definition of the mean, and the balance of works."""
     kind = spec.mean_speed_is
     out["omega.mean"] = out["omega.midrange" if kind == "midrange" else f"omega.mean_{kind}"]
     out["irregularity"] = out[f"irregularity.{kind}"]
@@ -241,7 +241,7 @@ def _by_definition(spec: MachineSpec, d: Decomposition, out: dict[str, Floats]) 
 
 
 def _required(spec: MachineSpec, columns: Columns, d: Decomposition, endings: Codes) -> Floats:
-    """The flywheel, (cases,): the drive's inertia as it is has no say in it, and may be too little."""
+    """The required flywheel inertia, (cases,), which does not depend on the drive's given inertia."""
     required = np.full(columns.cases, np.nan)
     wanted = columns.row("wanted_irregularity")
     known = (endings == _CODE[Ending.OK]) | (endings == _CODE[Ending.INERTIA_INSUFFICIENT])
@@ -279,7 +279,7 @@ def _block(spec: MachineSpec, columns: Columns) -> tuple[Floats, Codes]:
 def simulate(model: MachineSpec, columns: Mapping[str, ArrayLike], *, cases: int) -> Batch:
     """Run a batch of cases.
 
-    Every case's result is the same to the last bit whatever batch or order it is computed in.
+    The bits of a case's results do not depend on its batch or order.
 
     Parameters
     ----------
@@ -298,7 +298,7 @@ def simulate(model: MachineSpec, columns: Mapping[str, ArrayLike], *, cases: int
     Raises
     ------
     MachineError
-        If the structure makes no machine (a table that does not close, a formula that cannot be read).
+        If the structure is not a valid machine (a table that does not close, an unreadable formula).
     ValueError
         If a parameter is missing, unknown, or of the wrong shape.
     """
@@ -308,14 +308,14 @@ def simulate(model: MachineSpec, columns: Mapping[str, ArrayLike], *, cases: int
     endings = np.empty(cases, dtype=np.int8)
     for first in range(0, cases, BLOCK):
         part = slice(first, min(first + BLOCK, cases))
-        # Formulas and torques without bound run into infinities, which the endings and empty results tell of.
+        # Unbounded formulas and torques overflow to infinity, which the endings and empty results report.
         with np.errstate(all="ignore"):
             values[part], endings[part] = _block(model, block.take(part))
     return Batch(values, endings)
 
 
 def check(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> None:
-    """Refuse a base machine that has no steady motion, with all that is known about why.
+    """Refuse a base machine without steady motion, with all available reasons.
 
     Parameters
     ----------
@@ -355,7 +355,7 @@ def _problem(ending: Ending, result: Mapping[str, float], row: Columns, rule: st
     return None if plain is None else plain()
 
 
-#: Problems of which nothing is known but the ending.
+#: Problems without further information than the ending.
 _PLAIN_PROBLEMS: dict[Ending, type[MotorStalledError | MotorOverrunError | NearSingularError | QuadratureError]] = {
     problem.ending: problem for problem in (MotorStalledError, MotorOverrunError, NearSingularError, QuadratureError)
 }

@@ -1,4 +1,4 @@
-"""What a machine is made of: everything about it that is no number. Numbers come as columns, by path in a spec."""
+"""The structure of a machine: everything except its numbers, which are given as columns by path in a spec."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -39,7 +39,7 @@ class Drive:
 class MechanismChoice:
     """Which mechanism; ``table`` and ``formula`` give I''(phi) in kg*m^2.
 
-    A table of no more than one revolution repeats with every revolution.
+    A table of at most one revolution repeats every revolution.
     """
 
     kind: MechanismKind = "none"
@@ -61,13 +61,12 @@ class OperationChoice:
         compressed by it.
     form : {"constant", "table", "formula", "steps"}
         How a torque or force is given.
-    over : {"angle", "stroke"}
-        Against the shaft's angle (rad, over the whole cycle), or the fraction 0 .. 1 of the stroke that is done, seen
-        from where the forward stroke starts.
+    over : {"angle", "stroke"} Against the shaft's angle (rad, over the whole cycle), or the completed fraction 0 .. 1
+        of the stroke, measured from the start of the forward stroke.
     during : {"forward", "return", "both"}
         The strokes in which a diagram over the stroke holds.
-    sense : {"resisting", "fixed"}
-        A positive force is against the motion, whichever way it goes, or always against the forward stroke.
+    sense : {"resisting", "fixed"} A positive force is against the motion in either direction, or always against the
+        forward stroke.
     steps : int
         Number of steps.
     """
@@ -92,16 +91,13 @@ class MachineSpec:
         Revolutions of a cycle, 1 to 3.
     mean_speed_is : {"midrange", "angle", "time"}
         Which mean of the speed the required mean speed and the irregularity refer to.
-    balance : {"scale", "constant", "refuse", "motor"}
-        What makes the work over a cycle zero.
+    balance : {"scale", "constant", "refuse", "motor"} How the work over a cycle is made zero.
     drive, mechanism, operation :
         Its parts.
-    constants : tuple of str
-        Names that its formulas use beside ``phi`` (and ``x``, the fraction of the stroke); given as
-        ``constants.NAME``.
-    phi_c : int, optional
-        Which of the angles with T = T_mean the squares S3 and S4 are counted from; by default the first at which T
-        rises.
+    constants : tuple of str Names used in its formulas besides ``phi`` (and ``x``, the fraction of the stroke); given
+        as ``constants.NAME``.
+    phi_c : int, optional The angle, among those with T = T_mean, from which S3 and S4 count; by default the first at
+        which T rises.
     """
 
     cycle: int = 1

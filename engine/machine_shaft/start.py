@@ -17,7 +17,7 @@ _ITERATIONS = 60
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """What a mean of the speed depends on beside the energy at the start.
+    """The data that, with the energy at the start, determine a mean of the speed.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Stop:
     def of(cls, shape: Shape) -> "Stop":
         """The smallest work over the continuous cycle."""
         extremes = shape.panels.extremes(shape.work)
-        # The cycle begins without work done, whatever rounding makes of the polynomial there.
+        # No work is done at the start of the cycle, regardless of the polynomial's rounding error.
         return cls(np.minimum(extremes.lowest, 0.0), extremes.at_lowest)
 
     def take(self, rows: NDArray[np.int64]) -> "Stop":
@@ -111,7 +111,7 @@ def start_energy(shape: Shape, stop: Stop, kind: MeanSpeed, wanted: Floats) -> F
         high[active] = np.where(error >= 0.0, start[active], high[active])
         with np.errstate(divide="ignore", invalid="ignore"):
             step = start[active] - error / (2.0 * mean * slope)
-        # Where the shaft stops the slope is infinite, and the step leads nowhere.
+        # Where the shaft stops, the slope is infinite and the step is useless.
         inside = (step >= low[active]) & (step <= high[active]) & np.isfinite(slope)
         following = np.where(inside, step, 0.5 * (low[active] + high[active]))
         scale = np.abs(start[active]) + np.abs(stop.work[active])
@@ -127,7 +127,8 @@ def start_energy(shape: Shape, stop: Stop, kind: MeanSpeed, wanted: Floats) -> F
 def least_mean_speed(shape: Shape, stop: Stop, kind: MeanSpeed, torque: Floats) -> Floats:
     """Mean speed, shape (cases,), at which the smallest speed is 0; ``torque`` is that of drive and resistance.
 
-    The mean over time is 0 there if no torque acts where the shaft stops, for then it takes for ever to get away.
+    The mean over time is 0 there if no torque acts where the shaft stops, because the shaft then never leaves that
+    angle.
     """
     squares = shape.squares(-stop.work)
     if kind == "midrange":
@@ -142,7 +143,7 @@ def least_mean_speed(shape: Shape, stop: Stop, kind: MeanSpeed, torque: Floats) 
 
 
 def _near_stop(shape: Shape, stop: Stop) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Panels nearer to the angle at which the shaft stops than they are long, and the others that have a length."""
+    """Panels closer to the angle at which the shaft stops than their length, and the other panels of nonzero length."""
     cuts = np.broadcast_to(shape.panels.cuts, (len(shape.work), shape.panels.cuts.shape[1]))
     angle = stop.points.angle[:, None]
     length = np.diff(cuts, axis=1)

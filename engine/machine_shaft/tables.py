@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from sprag.engine.machine_shaft.problems import TableError
 
 if TYPE_CHECKING:
-    # Imported where tables are made: whoever only reads catalogues does not wait for it.
+    # Imported on use, so that reading catalogues does not wait for it.
     from scipy.interpolate import PPoly
 
 Floats = NDArray[np.float64]
 Interpolation = Literal["smooth", "linear"]
 
 MAX_ROWS = 5_000
-#: How well the last row of a periodic table must repeat the first, over the table's range.
+#: Tolerance for the last row of a periodic table to repeat the first, relative to the table's range.
 CLOSING = 1e-9
 
 
@@ -37,7 +37,7 @@ class Table:
 
 
 class Curve:
-    """A table made ready.
+    """A prepared table.
 
     Attributes
     ----------
@@ -69,11 +69,11 @@ def _checked(rows: Sequence[tuple[float, float]]) -> tuple[Floats, Floats]:
         raise TableError(f"A table needs 2 to {MAX_ROWS} rows, not {len(rows)}.")
     x, y = np.array(rows, dtype=np.float64).T
     if not (np.isfinite(x).all() and np.isfinite(y).all()):
-        raise TableError("A table holds finite numbers only.")
+        raise TableError("A table must contain finite numbers only.")
     steps = np.diff(x)
     if np.any(steps < 0.0):
         row = int(np.argmax(steps < 0.0)) + 1
-        raise TableError(f"The rows of a table ascend: row {row + 1} has {x[row]:g} after {x[row - 1]:g}.")
+        raise TableError(f"The rows of a table must ascend: row {row + 1} has {x[row]:g} after {x[row - 1]:g}.")
     if np.any((steps[1:] == 0.0) & (steps[:-1] == 0.0)):
         raise TableError("A table has at most two rows with the same x (a jump).")
     return x, y
@@ -84,7 +84,7 @@ def _smooth(x: Floats, y: Floats) -> "PPoly":
 
     if len(x) == 2:
         return PPoly(np.array([[(y[1] - y[0]) / (x[1] - x[0])], [y[0]]]), x)
-    # A slope near the least of numbers has a reciprocal beyond them, which makes it 0 as it should.
+    # The reciprocal of a tiny slope overflows, which correctly makes the slope 0.
     with np.errstate(over="ignore"):
         cubic = PchipInterpolator(x, y)
     return PPoly(cubic.c, cubic.x)
@@ -138,7 +138,7 @@ def periodic(table: Table, period: float) -> Curve:
         x, y = np.append(x, x[0] + period), np.append(y, y[0])
     jumps = np.nonzero(np.diff(x) == 0.0)[0]
     if len(jumps):
-        # Begin at a jump, so that every smooth part lies whole within the period.
+        # Begin at a jump, so that every smooth part lies completely within the period.
         first = int(jumps[0]) + 1
         x = np.concatenate([x[first:], x[1:first] + period])
         y = np.concatenate([y[first:], y[1:first]])

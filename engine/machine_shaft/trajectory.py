@@ -52,7 +52,7 @@ def trajectory(model: MachineSpec, columns: Mapping[str, ArrayLike], angles: Arr
     Raises
     ------
     MachineError
-        If the structure makes no machine.
+        If the structure is not a valid machine.
     ValueError
         If an angle is outside the cycle, or a parameter is missing or unknown.
     """
@@ -123,5 +123,5 @@ def _table(d: Decomposition, chosen: int | None, angles: Floats) -> dict[str, Fl
 
 def _time(d: Decomposition, cases: NDArray[np.int64], points: Points) -> Floats:
     pace = 1.0 / np.sqrt(d.squares)
-    # No time has passed at the angle 0, whatever rounding makes of the polynomial there.
+    # No time has passed at the angle 0, regardless of the polynomial's rounding error.
     return np.maximum(d.panels.running_at_rows(pace, d.panels.running(pace)[1], cases, points), 0.0)

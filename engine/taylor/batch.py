@@ -1,7 +1,8 @@
-"""Roots and peaks of many polynomials at once: the plain shapes of ``roots`` without branches, one polynomial a lane.
+"""Roots and peaks of many polynomials: the simple shapes of ``roots`` without branches, one polynomial per lane.
 
-Polynomials lie in blocks of ``SLOTS``; row k of a block holds the coefficients of x^k. Shapes that moduli cannot tell,
-and iterations that do not settle, are marked ``HARD`` and left to the functions of ``roots``, which miss nothing.
+Polynomials are stored in blocks of ``SLOTS``; row k of a block holds the coefficients of x^k. Shapes that the moduli
+cannot determine and iterations that do not converge are marked ``HARD`` and left to the functions of ``roots``, which
+find every root.
 """
 
 import numpy as np
@@ -56,7 +57,7 @@ def blocks_for(polynomials: int, order: int) -> NDArray[np.float64]:
 
 
 class _Shape:
-    """Code that tells the shape of a polynomial on [0, 1] from its coefficients (as ``roots._shape``)."""
+    """Code that determines the shape of a polynomial on [0, 1] from its coefficients (as ``roots._shape``)."""
 
     def __init__(self, order: int) -> None:
         self.code = code = LaneCode(SLOTS)

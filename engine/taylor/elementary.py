@@ -1,7 +1,7 @@
-"""Sine, cosine, logarithm and exponential for compiled code, by sums and products alone.
+"""Sine, cosine, logarithm and exponential for compiled code, computed by sums and products only.
 
-Those of a C library differ in the last bit from one processor to another, since it chooses among versions with and
-without fused multiply-adds. These are within an ulp or so. The methods are the classic ones of fdlibm.
+The functions of a C library can differ in the last bit between processors, because it chooses among versions with and
+without fused multiply-adds. These are accurate to about one ulp and use the classic methods of fdlibm.
 """
 
 import math

@@ -1,10 +1,10 @@
-"""First root and largest value of a polynomial on [0, 1], found so that a pair of roots cannot be missed.
+"""First root and largest value of a polynomial on [0, 1]; a pair of close roots is never missed.
 
 A polynomial in Bernstein form lies between its smallest and its largest coefficient, and the number of its roots in the
 interval is at most the number of sign changes of its coefficients (Descartes' rule in Bernstein form; see Farouki, "The
 Bernstein polynomial basis: a centennial retrospective", 2012, sections 4 and 5). No change: no root. One change:
-exactly one root, which a guarded Newton iteration refines. More: halve the interval (de Casteljau) and look again, left
-half first.
+exactly one root, refined by a guarded Newton iteration. More: halve the interval (de Casteljau) and repeat, left half
+first.
 """
 
 from math import comb
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 #: Highest degree the tables and work arrays below hold.
 MAX_DEGREE = 24
-#: Halvings after which an undecided interval counts as its ends say: about the spacing of doubles near 1.
+#: Halvings after which an undecided interval is decided by its ends: about the spacing of doubles near 1.
 MAX_DEPTH = 52
 #: Answer of ``first_root`` when there is none; larger than any root.
 NO_ROOT = 2.0
@@ -29,7 +29,7 @@ _INVERSE_BINOMIAL = np.array([[1.0 / max(1, comb(j, k)) for k in range(MAX_DEGRE
 #: 1/k, and 0 for k = 0: integrating a series without divisions.
 RECIPROCAL = np.array([0.0, *(1.0 / k for k in range(1, MAX_DEGREE + 2))])
 
-#: Columns of the work stack behind the coefficients: where an interval starts and how wide it is.
+#: Columns of the work stack after the coefficients: start and width of an interval.
 _LOW = MAX_DEGREE + 1
 _WIDTH = MAX_DEGREE + 2
 
@@ -131,7 +131,7 @@ def _refine_root(g: Floats, degree: int, low: float, high: float, guess: float) 
         else:
             high = x
         new = x - value / slope if slope != 0.0 else low - 1.0
-        # Newton squares the error: after so small a step the next one is below rounding.
+        # Newton's method squares the error: after such a small step the next one is below rounding.
         if abs(new - x) <= 1e-9 * x:
             return min(max(new, low), high)
         if not low < new < high:
@@ -146,7 +146,7 @@ def _refine_root(g: Floats, degree: int, low: float, high: float, guess: float) 
 def _refine_peak(g: Floats, degree: int, low: float, high: float, guess: float, rises: bool) -> float:
     """The single zero of the derivative of ``g`` between ``low`` and ``high``: Newton kept inside.
 
-    ``rises`` tells whether ``g`` rises at ``low``.
+    ``rises`` states whether ``g`` rises at ``low``.
     """
     x = guess if low < guess < high else 0.5 * (low + high)
     for _ in range(80):
@@ -156,7 +156,7 @@ def _refine_peak(g: Floats, degree: int, low: float, high: float, guess: float, 
         else:
             high = x
         new = x - slope / curvature if curvature != 0.0 else low - 1.0
-        # A peak is flat: its value is exact to rounding long before its place is.
+        # A peak is flat: its value is exact to rounding long before its position is.
         if abs(new - x) <= 1e-6:
             return min(max(new, low), high)
         if not low < new < high:

@@ -29,7 +29,7 @@ class LaneCode:
         return f"W[{row * self.lanes} + lane]"
 
     def let(self, name: str, expression: str) -> str:
-        """Define a local variable; return the name it really got, which is new each time."""
+        """Define a local variable; returns its actual name, which is unique."""
         use = self._uses[name] = self._uses.get(name, 0) + 1
         unique = name + self.tag if use == 1 else f"{name}{self.tag}_again{use}"
         self.lines.append(f"{unique} = {expression}")
@@ -93,10 +93,10 @@ def chord_constant(k: int) -> float:
 
 
 class Span(NamedTuple):
-    """Names of what bounds a polynomial on [0, 1]: its values at 0 and 1, its slope at 0, and its bulge.
+    """Names of the bounds of a polynomial on [0, 1]: its values at 0 and 1, its slope at 0, and its bulge.
 
     ``sum c_k x^k`` differs from the chord between its end values by at most the bulge, ``sum |c_k| max(x - x^k)`` over
-    k >= 2. For the short steps of a high order this is nearly sharp, and it takes no branches.
+    k >= 2. For the short steps of a high order this is nearly sharp, and it needs no branches.
     """
 
     start: str

@@ -32,7 +32,7 @@ class _Advance:
         return self.code.let("over", f"{self.h}*({integral(names, self.x)})")
 
     def require(self, condition: str) -> None:
-        """Have the lane looked at where a condition fails; a NaN fails every comparison."""
+        """Mark the lane for attention where a condition fails; a NaN fails every comparison."""
         self.attention = self.code.let("attention", f"{self.attention} + (0.0 if {condition} else 1.0)")
 
     def pendulum(self, index: int) -> None:
@@ -67,7 +67,7 @@ class _Advance:
         self.require(f"abs({w_end}) < {SPEED_BOUND!r}")
 
     def shaft_and_clock(self) -> None:
-        """Move the shaft and the clock; settle whether the lane needs attention."""
+        """Move the shaft and the clock; determine whether the lane needs attention."""
         layout, code = self.layout, self.code
         rotating = code.load("rotating", layout.rotating)
         total = [code.let("S", " + ".join(parts)) for parts in zip(*self.torques, strict=True)]

@@ -1,4 +1,4 @@
-"""The hybrid automaton (docs/theory.md) as one table: what each state watches, and where a crossing leads.
+"""The hybrid automaton (docs/theory.md) as one table: the guards of each state, and the targets of their crossings.
 
 Compiled code reads the arrays made from ``TRANSITIONS`` at the end of this module; documentation and tests read the
 table.
@@ -18,7 +18,7 @@ class Clutch(IntEnum):
     ENGAGED = 2
     BEYOND = 3
     LOCKED = 4
-    #: Not a state to stay in: the start of an interaction, resolved at once to TAKE_UP, ENGAGED, LOCKED or FREE.
+    #: A transient state: the start of an interaction, resolved immediately to TAKE_UP, ENGAGED, LOCKED or FREE.
     START = 5
 
 
@@ -53,7 +53,7 @@ class Transition:
     """One row of the automaton: in ``source``, when ``quantity`` passes ``threshold`` upward (+1) or downward (-1), go
     to ``target``.
 
-    ``reset`` says what is set at the crossing. ``literal_only`` rows hold under ``reset = "literal"`` alone
+    ``reset`` describes what is set at the crossing. ``literal_only`` rows hold under ``reset = "literal"`` alone
     (docs/theory.md)): there an engaged clutch restarts when w rises through 0. Since w is positive when it engages, the
     row that leads back to the same state notes the fall of w through 0 that has to come first; it changes nothing and
     counts as no event.

@@ -1,15 +1,15 @@
-"""Bounds of every watched quantity over a step: how far guards keep from their bands, how far extrema may be exceeded.
+"""Bounds of watched quantities over a step: distances of guards to their bands, possible excess over extrema.
 
-They are made in the vector loop, from the stored series; only lanes whose bounds cannot exclude an event or a new
+They are computed in the vector loop from the stored series; only lanes whose bounds cannot exclude an event or a new
 extremum get a second look (``lanes.look_for_events``, ``window.collect_peaks``).
 """
 
 from sprag.engine.taylor.straight import LaneCode, Span, horner, larger, primitive_span, rate_span, smaller, span
 from sprag.engine.vibration_drive.layout import Layout
 
-#: Margin that says the step itself is too long, not that a guard is near.
+#: Margin that indicates that the step itself is too long, not that a guard is close.
 TOO_LONG = -1e308
-#: Share of a torque that is rounding: of one that is constant, no step is short enough for less.
+#: Rounding share of a torque: for a constant torque no step reduces the defect below it.
 _TORQUE_ROUNDING = 1e-14
 
 
@@ -29,7 +29,7 @@ class _Watch:
     def guard(self, bounds: Span, block: int, low: int | None, high: int | None) -> None:
         """``low`` and ``high`` are rows of a band's edges; the distances to them go ``block`` rows further.
 
-        After a crossing the quantity starts on an edge and leaves it at once: that is far enough.
+        After a crossing the quantity starts on an edge and leaves it immediately, which counts as far enough.
         """
         code = self.code
         if low is not None:

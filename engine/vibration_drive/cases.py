@@ -1,4 +1,4 @@
-"""From columns of parameters to the matrix of cases that compiled code reads."""
+"""Conversion of parameter columns to the matrix of cases that compiled code reads."""
 
 import math
 from collections.abc import Mapping
@@ -49,7 +49,7 @@ STOPS = 4
 PENDULUM_COLUMNS = len(PendulumColumn)
 #: Fewest clutch coefficients of a kernel: the straight line beyond the data needs two.
 MIN_COEFFICIENTS = 2
-#: A stop this near a whole period is meant to be one.
+#: A stop this close to a whole period counts as one.
 _WHOLE = 1e-12
 #: Motions of a machine of its own that the step budget allows for, at most, in rad/s: faster ones are mistakes more
 #: often than machines, and a case of them is to end while it still costs little.
@@ -59,7 +59,7 @@ _DEFAULTS = {parameter.path: parameter.default for parameter in PARAMETERS}
 
 
 def pendulum_count(columns: Mapping[str, ArrayLike]) -> int:
-    """Number of pendulums that the paths speak of."""
+    """Number of pendulums in the paths."""
     indices = [int(path.split(".")[1]) for path in columns if path.startswith("pendulums.")]
     if not indices or max(indices) >= MAX_PENDULUMS:
         raise ValueError(f"a drive has 1 to {MAX_PENDULUMS} pendulums, numbered from 0")
@@ -121,8 +121,8 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     frequency = parameter("excitation.frequency")
     nu = 2.0 * math.pi * frequency
     shaft_inertia = parameter("shaft.inertia")
-    # The fastest of excitation, pendulums on their springs, and pendulums against the shaft through their clutches: it
-    # turns accelerations into speeds when a step's error is weighed.
+    # The fastest rate among the excitation, pendulums on their springs, and pendulums against the shaft through their
+    # clutches; it converts accelerations to speeds in the error estimate of a step.
     rate = nu
     acc_x, acc_y = (parameter(f"excitation.amplitude_{direction}") * nu**2 for direction in "xy")
     gravity = parameter("gravity")
@@ -183,7 +183,7 @@ def pendulum_column(coefficients: int, pendulum: int, column: int) -> int:
 
 
 def with_lengths(matrix: Floats, begin: Floats, periods: Floats, *, windowed: bool | NDArray[np.bool_]) -> Floats:
-    """The same cases, each run for its own number of periods from where in the period it begins.
+    """The same cases, each run for its own number of periods from its own starting phase.
 
     Parameters
     ----------

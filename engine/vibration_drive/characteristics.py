@@ -195,7 +195,7 @@ def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
     mean = np.clip(turn / cases.length, cases.shaft("speed_min"), cases.shaft("speed_max"))
     out["shaft.speed.mean"] = mean
     out["shaft.speed.max"] = cases.shaft("speed_max")
-    # Under a load the shaft never turns back: a negative minimum is the rounding of the instant it stops.
+    # Under a load the shaft never turns back: a negative minimum is a rounding error at the instant it stops.
     lowest = cases.shaft("speed_min")
     out["shaft.speed.min"] = np.where((cases.load > 0.0) & (lowest < 0.0), 0.0, lowest)
     out["shaft.irregularity"] = _ratio(cases.shaft("speed_max") - out["shaft.speed.min"], mean)
@@ -227,8 +227,8 @@ def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
 def _balances(cases: _Cases, out: dict[str, Floats]) -> None:
     """Residuals of both balances (docs/theory.md, "Balances"), each over the largest of its own terms.
 
-    The terms include the largest kinetic energy and the largest angular momentum of the shaft in the window, so that a
-    machine that only swings or coasts, with next to no work done, is not judged against zero.
+    The terms include the largest kinetic energy and angular momentum of the shaft in the window, so that a machine that
+    only swings or coasts, with almost no work done, is not judged against zero.
     """
     length = cases.length
     turn = cases.shaft("turn_2") - cases.shaft("turn_0")
@@ -240,7 +240,7 @@ def _balances(cases: _Cases, out: dict[str, Floats]) -> None:
     for i in range(cases.lay.n):
         fastest = np.maximum(cases.pendulum(i, "speed_max"), -cases.pendulum(i, "speed_min"))
         kinetic = kinetic + 0.5 * cases.parameter(i, PendulumColumn.INERTIA) * fastest**2
-    # Of a motion that has died away nothing but rounding is left: it is judged against a swing of 3e-5 rad.
+    # A motion that has died away consists of rounding errors only and is judged against a swing of 3e-5 rad.
     least = np.zeros_like(cases.period)
     for i in range(cases.lay.n):
         least = least + 1e-9 * cases.parameter(i, PendulumColumn.INERTIA) * (2.0 * np.pi / cases.period) ** 2

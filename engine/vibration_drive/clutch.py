@@ -1,7 +1,7 @@
 """Least-squares clutch characteristic from measured torque over angle (docs/theory.md).
 
-The polynomial is solved from the scaled matrix of powers by QR and SVD; the normal equations (7) are never formed.
-What the source's program reports of their matrix, eigenvalues and condition number, is found from singular values.
+The polynomial is solved from the scaled matrix of powers by QR and SVD; the normal equations (7) are never formed. The
+eigenvalues and condition number of their matrix, which the source's program reports, follow from singular values.
 """
 
 import math
@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 _EPS = float(np.finfo(np.float64).eps)
-#: Terms of a law this many times larger than the torque they add up to follow the scatter of the data, not the clutch.
+#: Terms of a law that exceed their sum by this factor follow the scatter of the data, not the clutch.
 _MAX_CANCELLATION = 30.0
 
 
@@ -63,10 +63,9 @@ def fit_clutch(
         Highest degree to try, 1 .. 11. Degrees with more unknowns than different windups are not tried.
     through_origin : bool
         True: c_1 = 0, no torque at zero windup, degrees from 1. False: the source's full polynomial, degrees from 0.
-    angles_include_backlash : bool
-        True: the angles count from the start of contact, and ``backlash`` (rad) is taken off to get windups. Rows
-        within the backlash are left out of the fit; they must show no torque (beyond ``accuracy``). A row at zero
-        windup stays. False: the angles are windups, and ``backlash`` is not used.
+    angles_include_backlash : bool True: the angles count from the start of contact, and ``backlash`` (rad) is
+        subtracted to get windups. Rows within the backlash are left out of the fit; they must show no torque (beyond
+        ``accuracy``). A row at zero windup stays. False: the angles are windups, and ``backlash`` is not used.
 
     Returns
     -------
@@ -241,7 +240,7 @@ def _data_warnings(
 def _not_reached(
     rows: Rows, reports: tuple[DegreeReport, ...], accuracy: float, max_degree: int, first_power: int
 ) -> tuple[str, str, str]:
-    """For data that no tried degree fits well enough: what is not reached, the residuals tried, what to do."""
+    """For data that no tried degree fits well enough: the missed accuracy, the residuals, and advice."""
     tried = ", ".join(
         f"{report.max_residual:.4g} N*m at degree {report.degree}"
         + ("" if report.rank == report.degree + 1 - first_power else " (not determined by these angles)")

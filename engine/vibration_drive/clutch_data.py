@@ -20,7 +20,7 @@ _EPS = float(np.finfo(np.float64).eps)
 class Rows:
     """Measured rows: windup (rad) and torque (N*m) of each, which of them are fitted, all of shape (m,).
 
-    ``distinct`` is the number of different windups that tell something about the law: the most unknowns it can have.
+    ``distinct`` is the number of different windups that carry information about the law: the most unknowns it can have.
     """
 
     windup: NDArray[np.float64]
@@ -39,7 +39,7 @@ class Rows:
 
 
 def check_options(accuracy: float, max_degree: int, through_origin: bool, include: bool, backlash: float) -> None:
-    """Refuse an option of ``fit_clutch`` that is no number or flag in its range."""
+    """Refuse an invalid option of ``fit_clutch``."""
 
     def refuse(name: str, value: object, message: str, allowed: str) -> None:
         raise ClutchFitError(message, name=name, value=value, allowed=allowed)
@@ -58,7 +58,7 @@ def check_options(accuracy: float, max_degree: int, through_origin: bool, includ
 
 
 def measured_rows(data: ArrayLike, backlash: float, accuracy: float, through_origin: bool) -> Rows:
-    """Windups from angles, with the rows inside the backlash set aside and the remaining ones checked for content."""
+    """Windups from angles; rows inside the backlash are separated, and the others checked for information content."""
     table = _table(data)
     angle, measured = table[:, 0], table[:, 1]
     windup = angle - backlash
@@ -81,13 +81,13 @@ def measured_rows(data: ArrayLike, backlash: float, accuracy: float, through_ori
         plural = "" if distinct == 1 else "s"
         raise ClutchFitError(
             f"has {distinct} different {word}windup{plural}, the largest {max(float(windup.max()), 0.0):.6g} rad"
-            + (" once the backlash is taken off" if backlash else ""),
+            + (" once the backlash is subtracted" if backlash else ""),
             name="data",
             value=distinct,
             allowed=f"at least 2 different {word}windups, the largest >= {MIN_WINDUP_RANGE:g} rad",
         )
     if not measured[fitted].any():
-        raise ClutchFitError("every torque is zero: the clutch would never transmit any", name="data", value=0.0)
+        raise ClutchFitError("every torque is zero: the clutch would never transmit torque", name="data", value=0.0)
     return Rows(windup, measured, fitted, distinct)
 
 
@@ -99,7 +99,7 @@ def _table(data: ArrayLike) -> NDArray[np.float64]:
     except ValueError:  # rows of different lengths
         raise ClutchFitError("rows differ in length", name="data", value=data, allowed=shape) from None
     if raw.dtype.kind not in "iuf":
-        raise ClutchFitError("holds something that is no number", name="data", value=data, allowed=shape)
+        raise ClutchFitError("contains something that is not a number", name="data", value=data, allowed=shape)
     if raw.ndim != 2 or raw.shape[1] != 2 or raw.shape[0] == 0:
         raise ClutchFitError("has the wrong shape", name="data", value=list(raw.shape), allowed=shape)
     table = raw.astype(np.float64)

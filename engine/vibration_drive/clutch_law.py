@@ -20,7 +20,7 @@ from sprag.engine.vibration_drive.parameters import CLUTCH_COEFFICIENT, MAX_COEF
 #: less than that is rounding of a law that touches zero.
 _ROUNDING = 1e-12
 
-#: Largest angle and windup that is taken for meant, rad.
+#: Largest accepted angle and windup, rad.
 MAX_ANGLE = 1e3
 
 _Array = NDArray[np.float64]
@@ -114,7 +114,7 @@ def check_law(coefficients: Sequence[float], windup_limit: float = math.inf) -> 
 
 
 def describe(law: Sequence[float], limit: float) -> tuple[bool, tuple[str, ...]]:
-    """Whether a law (that is not negative) is monotone in its range, and the warnings it deserves."""
+    """Whether a (non-negative) law is monotone in its range, and the warnings about it."""
     warnings = []
     if law[0] > 0.0:
         warnings.append(
@@ -198,7 +198,7 @@ def _split(coefficients: ArrayLike, limit: float, u: ArrayLike) -> tuple[_Array,
 
 
 def _at_end(law: _Array, limit: float) -> float:
-    """Value at the end of the range; 0 for a range without end, where nothing goes on straight."""
+    """Value at the end of the range; 0 for an infinite range, which has no linear continuation."""
     return float(poly.polyval(limit, law)) if math.isfinite(limit) else 0.0
 
 
@@ -233,7 +233,7 @@ def _limit(windup_limit: float) -> float:
 
 
 def is_number(value: object) -> bool:
-    """Whether ``value`` is a real number that a double can hold (NaN and infinity included), and no bool."""
+    """Whether ``value`` is a real number that fits into a double (including NaN and infinity), and not a bool."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Real):
         return False
     try:

@@ -1,4 +1,4 @@
-"""What the clutch's checks and its fit hand back, and the errors they refuse with."""
+"""Results and errors of the checks and the fit of a clutch law."""
 
 import reprlib
 from dataclasses import dataclass
@@ -9,8 +9,7 @@ class ClutchError(ValueError):
 
     Attributes
     ----------
-    message : str
-        The plain sentence, without name, value and range.
+    message : str The sentence, without name, value and range.
     name : str
         Dotted path of the field inside the clutch's own fields: ``accuracy``, ``coefficients.2``, ``data.4.0`` (row 4,
         angle), ``data.4.1`` (row 4, torque). Rows and coefficients are counted from 0, as in paths of a spec.
@@ -33,7 +32,7 @@ class ClutchError(ValueError):
 
 
 class ClutchLawError(ClutchError):
-    """A coefficient list that is no clutch law: wrong numbers, zero everywhere, or negative within its range."""
+    """Coefficients that are not a clutch law: invalid numbers, zero everywhere, or negative within the range."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +40,7 @@ class ClutchLaw:
     """A law that was checked.
 
     ``coefficients`` are c_1 first, N*m/rad^(k-1); ``windup_limit`` in rad, infinite where the law has no end.
-    ``monotone`` says that the torque never falls within the range; ``warnings`` are sentences about what is allowed
+    ``monotone`` states that the torque never falls within the range; ``warnings`` are sentences about what is allowed
     but notable.
     """
 
@@ -118,7 +117,7 @@ class ClutchFitError(ClutchError):
     """No law could be fitted: wrong input, accuracy not reached, or a law that is negative in its range.
 
     ``degrees`` holds the report of every degree that was tried, with its residuals; it is empty for wrong input.
-    ``summary`` is the message without the list of those residuals, for who shows the degrees beside it.
+    ``summary`` is the message without the list of residuals, for callers that show the degrees separately.
     """
 
     def __init__(

@@ -25,9 +25,9 @@ from sprag.engine.vibration_drive.strobes import BEGIN
 
 Floats = NDArray[np.float64]
 
-#: Excitation periods that a table is about at most: the last ones of a longer run.
+#: Most excitation periods of a table: the last ones of a longer run.
 MAX_PERIODS = 500
-#: Steps a period for which there is room at first.
+#: Initial capacity in steps per period.
 _STEPS = 100
 #: Part of a period by which an engagement at the strobe may be off in the next turn of an orbit.
 _SAME = 1e-9
@@ -54,7 +54,8 @@ def engagements(columns: Mapping[str, ArrayLike], run: Run) -> Engagements:
     Returns
     -------
     Engagements
-        Of a run longer than ``MAX_PERIODS`` only the last ones; an engagement that the window cuts is told in part.
+        For a run longer than ``MAX_PERIODS`` only the last periods; an engagement that the window cuts is given in
+        part.
 
     Raises
     ------
@@ -80,9 +81,9 @@ def engagements(columns: Mapping[str, ArrayLike], run: Run) -> Engagements:
 def settled_engagements(columns: Mapping[str, ArrayLike], settings: SettledRun) -> Engagements:
     """The engagements in one turn of the settled motion, and the means of its periods.
 
-    Times count from the start of an excitation period. An engagement that goes on into the next turn is told whole: it
-    ends after the turn. Of an irregular or unsettled motion the ``settings.max_period`` periods after the search are
-    told.
+    Times count from the start of an excitation period. An engagement that continues into the next turn is given
+    completely and ends after the turn. For irregular or unsettled motion, the ``settings.max_period`` periods after the
+    search are examined.
 
     Parameters
     ----------
@@ -104,7 +105,7 @@ def settled_engagements(columns: Mapping[str, ArrayLike], settings: SettledRun) 
     name = regime.name.lower()
     unloaded = not float(np.asarray(columns.get("shaft.load", 1.0))) > 0.0
     if ending != Ending.OK or (unloaded and regime in (Regime.COASTING, Regime.HELD)):
-        # Of the limit of a vanishing load no clutch transmits torque.
+        # In the limit of a vanishing load no clutch transmits torque.
         return Engagements(0.0, turn * period, name, (), (), ending)
     run = Run(tolerance=settings.tolerance, reset=settings.reset, max_events_per_period=settings.max_events_per_period)
     begin, length = float(found.points[0, BEGIN]), float(2 * turn if repeats else turn)

@@ -8,7 +8,7 @@ by J:
     shaft' = (sum T - M_c) / J_e                  T = sum c_k u^(k-1)                 u' = w - shaft
 
 Modes enter as numbers, not branches: the law in force is zero where a clutch is free and a straight line beyond the
-data; the shaft's mobility is zero where it is held. A locked clutch has w' = shaft' and its torque is what that takes.
+data; the shaft's mobility is zero where it is held. A locked clutch has w' = shaft', and its torque follows from this.
 """
 
 import math
@@ -113,15 +113,15 @@ def _free_acceleration(code: LaneCode, p: _Pendulum, x: list[str], y: list[str],
     phi.
     """
     i = p.index
-    # What is known before the newest coefficients is added up first: the step takes as long as the chain of operations
-    # from one order to the next, more than by their number.
+    # Terms known before the newest coefficients are summed first: the time of a step depends on the chain of operations
+    # from one order to the next, more than on their number.
     rest = code.let(f"R{i}_{k}", f"-{p.damping}*{p.w[k]} - {p.spring}*{p.phi[k]}")
     older = ""
     if k > 0:
         p.sin.append(_turned(code, f"s{i}_{k}", p.cos, p, k, 1.0))
         p.cos.append(_turned(code, f"c{i}_{k}", p.sin, p, k, -1.0))
         older = " + ".join(f"{a[j]}*{b[k - j]}" for j in range(1, k + 1) for a, b in ((x, p.cos), (y, p.sin))) + " + "
-    # The weight is kept apart: a base at rest drives nothing, not even by a rounding error.
+    # The weight is kept separate, so that a base at rest drives nothing, not even by a rounding error.
     p.drive.append(code.let(f"D{i}_{k}", f"{older}{x[0]}*{p.cos[k]} + {y[0]}*{p.sin[k]}"))
     weight = code.let(f"G{i}_{k}", f"{rest} + weight{i}*{p.sin[k]}")
     p.free = code.let(f"F{i}_{k}", f"{weight} + {p.ml}*{p.drive[k]}")
@@ -231,7 +231,7 @@ def _step_size(code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft
     longest = code.let("longest", f"({smaller('followed', repr(LONGEST_STEP))})*period")
     code.store(layout.h_free, "h_free")
     code.let("h_wanted", smaller("h_free", longest))
-    # A stop a hair behind the step's end is taken along rather than left for a step of rounding size.
+    # A stop barely after the step's end is included in the step instead of leaving a step of rounding size.
     code.store(layout.at_stop, f"0.0 if h_wanted < {rest}*0.999999 else 1.0")
     code.let("h", f"h_wanted if h_wanted < {rest}*0.999999 else {rest}")
     code.store(layout.h, "h")

@@ -73,7 +73,7 @@ def _guard(W: Floats, lay: Layout, lane: int, i: int, band: int, g: Floats) -> N
 
 @inlined
 def _offer(W: Floats, Z: Ints, lay: Layout, lane: int, x: float, pendulum: int, target: int) -> None:
-    """Note an event at the part ``x`` of a lane's step if it is the first so far; the part that is taken ends there."""
+    """Record an event at the fraction ``x`` of a lane's step if it is the earliest so far; the step then ends there."""
     first = W[lay.x * lay.lanes + lane]
     if Z[lane, EVENT_PENDULUM] == NO_EVENT and first == 1.0:
         first = 1.5
@@ -99,9 +99,9 @@ def _enter(
     meta: Ints,
     used: int,
 ) -> int:
-    """Put a guard's polynomial on the list of those whose first root is wanted; the length of the list then.
+    """Add a guard's polynomial to the list for the root search; returns the length of the list.
 
-    Leading zeros are roots that have been dealt with. What is not positive after them is an event at once.
+    Leading zeros are roots that have been handled. A polynomial that is not positive after them is an immediate event.
     """
     first = 0
     while first <= lay.order and g[first] == 0.0:
@@ -123,10 +123,10 @@ def _enter(
 
 @part
 def collect_guards(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks: Floats, meta: Ints, used: int) -> int:
-    """List the guards of a lane that its step may violate; the length of the list then.
+    """List the guards of a lane that its step may violate; returns the length of the list.
 
-    Of events at the same time the shaft's comes first, then the pendulum with the lowest index; the others are found
-    violated at the start of the next step and follow at once.
+    Of simultaneous events the shaft's comes first, then that of the pendulum with the lowest index; the others are
+    found violated at the start of the next step and follow immediately.
     """
     lanes = lay.lanes
     fresh = W[lay.steps * lanes + lane] == Z[lane, SKIP_STEP]
@@ -165,7 +165,7 @@ def collect_guards(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks
 def settle_guards(
     W: Floats, Z: Ints, lay: Layout, g: Floats, stack: Floats, blocks: Floats, meta: Ints, used: int
 ) -> None:
-    """After the vector loops over the list: note each lane's first event."""
+    """After the vector loops over the list: record each lane's first event."""
     for slot in range(used):
         start = slot_start(lay.order, slot)
         status = blocks[start + (lay.order + STATUS) * SLOTS]
@@ -209,16 +209,16 @@ def _start(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> None:
     if again:
         W[(base + lay.p_engagements) * lanes + lane] += 1.0
     if Z[lane, LITERAL] == 1 and Z[lane, i] == ENGAGED:
-        # From beyond the data too, w has just risen: it must fall before it can rise again.
+        # The same applies beyond the data: w has just risen and must fall before it can rise again.
         watch_fall(W, lay, lane, i, True)
 
 
 @part
 def _at_rest(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> bool:
-    """Whether the motion of pendulum ``i`` is nothing but rounding about its equilibrium; then it ends.
+    """Whether the motion of pendulum ``i`` is only rounding error about its equilibrium; it is then set to rest.
 
-    Without horizontal vibration the upright position is an equilibrium. What rounding leaves there can have any size,
-    1e-40 rad or 0, and the guards of a clutch cannot tell such a pendulum from one that moves.
+    Without horizontal vibration the upright position is an equilibrium. The rounding error there can have any size,
+    1e-40 rad or 0, and a clutch's guards cannot distinguish such a pendulum from a moving one.
     """
     lanes = lay.lanes
     base = lay.pendulums + i * lay.stride
@@ -233,9 +233,9 @@ def _at_rest(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> bool:
 
 @part
 def _break_away(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
-    """The shaft starts without acceleration, and so without leaving behind a pendulum that stays at rest.
+    """Start the shaft without acceleration, so that it does not outrun a pendulum that stays at rest.
 
-    Its torques balance the load but for the error of the step that led there.
+    Its torques balance the load up to the error of the preceding step.
     """
     Z[lane, SKIP_SHAFT] = 2
     for j in range(lay.n):
@@ -248,10 +248,10 @@ def _break_away(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
 
 @part
 def _unlock(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, target: int) -> None:
-    """Let the locked clutch ``i`` go, and decide about all locked clutches with it.
+    """Release the locked clutch ``i``, and decide all locked clutches together with it.
 
-    Copies of it come to the same edge at the same instant. One after the other they would leave each other a step of
-    rounding, in which nothing tells the trend any more.
+    Identical clutches reach the same edge simultaneously. Handled one after the other, they would leave each other
+    steps of rounding size, in which the trend is lost.
     """
     size = typical_speed(W, lay, lane, i)
     if Z[lane, EVENT_SMOOTH] == 0 and Z[lane, SKIP_T + i] == 0 and decide(W, Z, lay, lane, i, size, -1):
@@ -292,7 +292,7 @@ def transit(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
         Z[lane, SKIP_W + i] = 0
         Z[lane, SKIP_U + i] = 0
     if _at_rest(W, Z, lay, lane, i):
-        # The guards are asked again now that w is what it would be without rounding.
+        # The guards are evaluated again with the exact w.
         return
     if target == START:
         _start(W, Z, lay, lane, i)

@@ -1,4 +1,4 @@
-"""One call of a kernel: the work arrays it needs, and what it leaves in them."""
+"""One call of a kernel: its work arrays and its output."""
 
 import math
 from dataclasses import dataclass
@@ -26,14 +26,14 @@ SHAFT_SAMPLES, PENDULUM_SAMPLES = 4, 6
 
 @dataclass(frozen=True, slots=True)
 class Integration:
-    """What a kernel leaves behind.
+    """The output of a kernel.
 
     Attributes
     ----------
     sums : array, shape (cases, sum_columns(layout))
-    strobes : array, shape (cases, strobes, strobes.width(n))
-        States at the strobes; the shaft's turn counts from the start of the call. Of a run with more strobes the last
-        ones, each in the place of its number modulo their count (``strobes.in_order``).
+    strobes : array, shape (cases, strobes, strobes.width(n)) States at the strobes; the shaft's turn counts from the
+        start of the call. For a run with more strobes, the last ones, each at its number modulo their count
+        (``strobes.in_order``).
     samples, states : arrays, shape (times, columns)
         Instantaneous values of case 0, and states of its shaft and clutches.
     recorded : int

@@ -1,4 +1,4 @@
-"""Means of motions that never repeat themselves: batches of periods, their intervals, and the Lyapunov exponent."""
+"""Means of irregular motions: batches of periods, their intervals, and the Lyapunov exponent."""
 
 from dataclasses import dataclass, field
 

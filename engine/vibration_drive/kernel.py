@@ -1,5 +1,4 @@
-"""The generated kernel: straight-line code for one shape of machine, kept in a per-user cache together with its machine
-code.
+"""The generated kernel: straight-line code for one shape of machine, stored with its machine code in a per-user cache.
 
 One module per (pendulums, clutch coefficients, order, lanes).
 """
@@ -137,7 +136,7 @@ def integrate(
 
 
 class Kernel(Protocol):
-    """What a generated module offers."""
+    """Interface of a generated module."""
 
     LAYOUT: Layout
     RECORD: Layout
@@ -163,9 +162,9 @@ def order_for(tolerance: float) -> int:
 def lane_count() -> int:
     """Lanes of this machine's kernels: 40 are five vectors of AVX-512 or ten of AVX2, 24 are twelve of NEON.
 
-    A kernel's code does not fit into the first cache of instructions, so that it pays to use what is fetched for many
-    lanes; beyond 40 nothing is gained (benchmarks.kernel_shape; NEON was not measured). A power of two would put all
-    rows of a lane into the same few places of the first cache of numbers.
+    A kernel's code does not fit into the L1 instruction cache, so it pays to use fetched code for many lanes; beyond 40
+    there is no further gain (benchmarks.kernel_shape; NEON was not measured). A power of two would map all rows of a
+    lane to the same few sets of the L1 data cache.
     """
     return 40 if llvm.get_host_cpu_features().get("avx2") else 24
 
@@ -184,7 +183,7 @@ def source(layout: Layout) -> str:
 
 
 def _write(path: Path, text: str) -> None:
-    """Write atomically: several processes may make the same kernel at once."""
+    """Write atomically, because several processes may generate the same kernel simultaneously."""
     with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".tmp", delete=False, encoding="utf-8") as handle:
         handle.write(text)
     os.replace(handle.name, path)

@@ -1,4 +1,4 @@
-"""Life of one lane between two steps: taking a case in, stops, budgets, handing the case's sums out."""
+"""One lane between two steps: loading a case, stops, budgets, output of the case's sums."""
 
 import math
 
@@ -221,7 +221,7 @@ def _take_event(W: Floats, Z: Ints, lay: Layout, lane: int, h: float, most_event
     counts = pendulum == ev.OF_SHAFT or Z[lane, pendulum] != Z[lane, ev.EVENT_TARGET]
     locked = pendulum != ev.OF_SHAFT and Z[lane, pendulum] == _LOCKED
     transit(W, Z, lay, lane)
-    # A lock may hold after all, where another one gives way.
+    # A lock may hold after all, where another one opens.
     if counts and not (locked and Z[lane, pendulum] == _LOCKED):
         count_event(W, Z, lay, lane)
     if Z[lane, ev.EVENTS_IN_PERIOD] > most_events or Z[lane, ev.EVENTS_AT_ONCE] > MOST_AT_ONCE:
@@ -267,7 +267,7 @@ def settle(
     event = Z[lane, ev.EVENT_PENDULUM] != ev.NO_EVENT
     at_stop = W[lay.at_stop * lanes + lane] == 1.0
     if at_stop and h > 0.0:
-        # The stop is met exactly, whatever the sum of the steps rounds to.
+        # The stop is met exactly, regardless of the rounding of the sum of steps.
         W[lay.f * lanes + lane] = W[lay.f_stop * lanes + lane]
     if ending == _RUNNING and event:
         ending = _take_event(W, Z, lay, lane, h, most_events)
@@ -359,7 +359,7 @@ def shorten(W: Floats, lay: Layout, lane: int, g: Floats) -> None:
 def look_for_events(
     W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks: Floats, meta: Ints, used: int
 ) -> int:
-    """The second look at a lane whose bounds cannot exclude an event: list its doubtful guards, return the length."""
+    """Examine a lane whose bounds cannot exclude an event: list its doubtful guards, return the length."""
     if W[lay.margin * lay.lanes + lane] == TOO_LONG:
         shorten(W, lay, lane, g)
     return collect_guards(W, Z, lay, lane, g, blocks, meta, used)

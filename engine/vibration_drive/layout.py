@@ -1,4 +1,4 @@
-"""Rows of the lane workspace: the agreement between the generated kernel and the event code.
+"""Rows of the lane workspace, shared by the generated kernel and the event code.
 
 The workspace is one flat float64 array; quantity ``row`` of lane ``lane`` is at ``row * lanes + lane``. Rows of
 pendulum i start at ``pendulums + i * stride``; fields that begin with ``p_`` are offsets into that block.
@@ -207,7 +207,7 @@ def make_layout(n: int, coefficients: int, order: int, lanes: int) -> Layout:
 def as_record(layout: Layout) -> Layout:
     """The layout as compiled code gets it: a numpy record with the same fields.
 
-    A record goes to a compiled function as one pointer, a tuple as a hundred numbers at every call.
+    A record is passed to a compiled function as one pointer, a tuple as a hundred numbers at every call.
     """
     dtype = np.dtype([(name, np.int64) for name in Layout._fields])
     return cast(Layout, np.array([tuple(layout)], dtype=dtype)[0])

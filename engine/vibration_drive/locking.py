@@ -1,8 +1,8 @@
 """Clutches that lock: delta = 0 and c_1 > 0 (docs/theory.md, "Locking").
 
 All clutches that meet, with w = 0 and u = 0 or locked, are decided together. Their torques follow from the shaft's
-acceleration, the one root of a piecewise linear function; where that leaves a clutch at the edge of two states, its
-trend follows from the shaft's rate of acceleration in the same way.
+acceleration, the one root of a piecewise linear function; where this leaves a clutch at the edge between two states,
+its trend follows from the shaft's rate of acceleration in the same way.
 """
 
 import math
@@ -32,9 +32,9 @@ from sprag.engine.vibration_drive.states import (
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Relative speed and windup, against the pendulum's own motion, below which another clutch is about to lock too.
+#: Speed difference and windup, relative to the pendulum's motion, below which another clutch also locks.
 TOUCHING = 1e-9
-#: The same for a clutch that comes to the shaft's speed, or leaves it: below this it is rounding.
+#: The same for a clutch that reaches or leaves the shaft's speed: smaller values are rounding errors.
 ROUNDING = 1e-12
 #: A lock torque this near to 0 or c_1 (as a share of c_1) is at the edge of two states; its trend decides.
 EDGE = 1e-10
@@ -177,10 +177,11 @@ def _consistent(W: Floats, lay: Layout, lane: int, push: float) -> float:
 
 @part
 def _shared_acceleration(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float) -> float:
-    """Acceleration of the shaft that is consistent with every clutch that meets clutch ``i``; each one's share of c_1.
+    """Acceleration of the shaft that is consistent with all clutches that meet clutch ``i``; sets each one's share of
+    c_1.
 
-    Each of them opens (torque 0), locks (between) or winds up (c_1) as the shaft leaves it behind, keeps it or is left
-    behind: a linear complementarity problem.
+    Each clutch opens (torque 0), locks (between) or winds up (c_1) as the shaft outruns it, keeps pace or falls behind:
+    a linear complementarity problem.
     """
     lanes = lay.lanes
     push = -W[lay.load * lanes + lane]
@@ -269,15 +270,14 @@ def _put(W: Floats, Z: Ints, lay: Layout, lane: int, j: int, state: int, edge: i
 
 @part
 def decide(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float, target: int) -> bool:
-    """Put clutch ``i`` and all that it meets into the one combination of states that is consistent.
+    """Put clutch ``i`` and all clutches that it meets into the only consistent combination of states.
 
     Parameters
     ----------
     size : float
         A typical speed of pendulum ``i``, rad/s, against which others are near.
-    target : int
-        The state into which the torque of clutch ``i``, locked, just passes (FREE or ENGAGED); -1 where its state is
-        open.
+    target : int The state that the torque of the locked clutch ``i`` just enters (FREE or ENGAGED); -1 where it is
+        undecided.
 
     Returns
     -------
@@ -289,7 +289,7 @@ def decide(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float, targ
     near = EDGE
     own = (lay.pendulums + i * lay.stride + lay.p_m_w_low + _SHARE) * lanes + lane
     if target >= 0:
-        # Its share is at the edge but for the error of the step that led there; so are those of its copies.
+        # Its share is at the edge up to the error of the preceding step, as are those of identical clutches.
         passed = 1.0 if target == ENGAGED else 0.0
         near += abs(W[own] - passed)
         W[own] = passed

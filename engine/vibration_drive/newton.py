@@ -18,9 +18,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-#: Rises of the power of two in the power method that squares: beyond it nothing changes any more.
+#: Squarings in the power method, after which the result no longer changes.
 _SQUARINGS = 44
-#: Columns of what `step` tells of a point: scaled residual, scaled step, multiplier, whether the states agree.
+#: Columns of the report of `step` about a point: scaled residual, scaled step, multiplier, whether the states agree.
 RESIDUAL, STEP, MULTIPLIER, AGREES = range(4)
 
 
@@ -28,7 +28,7 @@ RESIDUAL, STEP, MULTIPLIER, AGREES = range(4)
 def disturb(points: Floats, units: Floats, size: float, steady_shaft: bool, starts: Floats, first: Ints) -> int:
     """Fill ``starts`` with each point and the points disturbed by ``size`` (scaled) in each free column.
 
-    ``first`` (shape (points + 1,)) gets the place of each point's first row, and the number of rows; gives that number.
+    ``first`` (shape (points + 1,)) gets the index of each point's first row, and the number of rows, which is returned.
     """
     columns = np.zeros(points.shape[1], dtype=np.int64)
     row = 0
@@ -125,7 +125,7 @@ def spectral_radius(a: Floats, n: int) -> float:
 
 @part
 def _place(columns: Ints, n: int, column: int) -> int:
-    """Where a column stands among the first ``n``; -1 where it does not."""
+    """Position of a column among the first ``n``; -1 where it is missing."""
     for k in range(n):
         if columns[k] == column:
             return k
@@ -134,10 +134,11 @@ def _place(columns: Ints, n: int, column: int) -> int:
 
 @part
 def _tie_windups(jacobian: Floats, move: Floats, columns: Ints, n: int, tied: Flags) -> int:
-    """Let windups of tied clutches move with their angles, and locked pendulums not at all; how many columns are left.
+    """Let windups of tied clutches move with their angles, and locked pendulums not at all; returns the remaining
+    columns.
 
-    The angle of a tied clutch's pendulum and its windup differ by a constant: another one is another orbit, no
-    disturbance that has to die away.
+    The angle of a tied clutch's pendulum and its windup differ by a constant. Another constant gives another orbit, not
+    a disturbance that must decay.
     """
     for i in range(tied.shape[0]):
         if not tied[i]:
@@ -178,8 +179,7 @@ def step(
     Parameters
     ----------
     points : array, shape (points, columns)
-    ends : array, shape (rows, columns)
-        Where the rows of `disturb` came to.
+    ends : array, shape (rows, columns) End states of the rows of `disturb`.
     first, units, size, steady_shaft :
         As of `disturb`.
     tied : array, shape (points, pendulums)

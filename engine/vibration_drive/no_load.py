@@ -1,8 +1,8 @@
 """The no-load point: the limit of a vanishing load.
 
-Without a load every shaft speed above the pendulums' is steady, so the run-up alone would decide. In the limit it does
-not: under a vanishing load the shaft slows down until one of the clutches just takes up its whole backlash. On its
-contact-free orbit a pendulum with backlash delta then drives a shaft of the speed w at which
+Without a load every shaft speed above the pendulums' is steady, so the result would depend on the run-up. The limit
+does not: under a vanishing load the shaft slows down until one of the clutches just takes up its whole backlash. On its
+contact-free orbit a pendulum with backlash delta then drives a shaft at the speed w that satisfies
 
     integral of (phi' - w) over one stretch with phi' > w  =  delta
 
@@ -23,12 +23,12 @@ from sprag.engine.vibration_drive.strobes import BEGIN
 
 Floats = NDArray[np.float64]
 
-#: Samples of a period; cubics between them are good to 1e-11 of the speed.
+#: Samples per period; cubic interpolation between them is accurate to 1e-11 of the speed.
 _SAMPLES = 4096
 
 
 def limit_speed(times: Floats, angle: Floats, speed: Floats, acceleration: Floats, backlash: float) -> float:
-    """Speed of the shaft that a pendulum just reaches with its backlash taken up; NaN where none above 0 is.
+    """Speed of the shaft that a pendulum just reaches with its backlash taken up; NaN where there is none above 0.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def limit_speed(times: Floats, angle: Floats, speed: Floats, acceleration: Float
 
 def _root(function: Callable[[float], float], high: float, xtol: float, rtol: float = 2.0**-50) -> float:
     """Where a function that changes its sign between 0 and ``high`` is 0."""
-    # It takes most of a second to load, and few studies have cases without a load.
+    # It takes nearly a second to load, and few studies have cases without a load.
     from scipy.optimize import brentq
 
     return float(brentq(function, 0.0, high, xtol=xtol, rtol=rtol))
@@ -84,7 +84,7 @@ def _level(b: float, c: float, d: float) -> list[float]:
     square = c * c - 3.0 * b * d
     if square < 0.0:
         return []
-    # The larger root of the two first: the difference of the other would cancel.
+    # The larger root first, because the other one would suffer from cancellation.
     q = -(c + math.copysign(math.sqrt(square), c))
     return [top / bottom for top, bottom in ((q, 3.0 * d), (b, q)) if bottom != 0.0]
 

@@ -22,7 +22,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter("pendulums.N.spring_rate", "c", "N/m", 0.0, 1e12, False, 0.0, "rate of the centring spring"),
     Parameter("pendulums.N.spring_arm", "a", "m", -1e3, 1e3, False, 0.0, "arm of the centring spring"),
     Parameter("pendulums.N.damping", "lambda", "N*m*s/rad", 0.0, 1e6, False, 0.0, "viscous damping"),
-    Parameter("pendulums.N.backlash", "delta", "rad", 0.0, 1e3, False, 0.0, "lost motion of the freewheel"),
+    Parameter("pendulums.N.backlash", "delta", "rad", 0.0, 1e3, False, 0.0, "backlash of the freewheel"),
     Parameter("pendulums.N.initial_angle", "phi(0)", "rad", -1e3, 1e3, False, 0.0, "angle at t = 0"),
     Parameter("pendulums.N.initial_speed", "phi'(0)", "rad/s", -1e6, 1e6, False, 0.0, "angular speed at t = 0"),
     Parameter("shaft.inertia", "J_e", "kg*m^2", 0.0, 1e6, True, None, "reduced inertia of the driven side"),

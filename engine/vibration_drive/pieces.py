@@ -1,4 +1,4 @@
-"""The steps of one case: where each begins, how long it lasts, and the polynomials of speeds and torques on it."""
+"""The steps of one case: their starts, lengths, and polynomials of speeds and torques."""
 
 from dataclasses import dataclass
 
@@ -30,7 +30,7 @@ def piece_width(lay: Layout) -> int:
 def keep(W: Floats, Z: Ints, lay: Layout, lane: int, since: float, done: int, pieces: Floats) -> int:
     """Write a lane's step as row ``done`` unless it has no length or begins before ``since`` (in periods).
 
-    Series are written in fractions of the part of the step that is taken. Returns how many rows are written then.
+    Series are written in fractions of the part of the step that is taken. Returns the number of rows written so far.
     """
     lanes = lay.lanes
     x = W[lay.x * lanes + lane]
@@ -123,7 +123,7 @@ def products(one: Floats, other: Floats) -> Floats:
 def largest(series: Floats) -> Floats:
     """Largest value of each series (rows) on its step.
 
-    A step is short beside the motion, so that the largest of its points has the maximum between its neighbours.
+    A step is short relative to the motion, so the maximum lies between the neighbours of the largest sample.
     """
     grid = np.linspace(0.0, 1.0, _POINTS)
     at = np.argmax(series @ (grid ** np.arange(series.shape[1])[:, np.newaxis]), axis=1)

@@ -1,4 +1,4 @@
-"""How one case comes to its motion: the states at its strobes, and the orbit that they come to."""
+"""How one case approaches its motion: the states at its strobes, and its orbit."""
 
 from collections.abc import Mapping
 
@@ -31,11 +31,11 @@ from sprag.engine.vibration_drive.strobes import (
 
 Floats = NDArray[np.float64]
 
-#: Strobes that are told at most: the last ones of a longer run.
+#: Most strobes that are returned: the last ones of a longer run.
 MAX_STROBES = 1000
 #: Strobes of a settled case at least, and turns of its orbit after it is settled.
 _LEAST, _TURNS = 40, 2
-#: Points of an orbit in one period, and of a whole orbit about at most.
+#: Points of an orbit per period, and the approximate maximum for a whole orbit.
 _POINTS, _ALL_POINTS, _LEAST_POINTS = 400, 6000, 40
 
 
@@ -63,7 +63,7 @@ def portrait(columns: Mapping[str, ArrayLike], run: Run) -> Portrait:
 def settled_portrait(columns: Mapping[str, ArrayLike], settings: SettledRun) -> Portrait:
     """The strobes of a case from its own start until it is settled, and one turn of its orbit.
 
-    Of an irregular or unsettled motion the strobes of the whole search are told, and there is no orbit.
+    For irregular or unsettled motion the strobes of the whole search are returned, without an orbit.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ from sprag.engine.vibration_drive.parameters import PARAMETERS
 
 Floats = NDArray[np.float64]
 
-#: States as trajectories tell them, by their numbers.
+#: Names of states in trajectories, by number.
 CLUTCH_NAMES = {int(state): state.name.lower() for state in Clutch}
 SHAFT_NAMES = {int(state): state.name.lower() for state in Shaft}
 
@@ -33,7 +33,7 @@ def _kernel(columns: Mapping[str, ArrayLike], run: Run) -> Kernel:
 def simulate(columns: Mapping[str, ArrayLike], run: Run, *, cases: int) -> Batch:
     """Run a batch of cases.
 
-    Every case's result is the same to the last bit whatever batch, order or process it is computed in.
+    The bits of a case's results do not depend on its batch, order or process.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def sampled(values: Mapping[str, float], found: Integration, times: Floats) -> T
     for column, name in enumerate(("shaft.angle", "shaft.speed", "shaft.acceleration", "torque")):
         out[name] = samples[:, column]
     if value["shaft.load"] > 0.0:
-        # As for the minimum in ``characteristics``: only rounding can turn a loaded shaft back.
+        # As for the minimum in ``characteristics``: only rounding errors can turn back a loaded shaft.
         out["shaft.speed"] = np.maximum(out["shaft.speed"], 0.0)
     out["power.useful"] = value["shaft.load"] * out["shaft.speed"]
     out["power.clutch"] = out["torque"] * out["shaft.speed"]
@@ -176,7 +176,7 @@ def warm_up(pendulums: int, coefficients: int, tolerance: float) -> None:
     for i in range(pendulums):
         columns |= {f"pendulums.{i}.inertia": 1.0, f"pendulums.{i}.mass": 0.0, f"pendulums.{i}.arm": 0.0}
     columns |= {f"clutch.coefficients.{k}": 1.0 for k in range(max(1, coefficients))}
-    # Nothing moves, and that repeats itself: every step of the search is taken, down to the means.
+    # Nothing moves, which is periodic: this runs all steps of the search, down to the means.
     settle(columns, SettledRun(tolerance=tolerance), cases=1)
     simulate(columns, Run(tolerance=tolerance), cases=1)
 

@@ -31,7 +31,7 @@ EVENTS_IN_PERIOD = 16
 EVENTS_AT_ONCE = 17
 SKIP_STEP = 18  # the skips below hold while the lane has made this many steps
 LITERAL = 19
-# Coefficients that vanish analytically at a transition but not in rounding: leading orders the root finder passes over.
+# Coefficients that vanish analytically at a transition but not numerically: leading orders that the root finder skips.
 SKIP_SHAFT = 20
 SKIP_W = 21  # eight columns
 SKIP_U = 29  # eight columns
@@ -73,7 +73,7 @@ def total(W: Floats, lay: Layout, lane: int, g: Floats) -> None:
 
 @part
 def stored_energy(W: Floats, lay: Layout, lane: int, i: int, u: float) -> float:
-    """Energy Pi(u) in the clutch of pendulum ``i`` at windup ``u >= 0``, the straight part beyond the data included."""
+    """Energy Pi(u) in the clutch of pendulum ``i`` at windup ``u >= 0``, including the linear part beyond the data."""
     base = lay.pendulums + i * lay.stride
     limit = W[(base + lay.p_limit) * lay.lanes + lane]
     inside = min(u, limit)
@@ -156,7 +156,7 @@ def set_shaft(W: Floats, Z: Ints, lay: Layout, lane: int, state: int) -> None:
     Z[lane, SHAFT_STATE] = state
     W[lay.rotating * lanes + lane] = 1.0 if state == ROTATING else 0.0
     W[lay.sum_high * lanes + lane] = load if state == HELD else NEVER
-    # Without a load nothing slows the shaft, and it is never held.
+    # Without a load nothing slows down the shaft, so it is never held.
     W[lay.speed_low * lanes + lane] = 0.0 if state == ROTATING and load > 0.0 else -NEVER
     _set_mobility(W, Z, lay, lane)
 

@@ -1,9 +1,9 @@
-"""States of a lane at the strobes, one excitation period apart: how a case begins at one, and how one is recorded.
+"""States of a lane at the strobes, one excitation period apart: loading a case from one, and recording one.
 
 A strobe is one row of numbers: the part of the excitation period at which strobes are taken, the part at which a case
 that begins with this row does so (the same, but for a case that moves its strobes), the shaft's speed, turn and state,
 and for each pendulum its angle, speed and windup, the state of its clutch, and whether that clutch, under literal
-resets, waits for the relative speed to fall through zero. These decide the motion that follows (docs/theory.md,
+resets, waits for the relative speed to fall through zero. These determine the subsequent motion (docs/theory.md,
 "Settled motion").
 """
 
@@ -42,7 +42,7 @@ def width(pendulums: int) -> int:
 
 
 def from_rest(cases: int, pendulums: int) -> Floats:
-    """Rows that have every case begin at its parameters' initial values, strobes at the ends of the periods."""
+    """Rows with which every case begins at its parameters' initial values, with strobes at the ends of the periods."""
     rows = np.zeros((cases, width(pendulums)))
     rows[:, FRACTION] = 1.0
     rows[:, SHAFT] = NOT_GIVEN
@@ -50,18 +50,17 @@ def from_rest(cases: int, pendulums: int) -> Floats:
 
 
 def in_order(recorded: Floats, periods: Ints) -> Floats:
-    """The last strobes of each case, the newest last, of rows that the kernel has filled around and around.
+    """The last strobes of each case, the newest last, from the kernel's ring buffer.
 
     Parameters
     ----------
     recorded : array, shape (cases, kept, columns)
-    periods : array, shape (cases,)
-        Whole periods that each case was run.
+    periods : array, shape (cases,) Whole periods for which each case was run.
 
     Returns
     -------
     array, shape (cases, kept, columns)
-        Where a case has fewer strobes, the first rows are as of `from_rest`: like no other strobe.
+        Where a case has fewer strobes, the first rows are those of `from_rest`, which differ from every strobe.
     """
     cases, kept, columns = recorded.shape
     number = periods[:, None] - kept + np.arange(kept)
@@ -106,7 +105,7 @@ def note(W: Floats, Z: Ints, lay: Layout, lane: int, fraction: float, out: Float
         state = Z[lane, i]
         out[column + ANGLE] = W[(base + lay.p_phi) * lanes + lane]
         out[column + SPEED] = W[(base + lay.p_speed) * lanes + lane]
-        # A free clutch's windup says nothing: interaction begins anew.
+        # The windup of a free clutch is irrelevant: the next interaction starts anew.
         out[column + WINDUP] = -W[(base + lay.p_backlash) * lanes + lane]
         if state != FREE:
             out[column + WINDUP] = W[(base + lay.p_u) * lanes + lane]

@@ -1,4 +1,4 @@
-"""What is taken from a run besides its end: extrema and energies over the window, samples of a trajectory."""
+"""Quantities recorded during a run: extrema and energies over the window, samples of a trajectory."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -58,7 +58,7 @@ def test_words_that_are_not_understood_are_no_fault_that_is_passed_over(
     hits: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(faults.FAULTS_VARIABLE, "burn shaft.load=0.25")
-    with pytest.raises(ValueError, match="is no fault"):
+    with pytest.raises(ValueError, match="is not a fault"):
         faults.inject(COLUMNS, 3)
 
 
