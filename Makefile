@@ -6,12 +6,15 @@ BIN := $(VENV)/bin
 RUNTIME := $(VENV)/.sprag-runtime
 DEV := $(VENV)/.sprag-dev
 SOURCES := pyproject.toml constraints.txt
-PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input --quiet --quiet
+# Of what is installed, most is never imported: a module is compiled when it is imported for the first time.
+PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input --quiet --quiet install --no-compile -c constraints.txt
 
 # The tests start many processes: compiling all modules anew in each would be a third of their time.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo test check serve clean
+CHECKS := mypy ruff imports reference collect
+
+.PHONY: help demo test check serve clean $(CHECKS)
 
 help:
 	@echo "make demo [EXIT=1]   set up, run the example study over HTTP, show its curve, then serve (or stop)"
@@ -30,14 +33,29 @@ serve: $(RUNTIME)
 test: check
 	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder
 
+# mypy takes as long as the others together.
 check: $(DEV)
+	@$(MAKE) --no-print-directory --jobs 2 $(if $(filter output-sync,$(.FEATURES)),--output-sync) $(CHECKS)
+
+ruff: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+
+mypy: $(DEV)
 	$(BIN)/mypy
+
+imports: $(DEV)
 	$(BIN)/lint-imports
+
+reference: $(DEV)
 	$(BIN)/python -m docs.reference --check
 
-# The first Python in PYTHONS that is new enough makes the environment; a broken environment is made anew.
+# Every file of tests can be imported. The processes that run them find them compiled, which each of them did anew.
+collect: $(DEV)
+	$(BIN)/python -m pytest --collect-only --quiet --quiet >$(VENV)/collected || (cat $(VENV)/collected; exit 1)
+
+# The first Python in PYTHONS that is new enough makes the environment; a broken environment is made anew. The pip that
+# Python brings takes twice as long to install the rest.
 define MAKE_ENVIRONMENT
 if ! $(BIN)/python -m pip --version >/dev/null 2>&1; then \
   for candidate in $(PYTHONS); do \
@@ -51,19 +69,20 @@ if ! $(BIN)/python -m pip --version >/dev/null 2>&1; then \
   fi; \
   echo "Making the environment $(VENV) ..."; \
   $$python -m venv --clear $(VENV) || exit 1; \
+  $(PIP) --upgrade pip || exit 1; \
 fi
 endef
 
 $(RUNTIME): $(SOURCES)
 	@$(MAKE_ENVIRONMENT)
 	@echo "Installing Sprag (a minute or so, this once) ..."
-	@$(PIP) install -c constraints.txt -e '.[server]'
+	@$(PIP) -e '.[server]'
 	@touch $@
 
 $(DEV): $(SOURCES)
 	@$(MAKE_ENVIRONMENT)
 	@echo "Installing Sprag and its tools (a minute or so, this once) ..."
-	@$(PIP) install -c constraints.txt -e '.[dev]'
+	@$(PIP) -e '.[dev]'
 	@touch $(RUNTIME) $@
 
 clean:
