@@ -29,10 +29,12 @@ _CONVENTIONS: Final = "CF-1.11"
 _CASE: Final = "case"
 #: Level of zlib: higher ones take several times as long and save a few per cent.
 _LEVEL: Final = 1
+#: Bytes of results that are written at once: to open the file anew takes longer than to write a small column.
+_AT_ONCE: Final = 16 * 2**20
 
 
 def netcdf_pieces(source: Source) -> Iterator[bytes]:
-    """The file in pieces. It is built on disk, one result at a time, to limit memory."""
+    """The file in pieces. It is built on disk, a few results at a time, to limit memory."""
     return spooled(partial(_write, source))
 
 
@@ -46,12 +48,15 @@ def _write(source: Source, folder: Path) -> Path:
     head["ending"] = grid.variable(rows.endings, _ending_attributes())
     head["flags"] = grid.variable(rows.flags, _flag_attributes())
     head.to_netcdf(path, engine="h5netcdf", unlimited_dims=())
-    for index, info in enumerate(source.infos):
-        column = grid.variable(*_variable(info, rows.column(index)))
-        # The coordinates are in the file already; xarray names them only for variables written together with them.
-        if grid.labels:
-            column.attrs["coordinates"] = " ".join(grid.labels)
-        xr.Dataset({info.name: column}).to_netcdf(path, engine="h5netcdf", mode="a")
+    at_once = max(1, _AT_ONCE // (8 * max(1, study.cases)))
+    for first in range(0, len(source.infos), at_once):
+        columns = {}
+        for index, info in enumerate(source.infos[first : first + at_once], first):
+            columns[info.name] = column = grid.variable(*_variable(info, rows.column(index)))
+            # The coordinates are in the file already; xarray names them only for variables written together with them.
+            if grid.labels:
+                column.attrs["coordinates"] = " ".join(grid.labels)
+        xr.Dataset(columns).to_netcdf(path, engine="h5netcdf", mode="a")
     return path
 
 
