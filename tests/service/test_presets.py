@@ -54,7 +54,7 @@ def test_any_number_varies_alone_and_in_batches(name: str) -> None:
     base = parse_spec(spec | {"axes": []}).study
     for path, parameter in models.parameters_of(base).items():
         value = base.base.get(path, 0.5)
-        values = [v for v in (0.97 * value, value, 1.02 * value + 1e-3) if parameter.accepts(v)]
+        values = [v for v in (0.97 * value, 1.02 * value + 1e-3) if parameter.accepts(v)]
         study = replace(base, axes=(Axis((path,), tuple(dict.fromkeys(values))),))
         batch = models.run_chunk(study, 0, study.cases)
         for case in range(study.cases):

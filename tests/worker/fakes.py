@@ -75,6 +75,12 @@ def spinning(task: ChunkTask) -> ChunkResult:
         pass
 
 
+def run_between(task: ChunkTask, *, begun: str, told: str) -> ChunkResult:
+    """Say into ``begun`` that the chunk began; it is through when somebody writes into ``told``."""
+    load_between(task.shape, begun=begun, told=told)
+    return result(task.first, task.count)
+
+
 def raising(task: ChunkTask) -> ChunkResult:
     """A fault of the program in every chunk."""
     raise ZeroDivisionError("no such thing")

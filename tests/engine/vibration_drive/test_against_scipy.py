@@ -6,6 +6,8 @@ be concluded is not counted.
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, assume, given, settings
@@ -17,12 +19,12 @@ from sprag.engine.vibration_drive.simulate import trajectory
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, clutch, column, drive, pendulum, periods
 from tests.engine.vibration_drive.reference_run import Accumulating, Drive
 
-DURATION, START = 8, 3
+DURATION, START = 6, 2
 NUDGE = 1e-12
 
-#: Fixed examples; shrinking a machine takes minutes and says little.
+#: Fixed examples; shrinking a machine takes minutes and says little. ``SPRAG_TEST_EXAMPLES=20`` draws more of each.
 PROFILE = settings(
-    max_examples=6,
+    max_examples=int(os.environ.get("SPRAG_TEST_EXAMPLES", "3")),
     derandomize=True,
     deadline=None,
     database=None,
@@ -127,7 +129,7 @@ def test_two_pendulums(columns: Columns) -> None:
     assume(compare(columns))
 
 
-@settings(PROFILE, max_examples=4)
+@PROFILE
 @given(_drives(3))
 def test_three_pendulums(columns: Columns) -> None:
     assume(compare(columns))
@@ -158,19 +160,19 @@ def test_locking_of_two(columns: Columns, first: float, load: float) -> None:
     assume(compare(columns | {"clutch.coefficients.0": first, "shaft.load": load} | different))
 
 
-@settings(PROFILE, max_examples=5)
+@PROFILE
 @given(_drives(2), st.floats(1e-3, 6e-3))
 def test_windup_beyond_the_data(columns: Columns, limit: float) -> None:
     assume(compare(columns | {"clutch.windup_limit": limit}))
 
 
-@settings(PROFILE, max_examples=5)
+@PROFILE
 @given(_drives(2))
 def test_without_load(columns: Columns) -> None:
     assume(compare(columns | {"shaft.load": 0.0}))
 
 
-@settings(PROFILE, max_examples=6)
+@PROFILE
 @given(
     _drives(
         1,

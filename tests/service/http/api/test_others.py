@@ -160,6 +160,7 @@ def test_pages_load_nothing_from_elsewhere_and_lead_nowhere_wrong(service: Servi
     single = service.submit(spec)
     service.fill(study_id)
     service.fill(single)
+    right: set[str] = set()  # most pages load and link the same
     parts = [f"/studies/{study_id}{part}" for part in ("", "/curves", "/map", "/cases", "/cases?sort=-case")]
     for page in (
         "/",
@@ -176,7 +177,9 @@ def test_pages_load_nothing_from_elsewhere_and_lead_nowhere_wrong(service: Servi
             path, _, anchor = address.partition("#")
             assert path.startswith("/") or not path, address
             assert not path.startswith("//")
-            assert service.http.get(path or page).status_code == 200, address
+            if path and path not in right:
+                assert service.http.get(path).status_code == 200, address
+                right.add(path)
             if anchor and path in ("", page):
                 assert anchor in loads.anchors
 
