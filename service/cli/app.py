@@ -13,6 +13,7 @@ from typing import Annotated, cast
 import typer
 
 from sprag.service.cli import (
+    cases,
     database,
     demo,
     doctor,
@@ -89,6 +90,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "cancel": remote.cancel,
         "retry": remote.retry,
         "prioritize": remote.prioritize,
+        "cases": cases.cases,
         "curve": pictures.curve,
         "export": remote.export,
         "map": pictures.draw_map,

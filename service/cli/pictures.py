@@ -145,10 +145,12 @@ def show_curves(found: dict[str, Any]) -> None:
     x = found["x"]
     columns = [(_heading(x["path"], x["unit"]), True)]
     columns += [(_heading(name, result["unit"]), True) for name, result in found["results"].items()]
-    columns.append(("ending", False))
+    settled = all("regime" in drawn for drawn in found["curves"])
+    columns += [("regime", False)] * settled + [("ending", False)]
     for drawn in found["curves"]:
         title = _held({**drawn["by"], **drawn["at"]}, found["units"])
-        rows = zip(drawn["x"], *drawn["y"].values(), drawn["endings"], strict=True)
+        regimes = [drawn["regime"]] if settled else []
+        rows = zip(drawn["x"], *drawn["y"].values(), *regimes, drawn["endings"], strict=True)
         show_table(title, columns, [(*row[:-1], "" if row[-1] == OK else row[-1]) for row in rows])
 
 

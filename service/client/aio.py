@@ -17,6 +17,7 @@ from sprag.service.client.frames import Curves, grid_of, table_of
 from sprag.service.client.queries import (
     Progressing,
     Value,
+    case_query,
     curve_query,
     extension,
     finish_text,
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from sprag.service.answers.results import Case
     from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
     from sprag.service.client.queries import Spec
 
@@ -226,6 +228,20 @@ class AsyncStudy:
     async def strobes(self, case: int) -> dict[str, Any]:
         """The state of one case once per excitation period, and its orbit, as `Study.strobes` gives them."""
         return await self._client.request("GET", strobes_path(self.id, case))
+
+    async def cases(
+        self, *, ending: str | None = None, regime: str | None = None, flag: str | None = None
+    ) -> AsyncIterator[Case]:
+        """Finished cases, as `Study.cases` gives them."""
+        query = case_query(ending, regime, flag)
+        token: list[tuple[str, str]] = []
+        while True:
+            page = await self._get("/cases", [*query, *token])
+            for case in page["cases"]:
+                yield case
+            if page["next_page_token"] is None:
+                return
+            token = [("page_token", page["next_page_token"])]
 
     async def table(self) -> pd.DataFrame:
         """All rows as a pandas table."""

@@ -56,6 +56,12 @@ def curve_query(
     return query + [("at", f"{path}={value}") for path, value in (at or {}).items()]
 
 
+def case_query(ending: str | None, regime: str | None, flag: str | None) -> list[tuple[str, str]]:
+    """Query of the cases with an ending, a regime and a flag; None leaves that open."""
+    given = (("ending", ending), ("regime", regime), ("flag", flag))
+    return [(name, value) for name, value in given if value is not None]
+
+
 def longer_query(regime: str | None, at_most: int | None) -> list[tuple[str, str]]:
     """Query of a longer study; None leaves a parameter to the service."""
     given = (("regime", regime), ("at_most", at_most))

@@ -12,6 +12,7 @@ from sprag.service.client.plain import ServiceClient
 from sprag.service.client.queries import (
     Progressing,
     Value,
+    case_query,
     curve_query,
     extension,
     finish_text,
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from sprag.service.answers.results import Case
     from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
     from sprag.service.client.queries import Spec
 
@@ -163,6 +165,17 @@ class Study:
     def strobes(self, case: int) -> dict[str, Any]:
         """The state of one case once per excitation period ("strobes"), and its "orbit" if it has one."""
         return self._client.plain.strobes(self.id, case)
+
+    def cases(self, *, ending: str | None = None, regime: str | None = None, flag: str | None = None) -> Iterator[Case]:
+        """Every finished case in order of the numbers, or those with an ending, a regime and a flag only."""
+        query = case_query(ending, regime, flag)
+        token: list[tuple[str, str]] = []
+        while True:
+            page = self._client.plain.cases(self.id, [*query, *token])
+            yield from page["cases"]
+            if page["next_page_token"] is None:
+                return
+            token = [("page_token", page["next_page_token"])]
 
     def table(self) -> pd.DataFrame:
         """All rows with all results as a pandas table, NaN for missing values."""

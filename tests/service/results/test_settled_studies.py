@@ -291,6 +291,32 @@ def test_runs_of_a_given_time_that_had_not_settled_are_run_longer(
     assert refused.json()["errors"][0]["parameter"] == "regime"
 
 
+def test_client_and_command_list_cases_by_ending_regime_and_flag(
+    service: Service, study_id: str, portal: Any, monkeypatch: pytest.MonkeyPatch, sprag: Any
+) -> None:
+    kinds: tuple[tuple[dict[str, str], list[int]], ...] = (
+        ({}, [0, 1, 2, 3]), ({"regime": "irregular"}, [1]), ({"flag": "unsettled"}, [3]), ({"ending": "chatter"}, [2]),
+        ({"regime": "held"}, []), ({"regime": "irregular", "flag": "unsettled"}, []),
+    )  # fmt: skip
+
+    def connected(*_: object) -> ServiceClient:
+        return ServiceClient("http://localhost", transport=PortalTransport(service.app, portal))
+
+    monkeypatch.setattr("sprag.service.cli.cases.connection", connected)
+    with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
+        for kind, numbers in kinds:
+            found = list(client.study(study_id).cases(**kind))
+            assert [case["case"] for case in found] == numbers
+            options = [text for name, value in kind.items() for text in (f"--{name}", value)]
+            done = [sprag("cases", study_id, *options, *more) for more in (["--json"], [])]
+            assert [ended.code for ended in done] == [0, 0], done[0].err
+            assert done[0].data["cases"] == found
+    table = sprag("cases", study_id, "--regime", "periodic", "--result", "efficiency", "--limit", 1)
+    assert table.code == 0
+    assert all(text in table.out for text in ("shaft.load", "regime", "periodic", "efficiency"))
+    assert "--result" in sprag("cases", study_id, "--result", "beauty").err
+
+
 def test_the_command_runs_longer_what_the_button_does(
     service: Service, study_id: str, portal: Any, monkeypatch: pytest.MonkeyPatch, sprag: Any
 ) -> None:
