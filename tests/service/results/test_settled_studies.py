@@ -173,11 +173,11 @@ def test_the_motion_of_a_settled_case_lasts_as_long_as_its_search_may(service: S
 def test_a_study_tells_how_many_cases_have_which_regime(service: Service, study_id: str) -> None:
     assert service.get(f"/studies/{study_id}")["regimes"] == {"periodic": 1, "irregular": 1, "unsettled": 1}
     page = service.http.get(f"/studies/{study_id}").text
-    assert "What motions settle to" in page
+    assert "Settled motions" in page
     assert f"/studies/{study_id}/cases?regime=unsettled" in page
     timed = service.submit(changed({"/run": {"duration": "60 periods"}}))
     assert service.get(f"/studies/{timed}")["regimes"] == {}
-    assert "What motions settle to" not in service.http.get(f"/studies/{timed}").text
+    assert "Settled motions" not in service.http.get(f"/studies/{timed}").text
 
 
 def test_cases_are_filtered_by_regime(service: Service, study_id: str) -> None:
