@@ -1,10 +1,13 @@
-"""Fields of a spec that are not model parameters, each described once for reader, JSON Schema and form."""
+"""Fields and lists of a spec that are no parameters, each described once for reader, JSON Schema and form."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from sprag.service.spec.fields import read_choice, read_flag, read_number, read_periods, read_plain, read_whole
+from sprag.service.spec.report import Report, join
 from sprag.worker.limits import (
     MAX_ORBIT_PERIODS,
     MAX_SETTLED,
@@ -14,7 +17,7 @@ from sprag.worker.limits import (
     MIN_SETTLED_PERIODS,
     MIN_TOLERANCE,
 )
-from sprag.worker.models import MAX_COEFFICIENTS, SETTLED
+from sprag.worker.models import MAX_COEFFICIENTS, SETTLED, Parameter
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +29,7 @@ class Described:
     name, label, help : its name, its label in the form, and its meaning
     kind : "whole" and "number", from ``low`` to ``high``; "periods", a text with a whole number of periods; "time", a
         number of seconds or a text; "flag"; "choice", one of ``choices``: values and their labels in the form
-    default : value of a field that is not given
+    default : what stands for a field that is not given; None where it is required or its absence means something
     """
 
     name: str
@@ -44,21 +47,100 @@ class Described:
         text = f"{self.default:g}".replace("e-0", "e-") if isinstance(self.default, float) else str(self.default)
         return f"{text} periods" if self.kind == "periods" else text
 
+    @property
+    def values(self) -> tuple[str, ...]:
+        """What can be chosen."""
+        return tuple(value for value, _ in self.choices)
+
+    def read(self, report: Report, pointer: str, found: Mapping[str, Any]) -> Any:
+        """Its value in the object ``found`` at ``pointer``; None, and a problem noted, when it is wrong or missing.
+
+        Times are read where the frequencies of a study are known.
+        """
+        given = self.name in found
+        if not given and self.default is not None:
+            return self.default
+        where, value = join(pointer, self.name), found.get(self.name)
+        match self.kind:
+            case "choice":
+                return read_choice(report, where, value, self.values, given=given)
+            case "flag":
+                return read_flag(report, where, value)
+            case "number":
+                return read_plain(report, where, value, self.low, self.high)
+        read = read_periods if self.kind == "periods" else read_whole
+        return read(report, where, value, int(self.low), int(self.high))
+
     def schema(self) -> dict[str, Any]:
         """Its JSON Schema."""
-        told: dict[str, Any] = {"description": self.help}
+        told: dict[str, Any] = {"description": self.help} if self.help else {}
         if self.kind == "periods":
             told["description"] += f": {self.low:,} to {self.high:,}"
             return {"type": "string", "examples": [self.default_text], "default": self.default_text, **told}
         if self.kind == "time":
             return {"type": ["number", "string"], "examples": ["60 periods", "2 s", 2.0], "minimum": 0, **told}
-        told["default"] = self.default
+        if self.default is not None:
+            told["default"] = self.default
         if self.kind == "choice":
-            return {"enum": [value for value, _ in self.choices], **told}
+            return {"enum": list(self.values), **told}
         if self.kind == "flag":
             return {"type": "boolean", **told}
         kind = "integer" if self.kind == "whole" else "number"
         return {"type": kind, "minimum": self.low, "maximum": self.high, **told}
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """A list of ``low`` to ``high`` ``items`` (what they are called); ``help`` says what it means.
+
+    ``note`` is said to those who gave another thing.
+    """
+
+    items: str
+    low: int
+    high: int
+    help: str = ""
+    note: str = ""
+
+    def read(self, report: Report, pointer: str, data: object) -> list[Any] | None:
+        """The list; None, and a fault noted, when it is not one or has too few or too many items."""
+        if isinstance(data, list) and self.low <= len(data) <= self.high:
+            return data
+        missing = data is None and self.low > 0
+        report.fault(
+            pointer,
+            "required" if missing else "wrong-type",
+            "is required" if missing else f"must be a list of {self.items}",
+            data,
+            allowed=f"a list of {self.low} to {self.high:,} {self.items}{self.note}",
+        )
+        return None
+
+    def read_rows(self, report: Report, pointer: str, data: object, *columns: Parameter) -> list[list[float]]:
+        """Rows with a number for each of ``columns``; those that are wrong are noted and left out."""
+        allowed = f"[{', '.join(column.path for column in columns)}]"
+        rows: list[list[float]] = []
+        for index, row in enumerate(self.read(report, pointer, data) or ()):
+            where = join(pointer, index)
+            if not isinstance(row, list) or len(row) != len(columns):
+                report.fault(where, "wrong-type", "must be a row of two numbers", row, allowed=allowed)
+                continue
+            read = [read_number(report, join(where, k), row[k], column) for k, column in enumerate(columns)]
+            numbers = [number for number in read if number is not None]
+            if len(numbers) == len(columns):
+                rows.append(numbers)
+        return rows
+
+    def schema(self, item: dict[str, Any]) -> dict[str, Any]:
+        """Its JSON Schema, ``item`` being that of each item."""
+        told = {"description": self.help} if self.help else {}
+        least = {"minItems": self.low} if self.low else {}
+        return {"type": "array", **least, "maxItems": self.high, "items": item, **told}
+
+
+def choice(name: str, help: str, *values: str, default: str | None = None) -> Described:
+    """A field that is one of ``values``, in which the form has no part."""
+    return Described(name, "", help, "choice", default=default, choices=tuple((value, value) for value in values))
 
 
 def schemas(fields: dict[str, Described]) -> dict[str, Any]:
@@ -66,7 +148,7 @@ def schemas(fields: dict[str, Described]) -> dict[str, Any]:
     return {name: field.schema() for name, field in fields.items()}
 
 
-def _named(*fields: Described) -> dict[str, Described]:
+def named(*fields: Described) -> dict[str, Described]:
     return {field.name: field for field in fields}
 
 
@@ -85,7 +167,7 @@ _RESET: Final = "whether an upward crossing while torque is transmitted restarts
 _BACKLASH: Final = "whether the angles include the backlash, which is then subtracted"
 
 #: Fields of a run until it is settled.
-SETTLED_RUN: Final = _named(
+SETTLED_RUN: Final = named(
     Described("until", "Each case runs", _UNTIL, "choice", 0, 0, SETTLED, ((SETTLED, "until its motion is settled"),)),
     Described("at_most", "At most", _AT_MOST, "periods", MIN_SETTLED_PERIODS, MAX_SETTLED_PERIODS, 1000),
     Described("settled", "Settled within", _SETTLED, "number", MIN_SETTLED, MAX_SETTLED, 1e-8),
@@ -93,12 +175,12 @@ SETTLED_RUN: Final = _named(
 )
 DURATION: Final = Described("duration", "Duration", _DURATION, "time", default="60 periods")
 #: Fields of every run.
-ANY_RUN: Final = _named(
+ANY_RUN: Final = named(
     Described("tolerance", "Tolerance", _TOLERANCE, "number", MIN_TOLERANCE, MAX_TOLERANCE, 1e-9),
     Described("reset", "Reading of (5)", _RESET, "choice", default="contact", choices=_READINGS),
 )
 #: Options of the fit of measured clutch data, besides the accuracy.
-FIT: Final = _named(
+FIT: Final = named(
     Described("max_degree", "Highest degree", "highest degree that is tried", "whole", 1, MAX_COEFFICIENTS - 1, 7),
     Described("through_origin", "", "no torque at zero windup (c_1 = 0)", "flag", default=True),
     Described("angles_include_backlash", "", _BACKLASH, "flag", default=False),

@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 from sprag.service.spec.report import Report, did_you_mean, join
-from sprag.service.spec.units import QuantityError, example, parse_exact, to_float
+from sprag.service.spec.units import PERIOD_NAMES, QuantityError, example, parse_exact, split_quantity, to_float
 from sprag.worker.models import Parameter
 
 
@@ -59,6 +59,35 @@ def read_whole(report: Report, pointer: str, value: object, low: int, high: int)
     return value
 
 
+def read_plain(report: Report, pointer: str, value: object, low: float, high: float) -> float | None:
+    """A number without a unit from ``low`` to ``high``; None, and a problem noted, when it is not one."""
+    allowed = f"{low:g} to {high:g}, a plain number"
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        report.fault(pointer, "wrong-type", "must be a plain number", value, allowed=allowed)
+        return None
+    if not low <= value <= high:
+        report.fault(pointer, "out-of-range", "is out of range", value, allowed=allowed)
+        return None
+    return float(value)
+
+
+def read_periods(report: Report, pointer: str, value: object, low: int, high: int) -> int | None:
+    """A text with a whole number of excitation periods; None, and a problem noted, when it is not one."""
+    allowed = f'{low} to {high:,} whole excitation periods, as in "1000 periods"'
+    try:
+        number, unit = split_quantity(value) if isinstance(value, str) else (None, "")
+    except QuantityError as error:
+        report.fault(pointer, error.code, str(error), value, allowed=allowed)
+        return None
+    if number is None or unit not in PERIOD_NAMES:
+        report.fault(pointer, "wrong-type", "must be a number of excitation periods", value, allowed=allowed)
+    elif number.denominator != 1 or not low <= number <= high:
+        report.fault(pointer, "out-of-range", "is out of range", value, allowed=allowed)
+    else:
+        return int(number)
+    return None
+
+
 def read_flag(report: Report, pointer: str, value: object) -> bool | None:
     """Read true or false; None, with a fault recorded, for anything else."""
     if isinstance(value, bool):
@@ -79,6 +108,17 @@ def read_choice(
     else:
         hint = did_you_mean(value, choices) if isinstance(value, str) else ""
         report.fault(pointer, "invalid-choice", f"is not a valid choice{hint}", value, allowed=allowed)
+    return None
+
+
+def read_one(report: Report, pointer: str, found: Mapping[str, Any], names: Sequence[str]) -> str | None:
+    """Which one of the fields ``names`` is in ``found``; None, and a fault noted, when it is not one exactly."""
+    given = [name for name in names if name in found]
+    if len(given) == 1:
+        return given[0]
+    told = f"{len(given)} are given: {', '.join(given)}" if given else "none is given"
+    listed = ", ".join(names)
+    report.fault(pointer, "exactly-one", f"needs exactly one of {listed}; {told}", allowed=f"one of {listed}")
     return None
 
 

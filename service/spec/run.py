@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.spec.described import ANY_RUN, SETTLED_RUN, Described
-from sprag.service.spec.fields import read_choice, read_object, read_whole
+from sprag.service.spec.described import ANY_RUN, SETTLED_RUN
+from sprag.service.spec.fields import read_object
 from sprag.service.spec.report import Report, join
 from sprag.service.spec.units import PERIOD_NAMES, QuantityError, exact_number, parse_exact, split_quantity, to_float
-from sprag.worker.limits import MAX_ORBIT_PERIODS, MAX_RUN_PERIODS, MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
-from sprag.worker.models import MEANS_FROM_PERIODS, SETTLED
+from sprag.worker.limits import MAX_RUN_PERIODS
+from sprag.worker.models import MEANS_FROM_PERIODS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 SETTLED_FIELDS: Final = tuple(SETTLED_RUN)
 TIMED_FIELDS: Final = ("duration", "window")
 FIELDS: Final = (*SETTLED_FIELDS, *TIMED_FIELDS, *ANY_RUN)
-RESETS: Final = tuple(value for value, _ in ANY_RUN["reset"].choices)
 _ANY_DEFAULTS: Final[dict[str, Any]] = {name: field.default for name, field in ANY_RUN.items()}
 #: Defaults of missing fields. A run without a field of `TIMED_FIELDS` lasts until it is settled.
 SETTLED_DEFAULTS: Final[dict[str, Any]] = {name: field.default for name, field in SETTLED_RUN.items()} | _ANY_DEFAULTS
@@ -46,12 +45,10 @@ def read_run(report: Report, data: object, frequencies: NDArray[np.float64]) -> 
     settled = not any(name in found for name in TIMED_FIELDS)
     run = dict(SETTLED_DEFAULTS if settled else TIMED_DEFAULTS)
     before = report.found
-    if "tolerance" in found:
-        run["tolerance"] = _read_plain(report, ANY_RUN["tolerance"], found["tolerance"])
-    if "reset" in found:
-        run["reset"] = read_choice(report, "/run/reset", found["reset"], RESETS, given=True)
+    for name, field in ((SETTLED_RUN | ANY_RUN) if settled else ANY_RUN).items():
+        run[name] = field.read(report, "/run", found)
     if settled:
-        _read_settled(report, found, run)
+        _warn_of_few_periods(report, run["at_most"])
         return run
     _refuse_settled(report, found)
     if "duration" in found:
@@ -79,19 +76,10 @@ def refuse_run(report: Report, data: object, why: str = "is not used: this model
     return {}
 
 
-def _read_settled(report: Report, found: Mapping[str, Any], run: dict[str, Any]) -> None:
-    """Read the fields of a settled run into ``run``."""
-    if "until" in found:
-        read_choice(report, "/run/until", found["until"], (SETTLED,), given=True)
-    if "at_most" in found:
-        run["at_most"] = _read_periods(report, found["at_most"])
-    if "settled" in found:
-        run["settled"] = _read_plain(report, SETTLED_RUN["settled"], found["settled"])
-    if "max_period" in found:
-        run["max_period"] = read_whole(report, "/run/max_period", found["max_period"], 1, MAX_ORBIT_PERIODS)
-    if run["at_most"] is not None and run["at_most"] < MEANS_FROM_PERIODS:
+def _warn_of_few_periods(report: Report, at_most: int | None) -> None:
+    if at_most is not None and at_most < MEANS_FROM_PERIODS:
         report.warn(
-            f"/run/at_most: {run['at_most']} periods are too few for the means of irregular motion, which takes "
+            f"/run/at_most: {at_most} periods are too few for the means of irregular motion, which takes "
             f"{MEANS_FROM_PERIODS}: cases without a periodic motion will be unsettled"
         )
 
@@ -105,22 +93,6 @@ def _refuse_settled(report: Report, found: Mapping[str, Any]) -> None:
                 f"/run/{name}", "conflict", f"contradicts {timed}: a run lasts until it is settled or for a given time",
                 found[name], allowed=f"no `{name}`, or neither `duration` nor `window`",
             )  # fmt: skip
-
-
-def _read_periods(report: Report, value: object) -> int | None:
-    allowed = f'{MIN_SETTLED_PERIODS} to {MAX_SETTLED_PERIODS:,} whole excitation periods, as in "1000 periods"'
-    try:
-        number, unit = split_quantity(value) if isinstance(value, str) else (None, "")
-    except QuantityError as error:
-        report.fault("/run/at_most", error.code, str(error), value, allowed=allowed)
-        return None
-    if number is None or unit not in PERIOD_NAMES:
-        report.fault("/run/at_most", "wrong-type", "must be a number of excitation periods", value, allowed=allowed)
-    elif number.denominator != 1 or not MIN_SETTLED_PERIODS <= number <= MAX_SETTLED_PERIODS:
-        report.fault("/run/at_most", "out-of-range", "is out of range", value, allowed=allowed)
-    else:
-        return int(number)
-    return None
 
 
 def in_periods(time: Time, frequency: float) -> float:
@@ -169,18 +141,6 @@ def _read_window(report: Report, data: object) -> list[Time] | None:
         return None
     times = [_read_time(report, join("/run/window", index), item) for index, item in enumerate(data)]
     return None if None in times else [time for time in times if time is not None]
-
-
-def _read_plain(report: Report, field: Described, value: object) -> float | None:
-    pointer, low, high = join("/run", field.name), field.low, field.high
-    allowed = f"{low:g} to {high:g}, a plain number"
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        report.fault(pointer, "wrong-type", "must be a plain number", value, allowed=allowed)
-        return None
-    if not low <= value <= high:
-        report.fault(pointer, "out-of-range", "is out of range", value, allowed=allowed)
-        return None
-    return float(value)
 
 
 def _check_times(

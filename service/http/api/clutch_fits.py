@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends
 from starlette.responses import Response
@@ -15,29 +15,16 @@ from sprag.service.http.requests import Body, read_body, strict_query
 from sprag.service.http.respond import JSON
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks
-from sprag.service.spec.described import FIT, schemas
 from sprag.service.spec.report import SpecError
+from sprag.service.spec.schema.drive import measured_schema
+from sprag.service.spec.schema.quantity import QUANTITY
 
 router = APIRouter(tags=["clutch"], dependencies=[Depends(strict_query)])
 
-_QUANTITY: Final = {"anyOf": [{"type": "number"}, {"type": "string", "minLength": 1}]}
-SCHEMA: Final[dict[str, Any]] = {
-    "type": "object",
-    "description": "Measured data of a clutch and the accuracy of its fit; numbers in SI or texts with a unit.",
-    "required": ["data", "accuracy"],
-    "additionalProperties": False,
-    "properties": {
-        "data": {
-            "type": "array",
-            "description": "rows of angle (rad) and torque (N*m)",
-            "minItems": 2,
-            "items": {"type": "array", "minItems": 2, "maxItems": 2, "items": _QUANTITY},
-        },
-        "accuracy": {**_QUANTITY, "description": "largest residual accepted (N*m)"},
-        **schemas(FIT),
-        "backlash": {**_QUANTITY, "description": "backlash to be subtracted from the angles (rad)", "default": 0},
-    },
-}
+SCHEMA: Final = measured_schema(
+    {"backlash": {**QUANTITY, "description": "lost motion to be taken off the angles (rad)", "default": 0}},
+    "Measured data of a clutch and how well it is to be fitted; numbers in SI or texts with a unit.",
+)
 
 
 @router.post(

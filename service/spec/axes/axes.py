@@ -11,7 +11,8 @@ import numpy as np
 
 from sprag.service.spec.axes.blocks import first_rows
 from sprag.service.spec.axes.values import PLANS, Plan, count_text, in_range
-from sprag.service.spec.fields import read_object
+from sprag.service.spec.described import Listed
+from sprag.service.spec.fields import read_object, read_one
 from sprag.service.spec.machine.machine import Machine
 from sprag.service.spec.report import Report, join, quantity_text
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_TIED_PATHS
@@ -21,7 +22,7 @@ from sprag.worker.study import Axis, Combine
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-FIELDS = ("path", *PLANS)
+AXES = Listed("axes", 0, MAX_AXES, "what varies from case to case")
 
 
 def read_axes(report: Report, data: object, combine: Combine, machine: Machine) -> tuple[Axis, ...] | None:
@@ -29,14 +30,14 @@ def read_axes(report: Report, data: object, combine: Combine, machine: Machine) 
 
     Counts are compared with the limits before values are computed, so no spec can allocate much memory.
     """
-    if not isinstance(data, list) or len(data) > MAX_AXES:
-        report.fault("/axes", "wrong-type", "must be a list of axes", data, allowed=f"a list of 0 to {MAX_AXES} axes")
+    items = AXES.read(report, "/axes", data)
+    if items is None:
         return None
     before = report.found
-    read = [read_axis(report, join("/axes", index), item, machine) for index, item in enumerate(data)]
+    read = [read_axis(report, join("/axes", index), item, machine) for index, item in enumerate(items)]
     check_paths(report, [(paths or ()) for paths, _ in read])
     plans = [plan for _, plan in read if plan is not None]
-    if not _sizes_fit(report, plans, combine) or len(plans) < len(data) or report.found > before:
+    if not _sizes_fit(report, plans, combine) or len(plans) < len(items) or report.found > before:
         return None
     axes: list[Axis] = []
     for paths, plan in read:
@@ -66,24 +67,14 @@ def read_axis(
     report: Report, pointer: str, data: object, machine: Machine
 ) -> tuple[tuple[str, ...] | None, Plan | None]:
     """The paths of one axis and the plan of its values; None for what could not be read."""
-    found = read_object(report, pointer, data, FIELDS)
+    found = read_object(report, pointer, data, ("path", *PLANS))
     if found is None:
         return None, None
     paths = read_paths(report, join(pointer, "path"), found.get("path"), machine)
-    ways = [name for name in PLANS if name in found]
-    if len(ways) != 1:
-        given = f"{len(ways)} are given: {', '.join(ways)}" if ways else "none is given"
-        report.fault(
-            pointer,
-            "exactly-one",
-            f"needs exactly one of {', '.join(PLANS)}; {given}",
-            allowed="one of " + ", ".join(PLANS),
-        )
+    way = read_one(report, pointer, found, tuple(PLANS))
+    if way is None or paths is None:
         return paths, None
-    if paths is None:
-        return None, None
-    plan = PLANS[ways[0]](report, join(pointer, ways[0]), found[ways[0]], machine.parameters[paths[0]])
-    return paths, plan
+    return paths, PLANS[way](report, join(pointer, way), found[way], machine.parameters[paths[0]])
 
 
 def read_paths(report: Report, pointer: str, data: object, machine: Machine) -> tuple[str, ...] | None:

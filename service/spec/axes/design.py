@@ -29,8 +29,9 @@ from sprag.service.spec.axes.exclude import kept, read_exclude
 from sprag.service.spec.axes.points import read_points
 from sprag.service.spec.axes.sample import read_sample
 from sprag.service.spec.axes.values import count_text
+from sprag.service.spec.described import Listed, choice
 from sprag.service.spec.fields import read_object
-from sprag.service.spec.report import Report, did_you_mean, join, quantity_text
+from sprag.service.spec.report import Report, join, quantity_text
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_COLUMNS
 
 if TYPE_CHECKING:
@@ -39,9 +40,13 @@ if TYPE_CHECKING:
     from sprag.service.spec.machine.machine import Machine
     from sprag.worker.study import Axis, Combine
 
-COMBINE: Final = ("grid", "zip", "union")
-GROUP_FIELDS: Final = ("combine", "axes")
-_ALLOWED: Final = "'grid' (every combination), 'zip' (side by side) or 'union' (one after the other)"
+_COMBINE_HELP: Final = (
+    "grid: every combination of the axes (the first varies slowest); zip: the axes side by side; union: one after the "
+    "other, what does not vary being as in the base, each case once"
+)
+COMBINE: Final = choice("combine", _COMBINE_HELP, "grid", "zip", "union", default="grid")
+#: Of a group, and of whatever is not a plain grid or zip.
+GROUPED: Final = Listed("axes", 1, MAX_AXES)
 
 
 def read_design(report: Report, found: Mapping[str, Any], machine: Machine) -> tuple[tuple[Axis, ...] | None, Combine]:
@@ -49,7 +54,7 @@ def read_design(report: Report, found: Mapping[str, Any], machine: Machine) -> t
 
     The axes are None when they are invalid; the faults are recorded.
     """
-    combine = _read_combine(report, "/combine", found.get("combine", "grid"))
+    combine = COMBINE.read(report, "", found)
     items = found.get("axes", [])
     plain = not isinstance(items, list) or all(_kind(item) == "axis" for item in items)
     if plain and combine != "union" and "exclude" not in found:
@@ -110,24 +115,16 @@ def _kind(item: object) -> str:
     return "axis"
 
 
-def _read_combine(report: Report, pointer: str, data: object) -> str | None:
-    if isinstance(data, str) and data in COMBINE:
-        return data
-    hint = did_you_mean(data, COMBINE) if isinstance(data, str) else ""
-    report.fault(pointer, "invalid-choice", f"must be 'grid', 'zip' or 'union'{hint}", data, allowed=_ALLOWED)
-    return None
-
-
 def _group(report: Report, pointer: str, items: object, combine: str | None, machine: Machine) -> Block | None:
     """The block of a list of axes, samples, points and (at the top) groups."""
     where = join(pointer, "axes")
-    if not isinstance(items, list) or not 1 <= len(items) <= MAX_AXES:
-        report.fault(where, "wrong-type", "must be a list of axes", items, allowed=f"a list of 1 to {MAX_AXES} axes")
+    listed = GROUPED.read(report, where, items)
+    if listed is None:
         return None
     top = not pointer
-    read = [_item(report, join(where, i), item, combine, machine, top=top) for i, item in enumerate(items)]
+    read = [_item(report, join(where, i), item, combine, machine, top=top) for i, item in enumerate(listed)]
     blocks = [block for block in read if block is not None]
-    if len(blocks) < len(items) or combine is None:
+    if len(blocks) < len(listed) or combine is None:
         return None
     if combine != "union":
         check_paths(report, [block.paths for block in blocks], where)
@@ -183,12 +180,11 @@ def _item(
         return readers[kind](report, pointer, data, machine)
     if kind == "axis":
         return _axis(report, pointer, data, "zip" if combine == "zip" else "grid", machine)
-    found = read_object(report, pointer, data, GROUP_FIELDS) or {}
+    found = read_object(report, pointer, data, ("combine", "axes")) or {}
     if not top:
         report.fault(pointer, "conflict", "is a group inside a group", allowed="an axis, a sample or points")
         return None
-    inner = _read_combine(report, join(pointer, "combine"), found.get("combine", "grid"))
-    return _group(report, pointer, found.get("axes"), inner, machine)
+    return _group(report, pointer, found.get("axes"), COMBINE.read(report, pointer, found), machine)
 
 
 def _axis(report: Report, pointer: str, data: object, combine: Combine, machine: Machine) -> Block | None:

@@ -12,7 +12,8 @@ import numpy as np
 
 from sprag.service.spec.axes.axes import read_paths
 from sprag.service.spec.axes.blocks import Block
-from sprag.service.spec.fields import read_choice, read_number, read_object, read_whole
+from sprag.service.spec.described import Described, Listed, choice, named
+from sprag.service.spec.fields import read_number, read_object
 from sprag.service.spec.report import Report, join
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES
 
@@ -21,11 +22,17 @@ if TYPE_CHECKING:
 
     from sprag.service.spec.machine.machine import Machine
 
-FIELDS: Final = ("sample", "count", "seed", "ranges")
-METHODS: Final = ("latin_hypercube", "sobol", "saltelli")
-SCALES: Final = ("linear", "log")
-_RANGE_FIELDS: Final = ("path", "from", "to", "scale")
-LARGEST_SEED: Final = 2**32 - 1
+_METHOD_HELP: Final = (
+    "latin_hypercube and sobol fill the ranges evenly; saltelli is the design for Sobol indices, of "
+    "count * (ranges + 2) cases"
+)
+SAMPLE: Final = named(
+    choice("sample", _METHOD_HELP, "latin_hypercube", "sobol", "saltelli"),
+    Described("count", "", "points; sobol and saltelli take a power of 2", "whole", 1, MAX_AXIS_VALUES),
+    Described("seed", "", "seed of the random numbers", "whole", 0, 2**32 - 1, 0),
+)
+RANGES: Final = Listed("ranges", 1, MAX_AXES)
+SCALE: Final = choice("scale", "log: even in the logarithm", "linear", "log", default="linear")
 
 
 @dataclass(frozen=True)
@@ -49,20 +56,10 @@ class SampleRange:
 def read_sample(report: Report, pointer: str, data: Mapping[str, Any], machine: Machine) -> Block | None:
     """Read the block of a sample; None, with the faults recorded, when it is invalid."""
     before = report.found
-    found = read_object(report, pointer, data, FIELDS) or {}
-    method = read_choice(report, join(pointer, "sample"), found.get("sample"), METHODS)
-    count = read_whole(report, join(pointer, "count"), found.get("count"), 1, MAX_AXIS_VALUES)
-    seed = read_whole(report, join(pointer, "seed"), found.get("seed", 0), 0, LARGEST_SEED)
-    items = found.get("ranges")
-    if not isinstance(items, list) or not 1 <= len(items) <= MAX_AXES:
-        message = "must be a list of ranges" if "ranges" in found else "is required"
-        report.fault(
-            join(pointer, "ranges"),
-            "wrong-type" if "ranges" in found else "required",
-            message,
-            items,
-            allowed=f"a list of 1 to {MAX_AXES} ranges",
-        )
+    found = read_object(report, pointer, data, (*SAMPLE, "ranges")) or {}
+    method, count, seed = (field.read(report, pointer, found) for field in SAMPLE.values())
+    items = RANGES.read(report, join(pointer, "ranges"), found.get("ranges"))
+    if items is None:
         return None
     ranges = [_read_range(report, join(pointer, "ranges", index), item, machine) for index, item in enumerate(items)]
     if count is not None and method != "latin_hypercube" and count & (count - 1):
@@ -82,11 +79,11 @@ def read_sample(report: Report, pointer: str, data: Mapping[str, Any], machine: 
 
 
 def _read_range(report: Report, pointer: str, data: object, machine: Machine) -> SampleRange | None:
-    found = read_object(report, pointer, data, _RANGE_FIELDS)
+    found = read_object(report, pointer, data, ("path", "from", "to", "scale"))
     if found is None:
         return None
     paths = read_paths(report, join(pointer, "path"), found.get("path"), machine)
-    scale = read_choice(report, join(pointer, "scale"), found.get("scale", "linear"), SCALES)
+    scale = SCALE.read(report, pointer, found)
     if paths is None:
         return None
     ends = []
@@ -107,7 +104,7 @@ def _read_range(report: Report, pointer: str, data: object, machine: Machine) ->
         report.fault(pointer, "invalid-range", "a log scale needs two ends of one sign, neither of them 0",
                        [found.get("from"), found.get("to")], unit=unit)  # fmt: skip
         return None
-    return None if scale is None else SampleRange(paths, low, high, "log" if scale == "log" else "linear")
+    return None if scale is None else SampleRange(paths, low, high, scale)
 
 
 def draw(method: str, count: int, seed: int, ranges: tuple[SampleRange, ...]) -> dict[str, NDArray[np.float64]]:

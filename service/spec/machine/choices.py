@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from sprag.service.spec.described import FIT
+from sprag.service.spec.machine import shaft, shaft_parts
 
 if TYPE_CHECKING:
     from sprag.worker.study import Study
@@ -13,22 +14,19 @@ if TYPE_CHECKING:
 #: The choices of a machine shaft.
 _MEANINGS: Final = {
     "cycle": "revolutions of a cycle",
-    "mean_speed_is": "mean that mean_speed and the irregularity refer to",
-    "balance": "how the work over a cycle is made zero",
-    "phi_c": "angle with T = T_mean from which S3 and S4 count, from 0",
-    "drive.motor.kind": "kind of the motor",
-    "drive.torque.interpolation": "between the rows of the torque's table",
+    "mean_speed_is": shaft.MEAN_SPEED_IS.help,
+    "balance": shaft_parts.BALANCE.help,
+    "phi_c": shaft_parts.PHI_C.help,
+    "drive.motor.kind": shaft_parts.MOTOR.help,
     "mechanism": "the mechanism",
-    "mechanism.quick_return.kind": "kind of the quick return",
-    "mechanism.cam.rise": "law of the rise",
-    "mechanism.cam.fall": "law of the fall",
-    "mechanism.interpolation": "between the rows of the mechanism's table",
     "operation": "how the resistance is given",
-    "operation.quantity": "quantity of the diagram",
-    "operation.over": "variable of the diagram",
-    "operation.during": "strokes in which the diagram holds",
-    "operation.sense": "direction of the force",
-    "operation.interpolation": "between the rows of the operation's table",
+    **{
+        f"mechanism.{kind}.{name}": field.help
+        for kind, fields in shaft_parts.MECHANISM_CHOICES.items()
+        for name, field in fields.items()
+    },
+    **{f"operation.{name}": field.help for name, field in shaft_parts.OPERATION_CHOICES.items()},
+    **{f"{part}.interpolation": shaft_parts.INTERPOLATION.help for part in ("drive.torque", "mechanism", "operation")},
 }
 
 

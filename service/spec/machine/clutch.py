@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag.service.spec.described import FIT
-from sprag.service.spec.fields import missing, placed, read_flag, read_number, read_object, read_whole
+from sprag.service.spec.described import FIT, Listed
+from sprag.service.spec.fields import missing, placed, read_number, read_object
 from sprag.service.spec.report import Report, join, quantity_text
 from sprag.worker import models
 from sprag.worker.limits import MAX_CLUTCH_LAWS, MAX_CLUTCH_ROWS
@@ -27,6 +27,16 @@ FIELDS = (*_BY_LAW, *_BY_DATA)
 _ANGLE = Parameter("angle", "xi", "rad", 0.0, 1e3, False, None, "measured angle")
 _TORQUE = Parameter("torque", "M", "N*m", -1e9, 1e9, False, None, "measured torque")
 ACCURACY = Parameter("accuracy", "", "N*m", 0.0, 1e9, True, None, "largest residual of the fit that is accepted")
+
+
+COEFFICIENTS = Listed(
+    "clutch coefficients", 1, MAX_COEFFICIENTS,
+    "c_1 .. c_p of the torque over the windup, c_1 first: N*m, N*m/rad, N*m/rad^2, ..",
+    ", c_1 first (N*m, N*m/rad, N*m/rad^2, ..); or `data` with `accuracy`",
+)  # fmt: skip
+ROWS = Listed(
+    "measured rows", 2, MAX_CLUTCH_ROWS, "measured rows [angle, torque]: rad and N*m, or texts with their units"
+)
 
 
 @dataclass(frozen=True)
@@ -95,17 +105,12 @@ def read_clutch(report: Report, pointer: str, data: object, prefix: str, backlas
 
 
 def _given(report: Report, pointer: str, data: Mapping[str, Any], prefix: str) -> Clutch | None:
-    items = data.get("coefficients")
     where = join(pointer, "coefficients")
-    allowed = f"a list of 1 to {MAX_COEFFICIENTS} numbers, c_1 first (N*m, N*m/rad, N*m/rad^2, ..)"
     limit: float | None = math.inf
     if "windup_limit" in data:
         limit = read_number(report, join(pointer, "windup_limit"), data["windup_limit"], CLUTCH_WINDUP_LIMIT)
+    items = COEFFICIENTS.read(report, where, data.get("coefficients"))
     if items is None:
-        report.fault(where, "required", "is required (or `data` with `accuracy`)", allowed=allowed)
-        return None
-    if not isinstance(items, list) or not 1 <= len(items) <= MAX_COEFFICIENTS:
-        report.fault(where, "wrong-type", "must be a list of clutch coefficients", items, allowed=allowed)
         return None
     numbers = [
         read_number(report, join(where, k), item, placed(CLUTCH_COEFFICIENT, f"{prefix}coefficients.{k}"))
@@ -120,20 +125,14 @@ def _measured(
     report: Report, pointer: str, data: Mapping[str, Any], prefix: str, backlashes: Sequence[float]
 ) -> Clutch | None:
     before = report.found
-    rows = _rows(report, join(pointer, "data"), data.get("data"))
+    rows = ROWS.read_rows(report, join(pointer, "data"), data.get("data"), _ANGLE, _TORQUE)
     accuracy = None
     if "accuracy" in data:
         accuracy = read_number(report, join(pointer, "accuracy"), data["accuracy"], ACCURACY)
     else:
         missing(report, join(pointer, "accuracy"), ACCURACY)
-    options: dict[str, Any] = {}
-    if "max_degree" in data:
-        where = join(pointer, "max_degree")
-        options["max_degree"] = read_whole(report, where, data["max_degree"], 1, MAX_COEFFICIENTS - 1)
-    for name in ("through_origin", "angles_include_backlash"):
-        if name in data:
-            options[name] = read_flag(report, join(pointer, name), data[name])
-    if options.get("angles_include_backlash"):
+    options = {name: field.read(report, pointer, data) for name, field in FIT.items()}
+    if options["angles_include_backlash"]:
         if len(set(backlashes)) > 1:
             report.fault(
                 join(pointer, "angles_include_backlash"),
@@ -162,25 +161,6 @@ def _measured(
     for warning in fit.warnings:
         report.warn(f"{pointer}: {warning}")
     return Clutch(pointer, prefix, fit.coefficients, fit.windup_limit, fit)
-
-
-def _rows(report: Report, pointer: str, data: object) -> list[tuple[float, float]]:
-    allowed = f"a list of 2 to {MAX_CLUTCH_ROWS:,} rows [angle, torque]"
-    if not isinstance(data, list) or not 2 <= len(data) <= MAX_CLUTCH_ROWS:
-        message = "is required" if data is None else "must be a list of measured rows"
-        report.fault(pointer, "required" if data is None else "wrong-type", message, data, allowed=allowed)
-        return []
-    rows: list[tuple[float, float]] = []
-    for index, row in enumerate(data):
-        where = join(pointer, index)
-        if not isinstance(row, list) or len(row) != 2:
-            report.fault(where, "wrong-type", "must be a row of two numbers", row, allowed="[angle, torque]")
-            continue
-        angle = read_number(report, join(where, 0), row[0], _ANGLE)
-        torque = read_number(report, join(where, 1), row[1], _TORQUE)
-        if angle is not None and torque is not None:
-            rows.append((angle, torque))
-    return rows
 
 
 def _shown(value: object) -> object:

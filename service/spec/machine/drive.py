@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from sprag.service.spec.described import Listed
 from sprag.service.spec.fields import placed, read_number, read_object, read_parameters
 from sprag.service.spec.machine.clutch import Clutch, read_clutch
 from sprag.service.spec.machine.machine import Machine
@@ -16,6 +17,7 @@ from sprag.worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, VIBRATION_DRIVE
 if TYPE_CHECKING:
     from sprag.worker.models import ClutchFit
 
+PENDULUMS = Listed("pendulums", 1, MAX_PENDULUMS)
 _PENDULUM_PATH = re.compile(r"pendulums\.([0-9]{1,9})\.(.+)")
 _CLUTCH_PATH = re.compile(r"(?:pendulums\.[0-9]{1,9}\.)?clutch\.(.+)")
 
@@ -111,18 +113,11 @@ def _read_section(
 
 
 def _read_pendulums(report: Report, pointer: str, data: object, entries: list[Parameter], machine: Drive) -> None:
-    if not isinstance(data, list) or not 1 <= len(data) <= MAX_PENDULUMS:
-        message = "is required" if data is None else "must be a list of pendulums"
-        report.fault(
-            pointer,
-            "required" if data is None else "wrong-type",
-            message,
-            data,
-            allowed=f"a list of 1 to {MAX_PENDULUMS} pendulums",
-        )
+    listed = PENDULUMS.read(report, pointer, data)
+    if listed is None:
         return
-    machine.pendulums = len(data)
-    for index, pendulum in enumerate(data):
+    machine.pendulums = len(listed)
+    for index, pendulum in enumerate(listed):
         # A null in the list is an invalid pendulum, not a missing section.
         item = "null" if pendulum is None else pendulum
         _read_section(report, join(pointer, index), item, f"pendulums.{index}", entries, machine)

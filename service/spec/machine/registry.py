@@ -16,9 +16,8 @@ from sprag.service.spec.machine.drive import Drive, read_drive
 from sprag.service.spec.machine.machine import read_plain
 from sprag.service.spec.machine.shaft import read_shaft
 from sprag.service.spec.run import read_run, refuse_run
-from sprag.service.spec.schema.axes import object_schema
 from sprag.service.spec.schema.drive import drive_schema, run_schema
-from sprag.service.spec.schema.quantity import plain_schema
+from sprag.service.spec.schema.quantity import object_schema, plain_schema
 from sprag.service.spec.schema.shaft import shaft_schema
 from sprag.service.spec.warnings import warn_machine_shaft, warn_vibration_drive
 from sprag.worker import models
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
     from sprag.service.spec.machine.machine import Machine
     from sprag.service.spec.report import Report
-    from sprag.service.spec.schema.axes import Schema
+    from sprag.service.spec.schema.quantity import Schema
     from sprag.worker.study import Axis, Combine, Study
 
     Axes = tuple[Axis, ...]

@@ -11,17 +11,18 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from sprag.service.spec.catalogue import general_path
-from sprag.service.spec.fields import read_choice, read_object
+from sprag.service.spec.described import choice
+from sprag.service.spec.fields import read_object
 from sprag.service.spec.machine.machine import Machine, read_numbers
 from sprag.service.spec.machine.shaft_check import check_machine
 from sprag.service.spec.machine.shaft_parts import (
+    PHI_C,
     read_balance,
     read_constants,
     read_cycle,
     read_drive,
     read_mechanism,
     read_operation,
-    read_phi_c,
 )
 from sprag.service.spec.report import Report, did_you_mean
 from sprag.worker import models
@@ -31,7 +32,8 @@ FIELDS: Final = (
     "cycle", "mean_speed", "mean_speed_is", "drive", "mechanism", "operation", "balance", "phi_c", "constants",
     "wanted_irregularity", "gravity",
 )  # fmt: skip
-MEAN_SPEEDS: Final = ("midrange", "angle", "time")
+_MEAN_HELP: Final = "which mean of the speed mean_speed and the irregularity refer to"
+MEAN_SPEED_IS: Final = choice("mean_speed_is", _MEAN_HELP, "midrange", "angle", "time", default="midrange")
 _INDEXED = re.compile(r"operation\.steps\.([0-9]{1,9})\.")
 
 
@@ -94,9 +96,9 @@ def _read_structure(report: Report, found: Mapping[str, Any], places: dict[str, 
     cycle = read_cycle(report, found.get("cycle", 1))
     constants = read_constants(report, found.get("constants", {}))
     balance = read_balance(report, found, drive)
-    mean = read_choice(report, "/base/mean_speed_is", found.get("mean_speed_is", MEAN_SPEEDS[0]), MEAN_SPEEDS)
+    mean = MEAN_SPEED_IS.read(report, "/base", found)
     before = report.found
-    phi_c = read_phi_c(report, found.get("phi_c"))
+    phi_c = None if found.get("phi_c") is None else PHI_C.read(report, "/base", found)
     parts = (drive, mechanism, operation, cycle, constants, balance, mean)
     if any(part is None for part in parts) or report.found > before:
         return None

@@ -7,45 +7,63 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from sprag.service.spec.fields import read_choice, read_number, read_object, read_whole
+from sprag.service.spec.described import Described, Listed, choice, named
+from sprag.service.spec.fields import read_object, read_one
 from sprag.service.spec.report import Report, join
 from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker import models
 from sprag.worker.models import Parameter, machine_shaft
 
-BALANCES: Final = ("constant", "scale", "refuse", "motor")
-LAWS: Final = ("cycloidal", "polynomial_345")
-INTERPOLATIONS: Final = ("smooth", "linear")
-MOTORS: Final = ("linear", "kloss")
-#: Non-numeric fields of a mechanism and their choices.
-MECHANISM_CHOICES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
+_BALANCE_HELP: Final = (
+    "what makes the work over a cycle zero; by default constant, refuse where a torque is given, motor where there is "
+    "one"
+)
+BALANCE: Final = choice("balance", _BALANCE_HELP, "constant", "scale", "refuse", "motor")
+_PHI_C_HELP: Final = (
+    "which of the angles with T = T_mean S3 and S4 count from, from 0; by default the first where T rises"
+)
+PHI_C: Final = Described("phi_c", "", _PHI_C_HELP, "whole", 0, 1000)
+_LAWS: Final = ("cycloidal", "polynomial_345")
+INTERPOLATION: Final = choice(
+    "interpolation",
+    "how rows of the table are joined: without overshoot, or by straight lines",
+    "smooth",
+    "linear",
+    default="smooth",
+)
+MOTOR: Final = choice("kind", "kind of the motor", "linear", "kloss")
+#: What of a mechanism is no number.
+MECHANISM_CHOICES: Final[dict[str, dict[str, Described]]] = {
     "slider_crank": {},
     "four_bar": {},
-    "quick_return": {"kind": ("crank_shaper", "whitworth")},
-    "cam": {"rise": LAWS, "fall": LAWS},
+    "quick_return": named(choice("kind", "kind of the quick return", "crank_shaper", "whitworth")),
+    "cam": named(*(choice(part, f"law of the {part}", *_LAWS, default=_LAWS[0]) for part in ("rise", "fall"))),
 }
 MECHANISMS: Final = ("table", "formula", *MECHANISM_CHOICES)
-#: Ways to give the diagram of an operation.
-FORMS: Final = ("value", "steps", "table", "formula")
-OPERATION_CHOICES: Final[dict[str, tuple[str, ...]]] = {
-    "quantity": ("force", "torque"),
-    "over": ("angle", "stroke"),
-    "during": ("forward", "return", "both"),
-    "sense": ("resisting", "fixed"),
-}
-OPERATION_FIELDS: Final = (*FORMS, "gas", *OPERATION_CHOICES, "interpolation", "scale")
-STEP_FIELDS: Final = ("from", "to", "value")
+#: Ways to give an operation.
+FORMS: Final = ("value", "steps", "table", "formula", "gas")
+_OVER: Final = "against the shaft's angle, or the fraction of the stroke"
+_DURING: Final = "strokes in which a diagram over the stroke holds"
+_SENSE: Final = "a force against the motion, or always against the forward stroke"
+OPERATION_CHOICES: Final = named(
+    choice("quantity", "a force on the working part, or a torque on the shaft", "force", "torque"),
+    choice("over", _OVER, "angle", "stroke", default="angle"),
+    choice("during", _DURING, "forward", "return", "both", default="forward"),
+    choice("sense", _SENSE, "resisting", "fixed", default="resisting"),
+)
+STEPS: Final = Listed("steps", 1, machine_shaft.MAX_STEPS, "constant pieces; zero elsewhere")
+ROWS: Final = Listed("rows", 2, machine_shaft.MAX_ROWS)
 _NAME = re.compile(r"[A-Za-z_][A-Za-z_0-9]{0,39}")
 _ANY: Final = 1e30
 _ANGLE = Parameter("angle", "phi", "rad", -100.0, 100.0, False, None, "angle of the shaft")
 _FRACTION = Parameter("fraction", "x", "1", 0.0, 1.0, False, None, "fraction of the stroke")
 
 
-def number_fields(prefix: str) -> tuple[str, ...]:
-    """Names of the numbers directly under ``prefix`` (with its last dot) in the catalogue."""
-    paths = [entry.path for entry in models.parameter_catalogue(models.MACHINE_SHAFT)]
-    names = [path.removeprefix(prefix) for path in paths if path.startswith(prefix)]
-    return tuple(name for name in names if "." not in name)
+def numbers_under(prefix: str) -> dict[str, Parameter]:
+    """The numbers directly under ``prefix`` (with its last dot) in the catalogue, by their names."""
+    entries = {entry.path: entry for entry in models.parameter_catalogue(models.MACHINE_SHAFT)}
+    below = {path.removeprefix(prefix): entry for path, entry in entries.items() if path.startswith(prefix)}
+    return {name: entry for name, entry in below.items() if "." not in name}
 
 
 def read_cycle(report: Report, value: object) -> int | None:
@@ -68,17 +86,12 @@ def read_cycle(report: Report, value: object) -> int | None:
     return None
 
 
-def read_phi_c(report: Report, value: object) -> int | None:
-    """Read the choice among the angles with T = T_mean; None means the first at which T rises."""
-    return None if value is None else read_whole(report, "/base/phi_c", value, 0, 1000)
-
-
 def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, Any] | None) -> str | None:
     """Read how the work over a cycle is made zero; by default a motor does it, and a given torque is kept."""
     motor = drive is not None and drive["motor"] is not None
     given = isinstance(found.get("drive"), Mapping) and "torque" in found["drive"]
     default = "motor" if motor else "refuse" if given else "constant"
-    balance = read_choice(report, "/base/balance", found.get("balance", default), BALANCES)
+    balance: str | None = BALANCE.read(report, "/base", {"balance": default, **found})
     if balance is None or drive is None:
         return balance
     if balance == "motor" and not motor:
@@ -142,10 +155,10 @@ def read_drive(report: Report, data: object, places: dict[str, str]) -> dict[str
 
 
 def _read_motor(report: Report, data: object, drive: dict[str, Any]) -> dict[str, Any] | None:
-    found = read_object(report, "/base/drive/motor", data, ("kind", *number_fields("drive.motor.")))
+    found = read_object(report, "/base/drive/motor", data, ("kind", *numbers_under("drive.motor.")))
     if found is None:
         return None
-    kind = read_choice(report, "/base/drive/motor/kind", found.get("kind"), MOTORS)
+    kind = MOTOR.read(report, "/base/drive/motor", found)
     if kind is None:
         return None
     own = _numbers_of({"balance": "motor", "drive": {"motor": kind}}, "drive.motor.")
@@ -173,13 +186,9 @@ def read_mechanism(report: Report, data: object, places: dict[str, str]) -> dict
     found = read_object(report, "/base/mechanism", data, (*MECHANISMS, "interpolation"))
     if found is None:
         return None
-    kinds = [kind for kind in MECHANISMS if kind in found]
-    if len(kinds) != 1:
-        given = f"{len(kinds)} are given: {', '.join(kinds)}" if kinds else "none is given"
-        report.fault("/base/mechanism", "exactly-one", f"needs exactly one of {', '.join(MECHANISMS)}; {given}",
-                       allowed="one of " + ", ".join(MECHANISMS))  # fmt: skip
+    kind = read_one(report, "/base/mechanism", found, MECHANISMS)
+    if kind is None:
         return None
-    kind = kinds[0]
     places["mechanism"] = pointer = join("/base/mechanism", kind)
     if kind in {"table", "formula"}:
         diagram = _diagram(report, "/base/mechanism", found, _ANGLE, _unit("kg*m^2"))
@@ -189,19 +198,13 @@ def read_mechanism(report: Report, data: object, places: dict[str, str]) -> dict
             "/base/mechanism/interpolation", "not-used", "applies to a table, and there is none", found["interpolation"]
         )
     choices = MECHANISM_CHOICES[kind]
-    own = read_object(report, pointer, found[kind], (*choices, *number_fields(f"mechanism.{kind}.")))
+    own = read_object(report, pointer, found[kind], (*choices, *numbers_under(f"mechanism.{kind}.")))
     if own is None:
         return None
     made: dict[str, Any] = {"kind": kind}
-    for name, allowed in choices.items():
-        # A quick return has no default kind; the laws of cams have one.
-        choice = read_choice(
-            report, join(pointer, name), own.get(name, None if name == "kind" else allowed[0]), allowed
-        )
-        if choice is None:
-            return None
-        made["quick_return" if name == "kind" else name] = choice
-    return made
+    for name, field in choices.items():
+        made["quick_return" if name == "kind" else name] = field.read(report, pointer, own)
+    return None if None in made.values() else made
 
 
 def read_operation(report: Report, data: object, places: dict[str, str]) -> dict[str, Any] | None:
@@ -209,29 +212,18 @@ def read_operation(report: Report, data: object, places: dict[str, str]) -> dict
     places["operation"] = "/base/operation"
     if data is None:
         return {"quantity": "none", "over": "angle", "steps": 0}
-    found = read_object(report, "/base/operation", data, OPERATION_FIELDS)
+    found = read_object(report, "/base/operation", data, (*FORMS, *OPERATION_CHOICES, "interpolation", "scale"))
     if found is None:
         return None
     if "gas" in found:
         return _read_gas(report, found)
-    forms = [form for form in FORMS if form in found]
-    if len(forms) != 1:
-        given = f"{len(forms)} are given: {', '.join(forms)}" if forms else "none is given"
-        report.fault("/base/operation", "exactly-one", f"needs exactly one of {', '.join((*FORMS, 'gas'))}; {given}",
-                       allowed="one of " + ", ".join((*FORMS, "gas")))  # fmt: skip
+    form = read_one(report, "/base/operation", found, FORMS)
+    if form is None:
         return None
-    defaults = {
-        "quantity": None,
-        **{name: choices[0] for name, choices in OPERATION_CHOICES.items() if name != "quantity"},
-    }
-    chosen = {
-        name: read_choice(report, join("/base/operation", name), found.get(name, defaults[name]), choices)
-        for name, choices in OPERATION_CHOICES.items()
-    }
+    chosen = {name: field.read(report, "/base/operation", found) for name, field in OPERATION_CHOICES.items()}
     if None in chosen.values():
         return None
     operation: dict[str, Any] = {**chosen, "steps": 0}
-    form = forms[0]
     places["operation"] = join("/base/operation", form)
     if form == "value":
         return operation | {"form": "constant"}
@@ -253,21 +245,16 @@ def _read_gas(report: Report, found: Mapping[str, Any]) -> dict[str, Any] | None
             found[name],
             allowed="gas, scale",
         )
-    known = number_fields("operation.gas.")
-    if foreign or read_object(report, "/base/operation/gas", found["gas"], known) is None:
+    if foreign or read_object(report, "/base/operation/gas", found["gas"], numbers_under("operation.gas.")) is None:
         return None
     return {"quantity": "gas", "over": "angle", "steps": 0}
 
 
 def _read_steps(report: Report, data: object) -> int | None:
-    most = machine_shaft.MAX_STEPS
-    if not isinstance(data, list) or not 1 <= len(data) <= most:
-        report.fault(
-            "/base/operation/steps", "wrong-type", "must be a list of steps", data, allowed=f"1 to {most} steps"
-        )
-        return None
-    read = [read_object(report, join("/base/operation/steps", k), item, STEP_FIELDS) for k, item in enumerate(data)]
-    return None if any(item is None for item in read) else len(data)
+    where, fields = "/base/operation/steps", numbers_under("operation.steps.K.")
+    steps = STEPS.read(report, where, data) or ()
+    read = [read_object(report, join(where, k), item, fields) for k, item in enumerate(steps)]
+    return None if not read or None in read else len(read)
 
 
 def _unit(unit: str) -> Parameter:
@@ -278,19 +265,12 @@ def _diagram(
     report: Report, pointer: str, found: Mapping[str, Any], place: Parameter, value: Parameter
 ) -> dict[str, Any] | None:
     """Form, table and formula of a diagram that is given either as a table or as a formula."""
-    given = [form for form in ("table", "formula") if form in found]
-    if len(given) != 1:
-        report.fault(
-            pointer, "exactly-one", "needs either a table or a formula", dict(found), allowed="table or formula"
-        )
-        return None
-    if given[0] == "formula":
-        return _formula(report, pointer, found)
+    form = read_one(report, pointer, found, ("table", "formula"))
+    if form != "table":
+        return None if form is None else _formula(report, pointer, found)
     before = report.found
-    rows = _rows(report, join(pointer, "table"), found["table"], place, value)
-    interpolation = read_choice(
-        report, join(pointer, "interpolation"), found.get("interpolation", "smooth"), INTERPOLATIONS
-    )
+    rows = ROWS.read_rows(report, join(pointer, "table"), found["table"], place, value)
+    interpolation = INTERPOLATION.read(report, pointer, found)
     if report.found > before:
         return None
     return {"form": "table", "table": {"rows": rows, "interpolation": interpolation}, "formula": None}
@@ -308,22 +288,3 @@ def _formula(report: Report, pointer: str, found: Mapping[str, Any]) -> dict[str
         )
         return None
     return {"form": "formula", "table": None, "formula": formula}
-
-
-def _rows(report: Report, pointer: str, data: object, place: Parameter, value: Parameter) -> list[list[float]]:
-    most = machine_shaft.MAX_ROWS
-    if not isinstance(data, list) or not 2 <= len(data) <= most:
-        report.fault(
-            pointer, "wrong-type", "must be a list of rows", data, allowed=f"2 to {most:,} rows [{place.path}, value]"
-        )
-        return []
-    rows: list[list[float]] = []
-    for index, row in enumerate(data):
-        where = join(pointer, index)
-        if not isinstance(row, list) or len(row) != 2:
-            report.fault(where, "wrong-type", "must be a row of two numbers", row, allowed=f"[{place.path}, value]")
-            continue
-        x, y = (read_number(report, join(where, k), row[k], entry) for k, entry in enumerate((place, value)))
-        if x is not None and y is not None:
-            rows.append([x, y])
-    return rows

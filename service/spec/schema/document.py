@@ -9,18 +9,10 @@ from __future__ import annotations
 from sprag.service.spec.axes.design import COMBINE
 from sprag.service.spec.document import UNNAMED, VERSION
 from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.schema.axes import (
-    COMBINE_HELP,
-    Schema,
-    axis_schema,
-    exclude_schema,
-    group_schema,
-    object_schema,
-    points_schema,
-    sample_schema,
-)
+from sprag.service.spec.schema.axes import axes_schema, exclude_schema
+from sprag.service.spec.schema.quantity import Schema, object_schema
 from sprag.worker import models
-from sprag.worker.limits import MAX_AXES, MAX_NAME_LENGTH
+from sprag.worker.limits import MAX_NAME_LENGTH
 
 
 def spec_schema() -> Schema:
@@ -38,18 +30,8 @@ def spec_schema() -> Schema:
             },
             "base": {"type": "object", "description": "the machine that every case begins from"},
             "run": {"type": "object"},
-            "axes": {
-                "type": "array",
-                "maxItems": MAX_AXES,
-                "items": {"anyOf": [axis_schema(), sample_schema(), points_schema(), group_schema()]},
-                "default": [],
-                "description": "what varies from case to case",
-            },
-            "combine": {
-                "enum": list(COMBINE),
-                "default": "grid",
-                "description": COMBINE_HELP,
-            },
+            "axes": axes_schema(),
+            "combine": COMBINE.schema(),
             "exclude": exclude_schema(),
         },
         required=("sprag", "model", "base"),

@@ -6,13 +6,19 @@ from dataclasses import replace
 
 from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN, schemas
 from sprag.service.spec.fields import placed
-from sprag.service.spec.machine.clutch import ACCURACY
+from sprag.service.spec.machine.clutch import ACCURACY, COEFFICIENTS, ROWS
+from sprag.service.spec.machine.drive import PENDULUMS
 from sprag.service.spec.run import SETTLED_FIELDS, TIMED_FIELDS
-from sprag.service.spec.schema.axes import Schema, object_schema
-from sprag.service.spec.schema.quantity import quantity_schema
+from sprag.service.spec.schema.quantity import (
+    QUANTITY,
+    Schema,
+    object_schema,
+    quantities,
+    quantity_schema,
+    required_of,
+)
 from sprag.worker import models
-from sprag.worker.limits import MAX_CLUTCH_ROWS
-from sprag.worker.models import CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, MAX_PENDULUMS, Parameter
+from sprag.worker.models import CLUTCH_WINDUP_LIMIT, Parameter
 
 
 def drive_schema() -> Schema:
@@ -29,7 +35,7 @@ def drive_schema() -> Schema:
             continue
         schema = _section(entries, with_clutch=section == "pendulums")
         if section == "pendulums":
-            schema = {"type": "array", "minItems": 1, "maxItems": MAX_PENDULUMS, "items": schema}
+            schema = PENDULUMS.schema(schema)
         properties[section] = schema
         if any(entry.default is None for entry in entries):
             required.append(section)
@@ -39,35 +45,21 @@ def drive_schema() -> Schema:
 
 def clutch_schema() -> Schema:
     """Schema of a clutch: a law, or measured data with the accuracy of its fit."""
-    pair = {"type": "array", "minItems": 2, "maxItems": 2, "description": "angle (rad) and torque (N*m)"}
-    law = {
-        "coefficients": {
-            "type": "array",
-            "minItems": 1,
-            "maxItems": MAX_COEFFICIENTS,
-            "items": {"type": ["number", "string"]},
-            "description": "c_1 .. c_p of the torque over the windup, c_1 first: N*m, N*m/rad, N*m/rad^2, ..",
-        },
-        "windup_limit": quantity_schema(CLUTCH_WINDUP_LIMIT),
-    }
-    measured = {
-        "data": {
-            "type": "array",
-            "minItems": 2,
-            "maxItems": MAX_CLUTCH_ROWS,
-            "items": {**pair, "items": {"type": ["number", "string"]}},
-            "description": "measured rows [angle, torque]",
-        },
-        "accuracy": quantity_schema(ACCURACY),
-        **schemas(FIT),
-    }
+    law = {"coefficients": COEFFICIENTS.schema(QUANTITY), "windup_limit": quantity_schema(CLUTCH_WINDUP_LIMIT)}
     return {
         "description": "torque of the freewheel clutch over its windup",
         "oneOf": [
             object_schema(law, required=("coefficients",)),
-            object_schema(measured, required=("data", "accuracy")),
+            measured_schema(),
         ],
     }
+
+
+def measured_schema(others: Schema | None = None, description: str = "") -> Schema:
+    """Schema of measured data with the accuracy of their fit; ``others`` are fields beside them."""
+    row = {"type": "array", "minItems": 2, "maxItems": 2, "items": QUANTITY, "description": "angle and torque"}
+    data = {"data": ROWS.schema(row), "accuracy": quantity_schema(ACCURACY)}
+    return object_schema({**data, **schemas(FIT), **(others or {})}, required=data, description=description)
 
 
 def run_schema() -> Schema:
@@ -89,8 +81,8 @@ def run_schema() -> Schema:
 
 
 def _section(entries: list[Parameter], *, with_clutch: bool) -> Schema:
-    names = {entry.path.split(".")[-1]: placed(entry, entry.path) for entry in entries}
-    properties = {name: quantity_schema(entry) for name, entry in names.items()}
+    numbers = {entry.path.split(".")[-1]: placed(entry, entry.path) for entry in entries}
+    properties = quantities(numbers)
     if with_clutch:
         properties["clutch"] = clutch_schema()
-    return object_schema(properties, required=[name for name, entry in names.items() if entry.default is None])
+    return object_schema(properties, required=required_of(numbers))

@@ -1,16 +1,45 @@
-"""Parts of JSON Schemas that all models share: quantities with their units."""
+"""Parts of JSON Schemas that every model has: objects, and quantities with their units."""
 
 from __future__ import annotations
 
 import math
-from typing import Final
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
 
-from sprag.service.spec.schema.axes import Schema, object_schema
 from sprag.service.spec.units import example
 from sprag.worker.limits import MAX_QUANTITY_LENGTH
 from sprag.worker.models import Parameter
 
+Schema = dict[str, Any]
+
+#: A number in SI or a text with its unit, where the parameter is not known yet.
+QUANTITY: Final[Schema] = {"type": ["number", "string"]}
 _TEXT: Final[Schema] = {"type": "string", "minLength": 1, "maxLength": MAX_QUANTITY_LENGTH}
+
+
+def object_schema(properties: Schema, required: Iterable[str] = (), description: str = "") -> Schema:
+    """Schema of an object of these fields and no others."""
+    schema: Schema = {"type": "object", "properties": properties, "additionalProperties": False}
+    if required := list(required):
+        schema["required"] = required
+    if description:
+        schema["description"] = description
+    return schema
+
+
+def one_of(schema: Schema, names: Iterable[str]) -> Schema:
+    """``schema`` of an object that has exactly one of the fields ``names``."""
+    return {**schema, "oneOf": [{"required": [name]} for name in names]}
+
+
+def quantities(parameters: Mapping[str, Parameter]) -> Schema:
+    """Schemas of quantities by name."""
+    return {name: quantity_schema(parameter) for name, parameter in parameters.items()}
+
+
+def required_of(parameters: Mapping[str, Parameter]) -> list[str]:
+    """The names of those that have no default."""
+    return [name for name, parameter in parameters.items() if parameter.default is None]
 
 
 def plain_schema(catalogue: tuple[Parameter, ...], prefix: str = "") -> Schema:

@@ -11,7 +11,8 @@ import pytest
 
 from sprag.service.spec.document import SpecError, format_of, load_spec, parse_spec
 from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.schema.document import axis_schema, spec_schema
+from sprag.service.spec.schema.axes import axis_schema
+from sprag.service.spec.schema.document import spec_schema
 from sprag.service.spec.schema.drive import clutch_schema, run_schema
 from sprag.worker.models import model_names, parameter_catalogue
 from tests.service.spec_sample import SPEC, changed
