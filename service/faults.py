@@ -6,12 +6,14 @@ Wording may change; programs and tests rely on the codes, which ``docs/faults.md
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
 _SHOWN_LENGTH = 200
+
+Choice = TypeVar("Choice", bound=str)
 
 #: Codes of the faults of one place of the input.
 Code = Literal[
@@ -277,6 +279,14 @@ def parameter_error(name: str, code: Code, message: str, value: Any = None, allo
     """A `FaultError` about one parameter of the request."""
     fault = ParameterFault(name, code, message, shown(value), allowed)
     return FaultError("invalid-parameter", f"{name}: {message}", (fault,))
+
+
+def choice_of(name: str, value: str, choices: Iterable[Choice]) -> Choice:
+    """``value`` as one of ``choices``; FaultError about the parameter ``name`` when it is none of them."""
+    known = list(choices)
+    if value in known:
+        return value
+    raise parameter_error(name, "invalid-choice", f"unknown {name}", value, ", ".join(known))
 
 
 def shown(value: Any) -> Any:

@@ -8,8 +8,8 @@ import pandas as pd
 
 from sprag.service.client.frames import table_of
 from sprag.service.client.queries import spec_of
-from sprag.service.jobs.local import pool_size, run_here, source_of
-from sprag.service.results.exports import export
+from sprag.service.jobs.local import pool_size, run_here
+from sprag.service.results.exports import export, stored
 from sprag.service.settings import Settings
 from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.document import parse_spec
@@ -78,7 +78,7 @@ def run(
         finish_by=finish_by,
         on_progress=on_progress,
     ) as done:
-        source = source_of(done, study)
+        source = stored(done.store, done.record, study)
         table = table_of(b"".join(export(source, "parquet")))
     units = {path: unit_of(study, path) for path in study.axis_paths}
     table.attrs["units"] = units | {info.name: info.unit for info in source.infos}

@@ -21,6 +21,11 @@ class StudyState(StrEnum):
         return self in TERMINAL
 
     @property
+    def going(self) -> bool:
+        """Whether cases are run, or will be as soon as a worker is free."""
+        return self in GOING
+
+    @property
     def sentence(self) -> str:
         """Description of the state."""
         return _SENTENCES[self]
@@ -45,6 +50,8 @@ _SENTENCES = {
 }
 
 TERMINAL: frozenset[StudyState] = frozenset({StudyState.CANCELLED, StudyState.FINISHED, StudyState.FAILED})
+
+GOING: frozenset[StudyState] = frozenset({StudyState.QUEUED, StudyState.RUNNING})
 
 
 class StudyEvent(StrEnum):

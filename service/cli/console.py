@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.faults import FaultError
+from sprag.service.faults import Code, Fault, FaultError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -65,6 +65,20 @@ class WrongInputError(CommandFailureError):
 
 class TroubleError(CommandFailureError):
     """The service or the storage has a problem: exit code 3."""
+
+
+def wrong_option(
+    option: str,
+    code: Code,
+    message: str,
+    value: object = None,
+    *,
+    allowed: str | None = None,
+    unit: str | None = None,
+    detail: str = "invalid option",
+) -> WrongInputError:
+    """The failure that one option of the command means."""
+    return WrongInputError("invalid-parameter", detail, [Fault(option, code, message, value, allowed, unit)])
 
 
 def write_json(data: object) -> None:

@@ -109,8 +109,8 @@ def _show(client: ServiceClient, picture: Path, as_json: bool) -> dict[str, Any]
     study = follow(client, created["id"], patient=False)
     say(f"{study['progress']['done']} cases done in {time.monotonic() - start:.1f} s, {study['progress']['ok']} ok.")
     query = [("x", _AXIS), *(("y", name) for name in _SHOWN), *(("at", f"{path}={value}") for path, value in _HELD)]
-    curves = client.curves(study["id"], query)
-    write_pieces(str(picture), client.picture(study["id"], query, picture.suffix[1:]))
+    curves = client.drawn(study["id"], "curves", query)
+    write_pieces(str(picture), client.picture(study["id"], "curves", query, picture.suffix[1:]))
     if as_json:
         write_json({"study": study, "curves": curves, "picture": str(picture), "server": client.server})
     else:

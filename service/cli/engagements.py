@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sprag.service.cli.console import ExitCode, WrongInputError, say, write_json
-from sprag.service.cli.files import output, read_study, to_file
+from sprag.service.cli.console import ExitCode, say, write_json, wrong_option
+from sprag.service.cli.files import is_json, output, read_study, require_cases, to_file
 from sprag.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
-from sprag.service.faults import Fault
 from sprag.service.json_text import to_bytes
 
 if TYPE_CHECKING:
@@ -42,8 +41,7 @@ def engagements(
     _require(study, case)
     with output(file) as write:
         made = run_engagements(study, case)
-        name = (file or "").lower()
-        if name.endswith(".json") or (as_json and not name.endswith(".csv")):
+        if is_json(file, as_json):
             write(to_bytes(engagements_json(made, case, study.case_parameters(case))) + b"\n")
         else:
             write(engagements_csv(made, table.value))
@@ -60,8 +58,6 @@ def _require(study: Study, case: int) -> None:
     from sprag.worker.models import VIBRATION_DRIVE, has_clutches
 
     if not has_clutches(study):
-        problem = Fault("/model", "wrong-type", "has no clutches", study.model, allowed=VIBRATION_DRIVE)
-        raise WrongInputError("invalid-parameter", "this study has no engagements", [problem])
-    if case >= study.cases:
-        problem = Fault("--case", "unknown-name", "there is no such case", case, allowed=f"0 .. {study.cases - 1}")
-        raise WrongInputError("invalid-parameter", "invalid option", [problem])
+        message, detail = "has no clutches, so that nothing engages", "this study has no engagements"
+        raise wrong_option("/model", "wrong-type", message, study.model, allowed=VIBRATION_DRIVE, detail=detail)
+    require_cases(study, [case])

@@ -7,11 +7,10 @@ from typing import Annotated, Any
 
 import typer
 
-from sprag.service.cli.console import WrongInputError, say
+from sprag.service.cli.console import say, wrong_option
 from sprag.service.cli.files import decode, read_bytes
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, WaitTimeout
-from sprag.service.cli.remote import connection, exit_as, follow, show_study
-from sprag.service.faults import Fault
+from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, Wait, WaitTimeout
+from sprag.service.cli.remote import connection, submitted
 from sprag.service.spec.numbers import parse_number
 from sprag.worker.limits import MAX_BODY_BYTES, MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
 
@@ -27,7 +26,7 @@ def extend(
     points: Annotated[
         str | None, typer.Option("--points", metavar="FILE", help="CSV file of further cases, a header of paths.")
     ] = None,
-    wait: Annotated[bool, typer.Option("--wait", help="Wait until the new study has ended.")] = False,
+    wait: Wait = False,
     timeout: WaitTimeout = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
@@ -39,12 +38,7 @@ def extend(
         old = client.study(study_id)
         study = client.extend(study_id, addition)
         say(_what_is_new(old, study))
-        say(*(f"warning: {warning}" for warning in study.get("warnings", ())))
-        if wait:
-            study = follow(client, study["id"], timeout)
-    show_study(study, as_json)
-    if wait:
-        exit_as(study)
+        submitted(client, study, wait, timeout, as_json)
 
 
 def longer(
@@ -63,7 +57,7 @@ def longer(
             help="Excitation periods of each search or run; default: four times as many as before.",
         ),
     ] = None,
-    wait: Annotated[bool, typer.Option("--wait", help="Wait until the new study has ended.")] = False,
+    wait: Wait = False,
     timeout: WaitTimeout = None,
     server: Server = DEFAULT_SERVER,
     token: Token = None,
@@ -71,12 +65,7 @@ def longer(
 ) -> None:
     """Submit a study of the unsettled cases of another, with more time for each."""
     with connection(server, token) as client:
-        study = client.run_longer(study_id, regime, at_most)
-        if wait:
-            study = follow(client, study["id"], timeout)
-    show_study(study, as_json)
-    if wait:
-        exit_as(study)
+        submitted(client, client.run_longer(study_id, regime, at_most), wait, timeout, as_json)
 
 
 def _what_is_new(old: Mapping[str, Any], study: Mapping[str, Any]) -> str:
@@ -89,18 +78,19 @@ def _what_is_new(old: Mapping[str, Any], study: Mapping[str, Any]) -> str:
 
 def _addition(axes: list[str], points: str | None) -> dict[str, Any]:
     if bool(axes) == (points is not None):
-        problem = Fault(
-            "--axis", "exactly-one", "or --points is needed, and not both", allowed="--axis shaft.load=0.5,0.7"
+        message = "or --points is needed, and not both"
+        raise wrong_option(
+            "--axis", "exactly-one", message, allowed="--axis shaft.load=0.5,0.7", detail="missing option"
         )
-        raise WrongInputError("invalid-parameter", "missing option", [problem])
     if points is not None:
         return {"cases": [{"points": decode(points, read_bytes(points, MAX_BODY_BYTES))}]}
     made = []
     for text in axes:
         path, sign, values = text.partition("=")
         if not sign or not path.strip() or not values.strip():
-            problem = Fault("--axis", "invalid-text", "must be PATH=VALUES", text, allowed="such as shaft.load=0.5,0.7")
-            raise WrongInputError("invalid-parameter", "invalid option", [problem])
+            raise wrong_option(
+                "--axis", "invalid-text", "must be PATH=VALUES", text, allowed="such as shaft.load=0.5,0.7"
+            )
         made.append({"path": path.strip(), "values": [_value(item.strip()) for item in values.split(",")]})
     return {"axes": made}
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Literal, cast
 
-from sprag.service.cli.console import CommandFailureError, TroubleError, WrongInputError
+from sprag.service.cli.console import CommandFailureError, TroubleError, WrongInputError, wrong_option
 from sprag.service.faults import Fault, Kind
 from sprag.service.spec.report import SpecError
 from sprag.service.stale_files import mark, sweep
@@ -22,6 +22,7 @@ from sprag.worker.limits import MAX_BODY_BYTES
 
 if TYPE_CHECKING:
     from sprag.service.spec.document import ParsedSpec
+    from sprag.worker.study import Study
 
 #: Largest file of measured data: far more rows than any clutch test has.
 MAX_DATA_BYTES = 16 * 1024 * 1024
@@ -90,8 +91,7 @@ def read_spec(path: str, points: str | None = None, limit: int = MAX_DATA_BYTES)
     from sprag.service.spec.text import load_spec
 
     if path == points == "-":
-        problem = Fault("--points", "conflict", "standard input is the spec already", allowed="a file")
-        raise WrongInputError("invalid-parameter", "invalid option", [problem])
+        raise wrong_option("--points", "conflict", "standard input is the spec already", allowed="a file")
     data = read_bytes(path, MAX_BODY_BYTES)
     try:
         spec = load_spec(data, _format(path, data))
@@ -116,6 +116,16 @@ def read_study(path: str, points: str | None = None) -> ParsedSpec:
             return parse_spec(data)
         except SpecError as error:
             raise spec_failure(path, error) from error
+
+
+def require_cases(study: Study, cases: Iterable[int]) -> None:
+    """Raise WrongInputError for numbers that no case has."""
+    allowed = f"0 .. {study.cases - 1}"
+    problems = [
+        Fault("--case", "unknown-name", "there is no such case", case, allowed) for case in cases if case >= study.cases
+    ]
+    if problems:
+        raise WrongInputError("invalid-parameter", "invalid option", problems)
 
 
 @contextmanager
@@ -171,6 +181,12 @@ def output(path: str | None) -> Iterator[Write]:
 def to_file(path: str | None) -> bool:
     """Whether `output` writes to a file, so that standard output is free for messages."""
     return path not in (None, "-")
+
+
+def is_json(path: str | None, as_json: bool) -> bool:
+    """Whether values are written as JSON: by the ending of the file's name, else by ``--json``."""
+    name = (path or "").lower()
+    return name.endswith(".json") or (as_json and not name.endswith(".csv"))
 
 
 def _replaced(target: Path) -> Iterator[Write]:

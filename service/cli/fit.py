@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sprag.service.cli.console import WrongInputError, say, show_table, write_json, write_text
+from sprag.service.cli.console import WrongInputError, say, show_table, write_json, write_text, wrong_option
 from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes
 from sprag.service.cli.options import JsonFlag
 from sprag.service.faults import Fault
@@ -49,10 +49,8 @@ def fit(
     """
     lost_motion = _quantity("--backlash", backlash, "rad")
     if lost_motion and not angles_include_backlash:
-        problem = Fault(
-            "--backlash", "not-used", "is subtracted from the angles only with --angles-include-backlash", backlash
-        )
-        raise WrongInputError("invalid-parameter", "invalid option", [problem])
+        message = "is taken off the angles only with --angles-include-backlash"
+        raise wrong_option("--backlash", "not-used", message, backlash)
     measured = _measured(data)
     made = _fitted(
         measured,
@@ -79,9 +77,7 @@ def _quantity(option: str, text: str, unit: str) -> float:
     try:
         return parse_quantity(text if number is None else number, unit)
     except QuantityError as error:
-        raise WrongInputError(
-            "invalid-parameter", "invalid option", [Fault(option, error.code, str(error), text, unit=unit)]
-        ) from error
+        raise wrong_option(option, error.code, str(error), text, unit=unit) from error
 
 
 def _measured(path: str) -> MeasuredData:

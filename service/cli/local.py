@@ -22,8 +22,9 @@ from sprag.service.cli.console import (
     show_table,
     write_json,
     write_text,
+    wrong_option,
 )
-from sprag.service.cli.files import output, read_study, to_file
+from sprag.service.cli.files import is_json, output, read_study, require_cases, to_file
 from sprag.service.cli.options import ChunkCases, FinishBy, Fresh, JsonFlag, OutputFile, PointsFile, Processes, SpecFile
 from sprag.service.cli.remote import TableFormat, table_format
 from sprag.service.cli.settings import read_settings
@@ -158,7 +159,8 @@ def trajectory(
     study = read_study(spec).study
     with output(file) as write:
         made = _trajectory(study, case, start, end, points)
-        write(_trajectory_bytes(made, study, case, _is_json(form, file, as_json)))
+        written = is_json(file, as_json) if form is None else form is ValueFormat.JSON
+        write(_trajectory_bytes(made, study, case, written))
     told = f"{points} points {'in time' if made.along == 'time' else 'over the angle'}"
     if not len(made.values):
         told = f"no points: {ENDING_SENTENCES[made.ending]}"
@@ -169,22 +171,12 @@ def trajectory(
         raise typer.Exit(ExitCode.NOT_ALL_OK)
 
 
-def _is_json(form: ValueFormat | None, file: str | None, as_json: bool) -> bool:
-    """Whether instantaneous values are written as JSON: by name, by ``--json``, or by the ending of the file's name."""
-    if form is not None:
-        return form is ValueFormat.JSON
-    name = (file or "").lower()
-    return name.endswith(".json") or (as_json and not name.endswith(".csv"))
-
-
 def _trajectory(study: Study, case: int, start: str | None, end: str | None, points: int) -> Trajectory:
     from sprag.service.faults import FaultError
     from sprag.service.results.trajectories import span
     from sprag.worker.models import run_trajectory
 
-    if case >= study.cases:
-        problem = Fault("--case", "unknown-name", "there is no such case", case, allowed=f"0 .. {study.cases - 1}")
-        raise WrongInputError("invalid-parameter", "invalid option", [problem])
+    require_cases(study, [case])
     try:
         first, last = span(study, case, start, end)
     except FaultError as error:
@@ -223,14 +215,8 @@ def presets(
             write_text("".join(f"{item:{width}}{ABOUT[item].shows}\n" for item in names))
         return
     if name not in names:
-        problem = Fault(
-            "NAME",
-            "unknown-name",
-            f"unknown preset{did_you_mean(name, names)}",
-            name,
-            allowed=", ".join(names),
-        )
-        raise WrongInputError("invalid-parameter", "invalid argument", [problem])
+        message = f"unknown preset{did_you_mean(name, names)}"
+        raise wrong_option("NAME", "unknown-name", message, name, allowed=", ".join(names), detail="invalid argument")
     file, text = preset_text(name)
     if as_json:
         write_json({"name": name, "file": file, "text": text})
@@ -326,17 +312,15 @@ def _finish(text: str | None) -> datetime | None:
     try:
         return None if text is None else finish_at(text, datetime.now(UTC))
     except FinishError as error:
-        problem = Fault("--finish-by", error.code, str(error), text, allowed=ALLOWED)
-        raise WrongInputError("invalid-parameter", "invalid option", [problem]) from None
+        raise wrong_option("--finish-by", error.code, str(error), text, allowed=ALLOWED) from None
 
 
 def _rows(done: LocalRun, study: Study, form: Format | ReportFormat) -> Iterator[bytes]:
     """The rows of a finished study as the service exports them, or its report."""
-    from sprag.service.jobs.local import source_of
-    from sprag.service.results.exports import export
+    from sprag.service.results.exports import export, stored
     from sprag.service.results.report import write_report
     from sprag.service.results.report.content import report_of
 
     if form == "html" or form == "pdf":  # noqa: PLR1714 - so that the types are told apart
         return iter([write_report(report_of(done.store, done.record.id), form)])
-    return export(source_of(done, study), form)
+    return export(stored(done.store, done.record, study), form)

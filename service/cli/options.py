@@ -69,6 +69,8 @@ def _no_nan(seconds: float | None) -> float | None:
     return seconds
 
 
+Wait = Annotated[bool, typer.Option("--wait", help="Wait until the study has ended.")]
+
 WaitTimeout = Annotated[
     float | None,
     typer.Option(
@@ -94,5 +96,6 @@ __all__ = [
     "SpecFile",
     "StudyId",
     "Token",
+    "Wait",
     "WaitTimeout",
 ]

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sprag.service.cli.console import OK, WrongInputError, cell_text, say, show_table, write_json
+from sprag.service.cli.console import OK, cell_text, say, show_table, write_json, wrong_option
 from sprag.service.cli.files import write_pieces
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
 from sprag.service.cli.remote import connection
-from sprag.service.faults import Fault
+
+if TYPE_CHECKING:
+    from sprag.service.client.plain import ServiceClient
+    from sprag.service.client.wire import Drawn
 
 HeldAt = Annotated[
     list[str] | None, typer.Option("--at", metavar="PATH=VALUE", help="Value at which another axis is held.")
@@ -28,12 +31,32 @@ def file_format(file: str, allowed: tuple[str, ...], what: str) -> str:
     form = file.rpartition(".")[2].lower()
     if form not in allowed:
         names = ", ".join(f".{name}" for name in allowed[:-1]) + f" or .{allowed[-1]}"
-        raise WrongInputError(
-            "invalid-parameter",
-            "invalid option",
-            [Fault("--output", "invalid-choice", f"no kind of {what}", file, allowed=f"a name that ends in {names}")],
+        raise wrong_option(
+            "--output", "invalid-choice", f"no kind of {what}", file, allowed=f"a name that ends in {names}"
         )
     return form
+
+
+def _answer(
+    client: ServiceClient,
+    study_id: str,
+    part: Drawn,
+    query: list[tuple[str, str]],
+    file: str | None,
+    show: Callable[[dict[str, Any]], None],
+    as_json: bool,
+) -> None:
+    """Show what the service draws of a study, and write it as a picture where a file is named."""
+    form = None if file is None else file_format(file, _PICTURES, "picture")
+    found = client.drawn(study_id, part, query)
+    if file is not None and form is not None:
+        write_pieces(file, client.picture(study_id, part, query, form))
+    if as_json:
+        write_json(found)
+    else:
+        show(found)
+    if file is not None:
+        say(f"picture: {file}")
 
 
 def curve(
@@ -50,19 +73,10 @@ def curve(
     as_json: JsonFlag = False,
 ) -> None:
     """Show results against an axis as a table, and write them as a picture."""
-    picture = "" if file is None else file_format(file, _PICTURES, "picture")
     query = [("x", x), *(("y", name) for name in y), *(("by", path) for path in by or ())]
     query += [("at", item) for item in at or ()]
     with connection(server, token) as client:
-        found = client.curves(study_id, query)
-        if file is not None:
-            write_pieces(file, client.picture(study_id, query, picture))
-    if as_json:
-        write_json(found)
-    else:
-        show_curves(found)
-    if file is not None:
-        say(f"picture: {file}")
+        _answer(client, study_id, "curves", query, file, show_curves, as_json)
 
 
 def draw_map(
@@ -77,18 +91,9 @@ def draw_map(
     as_json: JsonFlag = False,
 ) -> None:
     """Show one result over two axes as a table, and write it as a picture."""
-    picture = "" if file is None else file_format(file, _PICTURES, "picture")
     query = [("x", x), ("y", y), ("z", z), *(("at", item) for item in at or ())]
     with connection(server, token) as client:
-        found = client.map(study_id, query)
-        if file is not None:
-            write_pieces(file, client.map_picture(study_id, query, picture))
-    if as_json:
-        write_json(found)
-    else:
-        _show_map(found)
-    if file is not None:
-        say(f"picture: {file}")
+        _answer(client, study_id, "map", query, file, _show_map, as_json)
 
 
 def _show_map(found: dict[str, Any]) -> None:
@@ -110,20 +115,14 @@ def sensitivity(
     as_json: JsonFlag = False,
 ) -> None:
     """Show what results depend on: the share of their variance for every axis, and the range of its main effect."""
-    picture = "" if file is None else file_format(file, _PICTURES, "picture")
-    query = [("y", name) for name in y]
     with connection(server, token) as client:
-        found = client.sensitivity(study_id, query)
-        if file is not None:
-            write_pieces(file, client.sensitivity_picture(study_id, query, picture))
-    if as_json:
-        write_json(found)
-    else:
-        for result in found["results"]:
-            _show_effects(result)
-        say(*(f"warning: {text}" for text in found["warnings"]))
-    if file is not None:
-        say(f"picture: {file}")
+        _answer(client, study_id, "sensitivity", [("y", name) for name in y], file, _show_sensitivity, as_json)
+
+
+def _show_sensitivity(found: dict[str, Any]) -> None:
+    for result in found["results"]:
+        _show_effects(result)
+    say(*(f"warning: {text}" for text in found["warnings"]))
 
 
 def _show_effects(result: dict[str, Any]) -> None:

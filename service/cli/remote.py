@@ -33,6 +33,7 @@ from sprag.service.cli.options import (
     SpecFile,
     StudyId,
     Token,
+    Wait,
     WaitTimeout,
 )
 from sprag.service.faults import Fault, Kind
@@ -110,7 +111,7 @@ def _option(parameter: object) -> str:
 def submit(
     spec: SpecFile,
     points: PointsFile = None,
-    wait: Annotated[bool, typer.Option("--wait", help="Wait until the study has ended.")] = False,
+    wait: Wait = False,
     key: Annotated[
         str | None, typer.Option("--key", metavar="KEY", help="Idempotency key: the same key submits the study once.")
     ] = None,
@@ -125,13 +126,17 @@ def submit(
     """Submit a study to the service and print its id."""
     data = read_spec(spec, points, MAX_BODY_BYTES)
     with naming_points(points), connection(server, token) as client:
-        study = client.create_study(data, key, priority, fresh, finish_by)
-        say(*(f"warning: {warning}" for warning in study.get("warnings", ())))
-        if wait:
-            study = follow(client, study["id"], timeout)
+        submitted(client, client.create_study(data, key, priority, fresh, finish_by), wait, timeout, as_json)
+
+
+def submitted(client: ServiceClient, study: dict[str, Any], wait: bool, timeout: float | None, as_json: bool) -> None:
+    """Tell of a study that was submitted, at once or when it has ended."""
+    say(*(f"warning: {warning}" for warning in study.get("warnings", ())))
+    if wait:
+        study = follow(client, study["id"], timeout)
     show_study(study, as_json)
     if wait:
-        exit_as(study)
+        _exit_as(study)
 
 
 def watch(
@@ -146,7 +151,7 @@ def watch(
         client.study(study_id, timeout)  # a wrong address or id fails immediately
         study = follow(client, study_id, timeout)
     show_study(study, as_json)
-    exit_as(study)
+    _exit_as(study)
 
 
 def follow(
@@ -180,7 +185,7 @@ def _remark(study: dict[str, Any]) -> str:
     return progress_text(study["state"], progress["rate"], interval, study["finish_by"], progress["in_time"])
 
 
-def exit_as(study: dict[str, Any]) -> None:
+def _exit_as(study: dict[str, Any]) -> None:
     """Exit with the code that shows whether every case ended ok."""
     progress = study["progress"]
     if progress["ok"] != progress["total"]:

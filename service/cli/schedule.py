@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sprag.service.cli.console import WrongInputError, say, show_table, write_json
+from sprag.service.cli.console import WrongInputError, say, show_table, write_json, wrong_option
 from sprag.service.cli.files import read_spec
 from sprag.service.cli.options import DEFAULT_SERVER, Fresh, JsonFlag, Server, SpecFile, Token
 from sprag.service.cli.remote import PriorityOption, connection
-from sprag.service.faults import Fault
 from sprag.worker.limits import MAX_PRIORITY
 
 if TYPE_CHECKING:
@@ -95,18 +94,10 @@ def list_schedules(server: Server = DEFAULT_SERVER, token: Token = None, as_json
         (heading, False, heading == "id")
         for heading in ("id", "when", "window", "finish by", "last run", "next run", "name")
     ]
-    rows = [
-        (
-            s["id"],
-            _when(s),
-            "-".join(s["window"] or ()) or None,
-            s["finish_by"],
-            _run(s["last_run"]),
-            _next(s),
-            s["name"],
-        )
-        for s in found["schedules"]
-    ]
+    rows = []
+    for s in found["schedules"]:
+        window = "-".join(s["window"] or ()) or None
+        rows.append((s["id"], _when(s), window, s["finish_by"], _run(s["last_run"]), _next(s), s["name"]))
     show_table("", columns, rows)
 
 
@@ -205,8 +196,7 @@ def _window(text: str | None) -> dict[str, Any]:
         return {"window": []}
     begin, dash, end = text.partition("-")
     if not dash:
-        problem = Fault("--window", "invalid-text", "is not a time window", text, allowed="as 22:00-06:00")
-        raise WrongInputError("invalid-parameter", "invalid option", [problem])
+        raise wrong_option("--window", "invalid-text", "is not a time window", text, allowed="as 22:00-06:00")
     return {"window": [begin.strip(), end.strip()]}
 
 

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sprag.service.cli.console import ExitCode, WrongInputError, progress_bar, say, show_table, write_json
-from sprag.service.cli.files import output, read_study, to_file
+from sprag.service.cli.console import ExitCode, progress_bar, say, show_table, write_json, wrong_option
+from sprag.service.cli.files import output, read_study, require_cases, to_file
 from sprag.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
-from sprag.service.faults import Fault
 from sprag.service.json_text import to_bytes
 from sprag.worker.limits import MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
 
@@ -70,8 +69,8 @@ def _settled(study: Study, at_most: int | None) -> Study:
     from sprag.worker.models import VIBRATION_DRIVE, settled_study
 
     if study.model != VIBRATION_DRIVE:
-        problem = Fault("/model", "wrong-type", "has no settled motion", study.model, allowed=VIBRATION_DRIVE)
-        raise WrongInputError("invalid-parameter", "this study cannot be settled", [problem])
+        message, detail = "has no motion that settles", "this study cannot be settled"
+        raise wrong_option("/model", "wrong-type", message, study.model, allowed=VIBRATION_DRIVE, detail=detail)
     return settled_study(study, at_most)
 
 
@@ -79,13 +78,7 @@ def _chosen(study: Study, asked: list[int] | None) -> list[int]:
     """The selected cases; WrongInputError for an unknown number."""
     if asked is None:
         return list(range(study.cases))
-    problems = [
-        Fault("--case", "unknown-name", "there is no such case", case, allowed=f"0 .. {study.cases - 1}")
-        for case in asked
-        if case >= study.cases
-    ]
-    if problems:
-        raise WrongInputError("invalid-parameter", "invalid option", problems)
+    require_cases(study, asked)
     return list(dict.fromkeys(asked))
 
 

@@ -15,6 +15,7 @@ from sprag.service.client.wire import (
     API,
     EVENTS_TIMEOUT,
     FILE_TIMEOUT,
+    Drawn,
     Query,
     connection_options,
     document,
@@ -108,9 +109,13 @@ class ServiceClient:
         """Request a change of a study: "cancel", "pause", "resume", "retry" or "prioritize"."""
         return self._json("POST", f"{study_path(study_id)}:{verb}", params=list(query))
 
-    def curves(self, study_id: str, query: Query) -> dict[str, Any]:
-        """Curves of results against one axis."""
-        return self._json("GET", f"{study_path(study_id)}/curves", params=list(query))
+    def drawn(self, study_id: str, part: Drawn, query: Query) -> dict[str, Any]:
+        """Curves of results against one axis, a map of one result over two, or what results depend on."""
+        return self._json("GET", f"{study_path(study_id)}/{part}", params=list(query))
+
+    def picture(self, study_id: str, part: Drawn, query: Query, form: str) -> Iterator[bytes]:
+        """The same as a picture, "svg", "png" or "pdf"."""
+        return self.download(f"{study_path(study_id)}/{part}", [*query, ("format", form)])
 
     def cases(self, study_id: str, query: Query = ()) -> dict[str, Any]:
         """A page of case rows."""
@@ -148,26 +153,6 @@ class ServiceClient:
     def results(self, study_id: str, form: str) -> Iterator[bytes]:
         """All rows of a study in the named format."""
         return self.download(f"{study_path(study_id)}/results", [("format", form)])
-
-    def picture(self, study_id: str, query: Query, form: str) -> Iterator[bytes]:
-        """The picture of curves as "svg", "png" or "pdf"."""
-        return self.download(f"{study_path(study_id)}/curves", [*query, ("format", form)])
-
-    def map(self, study_id: str, query: Query) -> dict[str, Any]:
-        """One result over two axes."""
-        return self._json("GET", f"{study_path(study_id)}/map", params=list(query))
-
-    def map_picture(self, study_id: str, query: Query, form: str) -> Iterator[bytes]:
-        """The picture of a map as "svg", "png" or "pdf"."""
-        return self.download(f"{study_path(study_id)}/map", [*query, ("format", form)])
-
-    def sensitivity(self, study_id: str, query: Query) -> dict[str, Any]:
-        """Main effects and shares of the variance of results."""
-        return self._json("GET", f"{study_path(study_id)}/sensitivity", params=list(query))
-
-    def sensitivity_picture(self, study_id: str, query: Query, form: str) -> Iterator[bytes]:
-        """The picture of the sensitivity as "svg", "png" or "pdf"."""
-        return self.download(f"{study_path(study_id)}/sensitivity", [*query, ("format", form)])
 
     def report(self, study_id: str, form: str) -> Iterator[bytes]:
         """The study as a document, "html" or "pdf"."""

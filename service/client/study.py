@@ -147,16 +147,16 @@ class Study:
         at: Mapping[str, Value] | None = None,
     ) -> Curves:
         """Results ``y`` against axis ``x``, a curve for each value of the axes ``by``, others held ``at`` values."""
-        return Curves(cast("Any", self._client.plain.curves(self.id, curve_query(x, y, by, at))))
+        return Curves(cast("Any", self._client.plain.drawn(self.id, "curves", curve_query(x, y, by, at))))
 
     def map(self, x: str, y: str, z: str, *, at: Mapping[str, Value] | None = None) -> dict[str, Any]:
         """One result ``z`` over two axes."""
         query = [*curve_query(x, y, (), at), ("z", z)]
-        return self._client.plain.map(self.id, query)
+        return self._client.plain.drawn(self.id, "map", query)
 
     def sensitivity(self, y: str | Sequence[str]) -> dict[str, Any]:
         """Main effects of every axis on results, and shares of their variance."""
-        return self._client.plain.sensitivity(self.id, result_query(y))
+        return self._client.plain.drawn(self.id, "sensitivity", result_query(y))
 
     def engagements(self, case: int) -> dict[str, Any]:
         """Every engagement of the clutches of one case ("engagements"), and the means of its "periods"."""
@@ -215,7 +215,7 @@ class Study:
     ) -> Path:
         """Write curves as a picture: .svg, .png or .pdf."""
         path = Path(file)
-        pieces = self._client.plain.picture(self.id, curve_query(x, y, by, at), path.suffix[1:].lower())
+        pieces = self._client.plain.picture(self.id, "curves", curve_query(x, y, by, at), path.suffix[1:].lower())
         path.write_bytes(b"".join(pieces))
         return path
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ipaddress
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, Literal
 from urllib.parse import quote
 
 import httpx
@@ -23,6 +23,8 @@ FILE_TIMEOUT: Final = httpx.Timeout(None, connect=10.0)
 EVENTS_TIMEOUT: Final = httpx.Timeout(SILENCE, connect=10.0)
 
 Query = Sequence[tuple[str, str]]
+#: Parts of a study that the service draws, as numbers and as a picture.
+Drawn = Literal["curves", "map", "sensitivity"]
 
 
 def connection_options(server: str, token: str | None) -> dict[str, Any]:

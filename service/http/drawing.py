@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response
 
+from sprag.service.formats import MEDIA_TYPES, Format
 from sprag.service.http.respond import entity_tag, not_modified, tagged
 from sprag.service.http.work import Work
 from sprag.service.jobs import answers
 from sprag.service.results.defaults import drawn_numbers
 from sprag.service.results.pictures import curves as pictures
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from sprag.service.http.context import Context
     from sprag.service.storage.records import StudyRecord
 
+#: Formats of what is drawn from rows and written as a table too.
+DRAWN_FORMATS: Final = dict[Literal["json", "csv"] | pictures.Picture, str](
+    [("json", MEDIA_TYPES["json"]), ("csv", MEDIA_TYPES["csv"]), *pictures.MEDIA_TYPES.items()]
+)
+#: Formats of the tables of one case.
+TABLE_FORMATS: Final[dict[Literal["json", "csv"], str]] = {"json": MEDIA_TYPES["json"], "csv": MEDIA_TYPES["csv"]}
 #: matplotlib embeds its styles in the picture, which the pages' policy forbids; everything else is disabled.
 _PICTURE_POLICY = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
 
@@ -51,14 +60,10 @@ def picture(draw: Callable[..., bytes], form: pictures.Picture, *shown: object) 
     return Drawing(draw, (*shown, form), pictures.MEDIA_TYPES[form], headers)
 
 
-def picture_of(form: str) -> pictures.Picture:
-    """The kind of picture of that name."""
-    return next(picture for picture in pictures.PICTURES if picture == form)
-
-
-def attachment(content: bytes, media_type: str, filename: str) -> Response:
-    """A small file, downloaded under that name."""
-    return Response(content, media_type=media_type, headers=attached(filename))
+def table(content: bytes, form: Format, name: str) -> Response:
+    """JSON data, or a small file to be saved under that name with the ending of its format."""
+    headers = {} if form == "json" else attached(f"{name}.{form}")
+    return Response(content, media_type=MEDIA_TYPES[form], headers=headers)
 
 
 def attached(filename: str) -> dict[str, str]:
@@ -75,21 +80,36 @@ def placed(context: Context, drawing: Drawing) -> Response | Drawing:
 
 
 async def conditional(
-    context: Context,
-    work: Work,
-    request: Request,
-    study_id: str,
-    form: str,
-    make: Callable[[StudyRecord], Response | Drawing],
+    work: Work, study_id: str, form: str, make: Callable[[StudyRecord], Response | Drawing]
 ) -> Response:
     """The answer of ``make``, or 304 when the client has it; it depends on the study's rows and the query."""
 
-    def look() -> tuple[str, Response | Drawing, bool]:
-        record = context.store.get_study(study_id)
-        tag = entity_tag(record.id, record.revision, request.url.path, request.url.query, form)
-        unchanged = not_modified(request, tag)
-        return tag, unchanged or make(record), unchanged is not None
+    def look() -> tuple[str, Callable[[], Response | Drawing]]:
+        record = work.context.store.get_study(study_id)
+        return tag_of(work.request, record.id, record.revision, form), partial(make, record)
 
-    tag, made, unchanged = await run_in_threadpool(look)
+    return await unless_known(work, look)
+
+
+async def unless_known(work: Work, look: Callable[[], tuple[str, Callable[[], Response | Drawing]]]) -> Response:
+    """304 when the client has the version of the tag that ``look`` gives, else what the function beside it makes."""
+
+    def answer() -> tuple[str, Response | Drawing, bool]:
+        tag, make = look()
+        unchanged = not_modified(work.request, tag)
+        return tag, unchanged or make(), unchanged is not None
+
+    tag, made, unchanged = await run_in_threadpool(answer)
     response = await made.response(work) if isinstance(made, Drawing) else made
     return response if unchanged else tagged(response, tag)
+
+
+async def unchanging(work: Work, study_id: str, make: Callable[[], Awaitable[Response]]) -> Response:
+    """The answer about a case, or 304: a case is what its study says, and studies never change."""
+    tag = tag_of(work.request, study_id, models.ENGINE_VERSION)
+    return not_modified(work.request, tag) or tagged(await make(), tag)
+
+
+def tag_of(request: Request, *parts: object) -> str:
+    """The entity tag of an answer to this address that depends on ``parts``."""
+    return entity_tag(request.url.path, request.url.query, *parts)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar
 
 from starlette.concurrency import iterate_in_threadpool
 from starlette.requests import Request
@@ -13,11 +13,13 @@ from starlette.responses import Response, StreamingResponse
 from werkzeug.datastructures import MIMEAccept
 from werkzeug.http import parse_accept_header, parse_etags
 
-from sprag.service.faults import parameter_error, shown
+from sprag.service.faults import choice_of, shown
 from sprag.service.http.problems import ApiError
 from sprag.service.json_text import to_bytes
 
 JSON = "application/json"
+
+Form = TypeVar("Form", bound=str)
 
 
 def json_response(data: Any, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
@@ -55,22 +57,19 @@ def streamed(pieces: Iterable[bytes], media_type: str, filename: str) -> Streami
     return StreamingResponse(iterate_in_threadpool(whole), media_type=media_type, headers=headers)
 
 
-def choose_format(request: Request, wanted: str | None, media_types: Mapping[str, str]) -> str:
+def choose_format(request: Request, wanted: str | None, media_types: Mapping[Form, str]) -> Form:
     """The format of the answer: ``wanted`` (the query's ``format``), else the one preferred by Accept, else the first.
 
     A type that Accept names precedes one that it only allows (``image/*``, ``*/*``). Raises ApiError when the query
     names an unknown format, and when Accept allows none.
     """
-    formats: Sequence[str] = tuple(media_types)
     if wanted is not None:
-        if wanted not in media_types:
-            raise parameter_error("format", "invalid-choice", "unknown format", wanted, ", ".join(formats))
-        return wanted
+        return choice_of("format", wanted, media_types)
     header = ",".join(request.headers.getlist("accept"))
     accept = parse_accept_header(header, MIMEAccept)
     by_type = {media.partition(";")[0]: name for name, media in reversed(list(media_types.items()))}
     if not any("/" in media for media, _ in accept):
-        return formats[0]
+        return next(iter(media_types))
     named = {media.lower() for media, quality in accept if quality > 0}
     best = max(reversed(by_type), key=lambda media: (media in named, accept.quality(media)))
     if accept.quality(best) > 0:

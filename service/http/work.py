@@ -6,10 +6,13 @@ import asyncio
 from typing import TYPE_CHECKING, Annotated, Final, TypeVar, TypeVarTuple, cast
 
 from fastapi import Depends, Request
+from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
 from sprag.service.http.access import OPEN
+from sprag.service.http.context import study_with
 from sprag.service.spec.machine.shaft_check import NotCompiledError
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
@@ -20,6 +23,7 @@ if TYPE_CHECKING:
     from sprag.service.http.context import Context
     from sprag.service.http.shares import Shares
     from sprag.worker.models import KernelShape
+    from sprag.worker.study import Study
 
 #: Problems that any check can lead to.
 CHECK_PROBLEMS: Final = ("too-costly", "not-computed", "too-many-requests", "unavailable")
@@ -29,15 +33,15 @@ R = TypeVar("R")
 
 
 class Work:
-    """Access of one request to the processes that evaluate user input.
+    """One request, the service's context, and access to the processes that evaluate user input.
 
     Every method raises ApiError when there is too much work or a limit of time or memory is reached, and
     ClientDisconnect when the client has disconnected.
     """
 
     def __init__(self, request: Request) -> None:
-        self._request = request
-        self._context = cast("Context", request.app.state.context)
+        self.request = request
+        self.context = cast("Context", request.app.state.context)
 
     async def check(self, function: Callable[[*Args], R], *args: *Args) -> R:
         """The value of a function that reads, expands, fits or draws user input."""
@@ -48,20 +52,34 @@ class Work:
             return await self._check(function, *args)
 
     async def _check(self, function: Callable[[*Args], R], *args: *Args) -> R:
-        context = self._context
+        context = self.context
         return await self._attended(self._in_turn(context.check_shares, context.checker, function, *args))
 
     async def compute(self, function: Callable[[*Args], R], *args: *Args) -> R:
         """The value of a function of the engine."""
-        context = self._context
+        context = self.context
         return await self._attended(self._in_turn(context.compute_shares, context.computer, function, *args))
+
+    async def run_case(self, function: Callable[[Study, *Args], R], study: Study, *args: *Args) -> R:
+        """The value of a function that runs a case of ``study``, once its kernel is ready."""
+        await self.load(models.shape_of(study))
+        return await self.compute(function, study, *args)
+
+    async def case_of(self, study_id: str, case: int, look: Callable[[Study], R]) -> tuple[Study, R]:
+        """The study, when it has that case, and what ``look`` finds in it. Raises ApiError, and what ``look`` does."""
+
+        def find() -> tuple[Study, R]:
+            study = study_with(self.context, study_id, case)
+            return study, look(study)
+
+        return await run_in_threadpool(find)
 
     async def load(self, shape: KernelShape) -> None:
         """Load a kernel, compiling it if necessary; the compilation continues when the client disconnects."""
-        await self._attended(self._context.computer.load(shape))
+        await self._attended(self.context.computer.load(shape))
 
     async def _in_turn(self, shares: Shares, computer: Computes, function: Callable[[*Args], R], *args: *Args) -> R:
-        grant = cast("Grant | None", self._request.scope.get("sprag.grant")) or OPEN
+        grant = cast("Grant | None", self.request.scope.get("sprag.grant")) or OPEN
         async with shares.take(grant.id):
             return await computer.run(function, *args)
 
@@ -81,7 +99,7 @@ class Work:
 
     async def _left(self) -> None:
         """Wait until the client has disconnected."""
-        while (await self._request.receive())["type"] != "http.disconnect":
+        while (await self.request.receive())["type"] != "http.disconnect":
             pass
 
 

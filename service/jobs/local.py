@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sprag.service.jobs.dispatching import STANDBY_SECONDS, WorkerSettings, owner_name, pool, renewed_pool
-from sprag.service.results.exports.source import Source
 from sprag.service.stale_files import marked, sweep
 from sprag.service.storage.owners import run_owner
 from sprag.service.storage.part import SystemClock
@@ -21,7 +20,7 @@ from sprag.service.storage.store import Store
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.models import estimate_seconds_per_case, study_results
+from sprag.worker.models import estimate_seconds_per_case
 from sprag.worker.ports import ExecutorError, StoreError
 from sprag.worker.states import StudyState, TransitionError
 
@@ -122,13 +121,6 @@ def pool_size(study: Study, most: int, *, asked: bool) -> int:
     if not asked and study.cases * estimate_seconds_per_case(study) < _NO_POOL_SECONDS:
         return 0
     return most
-
-
-def source_of(done: LocalRun, study: Study) -> Source:
-    """The rows of a completed run, for an export."""
-    record = done.record
-    about = {"study": record.id, "name": record.name, "model": record.model, "engine_version": record.engine_version}
-    return Source(study, study_results(study), done.store.iter_rows(record.id), about, done.store.spec(record.id))
 
 
 def _cancelled(store: Store, study_id: str, *, ours: bool) -> StudyRecord:

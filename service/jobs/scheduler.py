@@ -12,7 +12,6 @@ from datetime import timedelta
 from typing import TYPE_CHECKING
 
 from sprag.service.storage.errors import StoreError
-from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -86,8 +85,7 @@ class Scheduler(threading.Thread):
                     self._store.let_in(study.number)
                 continue
             reason = f"outside its window, {study.window}; it continues by itself"
-            going = study.state in {StudyState.QUEUED, StudyState.RUNNING}
-            if going or (study.held and study.reason != reason):
+            if study.state.going or (study.held and study.reason != reason):
                 self._store.hold_for_window(study.number, reason)
 
     def _take(self, record: ScheduleRecord) -> None:

@@ -23,9 +23,11 @@ from sprag.service.results.selection import (
     held_text,
     listed,
     locate_axes,
+    numeric_results,
+    refused,
     require_axis,
 )
-from sprag.service.spec.catalogue import result_of, unit_of, unknown_result
+from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.codes import PENDING
 from sprag.worker.limits import MAX_CURVE_VALUES
@@ -44,7 +46,7 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
     SelectionError
         For an unknown path or result, a value that is not on its axis, an open axis, or too many numbers.
     """
-    results = _results(infos, "y", query.y)
+    results = numeric_results(infos, "y", query.y)
     x_axis = require_axis(study, "x", query.x)
     fixed = locate_axes(study, query.at)
     by_axes = {path: require_axis(study, "by", path) for path in dict.fromkeys(query.by)}
@@ -89,11 +91,9 @@ def draw_map(
     study: Study, infos: Sequence[ResultInfo], x: str, y: str, z: str, at: Sequence[tuple[str, str]], fetch: Fetch
 ) -> Map:
     """One result over two axes of a grid; raises SelectionError as `select` does."""
-    (result,) = _results(infos, "z", (z,))
+    (result,) = numeric_results(infos, "z", (z,))
     if study.combine == "zip":
-        raise SelectionError(
-            [ParameterFault("x", "not-a-grid", "a map needs a grid; the axes of this study go together (zip)")]
-        )
+        raise refused("x", "not-a-grid", "a map needs a grid; the axes of this study go together (zip)")
     x_axis, y_axis = require_axis(study, "x", x), require_axis(study, "y", y)
     fixed = locate_axes(study, at)
     _no_axis_twice({x: x_axis}, "y", {y: y_axis}, fixed)
@@ -125,27 +125,6 @@ def draw_map(
     )
 
 
-def _results(infos: Sequence[ResultInfo], parameter: str, names: Sequence[str]) -> tuple[ResultInfo, ...]:
-    names = tuple(dict.fromkeys(names))
-    faults = [
-        ParameterFault(
-            parameter, "unknown-name", unknown_result(infos, name), value=name, allowed=listed(i.name for i in infos)
-        )
-        for name in names
-        if result_of(infos, name) is None
-    ]
-    faults += [
-        ParameterFault(
-            parameter, "not-numeric", "is a category, which comes with every point", value=name, allowed="a number"
-        )
-        for name in names
-        if (info := result_of(infos, name)) is not None and info.kind == "category"
-    ]
-    if faults:
-        raise SelectionError(faults)
-    return tuple(info for name in names if (info := result_of(infos, name)) is not None)
-
-
 def _no_axis_twice(x: dict[str, int], second: str, others: dict[str, int], fixed: Fixed) -> None:
     taken: dict[int, str] = {}
     uses = [("x", path, axis) for path, axis in x.items()] + [(second, path, axis) for path, axis in others.items()]
@@ -153,14 +132,14 @@ def _no_axis_twice(x: dict[str, int], second: str, others: dict[str, int], fixed
     for parameter, path, axis in uses:
         if axis in taken:
             message = f"the axis is already taken by {taken[axis]}; one axis can have one role only"
-            raise SelectionError([ParameterFault(parameter, "repeated", message, value=path)])
+            raise refused(parameter, "repeated", message, path)
         taken[axis] = f"{parameter}={path}"
 
 
 def _check_size(points: int, results: int) -> None:
     if points * results > MAX_CURVE_VALUES:
         message = f"{points} points of {results} results are requested; select fewer with at=, or export the results"
-        raise SelectionError([ParameterFault("at", "too-many", message, allowed=f"<= {MAX_CURVE_VALUES} numbers")])
+        raise refused("at", "too-many", message, allowed=f"<= {MAX_CURVE_VALUES} numbers")
 
 
 def _grid_lines(
@@ -211,9 +190,7 @@ def _zip_lines(
     cases = np.flatnonzero(chosen).astype(np.int64)
     if cases.size == 0:
         message = "no case has all these values together"
-        raise SelectionError(
-            [ParameterFault("at", "unknown-value", message, value=listed(p for p, _ in fixed.values()))]
-        )
+        raise refused("at", "unknown-value", message, listed(p for p, _ in fixed.values()))
     _check_size(cases.size, results)
     at = {path: axes[i].value(index) for i, (path, index) in fixed.items()}
     x_all = axes[x_axis].array

@@ -78,9 +78,3 @@ def caption(study: Study, query: CurveQuery) -> str:
 def _with_unit(study: Study, path: str) -> str:
     unit = unit_of(study, path)
     return axis_name(study, path) + ("" if unit == "1" else f" ({unit})")
-
-
-def query_pairs(query: CurveQuery, **more: str) -> list[tuple[str, str]]:
-    """``query`` as the query parameters of the curves' URL."""
-    pairs = [("x", query.x), *(("y", name) for name in query.y), *(("by", path) for path in query.by)]
-    return [*pairs, *(("at", f"{path}={value}") for path, value in query.at), *more.items()]

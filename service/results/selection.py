@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.service.faults import Fault, FaultError, ParameterFault, shown
-from sprag.service.spec.catalogue import unit_of
+from sprag.service.faults import Code, Fault, FaultError, ParameterFault, shown
+from sprag.service.spec.catalogue import result_of, unit_of, unknown_result
 from sprag.service.spec.report import did_you_mean, quantity_text
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
-    from sprag.worker.study import Axis, Study
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Study
 
 #: Fixed axes: position of the axis -> (the path that named it, position of the value on it).
 Fixed = dict[int, tuple[str, int]]
@@ -29,6 +30,37 @@ class SelectionError(FaultError):
     def __init__(self, faults: Iterable[Fault]) -> None:
         faults = tuple(faults)
         super().__init__("invalid-selection", "; ".join(f"{item.where}: {item.message}" for item in faults), faults)
+
+
+def refused(
+    parameter: str,
+    code: Code,
+    message: str,
+    value: object = None,
+    *,
+    allowed: str | None = None,
+    unit: str | None = None,
+) -> SelectionError:
+    """What is wrong with one parameter of a selection."""
+    return SelectionError([ParameterFault(parameter, code, message, shown(value), allowed, unit)])
+
+
+def numeric_results(infos: Sequence[ResultInfo], parameter: str, names: Sequence[str]) -> tuple[ResultInfo, ...]:
+    """The results of those names, each once; SelectionError (about ``parameter``) for others and for categories."""
+    faults: list[Fault] = []
+    found: dict[str, ResultInfo] = {}
+    for name in dict.fromkeys(names):
+        info = result_of(infos, name)
+        if info is None:
+            message, known = unknown_result(infos, name), listed(info.name for info in infos)
+            faults.append(ParameterFault(parameter, "unknown-name", message, shown(name), known))
+        elif info.kind == "category":
+            faults.append(ParameterFault(parameter, "not-numeric", "is a category, not a number", name, "a number"))
+        else:
+            found[name] = info
+    if faults:
+        raise SelectionError(faults)
+    return tuple(found.values())
 
 
 def listed(values: Iterable[object]) -> str:
@@ -50,17 +82,7 @@ def require_axis(study: Study, parameter: str, path: str) -> int:
         if fixed
         else "not an axis of this study"
     ) + did_you_mean(path, study.axis_paths)
-    raise SelectionError(
-        [
-            ParameterFault(
-                parameter,
-                "not-an-axis",
-                message,
-                value=shown(path),
-                allowed=listed(study.axis_paths) or "no axis at all",
-            )
-        ]
-    )
+    raise refused(parameter, "not-an-axis", message, path, allowed=listed(study.axis_paths) or "no axis at all")
 
 
 def axis_name(study: Study, path: str) -> str:
@@ -94,11 +116,11 @@ def locate_axes(study: Study, at: Sequence[tuple[str, str]]) -> Fixed:
             continue
         index = study.axes[position].index_of(value)
         if index is None:
-            raise _no_such_value(path, text, study.axes[position], unit)
+            known = listed(np.sort(study.axes[position].array).tolist())
+            message = "the axis has no such value"
+            raise refused("at", "unknown-value", message, f"{path}={text}", allowed=known, unit=unit)
         if fixed.setdefault(position, (path, index))[1] != index:
-            raise SelectionError(
-                [ParameterFault("at", "repeated", "the axis is given two values", value=shown(f"{path}={text}"))]
-            )
+            raise refused("at", "repeated", "the axis is given two values", f"{path}={text}")
     return fixed
 
 
@@ -107,20 +129,4 @@ def _value(path: str, text: str, unit: str) -> float:
         number, unit_text = split_quantity(text)
         return parse_quantity(text, unit) if unit_text else to_float(number)
     except QuantityError as error:
-        item = ParameterFault("at", error.code, f"{path} {error}", value=shown(f"{path}={text}"), unit=unit)
-        raise SelectionError([item]) from error
-
-
-def _no_such_value(path: str, text: str, axis: Axis, unit: str) -> SelectionError:
-    return SelectionError(
-        [
-            ParameterFault(
-                "at",
-                "unknown-value",
-                "the axis has no such value",
-                value=shown(f"{path}={text}"),
-                allowed=listed(np.sort(axis.array).tolist()),
-                unit=unit,
-            )
-        ]
-    )
+        raise refused("at", error.code, f"{path} {error}", f"{path}={text}", unit=unit) from error

@@ -17,11 +17,13 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from sprag.service.faults import Fault, ParameterFault
+from sprag.service.answers import filled
+from sprag.service.answers.results import AxisEffect, ResultSensitivity
+from sprag.service.faults import Fault
 from sprag.service.json_text import numbers
 from sprag.service.results.curves import Fetch
 from sprag.service.results.regimes import UNSETTLED, counted, kind_columns, kinds_of
-from sprag.service.results.selection import SelectionError, axis_name, listed
+from sprag.service.results.selection import SelectionError, axis_name, numeric_results, refused
 from sprag.service.results.sensitivity_design import (
     factorial_table,
     going_together,
@@ -30,13 +32,12 @@ from sprag.service.results.sensitivity_design import (
     scattered,
     why_no_shares,
 )
-from sprag.service.spec.catalogue import result_of, unit_of, unknown_result
+from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.answers.results import ResultSensitivity
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Axis, Study
 
@@ -59,10 +60,11 @@ class Effect:
 
     Attributes
     ----------
-    values, means : arrays of one length Values of the axis (SI), or midpoints of groups of values, and the mean of the
-        result there; NaN for none.
-    first, total : float or None Indices, None where the method does not provide them.
-    first_error, total_error : float or None
+    values, means : arrays of one length
+        Values of the axis (SI), or middles of groups of them, and the mean of the result there; NaN for none.
+    first_order, total : float or None
+        Indices, None where the method does not tell them.
+    first_order_error, total_error : float or None
         Half widths of their 95 % intervals; None where they are exact.
     """
 
@@ -70,8 +72,8 @@ class Effect:
     unit: str
     values: Numbers
     means: Numbers
-    first: float | None
-    first_error: float | None
+    first_order: float | None
+    first_order_error: float | None
     total: float | None
     total_error: float | None
 
@@ -91,30 +93,11 @@ class Sensitivity:
 
     def to_json(self) -> ResultSensitivity:
         """The same as JSON data."""
-        return {
-            "result": self.info.name,
-            "unit": self.info.unit,
-            "description": self.info.description,
-            "method": self.method,
-            "cases": self.cases,
-            "missing": self.missing,
-            "mean": self.mean,
-            "variance": self.variance,
-            "effects": [
-                {
-                    "paths": list(effect.paths),
-                    "unit": effect.unit,
-                    "values": numbers(effect.values),
-                    "means": numbers(effect.means),
-                    "first_order": effect.first,
-                    "first_order_error": effect.first_error,
-                    "total": effect.total,
-                    "total_error": effect.total_error,
-                }
-                for effect in self.effects
-            ],
-            "notes": list(self.notes),
-        }
+        info, effects = self.info, []
+        for effect in self.effects:
+            effects.append(filled(AxisEffect, effect, values=numbers(effect.values), means=numbers(effect.means)))
+        told = {"result": info.name, "unit": info.unit, "description": info.description, "effects": effects}
+        return filled(ResultSensitivity, self, **told)
 
 
 def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fetch: Fetch) -> list[Sensitivity]:
@@ -124,38 +107,19 @@ def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fet
     result, a study in which nothing varies, or one that is too large.
     """
     infos = models.study_results(study)
-    faults: list[Fault] = [
-        ParameterFault(
-            "y", "unknown-name", unknown_result(infos, name), value=name, allowed=listed(info.name for info in infos)
-        )
-        for name in names
-        if result_of(infos, name) is None
-    ]
-    faults += [
-        ParameterFault("y", "not-numeric", "is a category, which has no variance", value=name)
-        for name in names
-        if (info := result_of(infos, name)) is not None and info.kind == "category"
-    ]
+    results = numeric_results(infos, "y", names)
     varying = [axis for axis in study.axes if np.any(axis.array != axis.array[0])]
-    if not varying and not faults:
-        faults = [ParameterFault("y", "nothing-varies", "nothing varies in this study")]
+    if not varying:
+        raise refused("y", "nothing-varies", "nothing varies in this study")
     if study.cases > MOST_CASES:
-        faults.append(
-            Fault(
-                None, "too-many", "the study is too large for it", value=study.cases, allowed=f"<= {MOST_CASES:,} cases"
-            )
-        )
-    if faults:
-        raise SelectionError(faults)
+        allowed = f"<= {MOST_CASES:,} cases"
+        raise SelectionError([Fault(None, "too-many", "the study is too large for it", study.cases, allowed)])
     regime = models.regime_info(infos)
     kinds = kind_columns(regime)
     columns = fetch(np.arange(study.cases, dtype=np.int64), list(dict.fromkeys([*names, *kinds])))
     regimes, _ = kinds_of(columns.values, regime)
     base = _saltelli_base(study, spec)
-    found = (result_of(infos, name) for name in names)
-    return [
-        _of_result(study, varying, info, columns.values[info.name], regimes, base) for info in found if info is not None
-    ]
+    return [_of_result(study, varying, info, columns.values[info.name], regimes, base) for info in results]
 
 
 def _saltelli_base(study: Study, spec: Mapping[str, Any]) -> int | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from sprag.service.faults import parameter_error, shown
+from sprag.service.faults import parameter_error
 from sprag.service.json_text import numbers, to_bytes
 from sprag.service.results.exports import table_csv
 from sprag.service.spec.units import PERIOD_NAMES, QuantityError, parse_quantity, split_quantity, to_float
@@ -34,11 +34,11 @@ def span(study: Study, case: int, start: str | None, end: str | None) -> tuple[f
     whole = {"time": "the run", "angle": "the cycle"}[extent.along]
     if not 0.0 <= first < extent.end:
         raise parameter_error(
-            "from", "out-of-range", f"outside {whole}", shown(start), f"0 .. {extent.end!r} {extent.unit}, before `to`"
+            "from", "out-of-range", f"outside {whole}", start, f"0 .. {extent.end!r} {extent.unit}, before `to`"
         )
     if not first < last <= extent.end:
         message = f"outside {whole}, or not after `from`"
-        raise parameter_error("to", "out-of-range", message, shown(end), f"{first!r} .. {extent.end!r} {extent.unit}")
+        raise parameter_error("to", "out-of-range", message, end, f"{first!r} .. {extent.end!r} {extent.unit}")
     return first, last
 
 
@@ -50,7 +50,7 @@ def _place(name: str, text: str, extent: Extent) -> float:
         return parse_quantity(text, extent.unit) if unit else to_float(number)
     except QuantityError as error:
         kind = {"time": "a time in s or periods", "angle": "an angle in rad, deg or cycles"}[extent.along]
-        raise parameter_error(name, error.code, str(error), shown(text), kind) from error
+        raise parameter_error(name, error.code, str(error), text, kind) from error
 
 
 def trajectory_file(study: Study, case: int, start: float, end: float, points: int, form: Format) -> bytes:

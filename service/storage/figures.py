@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import datetime
 from typing import TYPE_CHECKING
 
 import sqlalchemy as sa
 
-from sprag.service.storage.part import EPOCH, Part, moment
+from sprag.service.storage.part import Part, micros_of, moment
 from sprag.service.storage.tables import CHUNKS, DISPATCHER, ENDINGS, HELD_AT_DEADLINE, STUDIES
 from sprag.worker.states import TERMINAL, ChunkState
 
@@ -70,7 +70,7 @@ class Totals(Part):
 
     def finished_since(self, since: datetime) -> list[FinishedWork]:
         """Chunks finished after ``since``, in order."""
-        micros = (since - EPOCH) // timedelta(microseconds=1)
+        micros = micros_of(since)
         c = CHUNKS.c
         # Only studies that may have such chunks are read; chunks are indexed by study.
         lately = STUDIES.c.finished_at.is_(None) | (STUDIES.c.finished_at >= micros)

@@ -87,11 +87,13 @@ class Part:
 
     def _lift_deadline(self, connection: sa.Connection, number: int) -> None:
         """Let a resumed study run although its deadline has passed."""
-        connection.execute(
-            sa.update(STUDIES)
-            .where(STUDIES.c.number == number, STUDIES.c.finish_by <= self._now())
-            .values(finish_by=None, revision=STUDIES.c.revision + 1)
-        )
+        self._change(connection, number, STUDIES.c.finish_by <= self._now(), finish_by=None)
+
+    @staticmethod
+    def _change(connection: sa.Connection, number: int, *only: sa.ColumnElement[bool], **values: object) -> None:
+        """Put ``values`` into the row of a study where all of ``only`` hold; its revision tells readers of it."""
+        values["revision"] = STUDIES.c.revision + 1
+        connection.execute(sa.update(STUDIES).where(STUDIES.c.number == number, *only).values(values))
 
     def _move(self, connection: sa.Connection, number: int, event: StudyEvent, reason: str | None = None) -> StudyState:
         """Apply ``event`` to the study; raises TransitionError where the table of states has no such transition.
@@ -106,18 +108,13 @@ class Part:
         after = follow(before, event)
         if after is before:
             return after
-        values: dict[str, Any] = {
-            "state": after.value,
-            "revision": STUDIES.c.revision + 1,
-            "reason": reason,
-            "waits_for": None,
-        }
+        values: dict[str, Any] = {"state": after.value, "reason": reason, "waits_for": None}
         if after is StudyState.RUNNING:
             values["started_at"] = sa.func.coalesce(STUDIES.c.started_at, self._now())
         if after.terminal:
             values["finished_at"] = self._now()
         elif before.terminal:
             values["finished_at"] = None
-        connection.execute(sa.update(STUDIES).where(STUDIES.c.number == number).values(values))
+        self._change(connection, number, **values)
         announce(connection)
         return after

@@ -20,7 +20,7 @@ from sprag.service.storage.part import Part
 from sprag.service.storage.private_files import create_private
 from sprag.service.storage.tables import STUDIES, WAITS_FOR_ROOM
 from sprag.service.storage.work import return_claims
-from sprag.worker.states import StudyEvent, StudyState
+from sprag.worker.states import GOING, StudyEvent
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -126,13 +126,10 @@ class Room(Part):
             self._own(connection, epoch)
             if returned:
                 return_claims(connection)
-            going = [StudyState.QUEUED.value, StudyState.RUNNING.value]
-            numbers = connection.execute(sa.select(STUDIES.c.number).where(STUDIES.c.state.in_(going))).scalars().all()
+            numbers = connection.execute(sa.select(STUDIES.c.number).where(STUDIES.c.state.in_(GOING))).scalars().all()
             for number in numbers:
                 self._move(connection, number, StudyEvent.FAULT, reason)
-                connection.execute(
-                    sa.update(STUDIES).where(STUDIES.c.number == number).values(waits_for=WAITS_FOR_ROOM)
-                )
+                self._change(connection, number, waits_for=WAITS_FOR_ROOM)
 
     def let_go(self, epoch: int) -> None:
         """Queue again every study that `hold` paused and nobody has changed since."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import secrets
 from dataclasses import dataclass
-from datetime import timedelta
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,7 +13,7 @@ import sqlalchemy as sa
 from sprag.service.schedules.fields import ScheduleFields
 from sprag.service.schedules.times import Timing, Window, read_time_of_day
 from sprag.service.storage.errors import IdempotencyConflict, ScheduleNotFound, TooManySchedules
-from sprag.service.storage.part import EPOCH, Part, moment, optional_moment
+from sprag.service.storage.part import Part, micros_of, moment, optional_moment
 from sprag.service.storage.schedule_tables import SCHEDULE_RUNS, SCHEDULES
 from sprag.service.storage.tables import STUDIES, WAITS_FOR_WINDOW
 from sprag.worker.limits import MAX_SCHEDULES
@@ -172,23 +171,23 @@ class Schedules(Part):
     def due_schedules(self, now: datetime) -> list[ScheduleRecord]:
         """Schedules that are due at ``now``."""
         with self.session.read() as connection:
-            query = sa.select(SCHEDULES).where(_S.next_due <= _micros(now)).order_by(_S.next_due, _S.number)
+            query = sa.select(SCHEDULES).where(_S.next_due <= micros_of(now)).order_by(_S.next_due, _S.number)
             return [self._record(connection, row) for row in connection.execute(query).all()]
 
     def recover_schedules(self, now: datetime) -> list[str]:
         """Make schedules that a fast clock postponed due again at their next time after ``now``; returns their ids."""
         recovered = []
         with self.session.read() as connection:
-            rows = connection.execute(sa.select(SCHEDULES).where(_S.next_due > _micros(now))).all()
+            rows = connection.execute(sa.select(SCHEDULES).where(_S.next_due > micros_of(now))).all()
         for row in rows:
             due = _fields(row).next_due(now)
-            if due is None or _micros(due) >= row.next_due:
+            if due is None or micros_of(due) >= row.next_due:
                 continue
             with self.session.write() as connection:
                 connection.execute(
                     sa.update(SCHEDULES)
                     .where(_S.number == row.number, _S.next_due == row.next_due)
-                    .values(next_due=_micros(due))
+                    .values(next_due=micros_of(due))
                 )
             recovered.append(row.id)
         return recovered
@@ -201,17 +200,17 @@ class Schedules(Part):
         with self.session.write() as connection:
             moved = connection.execute(
                 sa.update(SCHEDULES)
-                .where(_S.number == record.number, _S.next_due == _micros(record.next_due))
-                .values(next_due=None if following is None else _micros(following))
+                .where(_S.number == record.number, _S.next_due == micros_of(record.next_due))
+                .values(next_due=None if following is None else micros_of(following))
             )
-            this = (_R.schedule == record.number) & (_R.due == _micros(due))
+            this = (_R.schedule == record.number) & (_R.due == micros_of(due))
             # After the clock was put back, the same due time comes again.
             if not moved.rowcount or connection.execute(sa.select(_R.due).where(this)).first():
                 return False
             connection.execute(
                 sa.insert(SCHEDULE_RUNS).values(
                     schedule=record.number,
-                    due=_micros(due),
+                    due=micros_of(due),
                     state=RunState.TAKEN.value,
                     missed=missed,
                     begun_at=self._now(),
@@ -273,12 +272,11 @@ class Schedules(Part):
         c = STUDIES.c
         with self.session.write() as connection:
             state = connection.execute(sa.select(c.state).where(c.number == number)).scalar_one()
-            if StudyState(state) in {StudyState.QUEUED, StudyState.RUNNING}:
+            if StudyState(state).going:
                 self._move(connection, number, StudyEvent.FAULT, reason)
-                connection.execute(sa.update(STUDIES).where(c.number == number).values(waits_for=WAITS_FOR_WINDOW))
+                self._change(connection, number, waits_for=WAITS_FOR_WINDOW)
             else:
-                held = (c.number == number) & (c.waits_for == WAITS_FOR_WINDOW)
-                connection.execute(sa.update(STUDIES).where(held).values(reason=reason, revision=c.revision + 1))
+                self._change(connection, number, c.waits_for == WAITS_FOR_WINDOW, reason=reason)
 
     def let_in(self, number: int) -> None:
         """Queue a study again that `hold_for_window` paused and nobody has changed since."""
@@ -294,7 +292,7 @@ class Schedules(Part):
             "name": fields.name,
             "spec": json.dumps(fields.spec, allow_nan=False),
             "cron": timing.cron,
-            "due_at": None if timing.at is None else _micros(timing.at),
+            "due_at": None if timing.at is None else micros_of(timing.at),
             "zone": timing.zone,
             "window_begin": None if window is None else f"{window.begin:%H:%M}",
             "window_end": None if window is None else f"{window.end:%H:%M}",
@@ -302,7 +300,7 @@ class Schedules(Part):
             "fresh": int(fields.fresh),
             "finish_by": fields.finish_by,
             "enabled": int(fields.enabled),
-            "next_due": None if due is None else _micros(due),
+            "next_due": None if due is None else micros_of(due),
         }
 
     def _schedule_row(self, connection: sa.Connection, schedule_id: str) -> sa.Row[Any]:
@@ -348,10 +346,6 @@ def lift_window(connection: sa.Connection, study: int, now: datetime) -> None:
     window = None if row is None else _window(row)
     if window is not None and not window.open_at(now):
         connection.execute(sa.update(SCHEDULE_RUNS).where(_R.study == study).values(unbound=1))
-
-
-def _micros(when: datetime) -> int:
-    return (when - EPOCH) // timedelta(microseconds=1)
 
 
 def _window(row: Any) -> Window | None:

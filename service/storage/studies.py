@@ -140,11 +140,14 @@ class Studies(Orders):
     def get_study(self, study_id: str) -> StudyRecord:
         """The study of that id; raises StudyNotFound."""
         with self.session.read() as connection:
-            return self._told(connection, record_of(self._row(connection, study_id, *RECORD_COLUMNS)))
+            return self._study_record(connection, study_id)
+
+    def _study_record(self, connection: sa.Connection, study_id: str) -> StudyRecord:
+        return self._told(connection, record_of(self._row(connection, study_id, *RECORD_COLUMNS)))
 
     def _told(self, connection: sa.Connection, record: StudyRecord) -> StudyRecord:
         """The study; where its worker is silent and cannot record a reason itself, with that reason."""
-        if record.reason is not None or record.state not in {StudyState.QUEUED, StudyState.RUNNING}:
+        if record.reason is not None or not record.state.going:
             return record
         row = connection.execute(sa.select(DISPATCHER.c.owner, DISPATCHER.c.heartbeat_at)).one_or_none()
         if row is None or self.clock.now() - moment(row.heartbeat_at) <= timedelta(seconds=SILENT_SECONDS):
@@ -243,11 +246,9 @@ class Studies(Orders):
             row.done,
             bool(row.coarse),
         )
-        going = state in {StudyState.QUEUED, StudyState.RUNNING}
-        finish_by = optional_moment(row.finish_by)
-        return record, Progress(
-            state, row.cases, row.done, row.ok, dict(endings), rate, left if going else None, covered, finish_by, now
-        )
+        times = (optional_moment(row.finish_by), now)
+        left = left if state.going else None
+        return record, Progress(state, row.cases, row.done, row.ok, dict(endings), rate, left, covered, *times)
 
     def pause_study(self, study_id: str) -> StudyRecord:
         """Hold the study until it is resumed; raises StudyNotFound, TransitionError when it has ended."""
@@ -270,12 +271,8 @@ class Studies(Orders):
                 lift_window(connection, row.number, self.clock.now())
             # It was paused, but not by the user.
             if event is StudyEvent.PAUSE and row.waits_for not in {None, HELD_AT_DEADLINE}:
-                connection.execute(
-                    sa.update(STUDIES)
-                    .where(STUDIES.c.number == row.number)
-                    .values(waits_for=None, reason=None, revision=STUDIES.c.revision + 1)
-                )
-            return self._told(connection, record_of(self._row(connection, study_id, *RECORD_COLUMNS)))
+                self._change(connection, row.number, waits_for=None, reason=None)
+            return self._study_record(connection, study_id)
 
     def prioritize_study(self, study_id: str, priority: int) -> StudyRecord:
         """Change the priority of the study: among waiting studies the highest runs first.
@@ -287,13 +284,9 @@ class Studies(Orders):
             number, state = row.number, StudyState(row.state)
             if state.terminal:
                 raise StudyEnded(f"the study {study_id} is {state.value}: its priority no longer matters")
-            connection.execute(
-                sa.update(STUDIES)
-                .where(STUDIES.c.number == number, STUDIES.c.priority != priority)
-                .values(priority=priority, revision=STUDIES.c.revision + 1)
-            )
+            self._change(connection, number, STUDIES.c.priority != priority, priority=priority)
             announce(connection)
-            return self._told(connection, record_of(self._row(connection, study_id, *RECORD_COLUMNS)))
+            return self._study_record(connection, study_id)
 
     def study_of_key(self, idempotency_key: str, body_hash: str | None) -> StudyRecord | None:
         """The study that was submitted with that key; ``body_hash`` None stands for any body.

@@ -25,7 +25,7 @@ from sprag.service.storage.tables import (
 from sprag.worker import models
 from sprag.worker.models import ChunkResult
 from sprag.worker.ports import ActiveStudy, Chunk
-from sprag.worker.states import TERMINAL, ChunkState, StudyEvent, StudyState
+from sprag.worker.states import GOING, TERMINAL, ChunkState, StudyEvent, StudyState
 from sprag.worker.study import Study
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ class Work(Reuse):
         query = sa.select(STUDIES.c.number, STUDIES.c.state)
         query = query.where(STUDIES.c.id == own_study(owner), STUDIES.c.deleted_at.is_(None))
         row = connection.execute(query).one_or_none()
-        if row is not None and StudyState(row.state) in {StudyState.QUEUED, StudyState.RUNNING}:
+        if row is not None and StudyState(row.state).going:
             self._move(connection, row.number, StudyEvent.FAULT, why_abandoned(owner))
 
     def dispatcher(self) -> DispatcherRecord | None:
@@ -249,15 +249,12 @@ class Work(Reuse):
             more = connection.execute(sa.update(ENDINGS).where(this).values(cases=ENDINGS.c.cases + cases))
             if not more.rowcount:
                 connection.execute(sa.insert(ENDINGS).values(study=chunk.study, ending=ending, cases=cases))
-        connection.execute(
-            sa.update(STUDIES)
-            .where(STUDIES.c.number == chunk.study)
-            .values(
-                done=STUDIES.c.done + chunk.count,
-                ok=STUDIES.c.ok + endings[models.OK],
-                reused=STUDIES.c.reused + (0 if known is None else known.cases.size),
-                revision=STUDIES.c.revision + 1,
-            )
+        self._change(
+            connection,
+            chunk.study,
+            done=STUDIES.c.done + chunk.count,
+            ok=STUDIES.c.ok + endings[models.OK],
+            reused=STUDIES.c.reused + (0 if known is None else known.cases.size),
         )
 
     def put_back(self, epoch: int, chunk: Chunk, detail: str) -> None:
@@ -303,15 +300,10 @@ class Work(Reuse):
 
     def note(self, epoch: int, number: int, reason: str | None) -> None:
         """Record why a queued or running study does not proceed; None removes the reason."""
-        going = STUDIES.c.state.in_([StudyState.QUEUED.value, StudyState.RUNNING.value])
-        new = STUDIES.c.reason.is_distinct_from(reason)
+        c = STUDIES.c
         with self.session.write() as connection:
             self._own(connection, epoch)
-            connection.execute(
-                sa.update(STUDIES)
-                .where(STUDIES.c.number == number, going, new)
-                .values(reason=reason, revision=STUDIES.c.revision + 1)
-            )
+            self._change(connection, number, c.state.in_(GOING), c.reason.is_distinct_from(reason), reason=reason)
 
     def fault(self, epoch: int, number: int, reason: str) -> None:
         """Hold the study with a reason and return its claims to waiting, without counting a failure of the cases."""
@@ -323,7 +315,7 @@ class Work(Reuse):
                 .values(failures=0, **_WAITING)
             )
             state = connection.execute(sa.select(STUDIES.c.state).where(STUDIES.c.number == number)).scalar_one()
-            if StudyState(state) in {StudyState.QUEUED, StudyState.RUNNING}:
+            if StudyState(state).going:
                 self._move(connection, number, StudyEvent.FAULT, reason)
 
     def time_is_over(self, epoch: int, number: int) -> None:
@@ -338,7 +330,7 @@ class Work(Reuse):
                 sa.select(c.state, c.waits_for, c.cases, c.done, c.finish_by).where(c.number == number)
             ).one()
             paused = StudyState(state) is StudyState.PAUSED and waits_for in GO_ON
-            if not paused and StudyState(state) not in {StudyState.QUEUED, StudyState.RUNNING}:
+            if not paused and not StudyState(state).going:
                 return
             if done < cases:
                 covered = self._coverage(connection, number, cases)
@@ -349,11 +341,7 @@ class Work(Reuse):
                 )
                 if not paused:
                     self._move(connection, number, StudyEvent.FAULT)
-                connection.execute(
-                    sa.update(STUDIES)
-                    .where(c.number == number)
-                    .values(waits_for=HELD_AT_DEADLINE, reason=reason, revision=c.revision + 1)
-                )
+                self._change(connection, number, waits_for=HELD_AT_DEADLINE, reason=reason)
                 return
         self.settle(epoch, number)
 

@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Request
-from starlette.concurrency import run_in_threadpool
+from fastapi import APIRouter, Depends, Query
 from starlette.responses import Response
 
 from sprag.service.answers import results as m
-from sprag.service.faults import parameter_error, shown
+from sprag.service.faults import choice_of, parameter_error
 from sprag.service.http.api.document import files, format_query, one_of, problems
 from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
+from sprag.service.http.drawing import TABLE_FORMATS, table
 from sprag.service.http.requests import strict_query
 from sprag.service.http.respond import choose_format, json_response
 from sprag.service.http.views import study_address
 from sprag.service.http.work import Attended
 from sprag.service.results import trajectories
-from sprag.service.results.exports import MEDIA_TYPES, Format, row_json, rows_json
+from sprag.service.results.exports import row_json, rows_json
 from sprag.service.storage.records import CaseRow
 from sprag.worker import models
 from sprag.worker.codes import FLAG_MASKS, PENDING
 from sprag.worker.limits import MAX_PAGE_SIZE, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
-
-if TYPE_CHECKING:
-    from sprag.worker.study import Study
 
 router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
 
@@ -64,16 +61,12 @@ def list_cases(
     ] = None,
 ) -> Response:
     """Finished cases, in order of their numbers; of a cancelled study also those that were never run."""
-    if ending is not None and ending not in models.ENDING_SENTENCES:
-        raise parameter_error(
-            "ending", "invalid-choice", "unknown ending", shown(ending), ", ".join(models.ENDING_SENTENCES)
-        )
-    if regime is not None and regime not in models.REGIME_SENTENCES:
-        raise parameter_error(
-            "regime", "invalid-choice", "unknown regime", shown(regime), ", ".join(models.REGIME_SENTENCES)
-        )
-    if flag is not None and flag not in FLAG_MASKS:
-        raise parameter_error("flag", "invalid-choice", "unknown flag", shown(flag), ", ".join(FLAG_MASKS))
+    if ending is not None:
+        choice_of("ending", ending, map(str, models.ENDING_SENTENCES))
+    if regime is not None:
+        choice_of("regime", regime, models.REGIME_SENTENCES)
+    if flag is not None:
+        choice_of("flag", flag, FLAG_MASKS)
     after = _after(page_token)
     # One more than the page, which shows whether there is another page.
     block = context.store.case_page(study_id, after, page_size + 1, ending, regime, flag)
@@ -86,13 +79,8 @@ def _after(page_token: str | None) -> int:
     if page_token is None:
         return -1
     if not (page_token.isascii() and page_token.isdigit() and len(page_token) < 19):
-        raise parameter_error(
-            "page_token",
-            "invalid-text",
-            "is not a token of the list",
-            shown(page_token),
-            "`next_page_token` of a page",
-        )
+        allowed = "`next_page_token` of a page"
+        raise parameter_error("page_token", "invalid-text", "not a token of this list", page_token, allowed)
     return int(page_token)
 
 
@@ -125,14 +113,12 @@ def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
     "/{case:case}/trajectory",
     response_model=m.Trajectory | m.AngleTable,
     responses={
-        **files("Instantaneous values, as JSON or CSV.", (MEDIA_TYPES["json"], MEDIA_TYPES["csv"])),
+        **files("Instantaneous values, as JSON or CSV.", TABLE_FORMATS.values()),
         **problems(*_CASE_PROBLEMS, "not-acceptable", "not-computed", "timed-out", "too-many-requests", "unavailable"),
     },
 )
 async def get_trajectory(
-    context: Ctx,
     work: Attended,
-    request: Request,
     study_id: StudyId,
     case: CaseNumber,
     start: Annotated[
@@ -162,19 +148,10 @@ async def get_trajectory(
             examples=[50],
         ),
     ] = 1000,
-    form: Annotated[str | None, format_query(("json", "csv"))] = None,
+    form: Annotated[str | None, format_query(TABLE_FORMATS)] = None,
 ) -> Response:
     """Every variable, torque, power and state of one case over time (or the angle). The case is run again for this."""
-    chosen = choose_format(request, form, {"json": MEDIA_TYPES["json"], "csv": MEDIA_TYPES["csv"]})
-    written: Format = "csv" if chosen == "csv" else "json"
-
-    def find() -> tuple[Study, tuple[float, float]]:
-        study = study_with(context, study_id, case)
-        return study, trajectories.span(study, case, start, end)
-
-    study, (first, last) = await run_in_threadpool(find)
-    await work.load(models.shape_of(study))
-    content = await work.compute(trajectories.trajectory_file, study, case, first, last, points, written)
-    name = f'attachment; filename="{study_id}-case-{case}.csv"'
-    headers = {"Content-Disposition": name} if written == "csv" else {}
-    return Response(content, media_type=MEDIA_TYPES[written], headers=headers)
+    chosen = choose_format(work.request, form, TABLE_FORMATS)
+    study, span = await work.case_of(study_id, case, lambda study: trajectories.span(study, case, start, end))
+    content = await work.run_case(trajectories.trajectory_file, study, case, *span, points, chosen)
+    return table(content, chosen, f"{study_id}-case-{case}")

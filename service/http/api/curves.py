@@ -2,35 +2,37 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Depends, Query
 from starlette.responses import Response
 
 from sprag.service.answers import results as m
-from sprag.service.faults import parameter_error, shown
+from sprag.service.faults import parameter_error
 from sprag.service.http.api.document import files, format_query, problems
 from sprag.service.http.api.document import not_modified as documented_304
-from sprag.service.http.context import Ctx, StudyId
-from sprag.service.http.drawing import Drawing, attached, conditional, picture, picture_of, placed
+from sprag.service.http.context import StudyId
+from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture, placed
 from sprag.service.http.requests import strict_query
 from sprag.service.http.respond import JSON, choose_format, streamed
-from sprag.service.http.work import CHECK_PROBLEMS, Attended
+from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
 from sprag.service.jobs import answers
 from sprag.service.results import exports, report
 from sprag.service.results.curves import CurveQuery
-from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.report.content import report_of
-from sprag.worker import models
 
 if TYPE_CHECKING:
     from sprag.service.storage.records import StudyRecord
 
 router = APIRouter(prefix="/studies/{study_id:study}", tags=["results"], dependencies=[Depends(strict_query)])
 
-_PICTURES: dict[str, str] = {str(picture): media for picture, media in pictures.MEDIA_TYPES.items()}
-_JSON = {"json": "application/json"}
-_FORMATS = _JSON | {"csv": exports.MEDIA_TYPES["csv"]} | _PICTURES
+#: How each is written as JSON, as a table and as a picture.
+_WRITERS: Final = {
+    "curves": (answers.curves_json, answers.curves_csv, answers.curves_picture),
+    "map": (answers.map_json, answers.map_csv, answers.map_picture),
+}
+#: JSON is what is sent to who asks for nothing.
+_ROW_FORMATS: Final[dict[exports.Format, str]] = {"json": JSON, **exports.MEDIA_TYPES}
 _PROBLEMS = ("invalid-parameter", "invalid-selection", "study-not-found", "not-acceptable", *CHECK_PROBLEMS)
 
 _REPORT_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; sandbox allow-modals"
@@ -49,15 +51,13 @@ Fixed = Annotated[
     "/curves",
     response_model=m.Curves,
     responses={
-        **files("Curves, as JSON, a table or a picture.", _FORMATS.values()),
+        **files("Curves, as JSON, a table or a picture.", DRAWN_FORMATS.values()),
         **problems(*_PROBLEMS),
         **documented_304(),
     },
 )
 async def get_curves(
-    context: Ctx,
     work: Attended,
-    request: Request,
     study_id: StudyId,
     x: XPath,
     y: Annotated[
@@ -71,57 +71,50 @@ async def get_curves(
         ),
     ] = None,
     at: Fixed = None,
-    form: Annotated[str | None, format_query(_FORMATS)] = None,
+    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """Results against one axis. An axis of several values that is neither x nor in `by` needs its value in `at`."""
-    chosen = choose_format(request, form, _FORMATS)
-    query = CurveQuery(x, tuple(y), tuple(by or ()), _pairs(at))
-
-    def make(record: StudyRecord) -> Response | Drawing:
-        asked, title = (context.library, study_id, query), record.name or record.model
-        if chosen == "json":
-            return placed(context, Drawing(answers.curves_json, asked, JSON))
-        if chosen == "csv":
-            headers = attached(f"{study_id}-curves.csv")
-            return placed(context, Drawing(answers.curves_csv, asked, _FORMATS["csv"], headers))
-        return picture(answers.curves_picture, picture_of(chosen), *asked, title)
-
-    return await conditional(context, work, request, study_id, chosen, make)
+    return await _drawn(work, study_id, form, "curves", CurveQuery(x, tuple(y), tuple(by or ()), _pairs(at)))
 
 
 @router.get(
     "/map",
     response_model=m.Map,
     responses={
-        **files("A map, as JSON, a table or a picture.", _FORMATS.values()),
+        **files("A map, as JSON, a table or a picture.", DRAWN_FORMATS.values()),
         **problems(*_PROBLEMS),
         **documented_304(),
     },
 )
 async def get_map(
-    context: Ctx,
     work: Attended,
-    request: Request,
     study_id: StudyId,
     x: XPath,
     y: Annotated[str, Query(description="path of the other axis", examples=["excitation.frequency"])],
     z: Annotated[str, Query(description="the result", examples=["shaft.speed.mean"])],
     at: Fixed = None,
-    form: Annotated[str | None, format_query(_FORMATS)] = None,
+    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """One result over two axes."""
-    chosen = choose_format(request, form, _FORMATS)
+    return await _drawn(work, study_id, form, "map", CurveQuery(x, (z,), (y,), _pairs(at)))
+
+
+async def _drawn(
+    work: Work, study_id: str, form: str | None, part: Literal["curves", "map"], query: CurveQuery
+) -> Response:
+    chosen = choose_format(work.request, form, DRAWN_FORMATS)
+    as_json, as_table, as_picture = _WRITERS[part]
 
     def make(record: StudyRecord) -> Response | Drawing:
-        asked = (context.library, study_id, CurveQuery(x, (z,), (y,), _pairs(at)))
+        asked = (work.context.library, study_id, query)
         if chosen == "json":
-            return placed(context, Drawing(answers.map_json, asked, JSON))
+            return placed(work.context, Drawing(as_json, asked, JSON))
         if chosen == "csv":
-            headers = attached(f"{study_id}-map.csv")
-            return placed(context, Drawing(answers.map_csv, asked, _FORMATS["csv"], headers))
-        return picture(answers.map_picture, picture_of(chosen), *asked, record.name or record.model)
+            headers = attached(f"{study_id}-{part}.csv")
+            return placed(work.context, Drawing(as_table, asked, DRAWN_FORMATS["csv"], headers))
+        return picture(as_picture, chosen, *asked, record.name or record.model)
 
-    return await conditional(context, work, request, study_id, chosen, make)
+    return await conditional(work, study_id, chosen, make)
 
 
 @router.get(
@@ -134,26 +127,19 @@ async def get_map(
     },
 )
 async def get_results(
-    context: Ctx,
     work: Attended,
-    request: Request,
     study_id: StudyId,
     form: Annotated[str | None, format_query(exports.FORMATS, "csv")] = None,
 ) -> Response:
     """Every finished case with all its results, in order of the cases: as a table, a labelled grid, or JSON."""
-    chosen = choose_format(request, form, _JSON | {str(name): media for name, media in exports.MEDIA_TYPES.items()})
+    chosen = choose_format(work.request, form, _ROW_FORMATS)
 
     def make(record: StudyRecord) -> Response:
-        study = context.store.study(study_id)
-        about = {"study": study_id, "name": record.name, "model": record.model, "engine_version": record.engine_version}
-        blocks = context.store.iter_rows(study_id)
-        source = exports.Source(study, models.study_results(study), blocks, about, context.store.spec(study_id))
-        form = next(form for form in exports.FORMATS if form == chosen)
-        return streamed(
-            exports.export(source, form), exports.MEDIA_TYPES[form], f"{study_id}.{exports.SUFFIXES[form][0]}"
-        )
+        source = exports.stored(work.context.store, record, work.context.store.study(study_id))
+        name = f"{study_id}.{exports.SUFFIXES[chosen][0]}"
+        return streamed(exports.export(source, chosen), exports.MEDIA_TYPES[chosen], name)
 
-    return await conditional(context, work, request, study_id, chosen, make)
+    return await conditional(work, study_id, chosen, make)
 
 
 @router.get(
@@ -166,23 +152,19 @@ async def get_results(
     },
 )
 async def get_report(
-    context: Ctx,
     work: Attended,
-    request: Request,
     study_id: StudyId,
     form: Annotated[str | None, format_query(report.REPORT_FORMATS, "pdf")] = None,
 ) -> Response:
     """A study as a printable page or a PDF: inputs, endings, ranges of all results, curves."""
-    chosen = choose_format(request, form, {str(name): media for name, media in report.MEDIA_TYPES.items()})
+    chosen = choose_format(work.request, form, report.MEDIA_TYPES)
 
     def make(_record: StudyRecord) -> Drawing:
-        form = next(form for form in report.REPORT_FORMATS if form == chosen)
-        policy = {"Content-Security-Policy": _REPORT_POLICY} if form == "html" else {}
-        return Drawing(
-            report.write_report, (report_of(context.store, study_id), form), report.MEDIA_TYPES[form], policy
-        )
+        policy = {"Content-Security-Policy": _REPORT_POLICY} if chosen == "html" else {}
+        shown = report_of(work.context.store, study_id), chosen
+        return Drawing(report.write_report, shown, report.MEDIA_TYPES[chosen], policy)
 
-    return await conditional(context, work, request, study_id, chosen, make)
+    return await conditional(work, study_id, chosen, make)
 
 
 def _pairs(at: list[str] | None) -> tuple[tuple[str, str], ...]:
@@ -190,8 +172,6 @@ def _pairs(at: list[str] | None) -> tuple[tuple[str, str], ...]:
     for item in at or ():
         path, separator, value = item.partition("=")
         if not separator or not path.strip() or not value.strip():
-            raise parameter_error(
-                "at", "invalid-text", "must be path=value", shown(item), "for instance shaft.load=0.1 N*m"
-            )
+            raise parameter_error("at", "invalid-text", "must be path=value", item, "for instance shaft.load=0.1 N*m")
         pairs.append((path.strip(), value.strip()))
     return tuple(pairs)

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Request
-from starlette.concurrency import run_in_threadpool
+from fastapi import APIRouter, Depends, Query
 from starlette.responses import Response
 
 from sprag.service.answers.results import EngagementTables
-from sprag.service.faults import parameter_error, shown
+from sprag.service.faults import choice_of
 from sprag.service.http.api.document import files, format_query, one_of, problems
-from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
+from sprag.service.http.context import CaseNumber, StudyId
+from sprag.service.http.drawing import TABLE_FORMATS
+from sprag.service.http.drawing import table as written
 from sprag.service.http.requests import strict_query
 from sprag.service.http.respond import choose_format
 from sprag.service.http.work import Attended
-from sprag.service.results.engagements import TABLES, Table, engagements_file, require_clutches
-from sprag.service.results.exports import MEDIA_TYPES, Format
-from sprag.worker import models
-
-if TYPE_CHECKING:
-    from sprag.worker.study import Study
+from sprag.service.results.engagements import TABLES, engagements_file, require_clutches
 
 router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
 
@@ -34,41 +30,22 @@ _PROBLEMS = (
     "/{case:case}/engagements",
     response_model=EngagementTables,
     responses={
-        **files("Both tables as JSON, or one of them as CSV.", (MEDIA_TYPES["json"], MEDIA_TYPES["csv"])),
+        **files("Both tables as JSON, or one of them as CSV.", TABLE_FORMATS.values()),
         **problems(*_PROBLEMS),
     },
 )
 async def get_engagements(
-    context: Ctx,
     work: Attended,
-    request: Request,
     study_id: StudyId,
     case: CaseNumber,
     table: Annotated[
         str, Query(description="the table of a CSV file; JSON has both", json_schema_extra=one_of(TABLES))
     ] = "engagements",
-    form: Annotated[str | None, format_query(("json", "csv"))] = None,
+    form: Annotated[str | None, format_query(TABLE_FORMATS)] = None,
 ) -> Response:
     """Every engagement of the clutches of one case, and the means of its periods. The case is run again for this."""
-    chosen = choose_format(request, form, {"json": MEDIA_TYPES["json"], "csv": MEDIA_TYPES["csv"]})
-    written: Format = "csv" if chosen == "csv" else "json"
-    asked = _table(table)
-
-    def find() -> Study:
-        study = study_with(context, study_id, case)
-        require_clutches(study)
-        return study
-
-    study = await run_in_threadpool(find)
-    await work.load(models.shape_of(study))
-    content = await work.compute(engagements_file, study, case, asked, written)
-    name = f'attachment; filename="{study_id}-case-{case}-{asked}.csv"'
-    headers = {"Content-Disposition": name} if written == "csv" else {}
-    return Response(content, media_type=MEDIA_TYPES[written], headers=headers)
-
-
-def _table(name: str) -> Table:
-    for table in TABLES:
-        if name == table:
-            return table
-    raise parameter_error("table", "invalid-choice", "unknown table", shown(name), ", ".join(TABLES))
+    chosen = choose_format(work.request, form, TABLE_FORMATS)
+    asked = choice_of("table", table, TABLES)
+    study, _ = await work.case_of(study_id, case, require_clutches)
+    content = await work.run_case(engagements_file, study, case, asked, chosen)
+    return written(content, chosen, f"{study_id}-case-{case}-{asked}")

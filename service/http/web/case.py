@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Query, Request
-from starlette.concurrency import run_in_threadpool
+from fastapi import APIRouter, Query
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
-from sprag.service.http.context import CaseNumber, Context, Ctx, StudyId, study_with
-from sprag.service.http.drawing import picture
-from sprag.service.http.respond import entity_tag, json_response, not_modified, tagged
+from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
+from sprag.service.http.drawing import picture, unchanging
+from sprag.service.http.respond import json_response
 from sprag.service.http.web.figures.answers import SAMPLES, motion_figures
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
@@ -101,52 +100,27 @@ def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = 
     )
 
 
-async def _asked(
-    context: Context, request: Request, study_id: str, case: int, span: tuple[str, str]
-) -> tuple[Study, tuple[float, float], str, Response | None]:
-    def find() -> tuple[Study, tuple[float, float]]:
-        study = study_with(context, study_id, case)
-        return study, _span(study, case, *span)
-
-    study, times = await run_in_threadpool(find)
-    # A case is determined by its study, and studies never change.
-    tag = entity_tag(study_id, request.url.path, request.url.query, models.ENGINE_VERSION)
-    return study, times, tag, not_modified(request, tag)
-
-
 @router.get("/studies/{study_id:study}/cases/{case:case}/motion")
-async def motion(
-    context: Ctx,
-    work: Attended,
-    request: Request,
-    study_id: StudyId,
-    case: CaseNumber,
-    begin: Begin = "",
-    end: End = "",
-) -> Response:
+async def motion(work: Attended, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = "") -> Response:
     """The figures of a motion."""
-    study, times, tag, unchanged = await _asked(context, request, study_id, case, (begin, end))
-    if unchanged:
-        return unchanged
-    await work.load(models.shape_of(study))
-    return tagged(json_response(await work.compute(motion_figures, study, case, *times)), tag)
+    study, span = await work.case_of(study_id, case, lambda study: _span(study, case, begin, end))
+
+    async def make() -> Response:
+        return json_response(await work.run_case(motion_figures, study, case, *span))
+
+    return await unchanging(work, study_id, make)
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/motion.svg")
 async def motion_picture(
-    context: Ctx,
-    work: Attended,
-    request: Request,
-    study_id: StudyId,
-    case: CaseNumber,
-    begin: Begin = "",
-    end: End = "",
+    work: Attended, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = ""
 ) -> Response:
     """The motion as one picture, for pages without JavaScript."""
-    study, times, tag, unchanged = await _asked(context, request, study_id, case, (begin, end))
-    if unchanged:
-        return unchanged
-    await work.load(models.shape_of(study))
-    made = await work.compute(models.run_trajectory, study, case, *times, SAMPLES // 3)
-    title = f"{study.name}, case {case}"
-    return tagged(await picture(draw_motion, "svg", made, models.presentation_of(study), title).response(work), tag)
+    study, span = await work.case_of(study_id, case, lambda study: _span(study, case, begin, end))
+
+    async def make() -> Response:
+        made = await work.run_case(models.run_trajectory, study, case, *span, SAMPLES // 3)
+        title = f"{study.name}, case {case}"
+        return await picture(draw_motion, "svg", made, models.presentation_of(study), title).response(work)
+
+    return await unchanging(work, study_id, make)

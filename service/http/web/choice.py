@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sprag.service.faults import ParameterFault
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import main_query, main_results, usual_value
-from sprag.service.results.selection import SelectionError
+from sprag.service.results.selection import refused
 
 if TYPE_CHECKING:
     from starlette.datastructures import QueryParams
@@ -73,7 +72,7 @@ def held(study: Study, given: Sequence[str], drawn: Sequence[str]) -> tuple[tupl
         if not item or any(_same_axis(study, path, name) for name in drawn):
             continue
         if not equals or not value.strip():
-            raise SelectionError([ParameterFault("at", "invalid-text", "must be path=value", value=item[:80])])
+            raise refused("at", "invalid-text", "must be path=value", item)
         pairs[path.strip()] = value.strip()
     if study.combine == "grid":
         for axis in study.axes:

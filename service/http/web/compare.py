@@ -8,29 +8,29 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Request
-from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from sprag.service.faults import ParameterFault
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx
-from sprag.service.http.drawing import Drawing, picture
-from sprag.service.http.respond import entity_tag, json_response, not_modified, tagged
+from sprag.service.http.drawing import Drawing, picture, tag_of, unless_known
+from sprag.service.http.respond import json_response
 from sprag.service.http.web.choice import held, varying_axes
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.study import fixed_choices
 from sprag.service.http.web.templates import page
-from sprag.service.http.work import Attended
+from sprag.service.http.work import Attended, Work
 from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.curves import CurveQuery, Curves
 from sprag.service.results.defaults import main_query
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.pictures.curves import draw_compare
-from sprag.service.results.selection import SelectionError
+from sprag.service.results.selection import SelectionError, refused
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 
 if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+
     from starlette.datastructures import QueryParams
 
     from sprag.service.storage.records import StudyRecord
@@ -89,7 +89,7 @@ def comparison(context: Context, given: QueryParams) -> Comparison:
     ]
     if not axes:
         message = "these studies have no varying parameter in common against which to draw results"
-        raise SelectionError([ParameterFault("study", "nothing-varies", message)])
+        raise refused("study", "nothing-varies", message)
     known = [{info.name for info in models.study_results(study)} for study in studies]
     results = [info for info in models.study_results(studies[0]) if all(info.name in names for names in known)]
     main = main_query(studies[0], models.study_results(studies[0]))
@@ -154,34 +154,24 @@ def _fixed(chosen: Comparison) -> list[dict[str, Any]]:
     return [choice for choice in choices if choice["path"] in chosen.axes]
 
 
-def _tag(context: Context, request: Request) -> str:
-    ids = request.query_params.getlist("study")[:_MOST]
-    revisions = [context.store.get_study(study_id).revision for study_id in ids]
-    return entity_tag(request.url.path, request.url.query, revisions)
+def _answered(work: Work, show: Callable[[list[tuple[str, Curves]]], Response | Drawing]) -> Awaitable[Response]:
+    """What ``show`` makes of the curves that the address compares, unless the client has it."""
+    context, given = work.context, work.request.query_params
+
+    def look() -> tuple[str, Callable[[], Response | Drawing]]:
+        revisions = [context.store.get_study(study_id).revision for study_id in given.getlist("study")[:_MOST]]
+        return tag_of(work.request, revisions), lambda: show(drawn(context, comparison(context, given)))
+
+    return unless_known(work, look)
 
 
 @router.get("/compare/figure")
-def compare_figure(context: Ctx, request: Request) -> Response:
+async def compare_figure(work: Attended) -> Response:
     """The figure of a comparison."""
-    tag = _tag(context, request)
-    if unchanged := not_modified(request, tag):
-        return unchanged
-    return tagged(
-        json_response(plotly_figure(curves_figure(drawn(context, comparison(context, request.query_params))))), tag
-    )
+    return await _answered(work, lambda curves: json_response(plotly_figure(curves_figure(curves))))
 
 
 @router.get("/compare/picture.svg")
-async def compare_picture(context: Ctx, work: Attended, request: Request) -> Response:
+async def compare_picture(work: Attended) -> Response:
     """The comparison as a picture, for pages without JavaScript."""
-
-    def look() -> tuple[str, Response | Drawing, bool]:
-        tag = _tag(context, request)
-        unchanged = not_modified(request, tag)
-        if unchanged is not None:
-            return tag, unchanged, True
-        return tag, picture(draw_compare, "svg", drawn(context, comparison(context, request.query_params))), False
-
-    tag, made, unchanged = await run_in_threadpool(look)
-    response = await made.response(work) if isinstance(made, Drawing) else made
-    return response if unchanged else tagged(response, tag)
+    return await _answered(work, partial(picture, draw_compare, "svg"))

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
+from sprag.service.http.context import CaseNumber, StudyId
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.results.engagements import require_clutches
 from sprag.worker import models
-
-if TYPE_CHECKING:
-    from sprag.worker.study import Study
 
 router = APIRouter(include_in_schema=False)
 
@@ -25,19 +20,12 @@ _SHOWN = 100
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/engagements")
-async def engagements_page(context: Ctx, work: Attended, study_id: StudyId, case: CaseNumber) -> Response:
+async def engagements_page(work: Attended, study_id: StudyId, case: CaseNumber) -> Response:
     """What the clutches of a case do."""
-
-    def find() -> Study:
-        study = study_with(context, study_id, case)
-        require_clutches(study)
-        return study
-
-    study = await run_in_threadpool(find)
-    await work.load(models.shape_of(study))
-    made = await work.compute(models.run_engagements, study, case)
+    study, _ = await work.case_of(study_id, case, require_clutches)
+    made = await work.run_case(models.run_engagements, study, case)
     own = f"/studies/{study_id}/cases/{case}"
-    frame = await run_in_threadpool(study_frame, context, study_id)
+    frame = await run_in_threadpool(study_frame, work.context, study_id)
     return page(
         "engagements.html",
         **frame,

@@ -8,11 +8,10 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from sprag.service.http.context import Ctx
 from sprag.service.http.drawing import picture
 from sprag.service.http.problems import ApiError
 from sprag.service.http.respond import json_response
@@ -22,7 +21,7 @@ from sprag.service.http.web.form.check import message
 from sprag.service.http.web.form.page import form_page, look_over
 from sprag.service.http.web.form.spec import plain
 from sprag.service.http.web.templates import fragment, page, spec_text
-from sprag.service.http.work import Attended, Work
+from sprag.service.http.work import Attended
 from sprag.service.presets import preset_names
 from sprag.service.results.pictures.curves import draw_motion
 from sprag.service.results.wording import number, words
@@ -167,12 +166,12 @@ def number_text(value: float) -> str:
 
 
 @router.get("/laboratory")
-async def laboratory(work: Attended, request: Request) -> Response:
+async def laboratory(work: Attended) -> Response:
     """The laboratory."""
-    chosen = await work.check(setting, dict(request.query_params))
+    chosen = await work.check(setting, dict(work.request.query_params))
     # The first compilation takes seconds: the page is shown immediately, and its script waits for the numbers.
     ready = models.is_compiled(models.shape_of(chosen.study))
-    case = await _case(work, chosen) if ready and not chosen.faults else None
+    case = await work.run_case(machine_case, chosen.study) if ready and not chosen.faults else None
     return page(
         "laboratory.html",
         status=422 if chosen.faults else 200,
@@ -194,11 +193,6 @@ def position(slider: Slider) -> float:
     return 1000.0 * (slider.value - slider.low) / span if span else 0.0
 
 
-async def _case(work: Work, chosen: Setting) -> dict[str, Any]:
-    await work.load(models.shape_of(chosen.study))
-    return await work.compute(machine_case, chosen.study)
-
-
 def _told(chosen: Setting, case: dict[str, Any] | None) -> str:
     infos = {info.name: info for info in models.study_results(chosen.study)}
     return fragment(
@@ -212,10 +206,10 @@ def _told(chosen: Setting, case: dict[str, Any] | None) -> str:
 
 
 @router.get("/laboratory/figure")
-async def laboratory_figure(work: Attended, request: Request) -> Response:
+async def laboratory_figure(work: Attended) -> Response:
     """Picture and numbers of a setting, for the sliders."""
-    chosen = await work.check(setting, dict(request.query_params))
-    case = None if chosen.faults else await _case(work, chosen)
+    chosen = await work.check(setting, dict(work.request.query_params))
+    case = None if chosen.faults else await work.run_case(machine_case, chosen.study)
     return json_response(
         {
             "figure": None if case is None else case["figure"],
@@ -227,22 +221,21 @@ async def laboratory_figure(work: Attended, request: Request) -> Response:
 
 
 @router.get("/laboratory/picture.svg")
-async def laboratory_picture(work: Attended, request: Request) -> Response:
+async def laboratory_picture(work: Attended) -> Response:
     """The motion as one picture, for pages without JavaScript."""
-    chosen = await work.check(setting, dict(request.query_params))
+    chosen = await work.check(setting, dict(work.request.query_params))
     if chosen.faults:
         raise ApiError("invalid-spec", "; ".join(text for texts in chosen.faults.values() for text in texts))
-    await work.load(models.shape_of(chosen.study))
     end = models.extent(chosen.study, 0).end
-    made = await work.compute(models.run_trajectory, chosen.study, 0, 0.0, end, SAMPLES // 4)
+    made = await work.run_case(models.run_trajectory, chosen.study, 0, 0.0, end, SAMPLES // 4)
     shown = models.presentation_of(chosen.study)
     return await picture(draw_motion, "svg", made, shown, chosen.study.name).response(work)
 
 
 @router.get("/laboratory/study")
-async def laboratory_study(context: Ctx, work: Attended, request: Request, question: str = "inertia") -> Response:
+async def laboratory_study(work: Attended, question: str = "inertia") -> Response:
     """One of the questions about the current machine, as a study to check and submit."""
-    chosen = await work.check(setting, dict(request.query_params))
+    chosen = await work.check(setting, dict(work.request.query_params))
     if question not in QUESTIONS:
         raise ApiError("not-found", f"Unknown question; known questions: {', '.join(QUESTIONS)}.")
     paths = {
@@ -258,4 +251,4 @@ async def laboratory_study(context: Ctx, work: Attended, request: Request, quest
         axes.append({"path": path, way: [float(number_text(slider.low)), float(number_text(slider.high)), count]})
     spec = {**chosen.spec, "name": f"{chosen.study.name}: irregularity against {QUESTIONS[question]}", "axes": axes}
     values = {"/text": spec_text(spec), "format": "json"}
-    return await run_in_threadpool(form_page, request, values, await look_over(context, work, values))
+    return await run_in_threadpool(form_page, work.request, values, await look_over(work.context, work, values))

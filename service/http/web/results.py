@@ -123,31 +123,31 @@ def _axis_choices(study: Study) -> list[dict[str, Any]]:
 
 
 @router.get("/studies/{study_id:study}/figures/curves")
-async def curves_of(
-    context: Ctx, work: Attended, request: Request, study_id: StudyId, columns: Annotated[int, Query(ge=1, le=2)] = 1
-) -> Response:
+async def curves_of(work: Attended, study_id: StudyId, columns: Annotated[int, Query(ge=1, le=2)] = 1) -> Response:
     """The figure of curves: as many points as the eye can distinguish, always including the highest and lowest."""
 
     def make(_record: StudyRecord) -> Response | Drawing:
+        context = work.context
         study = context.store.study(study_id)
-        query = curve_query(study, models.study_results(study), request.query_params)
+        query = curve_query(study, models.study_results(study), work.request.query_params)
         if query is None:
             return json_response(_NOTHING)
         return placed(context, Drawing(answers.curves_json, (context.library, study_id, query, columns), JSON))
 
-    return await conditional(context, work, request, study_id, "figure", make)
+    return await conditional(work, study_id, "figure", make)
 
 
 @router.get("/studies/{study_id:study}/figures/map")
-async def map_of(context: Ctx, work: Attended, request: Request, study_id: StudyId, kind: str = "heatmap") -> Response:
+async def map_of(work: Attended, study_id: StudyId, kind: str = "heatmap") -> Response:
     """The figure of a map."""
 
     def make(_record: StudyRecord) -> Response | Drawing:
+        context = work.context
         study = context.store.study(study_id)
-        query = map_query(study, models.study_results(study), request.query_params)
+        query = map_query(study, models.study_results(study), work.request.query_params)
         if query is None:
             return json_response(_NOTHING)
         curves = CurveQuery(query.x, (query.z,), (query.y,), query.at)
         return placed(context, Drawing(answers.map_json, (context.library, study_id, curves, kind == "contour"), JSON))
 
-    return await conditional(context, work, request, study_id, "figure", make)
+    return await conditional(work, study_id, "figure", make)

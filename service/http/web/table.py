@@ -10,11 +10,11 @@ import numpy as np
 from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
-from sprag.service.faults import ParameterFault
+from sprag.service.faults import FaultError, choice_of
 from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.web.study import fixed_choices, study_frame
 from sprag.service.http.web.templates import page
-from sprag.service.results.selection import SelectionError, listed, locate_axes
+from sprag.service.results.selection import locate_axes, refused
 from sprag.service.spec.catalogue import result_of, unit_of
 from sprag.worker import models
 
@@ -71,7 +71,7 @@ def cases_page(
     found = TablePage([], None, 0)
     try:
         found = _page(context, study_id, study, _Wanted(sort, ending, regime, flag, at, after))
-    except SelectionError as error:
+    except FaultError as error:
         faults = error.faults
     kept = [
         ("ending", ending),
@@ -120,13 +120,10 @@ class _Wanted:
 
 def _page(context: Context, study_id: str, study: Study, wanted: _Wanted) -> TablePage:
     ending, regime, flag, after = wanted.ending, wanted.regime, wanted.flag, wanted.after
-    if ending and ending not in models.ENDING_SENTENCES:
-        raise SelectionError([ParameterFault("ending", "invalid-choice", "unknown ending", value=ending)])
-    if regime and regime not in models.REGIME_SENTENCES:
-        raise SelectionError([ParameterFault("regime", "invalid-choice", "unknown regime", value=regime)])
-    if flag and flag not in (known := models.flags_of(study.model)):
-        fault = ParameterFault("flag", "invalid-choice", "unknown flag", value=flag, allowed=listed(known))
-        raise SelectionError([fault])
+    known = {"ending": models.ENDING_SENTENCES, "regime": models.REGIME_SENTENCES, "flag": models.flags_of(study.model)}
+    for name, choices in known.items():
+        if given := getattr(wanted, name):
+            choice_of(name, given, map(str, choices))
     if not wanted.sort and not wanted.at:
         block = context.store.case_page(study_id, after - 1, _ROWS + 1, ending or None, regime or None, flag or None)
         rows = list(block.rows())
@@ -146,7 +143,7 @@ def _ordered(context: Context, study_id: str, study: Study, wanted: _Wanted) -> 
     cases = study.cases_at(fixed)
     if cases.size > MOST_SORTED:
         message = f"{cases.size:,} cases are too many to sort; hold further axes at a value, or export all results"
-        raise SelectionError([ParameterFault("sort", "too-many", message, allowed=f"<= {MOST_SORTED:,} cases")])
+        raise refused("sort", "too-many", message, allowed=f"<= {MOST_SORTED:,} cases")
     name = sort.removeprefix("-")
     infos = models.study_results(study)
     by_result = result_of(infos, name) is not None
@@ -165,7 +162,7 @@ def _ordered(context: Context, study_id: str, study: Study, wanted: _Wanted) -> 
             np.float64
         )
     else:
-        raise SelectionError([ParameterFault("sort", "invalid-choice", "unknown column", value=name)])
+        raise refused("sort", "invalid-choice", "unknown column", name)
     cases, keys = cases[finished], np.asarray(keys, dtype=np.float64)[finished]
     # Missing values come last in either direction.
     missing = np.isnan(keys)

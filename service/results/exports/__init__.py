@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from sprag.service.formats import FORMATS, MEDIA_TYPES, SUFFIXES, Format, format_of
-from sprag.service.results.exports.source import Source
+from sprag.service.results.exports.source import Source, stored
 from sprag.service.results.exports.text import (
     csv_pieces,
     escape,
@@ -34,6 +34,7 @@ __all__ = [
     "json_pieces",
     "row_json",
     "rows_json",
+    "stored",
     "table_csv",
 ]
 

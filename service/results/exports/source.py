@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.results.exports.inputs import choices, defaults
+from sprag.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.storage.records import RowBlock
+    from sprag.service.storage.records import RowBlock, StudyRecord
+    from sprag.service.storage.store import Store
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 
@@ -31,6 +33,12 @@ class Source:
     blocks: Iterable[RowBlock]
     about: dict[str, Any]
     spec: Mapping[str, Any] = field(default_factory=dict)
+
+
+def stored(store: Store, record: StudyRecord, study: Study) -> Source:
+    """The rows of a study of the database."""
+    about = {"study": record.id, "name": record.name, "model": record.model, "engine_version": record.engine_version}
+    return Source(study, models.study_results(study), store.iter_rows(record.id), about, store.spec(record.id))
 
 
 def machine(source: Source) -> dict[str, Any]:

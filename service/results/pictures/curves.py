@@ -9,13 +9,12 @@ from contextlib import contextmanager
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
-from sprag.service.faults import ParameterFault
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.figure import PALETTE, shortened
 from sprag.service.results.figures.motion import motion_figure
 from sprag.service.results.figures.portrait import portrait_figure
 from sprag.service.results.regimes import MARKS
-from sprag.service.results.selection import SelectionError
+from sprag.service.results.selection import refused
 from sprag.service.results.wording import words
 from sprag.worker.pool.child_process import uncounted
 
@@ -135,11 +134,11 @@ def paint_figure(figure: Figure, drawn: Described, title: str) -> None:
     head(figure, title, (drawn.heading, *held) if drawn.heading else held)
 
 
-def check_size(what: str, count: int, most: int) -> None:
+def check_size(what: str, count: int, most: int, parameter: str = "format") -> None:
     """SelectionError when a picture would show more than ``most``."""
     if count > most:
         message = f"{count} {what} are too many for one picture; choose fewer, or take the numbers"
-        raise SelectionError([ParameterFault("format", "too-many", message, allowed=f"<= {most} {what}")])
+        raise refused(parameter, "too-many", message, allowed=f"<= {most} {what}")
 
 
 @cache

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.faults import ParameterFault
-from sprag.service.results.pictures.curves import Picture, axis_label, head, render
-from sprag.service.results.selection import SelectionError
+from sprag.service.results.pictures.curves import Picture, axis_label, check_size, head, render
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,9 +24,7 @@ _NOTE_WIDTH: Final = 110
 
 def draw_sensitivity(found: Sequence[Sensitivity], title: str, picture: Picture) -> bytes:
     """A row of two plots for each result; raises SelectionError when there are more than one picture can show."""
-    if len(found) > MOST_RESULTS:
-        message = f"{len(found)} results are too many for one picture; choose fewer, or request the numbers"
-        raise SelectionError([ParameterFault("y", "too-many", message, allowed=f"<= {MOST_RESULTS} results")])
+    check_size("results", len(found), MOST_RESULTS, "y")
     axes = len(found[0].effects)
     return render(partial(_paint, found, title), picture, (10.0, 0.8 + len(found) * max(2.6, 1.0 + 0.45 * axes)))
 
@@ -46,7 +42,7 @@ def _bars(axes: Axes, item: Sensitivity) -> None:
     names = ["\n".join(effect.paths[:2]) for effect in item.effects]
     places = np.arange(len(names))
     shares = (
-        ("first order", [(effect.first, effect.first_error) for effect in item.effects], -0.2),
+        ("first order", [(effect.first_order, effect.first_order_error) for effect in item.effects], -0.2),
         ("total", [(effect.total, effect.total_error) for effect in item.effects], 0.2),
     )
     for index, (name, values, offset) in enumerate(shares):

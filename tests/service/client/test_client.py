@@ -60,7 +60,7 @@ def test_every_foreign_answer_is_one_of_two_failures(answering: tuple[str, int])
         for ask in (
             lambda: client.study("st_1"),
             lambda: client.create_study({}),
-            lambda: client.curves("st_1", [("x", "shaft.load")]),
+            lambda: client.drawn("st_1", "curves", [("x", "shaft.load")]),
         ):
             with pytest.raises((UnreachableError, RefusedError)) as caught:
                 ask()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from sprag.service.results.curve_cases import select
-from sprag.service.results.defaults import caption, drawn_numbers, main_query, query_pairs
+from sprag.service.results.defaults import caption, drawn_numbers, main_query
 from sprag.service.spec.document import parse_spec
 from sprag.worker import models
 
@@ -31,12 +31,6 @@ def test_speed_against_load_with_a_curve_for_each_frequency(spec: dict[str, Any]
     query = query_of(spec)
     assert query is not None
     assert (query.x, query.y, query.by) == ("shaft.load", ("shaft.speed.mean",), ("excitation.frequency",))
-    assert query_pairs(query, format="svg") == [
-        ("x", "shaft.load"),
-        ("y", "shaft.speed.mean"),
-        ("by", "excitation.frequency"),
-        ("format", "svg"),
-    ]
 
 
 def test_one_axis_is_drawn_with_mean_and_maximum(spec: dict[str, Any]) -> None:

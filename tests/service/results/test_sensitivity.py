@@ -63,13 +63,13 @@ def test_a_full_grid_gives_exact_shares() -> None:
     }
     # Values are centred: of y = 3 u + v, the variances are 9 * 2/3 and 4; of a product nothing is first order.
     linear = effects(grid, lambda p: 3.0 * p["excitation.phase"] + p["pendulums.0.initial_angle"])
-    assert [effect.first for effect in linear.effects] == pytest.approx([0.6, 0.4, 0.0], abs=1e-12)
+    assert [effect.first_order for effect in linear.effects] == pytest.approx([0.6, 0.4, 0.0], abs=1e-12)
     assert [effect.total for effect in linear.effects] == pytest.approx([0.6, 0.4, 0.0], abs=1e-12)
     assert linear.effects[0].means.tolist() == pytest.approx([-3.0, 0.0, 3.0])
     assert (linear.method, linear.cases, linear.missing) == ("grid", 12, 0)
     assert linear.variance == pytest.approx(10.0)
     product = effects(grid, lambda p: p["excitation.phase"] * p["pendulums.0.initial_angle"])
-    assert [effect.first for effect in product.effects] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    assert [effect.first_order for effect in product.effects] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
     assert [effect.total for effect in product.effects] == pytest.approx([1.0, 1.0, 0.0], abs=1e-12)
 
 
@@ -86,7 +86,7 @@ def test_the_design_for_indices_gives_those_of_the_ishigami_function() -> None:
     assert (found.method, found.cases) == ("saltelli", 1024 * 5)
     # Closed form for a = 7, b = 0.1 (Ishigami and Homma 1990).
     for effect, first, total in zip(found.effects, (0.3139, 0.4424, 0.0), (0.5576, 0.4424, 0.2437), strict=True):
-        assert effect.first == pytest.approx(first, abs=0.03)
+        assert effect.first_order == pytest.approx(first, abs=0.03)
         assert effect.total == pytest.approx(total, abs=0.03)
         assert 0.0 < effect.total_error < 0.1
 
@@ -99,7 +99,7 @@ def test_points_of_the_design_with_a_missing_case_are_left_out_whole() -> None:
 
     found = effects({"axes": [sample]}, function)
     assert found.missing > 0
-    assert found.effects[1].first == pytest.approx(1.0, abs=0.05)
+    assert found.effects[1].first_order == pytest.approx(1.0, abs=0.05)
     assert any("points of the design are left out" in note for note in found.notes)
 
 
@@ -107,7 +107,7 @@ def test_any_sample_gives_first_order_shares() -> None:
     sample = {"sample": "latin_hypercube", "count": 2000, "seed": 5, "ranges": ranges(-1, 1)}
     found = effects({"axes": [sample]}, lambda p: 2.0 * p["excitation.phase"] + p["pendulums.0.initial_angle"])
     assert found.method == "rbd-fast"
-    assert [effect.first for effect in found.effects] == pytest.approx([0.8, 0.2, 0.0], abs=0.04)
+    assert [effect.first_order for effect in found.effects] == pytest.approx([0.8, 0.2, 0.0], abs=0.04)
     assert {effect.total for effect in found.effects} == {None}
     line = found.effects[0]
     assert len(line.values) == 10
@@ -117,9 +117,9 @@ def test_any_sample_gives_first_order_shares() -> None:
 def test_what_cannot_be_told_is_not_told() -> None:
     few = {"sample": "sobol", "count": 16, "ranges": ranges(-1, 1)}
     found = effects({"axes": [few]}, lambda p: p["excitation.phase"])
-    assert {effect.first for effect in found.effects} == {None}
+    assert {effect.first_order for effect in found.effects} == {None}
     constant = effects({"axes": [{**few, "count": 128}]}, lambda _: 5.0)
-    assert {effect.first for effect in constant.effects} == {None}
+    assert {effect.first_order for effect in constant.effects} == {None}
     assert "the result is the same in every case" in constant.notes
     with pytest.raises(SelectionError, match="nothing varies"):
         effects({"axes": []}, lambda _: 5.0)
