@@ -22,7 +22,9 @@ from tests.service.timed_spec import SPEC
 # Pages wait for processes that start, on a machine that is busy with other tests.
 expect.set_options(timeout=90_000)
 
-_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+#: The first one draws the same without the windows, tabs and menus of a whole browser, at half the cost.
+_NAMES = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+_OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-software-rasterizer"]
 
 
 @dataclass
@@ -92,7 +94,7 @@ def chromium() -> str:
 def browser(chromium: str) -> Iterator[Browser]:
     """One browser for the tests of a module; its event loop ends with them."""
     with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        opened = playwright.chromium.launch(executable_path=chromium, args=_OPTIONS)
         yield opened
         opened.close()
 
@@ -101,7 +103,7 @@ def browser(chromium: str) -> Iterator[Browser]:
 def office(tmp_path_factory: pytest.TempPathFactory, chromium: str) -> Iterator[Office]:
     """A service with a database of its own, for all tests."""
     with (
-        service(tmp_path_factory.mktemp("office"), SPRAG_PROCESSES="2") as started,
+        service(tmp_path_factory.mktemp("office"), SPRAG_PROCESSES="1") as started,
         httpx.Client(base_url=started.address, timeout=60.0) as client,
     ):
         yield Office(started.address, client)

@@ -6,12 +6,13 @@ import json
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qs, urlsplit
 
+import pytest
 from playwright.sync_api import expect
 
-from tests.service.http.web.fields import drawn, fill, named
+from tests.service.http.web.fields import drawn, fill, named, wrong
 
 if TYPE_CHECKING:
-    from tests.service.http.web.conftest import Visitor
+    from tests.service.http.web.conftest import Office, Visitor
 
 RAM = "mechanism.slider_crank.ram_mass"
 CRANK = "mechanism.slider_crank.crank"
@@ -56,3 +57,41 @@ def test_the_machine_that_is_chosen_is_the_one_that_is_shown(visitor: Visitor) -
     page.locator("#machines select").select_option("conveyor")
     page.wait_for_url("**/laboratory?machine=conveyor**")
     expect(page.locator("#lab input[name=machine]")).to_have_value("conveyor")
+
+
+def test_the_laboratory_answers_a_moved_slider(visitor: Visitor, office: Office) -> None:
+    page = visitor.page
+    page.goto("/laboratory?machine=press")
+    drawn(page, "#lab-plot")
+    told = page.locator("[data-irregularity]")
+    before = float(str(told.get_attribute("data-irregularity")))
+    slider = page.locator('input[type="range"][data-for="drive.inertia"]')
+    slider.focus()
+    for _ in range(5):
+        page.keyboard.press("PageUp")
+    inertia = named(page, "drive.inertia")
+    page.wait_for_url(f"**drive.inertia={inertia.input_value()}**")
+    # More inertia turns more evenly; and as a study of one case gives it too.
+    after = float(str(told.get_attribute("data-irregularity")))
+    assert after < before
+    spec = office.get("/presets/press")["spec"]
+    spec["base"]["drive"]["inertia"] = float(inertia.input_value())
+    study_id = office.submit(spec, axes=[])
+    results = office.get(f"/studies/{study_id}/cases/0")["results"]
+    assert after == pytest.approx(results["irregularity"], rel=1e-4)  # fields show six digits
+    speed, energy = drawn(page, "#lab-plot")[:2]
+    assert max(speed["y"]) == pytest.approx(results["omega.max"], rel=1e-4)
+    assert max(energy["y"]) - min(energy["y"]) == pytest.approx(results["energy.fluctuation"], rel=1e-4)
+    page.reload()
+    expect(inertia).to_have_value(str(page.url.split("drive.inertia=")[1].split("&")[0]))
+    inertia.fill("-3")
+    expect(wrong(page, "drive.inertia")).to_contain_text("out of range")
+    inertia.fill("20")
+    expect(wrong(page, "drive.inertia")).to_be_empty()
+    page.wait_for_url("**drive.inertia=20&**")
+    page.get_by_role("link", name="the operation's load").click()
+    expect(page.locator("[data-cases]")).to_have_text("25")
+    page.get_by_role("button", name="Submit the study").click()
+    page.wait_for_url("**/studies/st_*")
+    expect(page.locator("#progress .state")).to_have_text("finished", timeout=60_000)
+    drawn(page)

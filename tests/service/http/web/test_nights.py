@@ -127,6 +127,23 @@ def test_a_browser_logs_in_looks_and_acts_and_logs_out(house: House, tab: Page) 
     assert record.scope is TokenScope.WRITE
 
 
+@pytest.mark.parametrize("tab", [{}], indirect=True)
+def test_what_was_typed_outlives_the_session(house: House, tab: Page) -> None:
+    secret, _ = house.store.create_token("design office", TokenScope.WRITE)
+    tab.goto("/new")
+    log_in(tab, secret)
+    load = tab.get_by_label("Load", exact=False).first
+    load.fill("1")
+    tab.context.clear_cookies()
+    load.fill("1.25")
+    tab.get_by_text("Your session has ended").wait_for()
+    tab.get_by_role("button", name="Log in").click()
+    log_in(tab, secret)
+    tab.get_by_role("button", name="Go on").click()
+    tab.wait_for_url("**/new")
+    assert tab.get_by_label("Load", exact=False).first.input_value() == "1.25"
+
+
 def test_a_token_to_look_sees_every_page_and_may_change_nothing(house: House, tab: Page) -> None:
     secret, _ = house.store.create_token("wall display", TokenScope.READ)
     tab.goto("/login")
