@@ -29,7 +29,7 @@ ROOT = Path(__file__).resolve().parents[2]
 COMMAND = (sys.executable, "-m", "sprag.service.cli")
 #: Generous: the machine may be busy.
 PATIENCE = 600.0
-_LOOK = 0.02
+_LOOK = 0.1
 _ORPHANED = "EOFError: Ran out of input"
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import httpx
@@ -16,11 +16,18 @@ from tests.wrong_specs import BASE, WRONG, changed
 JSON = {"Content-Type": "application/json"}
 
 
+@pytest.fixture(scope="module")
+def http(running: Service) -> Iterator[httpx.Client]:
+    """One client of the service: to make one takes longer than a request."""
+    with httpx.Client(base_url=f"{running.address}/api/v1", timeout=60) as client:
+        yield client
+
+
 @pytest.mark.parametrize("address", ["studies", "studies:preview"])
 @pytest.mark.parametrize("name", WRONG)
-def test_wrong_specs_are_problem_documents(running: Service, name: str, address: str) -> None:
+def test_wrong_specs_are_problem_documents(http: httpx.Client, name: str, address: str) -> None:
     text, named = WRONG[name]
-    answer = httpx.post(f"{running.address}/api/v1/{address}", content=text, headers=JSON, timeout=60)
+    answer = http.post(f"/{address}", content=text, headers=JSON)
     assert answer.status_code == 422
     assert answer.headers["content-type"] == "application/problem+json"
     problem = answer.json()
@@ -41,15 +48,15 @@ def test_wrong_specs_through_submit(
     assert named in done.err
 
 
-def test_a_weak_spring_is_allowed_but_said(running: Service) -> None:
+def test_a_weak_spring_is_allowed_but_said(http: httpx.Client) -> None:
     text = changed("/base/pendulums/0/spring_rate", "1 N/m")
-    answer = httpx.post(f"{running.address}/api/v1/studies", content=text, headers=JSON, timeout=60)
+    answer = http.post("/studies", content=text, headers=JSON)
     assert answer.status_code == 202
     assert answer.json()["warnings"]
 
 
-def test_the_base_of_these_specs_is_itself_right(running: Service) -> None:
-    answer = httpx.post(f"{running.address}/api/v1/studies:preview", json=BASE, timeout=60)
+def test_the_base_of_these_specs_is_itself_right(http: httpx.Client) -> None:
+    answer = http.post("/studies:preview", json=BASE)
     assert answer.status_code == 200
     assert answer.json()["cases"] == 2
 

@@ -196,7 +196,10 @@ def test_a_reader_that_goes_away_is_no_failure_to_talk_about(tmp_path: Path) -> 
     short = tmp_path / "short.json"  # but with more rows than a pipe holds
     short.write_text(json.dumps(json.loads(SPEC.read_text()) | {"run": {"duration": "12 periods"}}))
     with subprocess.Popen(
-        [*COMMAND, "run", str(short)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment()
+        [*COMMAND, "run", str(short), "--processes", "1"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=environment(),
     ) as process:
         assert process.stdout is not None
         assert process.stderr is not None
@@ -231,7 +234,7 @@ def test_an_interrupted_run_leaves_nothing_behind(tmp_path: Path, number: signal
     assert sorted(path.name for path in tmp_path.iterdir()) == ["long.json", "tmp"]
 
 
-def test_a_full_disk_is_storage_trouble() -> None:
+def test_a_full_disk_is_storage_trouble(sprag: Sprag) -> None:
     if not os.path.exists("/dev/full"):  # only Linux has it
         return
     with open("/dev/full", "wb") as full:
@@ -240,7 +243,7 @@ def test_a_full_disk_is_storage_trouble() -> None:
         )
     assert done.returncode == 3
     assert b"no space left" in done.stderr
-    assert processes.sprag("run", SMALL, "-o", "/dev/full").code == 3
+    assert sprag("run", SMALL, "--processes", 1, "-o", "/dev/full").code == 3
 
 
 def test_specs_and_data_come_through_standard_input() -> None:

@@ -14,15 +14,13 @@ import pytest
 
 from tests.acceptance.processes import EXAMPLES, SECONDS, Service, service
 
-JSON = {"Content-Type": "application/json"}
-
 
 def until(condition: Callable[[], bool]) -> None:
     """Wait until ``condition`` holds; fails when it takes far too long."""
     deadline = time.monotonic() + SECONDS
     while not condition():
         assert time.monotonic() < deadline
-        time.sleep(0.05)
+        time.sleep(0.1)
 
 
 def worker_of(running: Service) -> psutil.Process:
@@ -35,9 +33,11 @@ def submit_and_finish(running: Service, duration: str) -> None:
     """A study of that time, which no other study has, goes through."""
     spec = json.loads((EXAMPLES / "one_pendulum.json").read_text())
     spec["run"] = {"duration": duration}
-    answer = httpx.post(f"{running.address}/api/v1/studies", content=json.dumps(spec), headers=JSON, timeout=60)
-    address = running.address + answer.headers["location"]
-    until(lambda: httpx.get(address, timeout=60).json()["state"] == "finished")
+    with httpx.Client(base_url=running.address, timeout=SECONDS) as client:
+        address = client.post("/api/v1/studies", json=spec).headers["location"]
+        with client.stream("GET", f"{address}/events") as events:
+            assert "event: end" in events.iter_lines()
+        assert client.get(address).json()["state"] == "finished"
 
 
 def test_a_killed_worker_is_replaced_and_nothing_outlives_a_killed_service(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sprag.service.storage.errors import NothingToRetry, StudyNotFound
@@ -57,6 +57,7 @@ def made(store: Store, endings: list[str]) -> StudyRecord:
 NAMES = st.sampled_from(["ok", "ok", "crashed", "timed_out", "diverged"])
 
 
+@settings(max_examples=30)  # on each driver
 @given(endings=st.lists(NAMES, min_size=1, max_size=45), chosen=st.sets(NAMES.filter(lambda name: name != "ok")))
 def test_exactly_the_failed_cases_run_again(store: Store, endings: list[str], chosen: set[str]) -> None:
     record = made(store, endings)

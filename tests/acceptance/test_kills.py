@@ -1,0 +1,60 @@
+"""Processes that are killed, stopped and ended while a study runs, for which nothing is lost, doubled or wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import httpx
+
+from benchmarks.faults import harness
+from benchmarks.faults.kills import kills
+from benchmarks.faults.stopped import stopped
+from tests.conftest import Finished
+
+
+def test_killed_processes_lose_nothing(tmp_path: Path) -> None:
+    figures = kills(tmp_path, cases=60, count=3, seed=9, periods=2000.0, processes=1)
+    assert figures["kills"] == {"pool process": 1, "dispatcher": 1, "service": 1}
+
+
+def test_a_dispatcher_that_was_stopped_commits_nothing_and_gives_up(tmp_path: Path) -> None:
+    stopped(tmp_path, cases=200, rounds=1, seed=1)
+
+
+def test_the_service_ends_soon_with_open_streams_and_hands_running_chunks_back(tmp_path: Path) -> None:
+    made = harness.spec(4_000, 2_000.0)
+    service = harness.Service(tmp_path, "--processes", 1, "--chunk", 500)
+    service.start()
+    study = service.submit(made)
+    claimed = "SELECT count(*) FROM chunks WHERE state = 'claimed'"
+    harness.until(lambda: harness.asked(service.database, claimed), "chunks are claimed")
+    http = httpx.Client(base_url=service.http.base_url, timeout=60, trust_env=False)
+    with http, http.stream("GET", f"/studies/{study}/events") as events:
+        lines = events.iter_lines()
+        assert any(line == "event: progress" for line in lines)
+        service.stop()
+        assert "event: end" not in list(lines)
+    assert harness.asked(service.database, claimed) == 0
+    assert harness.asked(service.database, "SELECT count(*) FROM chunks WHERE failures > 0") == 0
+    assert harness.asked(service.database, "SELECT state FROM studies") == "running"
+
+
+def test_a_copy_made_during_a_run_goes_on_where_it_was_made(tmp_path: Path, sprag: Callable[..., Finished]) -> None:
+    made = harness.spec(300, 2_000.0)
+    with harness.running(tmp_path, "--processes", 1, "--chunk", 10) as service:
+        study = service.submit(made)
+        harness.until(lambda: harness.done(service.database, study) > 20, "the study goes on")
+        (tmp_path / "restored").mkdir()
+        copy = tmp_path / "restored" / "sprag.sqlite3"
+        saved = sprag("db", "backup", copy, "--db", service.database)
+        assert saved.code == 0, saved.err
+        assert service.look(study)["state"] == "running"
+        service.http.post(f"/studies/{study}:cancel")
+    done = harness.done(copy, study)
+    assert 20 < done < 300
+    assert sprag("db", "check", "--db", copy).code == 0
+    with harness.running(copy.parent, "--processes", 1) as service:
+        assert service.look(study)["progress"]["done"] >= done
+        service.finish(study)
+    harness.compare(copy, study, made, ranges=[(16, 16), (284, 16)])
