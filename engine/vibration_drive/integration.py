@@ -56,6 +56,7 @@ def integrate(
     run: Run,
     *,
     starts: Floats | None = None,
+    before: Floats | None = None,
     strobes: int = 0,
     times: Floats | None = None,
     pieces: int = 0,
@@ -66,11 +67,12 @@ def integrate(
     ``run`` gives tolerance, reset and event budget; the lengths and step budgets of the runs stand in the matrix.
     ``strobes`` is the number of strobes recorded of each case, ``times`` (in excitation periods) where case 0 is
     sampled, ``pieces`` the most steps of case 0 that are kept, from the time ``since`` (in excitation periods) on.
+    ``before`` has the sums of an earlier window of the same cases: extrema are then those of both, and cost less.
     """
     lay = kernel.LAYOUT
     cases, n = len(matrix), lay.n
     asked = np.empty(0) if times is None else times
-    sums = np.full((cases, sum_columns(lay)), np.nan)
+    sums = np.full((cases, sum_columns(lay)), np.nan) if before is None else before.copy()
     recorded = np.full((cases, strobes, width(n)), np.nan)
     end = matrix[:, stop_column(STOPS - 1)]
     samples = np.empty((len(asked), SHAFT_SAMPLES + n * PENDULUM_SAMPLES))

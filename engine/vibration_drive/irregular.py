@@ -42,7 +42,10 @@ class Means:
 
 @dataclass(slots=True)
 class Batches:
-    """Sums of each of ``count`` batches of every case, and the disturbed runs beside the last ones."""
+    """Sums of each of ``count`` batches of every case, and the disturbed runs beside the last ones.
+
+    Extrema in the sums are those since the first batch.
+    """
 
     search: Search
     count: int
@@ -60,7 +63,8 @@ class Batches:
         """Run cases on by one batch."""
         number, search = len(self.sums), self.search
         starts = search.starts[active]
-        own = search.advance(active, ROUND, windowed=True)
+        before = self.sums[-1][active] if self.sums else None
+        own = search.advance(active, ROUND, windowed=True, before=before)
         sums = np.full((len(search.matrix), own.shape[1]), np.nan)
         sums[active] = own
         self.sums.append(sums)

@@ -110,6 +110,23 @@ def _zero_sums(W: Floats, lay: Layout, lane: int) -> None:
 
 
 @part
+def _go_on_from_extrema(W: Floats, lay: Layout, lane: int, sums: Floats) -> None:
+    """Take extrema that the row of sums holds already for those of the window: lesser ones are not looked for."""
+    for row in range(lay.speed_max, lay.power_max + 1):
+        value = sums[OUT_SUMS + row - lay.sum_held]
+        if not math.isnan(value):
+            W[row * lay.lanes + lane] = value
+    first = OUT_SUMS + lay.energy_lost - lay.sum_held + 1
+    for i in range(lay.n):
+        base = lay.pendulums + i * lay.stride
+        for row in range(lay.p_phi_max, lay.p_u_max + 1):
+            value = sums[first + row - lay.p_sum_phi]
+            if not math.isnan(value):
+                W[(base + row) * lay.lanes + lane] = value
+        first += lay.p_u_max - lay.p_sum_phi + 1
+
+
+@part
 def _input_work(W: Floats, lay: Layout, lane: int) -> float:
     total = 0.0
     for i in range(lay.n):
@@ -128,6 +145,7 @@ def _pass_stop(W: Floats, Z: Ints, lay: Layout, lane: int, stop: int, sums: Floa
     if stop == 0:
         _zero_sums(W, lay, lane)
         watch_extrema(W, lay, lane, True)
+        _go_on_from_extrema(W, lay, lane, sums)
         W[lay.turn_0 * lanes + lane] = W[lay.turn * lanes + lane]
         W[lay.speed_0 * lanes + lane] = W[lay.speed * lanes + lane]
         W[lay.energy_0 * lanes + lane] = energy(W, Z, lay, lane)

@@ -113,11 +113,10 @@ def spectral_radius(a: Floats, n: int) -> float:
             for j in range(n):
                 power[i, j] /= norm
         for i in range(n):
-            for j in range(n):
-                total = 0.0
-                for k in range(n):
-                    total += power[i, k] * power[k, j]
-                square[i, j] = total
+            square[i] = 0.0
+            for k in range(n):
+                for j in range(n):
+                    square[i, j] += power[i, k] * power[k, j]
         power, square = square, power
         share *= 0.5
     return exponential(log_norm)

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from sprag.engine.endings import ENDING_CODES, Ending
 from sprag.engine.run import Run, SettledRun
 from sprag.engine.vibration_drive import newton, orbits
-from sprag.engine.vibration_drive.automaton import Clutch
+from sprag.engine.vibration_drive.automaton import Clutch, Shaft
 from sprag.engine.vibration_drive.cases import with_lengths
-from sprag.engine.vibration_drive.characteristics import tied_clutches
+from sprag.engine.vibration_drive.characteristics import characteristics, tied_clutches
 from sprag.engine.vibration_drive.integration import Integration, integrate
 from sprag.engine.vibration_drive.kernel import Kernel
 from sprag.engine.vibration_drive.lanes import OUT_ENDING, OUT_EVENTS, OUT_STEPS
@@ -64,6 +64,7 @@ _SAME = 1e-7
 MOVED = 0.375
 
 _OK = ENDING_CODES.index(Ending.OK)
+_FREE, _HELD = float(Clutch.FREE), float(Shaft.HELD)
 
 
 @dataclass(slots=True)
@@ -75,7 +76,6 @@ class Orbits:
     orders: Ints
     multipliers: Floats
     residuals: Floats
-    sums: Floats
     #: The least period in the orbit's own strobes.
     least: Ints
 
@@ -83,7 +83,7 @@ class Orbits:
         """Some of them."""
         return Orbits(
             self.cases[rows], self.points[rows], self.orders[rows], self.multipliers[rows], self.residuals[rows],
-            self.sums[rows], self.least[rows],
+            self.least[rows],
         )  # fmt: skip
 
 
@@ -136,8 +136,8 @@ class Search:
         )
         return units
 
-    def advance(self, active: Ints, periods: int, *, windowed: bool) -> Floats:
-        """Run cases on by the same number of periods; the kernel's sums of each.
+    def advance(self, active: Ints, periods: int, *, windowed: bool, before: Floats | None = None) -> Floats:
+        """Run cases on by the same number of periods; the kernel's sums of each, with the extrema of those ``before``.
 
         The cases are those of the calls before or some of them. Cases that end otherwise than ok are noted with their
         ending.
@@ -147,10 +147,12 @@ class Search:
         begin = np.where(starts[:, SHAFT] == NOT_GIVEN, 0.0, starts[:, BEGIN])
         extra = np.where(starts[:, FRACTION] < 1.0, starts[:, FRACTION], 0.0) - begin
         matrix = with_lengths(self.matrix[active], begin, periods + extra, windowed=windowed)
-        done = integrate(self.kernel, matrix, self.run, starts=starts, strobes=periods)
+        done = integrate(self.kernel, matrix, self.run, starts=starts, before=before, strobes=periods)
         self.endings[active] = done.sums[:, OUT_ENDING].astype(np.int8)
         first = self.periods[active[0]]
-        self.turns[active, first : first + periods] = np.diff(done.strobes[:, :, TURN], axis=1, prepend=0.0)
+        turned = done.strobes[:, :, TURN].copy()
+        turned[:, 1:] -= done.strobes[:, :-1, TURN]
+        self.turns[active, first : first + periods] = turned
         self.periods[active] += periods
         self.spent[active] += periods
         self.steps[active] += done.sums[:, OUT_STEPS]
@@ -163,12 +165,12 @@ class Search:
 
     def look(self, active: Ints) -> Orbits:
         """Orbits to which cases go, of those that seem to approach one."""
+        active = active[self.periods[active] >= self.wait[active]]
         units = self.units(active)
         found = np.zeros(len(active), dtype=np.int64)
         orbits.find_candidates(
             self.history, active, self.count, units, NEAR, _SHARED, WINDOW, self.settings.max_period, found
         )
-        found[self.periods[active] < self.wait[active]] = 0
         rows = np.flatnonzero(found)
         # The longest runs first: what is last leaves lanes idle.
         rows = rows[np.argsort(-found[rows], kind="stable")]
@@ -177,38 +179,32 @@ class Search:
 
     def certify(self, cases: Ints, points: Floats, orders: Ints, units: Floats) -> Orbits:
         """Newton's method from points near orbits of those orders; the stable ones that are near the points."""
-        begun, all_points = points, points.copy()
-        where = np.arange(len(cases))
+        begun = points
         certified: list[Orbits] = []
         for step in range(_STEPS):
-            if not len(where):
+            if not len(cases):
                 break
-            own = all_points[where]
-            disturbed, first, done = self._disturbed_runs(cases[where], own, orders[where], units[where])
-            last = orders[where][disturbed] - 1
-            moved, told = np.empty_like(own), np.empty((len(where), 4))
-            ends = np.ascontiguousarray(done.strobes[np.arange(len(last)), last])
-            tied = self._tied(cases[where], own, orders[where], done.sums[first[:-1]])
-            newton.step(own, ends, first, units[where], DISTURBANCE, self.steady_shaft, tied, moved, told)
-            away = np.empty(len(where))
-            orbits.distances(moved, begun[where], units[where], away)
+            disturbed, first, done = self._disturbed_runs(cases, points, orders, units)
+            ends = np.ascontiguousarray(done.strobes[np.arange(len(disturbed)), orders[disturbed] - 1])
+            tied = self._tied(cases, points, orders, done.sums[first[:-1]])
+            moved, told = np.empty_like(points), np.empty((len(cases), 4))
+            newton.step(points, ends, first, units, DISTURBANCE, self.steady_shaft, tied, moved, told)
+            away = np.empty(len(cases))
+            orbits.distances(moved, begun, units, away)
             residual, size, multiplier = told[:, newton.RESIDUAL], told[:, newton.STEP], told[:, newton.MULTIPLIER]
             converged = (residual < RESIDUAL) & ((size < RESIDUAL) | (step >= _ENOUGH_STEPS))
             accepted = converged & (multiplier < STABLE) & (away < AWAY)
-            least = np.empty(len(where), dtype=np.int64)
-            orbits.find_least(own, done.strobes[first[:-1]], orders[where], units[where], _SAME, least)
-            certified.append(
-                Orbits(
-                    cases[where], own, orders[where], multiplier.copy(), residual.copy(), done.sums[first[:-1]], least
-                ).take(accepted)
-            )
+            if np.any(accepted):
+                least = np.empty(len(cases), dtype=np.int64)
+                orbits.find_least(points, done.strobes[first[:-1]], orders, units, _SAME, least)
+                certified.append(Orbits(cases, points, orders, multiplier, residual, least).take(accepted))
             fails = converged | (told[:, newton.AGREES] == 0.0) | ~(size < 1.0) | ~(away < AWAY)
             fails |= (residual < _TELLING) & (multiplier >= STABLE)
-            self._failed(cases[where[fails & ~accepted]])
-            go_on = ~(fails | accepted)
-            all_points[where[go_on]] = moved[go_on]
-            where = where[go_on]
-        self._failed(cases[where])
+            self._failed(cases[fails & ~accepted])
+            left = np.flatnonzero(~(fails | accepted))
+            cases, orders = cases[left], orders[left]
+            points, begun, units = moved[left], begun[left], units[left]
+        self._failed(cases)
         return _joined(certified, self)
 
     def _disturbed_runs(
@@ -220,20 +216,35 @@ class Search:
         count = newton.disturb(points, units, DISTURBANCE, self.steady_shaft, rows, first)
         of_row = np.repeat(np.arange(len(cases)), np.diff(first))
         self.spent[cases] += orders * np.diff(first)
-        # Characteristics are wanted of the points' own runs only.
-        own = np.zeros(count, dtype=bool)
-        own[first[:-1]] = True
+        # Sums, which cost time, tell of clutches that never let go of a held shaft.
+        windowed = np.zeros(count, dtype=bool)
+        windowed[first[:-1]] = points[:, SHAFT] == _HELD
         matrix = with_lengths(
-            self.matrix[cases[of_row]], points[of_row, BEGIN], orders[of_row].astype(float), windowed=own
+            self.matrix[cases[of_row]], points[of_row, BEGIN], orders[of_row].astype(float), windowed=windowed
         )
         done = integrate(self.kernel, matrix, self.run, starts=rows[:count], strobes=int(orders.max()))
         return of_row, first, done
 
     def _tied(self, cases: Ints, points: Floats, orders: Ints, sums: Floats) -> Flags:
         """Clutches of orbits that never let go of a held shaft, shape (orbits, pendulums)."""
-        matrix = with_lengths(self.matrix[cases], points[:, BEGIN], orders.astype(float), windowed=True)
-        interacts: Flags = points[:, SHAFT_WIDTH + CLUTCH :: PENDULUM_WIDTH] != Clutch.FREE
-        return interacts & tied_clutches(self.kernel.LAYOUT, matrix, sums)
+        tied = np.zeros((len(cases), self.kernel.LAYOUT.n), dtype=np.bool_)
+        held = np.flatnonzero(points[:, SHAFT] == _HELD)
+        if len(held):
+            lengths = orders[held].astype(float)
+            matrix = with_lengths(self.matrix[cases[held]], points[held, BEGIN], lengths, windowed=True)
+            interacts = points[held, SHAFT_WIDTH + CLUTCH :: PENDULUM_WIDTH] != _FREE
+            tied[held] = interacts & tied_clutches(self.kernel.LAYOUT, matrix, sums[held])
+        return tied
+
+    def over_one_turn(self, found: Orbits) -> Floats:
+        """Characteristics of orbits over one turn of each, shape (orbits, results)."""
+        cases = found.cases
+        matrix = with_lengths(self.matrix[cases], found.points[:, BEGIN], found.orders.astype(float), windowed=True)
+        sums = integrate(self.kernel, matrix, self.run, starts=found.points).sums
+        self.spent[cases] += found.orders
+        self.steps[cases] += sums[:, OUT_STEPS]
+        self.events[cases] += sums[:, OUT_EVENTS]
+        return characteristics(self.kernel.LAYOUT, matrix, sums)
 
     def _failed(self, cases: Ints) -> None:
         """Let cases run on before the next search."""
@@ -258,7 +269,7 @@ class Search:
 def _joined(parts: list[Orbits], search: Search) -> Orbits:
     if not parts:
         none, numbers = np.empty(0), np.empty(0, dtype=np.int64)
-        return Orbits(numbers, np.empty((0, search.history.shape[2])), numbers, none, none, np.empty((0, 0)), numbers)
+        return Orbits(numbers, np.empty((0, search.history.shape[2])), numbers, none, none, numbers)
     return Orbits(*(np.concatenate([getattr(part, name) for part in parts]) for name in Orbits.__slots__))
 
 

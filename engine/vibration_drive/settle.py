@@ -9,17 +9,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from sprag.engine.endings import ENDING_CODES, Ending
 from sprag.engine.run import MEANS_FROM_PERIODS, Run, SettledRun
-from sprag.engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count, with_lengths
-from sprag.engine.vibration_drive.characteristics import characteristics
+from sprag.engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count
 from sprag.engine.vibration_drive.irregular import BATCHES, Batches
 from sprag.engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
-from sprag.engine.vibration_drive.lanes import OUT_EVENTS, OUT_STEPS, RUNUP_SHARE
+from sprag.engine.vibration_drive.lanes import RUNUP_SHARE
 from sprag.engine.vibration_drive.no_load import limit_of
 from sprag.engine.vibration_drive.orbits import distances, settling_periods
 from sprag.engine.vibration_drive.regimes import Regime, means, settled_infos
 from sprag.engine.vibration_drive.results import result_infos
 from sprag.engine.vibration_drive.search import ROUND, Orbits, Search, transient_rounds
-from sprag.engine.vibration_drive.strobes import BEGIN, SHAFT_SPEED
+from sprag.engine.vibration_drive.strobes import SHAFT_SPEED
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -167,11 +166,8 @@ def _take_settled(search: Search, active: Ints, results: _Results) -> Ints:
 
 
 def _write(search: Search, found: Orbits, results: _Results) -> None:
-    cases, lay = found.cases, search.kernel.LAYOUT
-    matrix = with_lengths(search.matrix[cases], found.points[:, BEGIN], found.orders.astype(float), windowed=True)
-    results.values[cases, : results.plain] = characteristics(lay, matrix, found.sums)
-    search.steps[cases] += found.sums[:, OUT_STEPS]
-    search.events[cases] += found.sums[:, OUT_EVENTS]
+    cases = found.cases
+    results.values[cases, : results.plain] = search.over_one_turn(found)
     results.put(cases, "regime.order", found.orders)
     results.put(cases, "regime.multiplier", found.multipliers)
     results.put(cases, "regime.residual", found.residuals)
@@ -197,22 +193,23 @@ def _whole_run(search: Search, cases: Ints, results: _Results) -> None:
     results.put(cases, "run.events", search.events[cases])
     period = search.matrix[cases, 1]
     wanted = RUNUP_SHARE * results.values[cases, results.column("shaft.speed.mean")] * period
-    runup = [
-        _runup(search.turns[case, : search.periods[case]], turn)
-        for case, turn in zip(cases.tolist(), wanted.tolist(), strict=True)
-    ]
+    runup = _runup(search.turns[cases], wanted)
     started = search.matrix[cases, _SPEED] == 0.0
-    results.put(cases, "runup.time", np.where(started, period * np.array(runup), math.nan))
+    results.put(cases, "runup.time", np.where(started, period * runup, math.nan))
 
 
-def _runup(turns: Floats, wanted: float) -> float:
-    """Periods until the turn in a period first reaches ``wanted``, linearly between whole periods."""
-    reached = np.flatnonzero(turns >= wanted)
-    if not wanted > 0.0 or not len(reached):
-        return math.nan
-    k = int(reached[0])
-    before = float(turns[k - 1]) if k else 0.0
-    return k + (wanted - before) / (float(turns[k]) - before)
+def _runup(turns: Floats, wanted: Floats) -> Floats:
+    """Periods until the turn in a period first reaches ``wanted``, linearly between whole periods; NaN where never.
+
+    ``turns`` (shape (cases, periods)) is 0 after a case's last period.
+    """
+    reached = (turns >= wanted[:, None]) & (wanted[:, None] > 0.0)
+    k = np.argmax(reached, axis=1)
+    rows = np.arange(len(turns))
+    before = np.where(k > 0, turns[rows, k - 1], 0.0)
+    gained = np.where(reached[rows, k], turns[rows, k] - before, np.nan)
+    runup: Floats = k + (wanted - before) / gained
+    return runup
 
 
 def _unloaded(module: Kernel, search: Search, cases: Ints, results: _Results) -> None:
@@ -254,11 +251,11 @@ def _steady_shaft(search: Search, case: int, speed: float, results: _Results) ->
     results.put(at, "fraction.rotating", 1.0 if speed > 0.0 else 0.0)
     results.put(at, "fraction.held", 0.0 if speed > 0.0 else 1.0)
     results.points[case, SHAFT_SPEED] = speed
-    turns = search.turns[case, : search.periods[case]]
     period = search.matrix[case, 1]
     rest = results.values[case, results.column("shaft.speed.from_rest")]
     started = search.matrix[case, _SPEED] == 0.0
-    results.put(at, "runup.time", period * _runup(turns, RUNUP_SHARE * rest * period) if started else math.nan)
+    runup = _runup(search.turns[at], np.array([RUNUP_SHARE * rest * period]))
+    results.put(at, "runup.time", period * runup if started else math.nan)
 
 
 def _speed_from_rest(search: Search, cases: Ints) -> Floats:

@@ -19,7 +19,6 @@ from sprag.engine.vibration_drive.cases import (
     case_matrix,
     coefficient_count,
     pendulum_count,
-    with_lengths,
 )
 from sprag.engine.vibration_drive.characteristics import characteristics
 from sprag.engine.vibration_drive.integration import integrate
@@ -28,7 +27,7 @@ from sprag.engine.vibration_drive.lanes import OUT_ENDING
 from sprag.engine.vibration_drive.results import result_infos
 from sprag.engine.vibration_drive.search import ROUND, Search
 from sprag.engine.vibration_drive.simulate import simulate
-from sprag.engine.vibration_drive.strobes import BEGIN, SHAFT_SPEED, TURN, in_order
+from sprag.engine.vibration_drive.strobes import SHAFT_SPEED, TURN, in_order
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -142,10 +141,7 @@ class _Settled:
         search = self._search
         found = search.look(active)
         if len(found.cases):
-            lay, cases = search.kernel.LAYOUT, found.cases
-            turns = found.orders.astype(float)
-            matrix = with_lengths(search.matrix[cases], found.points[:, BEGIN], turns, windowed=True)
-            self.seen[cases] = characteristics(lay, matrix, found.sums)[:, self.columns]
+            self.seen[found.cases] = search.over_one_turn(found)[:, self.columns]
         active = active[~np.isin(active, found.cases)]
         if not len(active):
             return active

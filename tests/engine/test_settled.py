@@ -247,8 +247,12 @@ def test_windows_that_follow_each_other_add_up_to_one() -> None:
 
     first = integrate(module, lengths(5), run, strobes=5)
     second = integrate(module, lengths(7), run, starts=np.ascontiguousarray(first.strobes[:, -1]))
+    starts = np.ascontiguousarray(first.strobes[:, -1])
+    knowing = integrate(module, lengths(7), run, starts=starts, before=first.sums)
+    added = combined(module.LAYOUT, [first.sums, second.sums])
+    np.testing.assert_array_equal(combined(module.LAYOUT, [first.sums, knowing.sums]), added)
     whole = characteristics(module.LAYOUT, lengths(12), integrate(module, lengths(12), run).sums)
-    added = characteristics(module.LAYOUT, lengths(12), combined(module.LAYOUT, [first.sums, second.sums]))
+    added = characteristics(module.LAYOUT, lengths(12), added)
     for column, info in enumerate(result_infos(1)):
         if info.name not in {*NOT_COMPARED, "runup.time"}:
             np.testing.assert_allclose(added[:, column], whole[:, column], rtol=1e-10, atol=1e-10, err_msg=info.name)
