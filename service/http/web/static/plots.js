@@ -13,14 +13,21 @@ sprag.figures = new Map();
 sprag.colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 // Widths of a picture (px) below which its panels stand one under the other, and its legend under them.
-const NARROW = 600, ENTRIES = { legend: 110, legend2: 130 }, LINE = 20, SCALE = 80;
+const NARROW = 600, ENTRIES = { legend: 110, legend2: 130 }, LINE = 20, SCALE = 80, LETTER = 7;
+
+// The title of a legend in lines that fit a width (px), as far as its words allow.
+const titleLines = (figure, name, width) => (figure.layout[name]?.title?.text ?? "").split(" ").reduce((lines, word) => {
+  const longer = [lines.at(-1), word].filter(Boolean).join(" ");
+  return longer.length * LETTER > width ? [...lines, word] : [...lines.slice(0, -1), longer];
+}, [""]).filter(Boolean);
 
 const hasScale = (figure) => figure.data.some((trace) => trace.colorbar && trace.showscale !== false);
 
 // Pixels that a legend takes over the whole width.
 const legendHeight = (figure, name, width) => {
   const shown = figure.data.filter((trace) => trace.showlegend !== false && (trace.legend || "legend") === name).length;
-  return shown && (Math.ceil(shown / Math.max(Math.floor(width / ENTRIES[name]), 1)) + 1) * LINE;
+  const rows = Math.ceil(shown / Math.max(Math.floor(width / ENTRIES[name]), 1));
+  return shown && (rows + Math.max(titleLines(figure, name, width).length, 1)) * LINE;
 };
 
 // Room for the legends below the panels. In a narrow picture all are there: beside the panels they would leave no room for them.
@@ -34,7 +41,7 @@ sprag.fitted = (figure, width) => {
   const height = layout.height - t - b + margin.t + bottom;
   if (!narrow) return { ...layout, height, margin };
   const below = { orientation: "h", x: 0, xref: "container", xanchor: "left", yref: "container", yanchor: "bottom" };
-  const title = { ...layout.legend?.title, font: { size: 11 } };
+  const title = { ...layout.legend?.title, text: titleLines(figure, "legend", width).join("<br>"), font: { size: 11 } };
   const legends = { legend: { ...layout.legend, ...below, title, y: second / height }, legend2: { ...layout.legend2, ...below, y: 0 } };
   return { ...layout, height, margin, ...legends };
 };
