@@ -295,10 +295,10 @@ def test_damaged_kernels_are_compiled_anew(tmp_path: Path, caplog: pytest.LogCap
     study = fakes.study(80)
     with clusters() as made, Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}", chunking=Chunking(cases=4)) as store:
         made.start_scheduler()
-        made.start_worker(3, SPRAG_KERNEL_CACHE=str(tmp_path))
-        # One after the other dies while it loads; the last one finds the damaged file gone.
+        made.start_worker(2, SPRAG_KERNEL_CACHE=str(tmp_path))
+        # One after the other dies while it loads; the next one finds the damaged file gone.
         executor = DaskExecutor(made.url, 0, chunk_timeout=60.0, run=fakes.run, load=fakes.load_or_die)
-        eventually(lambda: executor.wait(0.05) or executor.capacity == 3 + SPARE_CHUNKS)
+        eventually(lambda: executor.wait(0.05) or executor.capacity == 2 + SPARE_CHUNKS)
         damaged = tmp_path / "kernels" / models.cache_folder().name / fakes.DAMAGED
         damaged.parent.mkdir(parents=True, exist_ok=True)
         damaged.touch()
