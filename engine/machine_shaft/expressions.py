@@ -272,7 +272,7 @@ class Expression:
         if parser.index < len(parser.tokens):
             raise ExpressionError(f"{parser.peek()!r} is not expected here", parser.position())
         #: The variables that it uses.
-        self.used = frozenset(_names(self.root))
+        self.used = frozenset(names_of(self.root))
         self._switches: list[Callable[[Mapping[str, Dual]], Value]] = []
         self._find_switches(self.root)
 
@@ -284,7 +284,7 @@ class Expression:
     @property
     def names(self) -> set[str]:
         """Names of variables and constants that the formula uses."""
-        return _names(self.root)
+        return names_of(self.root)
 
     @property
     def kinds(self) -> set[str]:
@@ -334,9 +334,10 @@ def _content(node: Node) -> tuple[object, ...]:
     return (node.kind, node.number, *map(_content, node.parts))
 
 
-def _names(node: Node) -> set[str]:
+def names_of(node: Node) -> set[str]:
+    """Names of variables and constants under a node."""
     own = {node.kind[5:]} if node.kind.startswith("name ") else set()
-    return own.union(*(_names(part) for part in node.parts))
+    return own.union(*(names_of(part) for part in node.parts))
 
 
 def _kinds(node: Node) -> set[str]:
