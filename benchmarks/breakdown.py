@@ -47,11 +47,11 @@ STAGES = {
     SETTLE: "transitions, stops, ends of periods",
     REFILL: "lanes filled again, and the reading itself",
 }
-#: Behind the stages: the last reading, lanes computed, lanes of these that had a case.
+#: Indices after the stages: the last reading, computed lanes, and computed lanes with a case.
 _LAST, _COMPUTED, _BUSY = len(STAGES), len(STAGES) + 1, len(STAGES) + 2
 _TICKS = len(STAGES) + 3
 
-#: What is put where in the text of a kernel: each anchor stands there once.
+#: Anchors in the source of a kernel, each of which occurs once, and their replacements.
 _READINGS = (
     ("from sprag.engine.vibration_drive.window import", "from benchmarks.breakdown import read\n{anchor}"),
     ("since, pieces,\n):", "since, pieces, ticks,\n):"),
@@ -91,7 +91,7 @@ read = inlined(_read)
 
 
 class Readings:
-    """A kernel with readings, and what they have come to."""
+    """A kernel with readings, and their sums."""
 
     def __init__(self, pendulums: int, coefficients: int, order: int, lanes: int) -> None:
         text = source(make_layout(pendulums, coefficients, order, lanes))

@@ -1,8 +1,8 @@
-"""A paper estimate: 10^9 cases on 1,000 workers, one dispatcher, one database. What saturates first?
+"""An estimate for 10^9 cases on 1,000 workers with one dispatcher and one database: what saturates first?
 
-Measures on this machine what the dispatcher spends on a chunk (claim, turning the result into rows, commit) with a real
-store, what a chunk's task and result weigh on the network, and what Dask's scheduler spends on a task; then
-plays the queue of chunks through with these numbers.
+Measures on this machine the dispatcher's time per chunk (claim, conversion of the result to rows, commit) with a real
+store, the size of a chunk's task and result on the network, and the time of Dask's scheduler per task; then simulates
+the queue of chunks with these numbers.
 
     python -m benchmarks.cluster_simulation [--db URL] [--workers 1000] [--cases 1e9] [--per-case 0.001]
 

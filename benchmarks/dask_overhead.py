@@ -1,4 +1,4 @@
-"""What a Dask cluster on this machine costs against the process pool, for chunks of about a second.
+"""Overhead of a Dask cluster on this machine compared with the process pool, for chunks of about a second.
 
 Both have the same number of warm processes and run the same chunks in turn, in one run of this program; what counts is
 the ratio.

@@ -1,4 +1,4 @@
-"""Made-up requests to every operation of the interface, in all phases of schemathesis; takes minutes.
+"""Random requests to every operation of the API, in all phases of schemathesis; takes minutes.
 
 ``python -m benchmarks.fuzz --examples 100``: a service of its own behind a real server on this machine, with a token,
 on a database with studies of made-up rows; motions are computed for real. The suite sends a few of the same requests

@@ -1,4 +1,4 @@
-"""What hostile clients can do to a service: the longest wait for /livez, memory, and the time to its end.
+"""Effect of hostile clients on a service: the longest wait for /livez, memory, and the shutdown time.
 
 Run as ``python -m benchmarks.hostile [--clients N]``. Each bomb is within every limit of a spec; all are sent at once
 by clients that leave after five seconds, or wait for their answers, to a service with its default settings.

@@ -1,4 +1,4 @@
-"""How many machines a second one core solves, and what the definition of the mean and the kind of axis cost.
+"""Machine shafts solved per second on one core, and the cost of definitions of the mean and kinds of axes.
 
 All in one run of this program, in turn; the ratios are to the first line. Then the same question as a study, through
 spec, dispatcher, one pool process and SQLite, against the engine alone.
@@ -56,7 +56,7 @@ BASE: dict[str, Any] = {
 
 
 def studies(cases: int) -> dict[str, tuple[MachineSpec, Mapping[str, Any]]]:
-    """The presets' three questions, and what makes a case dearer."""
+    """The presets' three questions, and features that make a case more expensive."""
     inertia = NUMBERS | {"drive.inertia": np.linspace(5.0, 50.0, cases)}
     ram = NUMBERS | {"mechanism.slider_crank.ram_mass": np.linspace(1.0, 60.0, cases)}
     ram["mechanism.slider_crank.crank"] = np.linspace(0.08, 0.12, cases)

@@ -1,4 +1,4 @@
-"""Each safety mechanism matters: with it removed, the test that watches over it fails.
+"""Every safety mechanism is necessary: without it, the corresponding test fails.
 
     python -m benchmarks.mutants
 
@@ -57,7 +57,7 @@ MUTANTS = (
     ),
     Mutant(
         "no FULL synchronisation",
-        "service/storage/session.py",
+        "service/storage/sqlite_files.py",
         '"synchronous = FULL"',
         '"synchronous = NORMAL"',
         (f"{_FAULTS}test_a_power_cut_takes_nothing_that_was_acknowledged",),

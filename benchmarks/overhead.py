@@ -1,4 +1,4 @@
-"""What the service adds to the engine: a study through dispatcher, pool and SQLite, against the engine alone.
+"""Overhead of the service: a study through dispatcher, pool and SQLite, compared with the engine alone.
 
 Both run on the same number of warm processes, in turn, in one run of this program; what counts is the ratio.
 

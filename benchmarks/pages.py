@@ -1,8 +1,8 @@
-"""How soon pages answer on a database of a million cases, against the most trivial request of the same service.
+"""Response times of pages on a database of a million cases, against the simplest request of the same service.
 
     python -m benchmarks.pages [--cases 1000000] [--requests 30]
 
-The rows are made up (running them is what `benchmarks.scaling` measures); the service is a process of its own.
+The rows are synthetic (`benchmarks.scaling` measures their computation); the service is a separate process.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def fill(store: Store, axes: list[dict[str, object]], name: str) -> str:
 
 
 def pages(big: str, line: str, cases: int) -> dict[str, str]:
-    """What is asked for, by what it is called."""
+    """The requested addresses by name."""
     own = f"/studies/{big}"
     held = urlencode([("at", "excitation.frequency=20"), ("sort", "-efficiency")])
     return {

@@ -1,8 +1,8 @@
-"""The same cases by code for several processors of this machine: the same bits, and how much faster one code is.
+"""Code for several instruction sets on this machine: equal bits, and relative speeds.
 
-Every code runs in a process of its own; they compute in turn, so that a slow minute of the machine falls on all of
-them. The least processor time of a workload counts. A code without fused multiply-adds calls a function for each and
-is very slow: it computes a few cases only.
+Each code runs in its own process; they compute in turn, so that slow phases of the machine affect all of them. The
+least processor time of a workload counts. Code without fused multiply-adds calls a function for each of them and is
+very slow, so it computes a few cases only.
 
     python -m benchmarks.processors [--repeats 5] [--plain] [--cases 512]
 """
@@ -27,7 +27,7 @@ from sprag.engine.run import Run, SettledRun, Span
 
 ROOT = Path(__file__).resolve().parents[1]
 _WORKLOADS = {workload.name: workload for workload in (W1, W2)}
-#: Batches in which the compared cases are computed, and how many those are.
+#: Batch sizes for the compared cases, and the number of these cases.
 _BATCHES = (1, 7, 40)
 _COMPARED = 48
 #: Everything beyond SSE 4.2.

@@ -1,6 +1,7 @@
 """Reading from a large database: pages and curves, and the whole study in every format, from a running service.
 
-Builds its own database of made-up rows of one pendulum, then starts `sprag serve` on it and asks as a client does.
+Builds its own database of synthetic rows of one pendulum, then starts `sprag serve` on it and sends requests as a
+client.
 
     python -m benchmarks.reading [--cases 1000000] [--requests 200] [--formats parquet,csv] [--folder DIR]
 """

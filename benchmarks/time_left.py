@@ -1,9 +1,8 @@
-"""How often the truth lay inside the interval of the time left, for studies of different structure of cost.
+"""How often the interval of the time left contains the actual time, for studies with different courses of cost.
 
-The estimator is the service's own (`sprag.service.storage.progress`). Chunks of made-up cost are run on simulated
-processes, in the order of the service; at every so many commits the interval is taken and compared with what was left
-in truth.
-With ``--real`` studies of the engine are run here as well, and the intervals that ``sprag run`` tells are taken.
+The estimator is the service's own (`sprag.service.storage.progress`). Chunks of synthetic cost are run on simulated
+processes, in the order of the service; after certain commits the interval is compared with the actual time left. With
+``--real`` studies of the engine are run here too, and the intervals of ``sprag run`` are used.
 
     python -m benchmarks.time_left [--studies 60] [--seed 1] [--real]
 """
@@ -36,7 +35,7 @@ from sprag.worker.study import Axis, Study
 
 Costs = NDArray[np.float64]
 
-#: Looks at each study, and where a look counts as early, in the middle, or late (share of the time that is over).
+#: Estimates per study, and the shares of elapsed time that count as early, middle and late.
 _LOOKS = 40
 #: Cases of a chunk of settled motions.
 _CHUNK_CASES = (16, 64, 256)
@@ -45,7 +44,7 @@ _PARTS = (("early", 0.0, 1 / 3), ("middle", 1 / 3, 2 / 3), ("late", 2 / 3, 1.0))
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """One interval and the truth, s; ``at`` is the share of the whole time that was over."""
+    """One interval and the actual time left, s; ``at`` is the elapsed share of the whole time."""
 
     at: float
     low: float
@@ -69,13 +68,13 @@ def noisy(rng: np.random.Generator, count: int) -> Costs:
 
 
 def rising(rng: np.random.Generator, count: int) -> Costs:
-    """The first axis makes a case up to four times as dear, or cheap, from its begin to its end."""
+    """The cost rises or falls up to fourfold along the first axis."""
     slope = np.linspace(0.0, rng.uniform(-np.log(4.0), np.log(4.0)), count)
     return np.exp(slope) * rng.lognormal(0.0, 0.1, count)
 
 
 def stepped(rng: np.random.Generator, count: int) -> Costs:
-    """From some case on the motion is another, and the cost with it."""
+    """From some case on, the motion and its cost change."""
     cost = np.ones(count)
     cost[int(rng.uniform(0.2, 0.8) * count) :] = rng.uniform(0.4, 2.5)
     return cost * rng.lognormal(0.0, 0.1, count)
@@ -93,7 +92,7 @@ def rare(rng: np.random.Generator, count: int) -> Costs:
 
 
 def interrupted(rng: np.random.Generator, count: int) -> Costs:
-    """Somebody else takes the machine for some time: everything is slower by half."""
+    """Other work slows the machine down by half for some time."""
     cost = even(rng, count)
     begin = int(rng.uniform(0.0, 0.9) * count)
     cost[begin : begin + int(rng.uniform(0.1, 0.4) * count)] *= 1.5
@@ -213,7 +212,7 @@ def real_studies() -> Iterator[tuple[str, Study]]:
 
 
 def told(name: str, looks: list[Look]) -> None:
-    """One line: shares that held and how wide the interval was, for each part."""
+    """Print one line: share of correct intervals and their width, for each part."""
     cells = []
     for _, begin, end in _PARTS:
         part = [look for look in looks if begin <= look.at < end]
@@ -228,14 +227,14 @@ def told(name: str, looks: list[Look]) -> None:
 
 
 def main() -> None:
-    """Measure and tell."""
+    """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--studies", type=int, default=60, help="studies of each structure")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--real", action="store_true", help="run studies of the engine, too")
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
-    print("share of intervals that held the truth (median width in parts of the truth)")
+    print("share of intervals that contained the actual time (median width relative to it)")
     print(f"{'structure of cost':32}{'  '.join(f'{name:>14}' for name, _, _ in _PARTS)}      all   looks")
     every: dict[str, list[Look]] = defaultdict(list)
     for name, cost in STRUCTURES.items():
@@ -243,7 +242,7 @@ def main() -> None:
             count, processes = int(np.exp(rng.uniform(np.log(20), np.log(2000)))), int(rng.choice([1, 2, 8, 32]))
             every[name] += simulate(cost(rng, count), processes, name.endswith("refined"))
         told(name, every[name])
-    told("all made-up ones", [look for looks in every.values() for look in looks])
+    told("all synthetic ones", [look for looks in every.values() for look in looks])
     if options.real:
         for name, study in real_studies():
             told(name, list(real_looks(study)))

@@ -1,4 +1,4 @@
-"""Faults done to the running program on purpose, and what becomes of its studies.
+"""Deliberate faults in the running program, and their effect on its studies.
 
 Each drill raises AssertionError when something is lost, doubled or wrong, and otherwise gives its figures.
 """

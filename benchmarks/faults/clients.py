@@ -1,4 +1,4 @@
-"""Many clients write and many read while a study runs: nobody is told that the database is locked."""
+"""Many clients write and read while a study runs: no request fails because the database is locked."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _CURVE = {"x": "shaft.load", "y": ["shaft.speed.mean", "torque.mean"]}
 
 
 class _Client(threading.Thread):
-    """Asks again and again until the end; notes how long each answer took, and every answer that is none."""
+    """Sends requests until the end; records the time of each answer, and every failure."""
 
     def __init__(self, address: str, study: str, writes: bool, seed: int, end: float) -> None:
         super().__init__()

@@ -39,7 +39,7 @@ class Cluster:
 
     @property
     def url(self) -> str:
-        """What the service is told of it."""
+        """Its address for the service."""
         return f"dask://{self.host}:{self.port}"
 
     def start_scheduler(self, begin: Sequence[str] = ()) -> None:
@@ -84,7 +84,7 @@ class Cluster:
 
 @contextmanager
 def clusters(host: str = "127.0.0.1", protocol: str = "tcp", **environment: str) -> Iterator[Cluster]:
-    """A cluster without parts, of which nothing is left in the end."""
+    """An empty cluster, whose processes are all ended on exit."""
     made = Cluster(host, protocol, **environment)
     try:
         yield made

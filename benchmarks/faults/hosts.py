@@ -41,7 +41,7 @@ class Hosts:
         return ["ip", "netns", "exec", self._namespace(name)]
 
     def cut(self, name: str) -> None:
-        """Cut the link of a host: what is sent is lost, and nobody is told."""
+        """Cut the link of a host: packets are lost silently."""
         _ip("-n", self._namespace("switch"), "link", "set", name, "nomaster")
 
     def mend(self, name: str) -> None:

@@ -85,7 +85,7 @@ def _count_claims(database: Path) -> None:
 
 
 def _kill(service: harness.Service, draw: random.Random) -> str:
-    """Kill what is drawn; what is not there is waited for."""
+    """Kill the drawn target; wait until it exists."""
     target = draw.choices(list(TARGETS), list(TARGETS.values()))[0]
     if target == "service":
         service.kill()

@@ -1,4 +1,4 @@
-"""A dispatcher is stopped as by SIGSTOP, a second one takes over, the first is woken up again."""
+"""A dispatcher is stopped by SIGSTOP, a second one takes over, and the first is continued."""
 
 from __future__ import annotations
 

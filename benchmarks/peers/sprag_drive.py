@@ -1,4 +1,4 @@
-"""This engine, behind the same face as its peers."""
+"""This engine, behind the same interface as its peers."""
 
 from __future__ import annotations
 
