@@ -19,12 +19,15 @@ from sprag.service.http.work import Attended
 from sprag.service.results import trajectories
 from sprag.service.results.defaults import main_results
 from sprag.service.results.pictures.curves import draw_motion
+from sprag.service.results.regimes import ORDER
 from sprag.service.results.selection import axis_name
+from sprag.service.results.wording import number
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.codes import PENDING
 
 if TYPE_CHECKING:
+    from sprag.service.storage.records import CaseRow
     from sprag.worker.study import Study
 
 router = APIRouter(include_in_schema=False)
@@ -47,6 +50,20 @@ def _span(study: Study, case: int, begin: str, end: str) -> tuple[float, float]:
     if window:
         last = min(window[1][0] * (extent.period if window[1][1] == "periods" else 1.0), extent.end)
     return max(last - _FIRST_PERIODS * extent.period, 0.0), last
+
+
+def _motion(row: CaseRow) -> str:
+    """The settled motion in a sentence; nothing where a flag explains it, or the study has no regimes."""
+    regime, order, after = (row.results.get(name) for name in ("regime", ORDER, "regime.settled_after"))
+    if not isinstance(regime, str) or regime in row.flags:
+        return ""
+    sentence = models.REGIME_SENTENCES[regime]
+    if regime == "periodic" and isinstance(order, int):
+        turn = "every excitation period" if order == 1 else f"every {order} excitation periods"
+        sentence = f"The motion repeats itself {turn}, and disturbances of it die away."
+    if isinstance(after, float):
+        sentence += f" From its start it is settled after {number(after, 3)} periods."
+    return sentence
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}")
@@ -73,6 +90,7 @@ def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = 
         row=row,
         ending=PENDING if row is None else row.ending,
         sentence="The case has not been run yet." if row is None else models.ENDING_SENTENCES.get(row.ending, ""),
+        motion="" if row is None else _motion(row),
         flags=[(flag, models.flags_of(study.model).get(flag, "")) for flag in (() if row is None else row.flags)],
         parameters=[
             (

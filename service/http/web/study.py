@@ -29,7 +29,7 @@ from sprag.service.results.defaults import caption, drawn_numbers
 from sprag.service.results.exports.inputs import inputs as every_input
 from sprag.service.results.exports.inputs import run_inputs
 from sprag.service.results.pictures import curves as pictures
-from sprag.service.results.regimes import DOUBTFUL, ORDER
+from sprag.service.results.regimes import DOUBTFUL, ORDER, counted
 from sprag.service.results.selection import SelectionError
 from sprag.service.spec.catalogue import parameter_of, unit_of
 from sprag.service.spec.numbers import parse_number
@@ -114,6 +114,7 @@ def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[Clutch
         run=run_inputs(study, frame["study"]["spec"]),
         fits=fits,
         regimes=kinds.regimes,
+        counts=counted(kinds.regimes),
         regime_meanings=models.REGIME_SENTENCES,
         # The flags of regimes appear together with the regimes.
         flags={flag: count for flag, count in kinds.flags.items() if flag not in models.REGIME_SENTENCES},

@@ -43,8 +43,8 @@ def _plane(made: Portrait, shown: Presentation) -> Iterator[Line]:
     phases = shown.phases(made.strobes.names)
     step = max(made.orbit.times.size * len(phases) // _MOST_POINTS, 1)
     for index, (angle, speed, label) in enumerate(phases):
-        x, y = (_column(made.orbit, name) for name in (angle, speed))
         if made.order:
+            x, y = _column(made.orbit, angle), _column(made.orbit, speed)
             kept = np.append(np.arange(0, x.size - 1, step), x.size - 1)
             yield Line(label, x[kept], y[kept], PALETTE[index % len(PALETTE)], key=label)
         yield Line(
@@ -59,9 +59,9 @@ def _plane(made: Portrait, shown: Presentation) -> Iterator[Line]:
             joined=False,
         )
         if made.order:
-            own = slice(0, -1, made.points)
+            x, y = (_column(made.orbit, variable)[: -1 : made.points] for variable in (angle, speed))
             name = f"{label}: strobe of the orbit"
-            yield Line(name, x[own], y[own], _RING, index, key=label, listed=False, joined=False, ring=True)
+            yield Line(name, x, y, _RING, index, key=label, listed=False, joined=False, ring=True)
 
 
 def _along(made: Portrait, lines: list[tuple[str, str]]) -> Iterator[Line]:

@@ -174,6 +174,7 @@ def test_a_study_tells_how_many_cases_have_which_regime(service: Service, study_
     assert service.get(f"/studies/{study_id}")["regimes"] == {"periodic": 1, "irregular": 1, "unsettled": 1}
     page = service.http.get(f"/studies/{study_id}").text
     assert "Settled motions" in page
+    assert "4 of 4 cases done, 3 ok: 1 periodic, 1 irregular, 1 unsettled" in page
     assert f"/studies/{study_id}/cases?regime=unsettled" in page
     timed = service.submit(changed({"/run": {"duration": "60 periods"}}))
     assert service.get(f"/studies/{timed}")["regimes"] == {}
@@ -354,6 +355,17 @@ def test_the_page_of_a_study_has_a_button_that_runs_cases_longer(service: Servic
     assert shown[0] == shown[1]
     assert service.store.study(shown[0].rpartition("/")[2]).run["at_most"] == 4000
     assert service.http.post(f"/studies/{study_id}/longer/held").status_code == 404
+
+
+def test_the_page_of_a_case_tells_its_motion(service: Service, study_id: str) -> None:
+    pages = [service.http.get(f"/studies/{study_id}/cases/{case}").text for case in range(4)]
+    assert "The motion repeats itself every excitation period, and" in pages[0]
+    assert "From its start it is settled after" in pages[0]
+    assert models.REGIME_SENTENCES["irregular"] not in pages[0]
+    for page, flag in ((pages[1], "irregular"), (pages[3], "unsettled")):
+        assert page.count(f'<p class="warning"><span class="flag">{flag}</span>') == 1
+        assert "The motion repeats itself" not in page
+    assert " ± " in pages[1]
 
 
 def test_the_report_counts_the_regimes(service: Service, study_id: str) -> None:

@@ -49,6 +49,10 @@ def test_a_run_of_a_given_time_has_strobes_only(service: Service, spec: dict[str
     body = asked(service, study_id, case=4).json()
     assert (body["regime"], body["order"], body["orbit"]) == (None, None, None)
     assert body["strobes"]["times"] == pytest.approx([k / 25.5 for k in range(1, 13)])
+    strobes, along = service.http.get(f"/studies/{study_id}/cases/4/strobes").json()["data"]
+    assert strobes["x"] == body["strobes"]["values"]["pendulums.0.angle"]
+    assert strobes["customdata"] == along["x"] == list(range(1, 13))
+    assert asked(service, study_id, "?format=svg", case=4).status_code == 200
     with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
         assert client.study(study_id).strobes(4) == body
 
