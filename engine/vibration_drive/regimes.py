@@ -1,4 +1,4 @@
-"""What a settled motion can be, and the results that tell of it."""
+"""Regimes of settled motion, and the results that describe them."""
 
 from enum import IntEnum
 
@@ -7,11 +7,11 @@ from sprag.engine.vibration_drive.results import result_infos
 
 
 class Regime(IntEnum):
-    """The motion a case comes to from its own start."""
+    """The motion that a case approaches from its own start."""
 
-    #: There is none: the case did not end ok.
+    #: None: the case did not end ok.
     NONE = 0
-    #: A stable orbit of the strobe map, to which the run goes.
+    #: A stable orbit of the strobe map, which the run approaches.
     PERIODIC = 1
     #: Periodic, and the shaft never turns.
     HELD = 2
@@ -24,20 +24,20 @@ class Regime(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """What the regime means, for people."""
+        """Description of the regime."""
         return _SENTENCES[self]
 
 
 _SENTENCES = {
     Regime.NONE: "The case did not end ok.",
     Regime.PERIODIC: (
-        "The motion repeats itself after a whole number of excitation periods, and disturbances of it die away."
+        "The motion repeats after a whole number of excitation periods, and disturbances of it die away."
     ),
     Regime.HELD: "The pendulums settle to a periodic motion, or to rest, and never turn the shaft.",
     Regime.COASTING: "Without a load the shaft turns steadily at the limit of a vanishing load.",
     Regime.IRREGULAR: (
-        "The motion never repeats itself but its means are steady: means stand with the half width of their 95 % "
-        "interval, extremes are the largest seen."
+        "The motion never repeats, but its means are stationary: they have the half width of their 95 % "
+        "interval; extremes are those observed."
     ),
     Regime.UNSETTLED: "The motion still changed when the search ended: the results are those of its last periods.",
 }
@@ -70,7 +70,7 @@ _OWN = (
 
 
 def means(pendulums: int) -> tuple[int, ...]:
-    """Places, among ``result_infos``, of the results that are means."""
+    """Indices into ``result_infos`` of the results that are means."""
     names = [info.name for info in result_infos(pendulums)]
     own = [name.split(".", 2)[2] if name.startswith("pendulums.") else name for name in names]
     return tuple(place for place, name in enumerate(own) if name in _MEANS)

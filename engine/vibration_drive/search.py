@@ -1,4 +1,4 @@
-"""The search for settled motions of a batch: run on, look for an orbit, certify it by Newton's method.
+"""The search for settled motions of a batch: continue the runs, look for orbits, certify them by Newton's method.
 
 Every decision about a case follows from that case alone, so its numbers do not depend on the batch.
 """
@@ -35,29 +35,29 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-#: Periods run before each look for an orbit, then as many as `ROUND` each time.
+#: Periods before each of the first searches for an orbit; later rounds have `ROUND` periods.
 FIRST_ROUNDS = (12, 8, 10, 10, 15, 15, 20, 20, 30, 30, 30)
 ROUND = 40
-#: Strobes that near to those one orbit earlier, and coming nearer, make an orbit worth Newton's method.
+#: Strobes this close to those one orbit earlier, and approaching them, justify Newton's method.
 NEAR = 0.01
-#: The same, shared among the periods of an orbit: irregular motions return by chance, and to try a long orbit is dear.
+#: The same, divided by the order: irregular motions return by chance, and trying a long orbit is expensive.
 _SHARED = 0.05
-#: Strobes over which a run must have come nearer.
+#: Strobes over which a run must have approached the orbit.
 WINDOW = 6
-#: Distance of an orbit from the run beyond which nothing says that the run goes to it.
+#: Distance of an orbit from the run beyond which the run need not approach it.
 AWAY = 0.005
-#: Scaled disturbance of the differences that make the derivative, and the residual of an orbit.
+#: Scaled disturbance for the finite differences of the derivative, and the accepted residual of an orbit.
 DISTURBANCE = 1e-7
 RESIDUAL = 1e-10
-#: A multiplier up to this is stable; with a residual below the second number an unstable one ends the search at once.
+#: A multiplier up to this is stable; with a residual below the second number an unstable one ends Newton's method.
 STABLE = 1.0 - 1e-4
 _TELLING = 1e-2
 _STEPS = 8
-#: Steps after which an orbit whose residual is small counts although rounding keeps its steps from shrinking.
+#: Steps after which an orbit with a small residual is accepted although rounding prevents its steps from shrinking.
 _ENOUGH_STEPS = 5
-#: After a search that came to nothing a case runs on for this factor before the next.
+#: After an unsuccessful search a case is continued by this factor before the next one.
 _BACK = 1.25
-#: Halves of an orbit nearer than this are the same: its order is less.
+#: Parts of an orbit closer than this are equal, so that its order is smaller.
 _SAME = 1e-7
 #: Where in the period strobes are moved to when no orbit was found with those at its end; exact in binary, so that
 #: whole periods later are too.
@@ -69,7 +69,7 @@ _FREE, _HELD = float(Clutch.FREE), float(Shaft.HELD)
 
 @dataclass(slots=True)
 class Orbits:
-    """Orbits that were certified, one a row: case numbers, points at the strobe, orders, and what Newton tells."""
+    """Certified orbits, one per row: case numbers, points at the strobe, orders, and the report of Newton's method."""
 
     cases: Ints
     points: Floats
@@ -89,7 +89,7 @@ class Orbits:
 
 @dataclass(slots=True)
 class Search:
-    """Where the cases of a batch have come to.
+    """The current state of the cases of a batch.
 
     ``steady_shaft`` leaves the shaft's speed out of the orbits: nothing changes it where no clutch transmits.
     """
@@ -110,7 +110,7 @@ class Search:
     endings: NDArray[np.int8] = field(init=False)
     #: Periods before which no orbit is looked for again.
     wait: Floats = field(init=False)
-    #: Periods computed for each case in all, those of disturbed runs included.
+    #: Total periods computed for each case, including disturbed runs.
     spent: Floats = field(init=False)
 
     def __post_init__(self) -> None:
@@ -139,8 +139,7 @@ class Search:
     def advance(self, active: Ints, periods: int, *, windowed: bool, before: Floats | None = None) -> Floats:
         """Run cases on by the same number of periods; the kernel's sums of each, with the extrema of those ``before``.
 
-        The cases are those of the calls before or some of them. Cases that end otherwise than ok are noted with their
-        ending.
+        The cases are those of the calls before or some of them. The ending of cases that do not end ok is recorded.
         """
         starts = self.starts[active]
         # A case whose strobes have just been moved begins before its first strobe and ends at one.
@@ -164,7 +163,7 @@ class Search:
         return done.sums
 
     def look(self, active: Ints) -> Orbits:
-        """Orbits to which cases go, of those that seem to approach one."""
+        """Orbits that cases approach, among the cases that seem to approach one."""
         active = active[self.periods[active] >= self.wait[active]]
         units = self.units(active)
         found = np.zeros(len(active), dtype=np.int64)
@@ -172,7 +171,7 @@ class Search:
             self.history, active, self.count, units, NEAR, _SHARED, WINDOW, self.settings.max_period, found
         )
         rows = np.flatnonzero(found)
-        # The longest runs first: what is last leaves lanes idle.
+        # The longest runs first, because the last ones leave lanes idle.
         rows = rows[np.argsort(-found[rows], kind="stable")]
         certified = self.certify(active[rows], self.starts[active[rows]], found[rows], units[rows])
         return self._of_least_order(certified)
@@ -216,7 +215,7 @@ class Search:
         count = newton.disturb(points, units, DISTURBANCE, self.steady_shaft, rows, first)
         of_row = np.repeat(np.arange(len(cases)), np.diff(first))
         self.spent[cases] += orders * np.diff(first)
-        # Sums, which cost time, tell of clutches that never let go of a held shaft.
+        # The sums, which cost time, show clutches that never release a held shaft.
         windowed = np.zeros(count, dtype=bool)
         windowed[first[:-1]] = points[:, SHAFT] == _HELD
         matrix = with_lengths(
@@ -226,7 +225,7 @@ class Search:
         return of_row, first, done
 
     def _tied(self, cases: Ints, points: Floats, orders: Ints, sums: Floats) -> Flags:
-        """Clutches of orbits that never let go of a held shaft, shape (orbits, pendulums)."""
+        """Clutches of orbits that never release a held shaft, shape (orbits, pendulums)."""
         tied = np.zeros((len(cases), self.kernel.LAYOUT.n), dtype=np.bool_)
         held = np.flatnonzero(points[:, SHAFT] == _HELD)
         if len(held):
@@ -247,16 +246,16 @@ class Search:
         return characteristics(self.kernel.LAYOUT, matrix, sums)
 
     def _failed(self, cases: Ints) -> None:
-        """Let cases run on before the next search."""
+        """Let cases continue before the next search."""
         self.wait[cases] = _BACK * self.periods[cases]
 
     def move_strobes(self, active: Ints) -> None:
-        """Take the strobes elsewhere in the period, in case an event falls on them."""
+        """Move the strobes within the period, in case an event coincides with them."""
         self.starts[active, FRACTION] = MOVED
         self.count = 0
 
     def _of_least_order(self, found: Orbits) -> Orbits:
-        """The same orbits with an order that no divisor of it undercuts."""
+        """The same orbits with their least orders."""
         again = np.flatnonzero(found.least < found.orders)
         if not len(again):
             return found

@@ -45,10 +45,9 @@ class SettledBatch:
         Index into ``sprag.engine.endings.ENDING_CODES``.
     regimes : int8 array, shape (cases,)
         Members of ``Regime``.
-    points : array, shape (cases, strobes.width(n))
-        State at a strobe on the orbit, or where the search ended; it can be gone on from.
-    spent : array, shape (cases,)
-        Excitation periods computed for each case in all, those of disturbed runs included.
+    points : array, shape (cases, strobes.width(n)) State at a strobe on the orbit, or where the search ended, from
+        which it can be continued.
+    spent : array, shape (cases,) Total excitation periods computed for each case, including disturbed runs.
     """
 
     values: Floats
@@ -80,10 +79,10 @@ class _Results:
 def settle(columns: Mapping[str, ArrayLike], settings: SettledRun, *, cases: int) -> SettledBatch:
     """Find the settled motion of each case, from its own start.
 
-    A case is run on and its strobes are watched. Where they seem to approach an orbit, Newton's method finds it; the
-    orbit counts if it is stable by its multipliers and the run is near it (docs/theory.md, "Settled motion"). Results
-    are those of whole turns of the orbit, from the orbit. A case without an orbit up to ``settings.max_period`` has
-    means over the last 800 periods, with intervals.
+    Each run is continued while its strobes are examined. Where they seem to approach an orbit, Newton's method finds
+    it. The orbit is accepted if its multipliers show that it is stable and the run is close to it (docs/theory.md,
+    "Settled motion"). Results are those of whole turns, started on the orbit. A case without an orbit up to
+    ``settings.max_period`` has means over the last 800 periods, with intervals.
 
     Parameters
     ----------
@@ -153,7 +152,7 @@ def _settle(search: Search, active: Ints, results: _Results) -> None:
 
 
 def _take_settled(search: Search, active: Ints, results: _Results) -> Ints:
-    """Write the results of cases that have ended or whose orbit is found; the others."""
+    """Write the results of cases that have ended or whose orbit is found; returns the others."""
     ended = search.endings[active] != _OK
     results.endings[active[ended]] = search.endings[active[ended]]
     active = active[~ended]
@@ -241,7 +240,7 @@ def _unloaded(module: Kernel, search: Search, cases: Ints, results: _Results) ->
 
 
 def _steady_shaft(search: Search, case: int, speed: float, results: _Results) -> None:
-    """Write what the shaft does at a steady speed that no clutch changes."""
+    """Write the results of a shaft at a steady speed that no clutch changes."""
     at = np.array([case])
     order = results.values[case, results.column("regime.order")]
     for name in ("shaft.speed.mean", "shaft.speed.max", "shaft.speed.min"):
@@ -259,7 +258,9 @@ def _steady_shaft(search: Search, case: int, speed: float, results: _Results) ->
 
 
 def _speed_from_rest(search: Search, cases: Ints) -> Floats:
-    """Speed that the unloaded shaft comes to from the case's own start: it never falls, and ends where none drives."""
+    """Speed that the unloaded shaft reaches from the case's own start; it never falls, and is final once no clutch
+    drives.
+    """
     active = cases
     while len(active):
         before = search.starts[active, SHAFT_SPEED].copy()

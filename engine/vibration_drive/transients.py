@@ -33,9 +33,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-#: Share of the settled mean from which on the mean over the window is off.
+#: Relative difference from the settled mean above which the mean over the window is off.
 OFF = 0.01
-#: Excitation periods that a run is followed on at most: so many times its own, and so many in all.
+#: Most excitation periods by which a run is continued: a factor on its own, and an absolute maximum.
 TIMES, MOST = 6, 340
 #: Amplitude in rad below which a pendulum does not swing.
 _STILL = 1e-6
@@ -57,8 +57,7 @@ class JudgedBatch:
     off : bool array, shape (cases,)
         Whether the motion in the window was not the settled one: its mean speed is off by more than ``OFF``, or, with
         the shaft held, the swing of a pendulum.
-    spent : array, shape (cases,)
-        Excitation periods that were computed for that beyond the run itself.
+    spent : array, shape (cases,) Excitation periods computed for this beyond the run itself.
     """
 
     batch: Batch
@@ -69,8 +68,8 @@ class JudgedBatch:
 def simulate_judged(columns: Mapping[str, ArrayLike], run: Run, *, cases: int) -> JudgedBatch:
     """Run a batch of cases, and judge from their strobes whether they had settled.
 
-    The run of each case is followed on from its last strobe until the orbit is found that it goes to, at most
-    ``TIMES`` times as long and ``MOST`` periods.
+    Each run is continued from its last strobe until the orbit that it approaches is found, for at most ``TIMES`` times
+    its length and ``MOST`` periods.
 
     Parameters
     ----------
@@ -133,7 +132,7 @@ class _Settled:
         return np.where(held, np.any(off[:, 1:], axis=1), off[:, 0])
 
     def lost(self, cases: Ints) -> None:
-        """Note cases that end otherwise than ok when they are followed on: their windows do not show what comes."""
+        """Record cases whose continuation does not end ok: their windows do not show the later motion."""
         self.seen[cases] = np.inf
 
     def look(self, active: Ints) -> Ints:
@@ -151,7 +150,7 @@ class _Settled:
             turned = np.add.reduce(search.turns[active, last - over : last], axis=1)
             self.seen[active, 0] = turned / (over * search.matrix[active, Column.PERIOD])
         speeds = search.history[active, -ROUND:, SHAFT_SPEED]
-        # Without a load nothing slows the shaft down: its speed is settled when no clutch changes it any more.
+        # Without a load nothing slows down the shaft: its speed is settled once no clutch changes it.
         steady = (search.matrix[active, Column.LOAD] == 0.0) & np.all(speeds == speeds[:, :1], axis=1)
         self.seen[active[steady], 0] = speeds[steady, 0]
         others: Ints = active[~steady]
@@ -159,7 +158,7 @@ class _Settled:
 
 
 def _follow(search: Search, active: Ints, most: Floats, settled: _Settled) -> None:
-    """Run cases on, each for about as many periods as it may take, until their settled means are known."""
+    """Continue cases, each for at most about its allowed number of periods, until their settled means are known."""
     active = settled.look(active)
     ran = 0
     while True:
