@@ -90,3 +90,13 @@ class SettledRun:
     tolerance: float = 1e-9
     reset: Reset = "contact"
     max_events_per_period: int = 2_000
+
+    @property
+    def run(self) -> Run:
+        """A run as long as the search at most, with its accuracy and budgets."""
+        return Run(
+            duration=Span(float(self.at_most)),
+            tolerance=self.tolerance,
+            reset=self.reset,
+            max_events_per_period=self.max_events_per_period,
+        )

@@ -101,8 +101,8 @@ class _Watch:
         code = self.code
         end = code.let("torque_end", " + ".join(torque))
         defect = code.let("defect", f"abs({horner(force, u_end)} - {end})*(1.0 - {code.row(locked)})")
-        least = code.let("least", f"{code.row(allowed)} + {_TORQUE_ROUNDING!r}*abs({end})")
-        self.margin = code.let("margin", f"{self.margin} if {defect} <= {least} else {TOO_LONG!r}")
+        most = code.let("most", f"{code.row(allowed)} + {_TORQUE_ROUNDING!r}*abs({end})")
+        self.margin = code.let("margin", f"{self.margin} if {defect} <= {most} else {TOO_LONG!r}")
 
     def shaft(self) -> None:
         """Watch the shaft and what all clutches do together."""

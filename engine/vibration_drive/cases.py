@@ -66,6 +66,11 @@ def pendulum_count(columns: Mapping[str, ArrayLike]) -> int:
     return max(indices) + 1
 
 
+def scalars(columns: Mapping[str, ArrayLike]) -> dict[str, float]:
+    """The parameters of one case as numbers."""
+    return {path: float(np.asarray(value)) for path, value in columns.items()}
+
+
 def _law_prefix(columns: Mapping[str, ArrayLike], pendulum: int) -> str:
     own = f"pendulums.{pendulum}.clutch."
     return own if any(path.startswith(own) for path in columns) else "clutch."

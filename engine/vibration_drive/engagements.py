@@ -14,9 +14,9 @@ from sprag.engine.endings import ENDING_CODES, Ending
 from sprag.engine.outcome import Engagement, Engagements, PeriodMeans
 from sprag.engine.run import Run, SettledRun
 from sprag.engine.vibration_drive.automaton import Clutch
-from sprag.engine.vibration_drive.cases import Column, case_matrix, coefficient_count, pendulum_count, with_lengths
+from sprag.engine.vibration_drive.cases import Column, case_matrix, pendulum_count, with_lengths
 from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
+from sprag.engine.vibration_drive.kernel import Kernel, kernel_of
 from sprag.engine.vibration_drive.lanes import OUT_ENDING
 from sprag.engine.vibration_drive.pieces import Pieces, integrals, largest, products
 from sprag.engine.vibration_drive.regimes import Regime, settled_infos
@@ -68,7 +68,7 @@ def engagements(columns: Mapping[str, ArrayLike], run: Run) -> Engagements:
     end = min(end, last)
     since = max(0.0, last - MAX_PERIODS)
     start = min(max(start, since), end)
-    module = _kernel(columns, run.tolerance)
+    module = kernel_of(columns, run.tolerance)
     ending, pieces = _pieces(module, case_matrix(columns, run, 1), run, since, last - since)
     period = 1.0 / frequency
     if ending != Ending.OK:
@@ -99,7 +99,7 @@ def settled_engagements(columns: Mapping[str, ArrayLike], settings: SettledRun) 
     found = settle(columns, settings, cases=1)
     regime, ending = Regime(int(found.regimes[0])), ENDING_CODES[int(found.endings[0])]
     period = 1.0 / float(np.asarray(columns["excitation.frequency"]))
-    repeats = regime in (Regime.PERIODIC, Regime.HELD, Regime.COASTING)
+    repeats = regime.repeats
     names = [info.name for info in settled_infos(pendulum_count(columns))]
     turn = int(found.values[0, names.index("regime.order")]) if repeats else settings.max_period
     name = regime.name.lower()
@@ -107,10 +107,10 @@ def settled_engagements(columns: Mapping[str, ArrayLike], settings: SettledRun) 
     if ending != Ending.OK or (unloaded and regime in (Regime.COASTING, Regime.HELD)):
         # In the limit of a vanishing load no clutch transmits torque.
         return Engagements(0.0, turn * period, name, (), (), ending)
-    run = Run(tolerance=settings.tolerance, reset=settings.reset, max_events_per_period=settings.max_events_per_period)
+    run = settings.run
     begin, length = float(found.points[0, BEGIN]), float(2 * turn if repeats else turn)
     matrix = with_lengths(case_matrix(columns, run, 1), np.array([begin]), np.array([length]), windowed=False)
-    module = _kernel(columns, settings.tolerance)
+    module = kernel_of(columns, settings.tolerance)
     ending, pieces = _pieces(module, matrix, run, 0.0, length + 1.0, starts=found.points)
     if ending != Ending.OK:
         return Engagements(0.0, turn * period, name, (), (), ending)
@@ -122,10 +122,6 @@ def settled_engagements(columns: Mapping[str, ArrayLike], settings: SettledRun) 
     if begin > 0.0:  # the first whole period of the pieces is the second of the turn
         means = tuple(replace(mean, start=k * period) for k, mean in enumerate((*means[-1:], *means[:-1])))
     return Engagements(0.0, turn * period, name, tuple(rows), means, ending)
-
-
-def _kernel(columns: Mapping[str, ArrayLike], tolerance: float) -> Kernel:
-    return kernel(pendulum_count(columns), coefficient_count(columns), order_for(tolerance), lane_count())
 
 
 def _pieces(

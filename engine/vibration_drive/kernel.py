@@ -8,6 +8,7 @@ import math
 import os
 import sys
 import tempfile
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -15,13 +16,14 @@ from typing import Protocol, cast
 
 import llvmlite.binding as llvm
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sprag.engine.compile.cache import cache_folder
 from sprag.engine.compile.ways import GROUP
 from sprag.engine.taylor.batch import ROWS, SLOTS, peaks_loop, roots_loop
 from sprag.engine.vibration_drive.advance import advance_loop
 from sprag.engine.vibration_drive.bounds import bounds_loop
+from sprag.engine.vibration_drive.cases import coefficient_count, pendulum_count
 from sprag.engine.vibration_drive.equations import series_loop
 from sprag.engine.vibration_drive.layout import Layout, make_layout
 
@@ -203,3 +205,14 @@ def kernel(pendulums: int, coefficients: int, order: int, lanes: int) -> Kernel:
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return cast(Kernel, module)
+
+
+def kernel_of(columns: Mapping[str, ArrayLike], tolerance: float) -> Kernel:
+    """The kernel for cases of a batch, on this machine's lanes.
+
+    Raises
+    ------
+    ValueError
+        If the number of pendulums or coefficients is out of range.
+    """
+    return kernel(pendulum_count(columns), coefficient_count(columns), order_for(tolerance), lane_count())

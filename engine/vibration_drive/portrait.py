@@ -7,11 +7,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from sprag.engine.endings import ENDING_CODES, Ending
 from sprag.engine.outcome import Portrait, Trajectory
-from sprag.engine.run import Run, SettledRun, Span
+from sprag.engine.run import Run, SettledRun
 from sprag.engine.vibration_drive.automaton import Clutch
-from sprag.engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count, with_lengths
+from sprag.engine.vibration_drive.cases import case_matrix, pendulum_count, scalars, with_lengths
 from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
+from sprag.engine.vibration_drive.kernel import kernel_of
 from sprag.engine.vibration_drive.lanes import OUT_ENDING
 from sprag.engine.vibration_drive.regimes import Regime, settled_infos
 from sprag.engine.vibration_drive.settle import settle
@@ -53,7 +53,7 @@ def portrait(columns: Mapping[str, ArrayLike], run: Run) -> Portrait:
     ValueError
         If a required parameter is missing or the number of pendulums or coefficients is out of range.
     """
-    values = _scalars(columns)
+    values = scalars(columns)
     frequency = values["excitation.frequency"]
     periods = int(run.duration.in_periods(frequency) * (1.0 + 1e-12))
     ending, strobes = _strobes(values, run, periods)
@@ -76,35 +76,21 @@ def settled_portrait(columns: Mapping[str, ArrayLike], settings: SettledRun) -> 
     ValueError
         If a required parameter is missing or the number of pendulums or coefficients is out of range.
     """
-    values = _scalars(columns)
+    values = scalars(columns)
     found = settle(values, settings, cases=1)
     regime, ending = Regime(int(found.regimes[0])), ENDING_CODES[int(found.endings[0])]
     names = [info.name for info in settled_infos(pendulum_count(values))]
     row = dict(zip(names, found.values[0].tolist(), strict=True))
-    repeats = regime in (Regime.PERIODIC, Regime.HELD, Regime.COASTING)
-    order = int(row["regime.order"]) if repeats else 0
-    run = Run(
-        duration=Span(float(settings.at_most)),
-        tolerance=settings.tolerance,
-        reset=settings.reset,
-        max_events_per_period=settings.max_events_per_period,
-    )
+    order = int(row["regime.order"]) if regime.repeats else 0
+    run = settings.run
     periods = settings.at_most
-    if repeats and row["regime.settled_after"] < periods:
+    if regime.repeats and row["regime.settled_after"] < periods:
         periods = min(periods, max(_LEAST, int(np.ceil(row["regime.settled_after"])) + _TURNS * order))
     _, strobes = _strobes(values, run, periods)
     if not order:
         return Portrait(regime.name.lower() if regime else "", 0, strobes, _nothing(), 0, ending)
     orbit, points = _orbit(values, run, found.points, order)
     return Portrait(regime.name.lower(), order, strobes, orbit, points, ending)
-
-
-def _scalars(columns: Mapping[str, ArrayLike]) -> dict[str, float]:
-    return {path: float(np.asarray(value)) for path, value in columns.items()}
-
-
-def _kernel(values: Mapping[str, float], run: Run) -> Kernel:
-    return kernel(pendulum_count(values), coefficient_count(values), order_for(run.tolerance), lane_count())
 
 
 def _nothing() -> Trajectory:
@@ -116,7 +102,7 @@ def _strobes(values: Mapping[str, float], run: Run, periods: int) -> tuple[Endin
     n = pendulum_count(values)
     matrix = with_lengths(case_matrix(values, run, 1), np.zeros(1), np.array([float(periods)]), windowed=False)
     kept = min(periods, MAX_STROBES)
-    done = integrate(_kernel(values, run), matrix, run, strobes=kept)
+    done = integrate(kernel_of(values, run.tolerance), matrix, run, strobes=kept)
     ending = ENDING_CODES[int(done.sums[0, OUT_ENDING])]
     # A run that did not end ok has no more than its first strobes.
     rows = in_order(done.strobes, np.array([periods]))[0] if kept else done.strobes[0]
@@ -145,5 +131,5 @@ def _orbit(values: Mapping[str, float], run: Run, points: Floats, order: int) ->
         case_matrix(values, run, 1), points[:, BEGIN], np.array([first + order - begin]), windowed=False
     )
     turn = np.arange(order * each + 1) / each
-    found = integrate(_kernel(values, run), matrix, run, starts=points, times=first + turn)
+    found = integrate(kernel_of(values, run.tolerance), matrix, run, starts=points, times=first + turn)
     return sampled(values, found, turn / values["excitation.frequency"]), each

@@ -27,6 +27,11 @@ class Regime(IntEnum):
         """Description of the regime."""
         return _SENTENCES[self]
 
+    @property
+    def repeats(self) -> bool:
+        """Whether the motion has an orbit, with an order."""
+        return self in (Regime.PERIODIC, Regime.HELD, Regime.COASTING)
+
 
 _SENTENCES = {
     Regime.NONE: "The case did not end ok.",

@@ -13,7 +13,7 @@ from sprag.engine.endings import ENDING_CODES, Ending
 from sprag.engine.run import Run, SettledRun
 from sprag.engine.vibration_drive import newton, orbits
 from sprag.engine.vibration_drive.automaton import Clutch, Shaft
-from sprag.engine.vibration_drive.cases import with_lengths
+from sprag.engine.vibration_drive.cases import Column, with_lengths
 from sprag.engine.vibration_drive.characteristics import characteristics, tied_clutches
 from sprag.engine.vibration_drive.integration import Integration, integrate
 from sprag.engine.vibration_drive.kernel import Kernel
@@ -125,14 +125,19 @@ class Search:
     @property
     def run(self) -> Run:
         """Accuracy and budgets."""
-        own = self.settings
-        return Run(tolerance=own.tolerance, reset=own.reset, max_events_per_period=own.max_events_per_period)
+        return self.settings.run
 
     def units(self, active: Ints) -> Floats:
         """Scales of the strobes' columns."""
         units = np.empty((len(active), self.history.shape[2]))
         orbits.find_units(
-            self.history, active, self.count, self.settings.max_period, self.matrix[active, 0], self.steady_shaft, units
+            self.history,
+            active,
+            self.count,
+            self.settings.max_period,
+            self.matrix[active, Column.NU],
+            self.steady_shaft,
+            units,
         )
         return units
 

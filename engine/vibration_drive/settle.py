@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sprag.engine.endings import ENDING_CODES, Ending
-from sprag.engine.run import MEANS_FROM_PERIODS, Run, SettledRun
-from sprag.engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count
+from sprag.engine.run import MEANS_FROM_PERIODS, SettledRun
+from sprag.engine.vibration_drive.cases import Column, case_matrix, pendulum_count
 from sprag.engine.vibration_drive.irregular import BATCHES, Batches
-from sprag.engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
+from sprag.engine.vibration_drive.kernel import Kernel, kernel_of
 from sprag.engine.vibration_drive.lanes import RUNUP_SHARE
 from sprag.engine.vibration_drive.no_load import limit_of
 from sprag.engine.vibration_drive.orbits import distances, settling_periods
@@ -23,7 +23,6 @@ from sprag.engine.vibration_drive.strobes import SHAFT_SPEED
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_LOAD, _SPEED = 6, 9
 #: Periods before the strobes of a case without an orbit are moved.
 _MOVE_AFTER = 140
 #: Speed in rad/s of a shaft that no pendulum reaches.
@@ -102,13 +101,12 @@ def settle(columns: Mapping[str, ArrayLike], settings: SettledRun, *, cases: int
         If a required parameter is missing or the number of pendulums or coefficients is out of range.
     """
     n = pendulum_count(columns)
-    run = Run(tolerance=settings.tolerance, reset=settings.reset)
-    module = kernel(n, coefficient_count(columns), order_for(settings.tolerance), lane_count())
-    matrix = case_matrix(columns, run, cases)
+    module = kernel_of(columns, settings.tolerance)
+    matrix = case_matrix(columns, settings.run, cases)
     search = Search(module, matrix, settings)
     results = _Results(cases, n, search.starts.shape[1])
     if cases:
-        loaded = matrix[:, _LOAD] > 0.0
+        loaded = matrix[:, Column.LOAD] > 0.0
         _settle(search, np.flatnonzero(loaded), results)
         _unloaded(module, search, np.flatnonzero(~loaded), results)
         results.values[results.endings != _OK] = np.nan
@@ -190,10 +188,10 @@ def _whole_run(search: Search, cases: Ints, results: _Results) -> None:
     """Write what belongs to the whole run from its start: steps, events, run-up."""
     results.put(cases, "run.steps", search.steps[cases])
     results.put(cases, "run.events", search.events[cases])
-    period = search.matrix[cases, 1]
+    period = search.matrix[cases, Column.PERIOD]
     wanted = RUNUP_SHARE * results.values[cases, results.column("shaft.speed.mean")] * period
     runup = _runup(search.turns[cases], wanted)
-    started = search.matrix[cases, _SPEED] == 0.0
+    started = search.matrix[cases, Column.SPEED] == 0.0
     results.put(cases, "runup.time", np.where(started, period * runup, math.nan))
 
 
@@ -217,7 +215,7 @@ def _unloaded(module: Kernel, search: Search, cases: Ints, results: _Results) ->
         return
     results.put(cases, "shaft.speed.from_rest", _speed_from_rest(search, cases))
     free = search.matrix[cases].copy()
-    free[:, _SPEED] = _OUT_OF_REACH
+    free[:, Column.SPEED] = _OUT_OF_REACH
     apart = Search(module, free, search.settings, steady_shaft=True)
     own = _Results(len(cases), module.LAYOUT.n, apart.starts.shape[1])
     _settle(apart, np.arange(len(cases)), own)
@@ -246,13 +244,13 @@ def _steady_shaft(search: Search, case: int, speed: float, results: _Results) ->
     for name in ("shaft.speed.mean", "shaft.speed.max", "shaft.speed.min"):
         results.put(at, name, speed)
     results.put(at, "shaft.irregularity", 0.0 if speed > 0.0 else math.nan)
-    results.put(at, "shaft.turn", speed * order * search.matrix[case, 1])
+    results.put(at, "shaft.turn", speed * order * search.matrix[case, Column.PERIOD])
     results.put(at, "fraction.rotating", 1.0 if speed > 0.0 else 0.0)
     results.put(at, "fraction.held", 0.0 if speed > 0.0 else 1.0)
     results.points[case, SHAFT_SPEED] = speed
-    period = search.matrix[case, 1]
+    period = search.matrix[case, Column.PERIOD]
     rest = results.values[case, results.column("shaft.speed.from_rest")]
-    started = search.matrix[case, _SPEED] == 0.0
+    started = search.matrix[case, Column.SPEED] == 0.0
     runup = _runup(search.turns[at], np.array([RUNUP_SHARE * rest * period]))
     results.put(at, "runup.time", period * runup if started else math.nan)
 

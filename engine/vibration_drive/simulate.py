@@ -12,10 +12,10 @@ from sprag.engine.endings import ENDING_CODES
 from sprag.engine.outcome import Batch, Trajectory
 from sprag.engine.run import Run, SettledRun
 from sprag.engine.vibration_drive.automaton import Clutch, Shaft
-from sprag.engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count
+from sprag.engine.vibration_drive.cases import case_matrix, pendulum_count, scalars
 from sprag.engine.vibration_drive.characteristics import characteristics
 from sprag.engine.vibration_drive.integration import PENDULUM_SAMPLES, SHAFT_SAMPLES, Integration, integrate
-from sprag.engine.vibration_drive.kernel import Kernel, kernel, lane_count, order_for
+from sprag.engine.vibration_drive.kernel import kernel_of, order_for
 from sprag.engine.vibration_drive.lanes import OUT_ENDING
 from sprag.engine.vibration_drive.parameters import PARAMETERS
 
@@ -24,10 +24,6 @@ Floats = NDArray[np.float64]
 #: Names of states in trajectories, by number.
 CLUTCH_NAMES = {int(state): state.name.lower() for state in Clutch}
 SHAFT_NAMES = {int(state): state.name.lower() for state in Shaft}
-
-
-def _kernel(columns: Mapping[str, ArrayLike], run: Run) -> Kernel:
-    return kernel(pendulum_count(columns), coefficient_count(columns), order_for(run.tolerance), lane_count())
 
 
 def simulate(columns: Mapping[str, ArrayLike], run: Run, *, cases: int) -> Batch:
@@ -57,7 +53,7 @@ def simulate(columns: Mapping[str, ArrayLike], run: Run, *, cases: int) -> Batch
     if cases == 0:
         count = len(characteristics_names(pendulum_count(columns)))
         return Batch(np.empty((0, count)), np.empty(0, dtype=np.int8))
-    module, matrix = _kernel(columns, run), case_matrix(columns, run, cases)
+    module, matrix = kernel_of(columns, run.tolerance), case_matrix(columns, run, cases)
     sums = integrate(module, matrix, run).sums
     return Batch(characteristics(module.LAYOUT, matrix, sums), sums[:, OUT_ENDING].astype(np.int8))
 
@@ -109,13 +105,13 @@ def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike) -> 
         If the times are not ascending or not within the run.
     """
     asked = np.ascontiguousarray(times, dtype=np.float64)
-    values = {path: float(np.asarray(value)) for path, value in columns.items()}
+    values = scalars(columns)
     frequency = values["excitation.frequency"]
     end = run.duration.in_periods(frequency) / frequency
     if asked.size and (np.any(np.diff(asked) < 0) or asked[0] < 0 or asked[-1] > end * (1 + 1e-12)):
         raise ValueError(f"times must ascend within 0 .. {end:g} s")
     periods = np.minimum(asked * frequency, run.duration.in_periods(frequency))
-    found = integrate(_kernel(values, run), case_matrix(values, run, 1), run, times=periods)
+    found = integrate(kernel_of(values, run.tolerance), case_matrix(values, run, 1), run, times=periods)
     return sampled(values, found, asked)
 
 

@@ -12,17 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from sprag.engine.endings import ENDING_CODES, Ending
 from sprag.engine.outcome import Batch
 from sprag.engine.run import Run, SettledRun
-from sprag.engine.vibration_drive.cases import (
-    SHAFT_COLUMNS,
-    STOPS,
-    Column,
-    case_matrix,
-    coefficient_count,
-    pendulum_count,
-)
+from sprag.engine.vibration_drive.cases import STOPS, Column, case_matrix, pendulum_count, stop_column
 from sprag.engine.vibration_drive.characteristics import characteristics
 from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import kernel, lane_count, order_for
+from sprag.engine.vibration_drive.kernel import kernel_of
 from sprag.engine.vibration_drive.lanes import OUT_ENDING
 from sprag.engine.vibration_drive.results import result_infos
 from sprag.engine.vibration_drive.search import ROUND, Search
@@ -84,7 +77,7 @@ def simulate_judged(columns: Mapping[str, ArrayLike], run: Run, *, cases: int) -
     if cases == 0:
         return JudgedBatch(simulate(columns, run, cases=0), np.zeros(0, dtype=np.bool_), np.zeros(0))
     n = pendulum_count(columns)
-    module = kernel(n, coefficient_count(columns), order_for(run.tolerance), lane_count())
+    module = kernel_of(columns, run.tolerance)
     matrix = case_matrix(columns, run, cases)
     settings = SettledRun(
         at_most=MOST + ROUND,
@@ -98,7 +91,7 @@ def simulate_judged(columns: Mapping[str, ArrayLike], run: Run, *, cases: int) -
     endings = done.sums[:, OUT_ENDING].astype(np.int8)
     values = characteristics(module.LAYOUT, matrix, done.sums)
     batch = Batch(values, endings)
-    duration = np.sum(matrix[:, SHAFT_COLUMNS + 2 * (STOPS - 1) : SHAFT_COLUMNS + 2 * STOPS], axis=1)
+    duration = np.sum(matrix[:, stop_column(STOPS - 1) : stop_column(STOPS)], axis=1)
     periods = np.floor(duration).astype(np.int64)
     ran = endings == _OK
     search.history[ran] = in_order(done.strobes[ran], periods[ran])
