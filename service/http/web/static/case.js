@@ -1,5 +1,5 @@
-// The motion of a case: drawn by the figures of the server; a closer look is computed anew there. The table of its
-// engagements is taken from the page that has it.
+// The motion of a case: figures from the server, which recomputes a zoomed part. The table of its
+// engagements is loaded from its own page.
 "use strict";
 
 const motion = document.getElementById("motion"), phase = document.getElementById("phase");

@@ -1,15 +1,15 @@
-// The form for a new study: looked over by the server while it is filled in; the sketch shows what a field means.
+// The form for a new study: checked by the server while it is filled in; the sketch explains the current field.
 "use strict";
 
 let form = document.getElementById("study-form");
 let waiting = null, latest = 0;
 const touched = new Set();
-let old = false; // the panel has costs of what was typed before; it is asked for anew when the connection is there again
-let whole = false; // after a look at everything, empty required fields are told of too
+let old = false; // the panel is out of date; it is requested again once the connection is restored
+let whole = false; // after a full check, empty required fields are reported too
 
 const encoded = (extra = []) => new URLSearchParams([...new FormData(form), ...extra]);
 
-// What is typed goes with the button to the login, and comes back from there.
+// The input is sent with the button to the login, and comes back from there.
 const ended = () => {
   old = false;
   document.getElementById("panel").classList.remove("stale");
@@ -32,7 +32,7 @@ const fail = (text) => {
 const check = async () => {
   const mine = ++latest, panel = document.getElementById("panel");
   old = true;
-  panel.classList.add("stale"); // until it is that of what is typed now
+  panel.classList.add("stale"); // until it matches the current input
   let found = null;
   try {
     const answer = await sprag.fetch(form.dataset.check, { method: "POST", body: encoded() });
@@ -65,7 +65,7 @@ const check = async () => {
 
 const soon = () => { clearTimeout(waiting); waiting = setTimeout(check, 300); };
 
-// Another pendulum or axis: the server makes the form anew with what is filled in.
+// Another pendulum or axis: the server rebuilds the form with the current input.
 let reshaping = false;
 const reshape = async (extra) => {
   if (reshaping) return;
@@ -79,7 +79,7 @@ const newShape = async (extra) => {
   let answer = null;
   try {
     answer = await sprag.fetch(form.action, { method: "POST", body: encoded(extra), headers: { Accept: "text/html" } });
-  } catch (error) { return; } // the bar says so; what is typed stays
+  } catch (error) { return; } // the bar reports it; the input is kept
   if (answer.status === 401) { ended(); return; }
   const page = new DOMParser().parseFromString(await answer.text(), "text/html");
   const fresh = page.getElementById("study-form");
@@ -124,7 +124,7 @@ function listen() {
   });
 }
 
-// After a submission that was refused: to the first field at fault, or to the first message where no field is.
+// After a refused submission: go to the first faulty field, or to the first message without a field.
 const refused = form.querySelector("[aria-invalid]") || form.querySelector(".wrong:not(:empty), #panel .fault");
 if (refused) {
   whole = true;

@@ -1,4 +1,4 @@
-// The laboratory: a moved slider or a changed field is answered by the server with picture and numbers.
+// The laboratory: the server answers a moved slider or a changed field with picture and numbers.
 "use strict";
 
 const lab = document.getElementById("lab"), plot = document.getElementById("lab-plot"), answer = document.getElementById("answer");
@@ -16,7 +16,7 @@ const positionOf = (slider, value) => {
   return Math.min(Math.max(1000 * share, 0), 1000);
 };
 
-// One question at a time; what changed meanwhile is asked when the answer is there.
+// One request at a time; later changes are sent when the answer has arrived.
 const ask = async () => {
   if (busy) { again = true; return; }
   busy = true;
@@ -55,7 +55,7 @@ for (const slider of lab.querySelectorAll("input[type=range]")) {
   });
 }
 for (const field of lab.querySelectorAll("[data-further]")) field.addEventListener("input", ask);
-// Another machine is shown as soon as it is chosen: never one beside the name of another.
+// A chosen machine is shown immediately, so that picture and name always match.
 const machines = document.getElementById("machines");
 machines.addEventListener("change", () => machines.submit());
 window.addEventListener("pageshow", (event) => { if (event.persisted) machines.reset(); });

@@ -1,4 +1,4 @@
-// The connection to the service: requests of pages go through here, and a bar says when they are not answered.
+// The connection to the service: requests of pages go through here, and a bar shows when they are not answered.
 "use strict";
 
 const sprag = {};
@@ -8,7 +8,7 @@ sprag.LostError = class extends Error {
 };
 
 (() => {
-  const DELAYS = [1, 2, 5, 10]; // seconds between tries
+  const DELAYS = [1, 2, 5, 10]; // seconds between attempts
   let bar = null, timer = null, tries = 0, leaving = false;
   window.addEventListener("pagehide", () => { leaving = true; });
   window.addEventListener("pageshow", () => { leaving = false; });
@@ -28,7 +28,7 @@ sprag.LostError = class extends Error {
     timer = setTimeout(probe, 1000 * seconds);
   };
 
-  // The service answers again: whoever shows what may be old asks anew.
+  // The service answers again: parts that may be out of date are requested again.
   const found = () => {
     bar.remove();
     bar = null;
@@ -43,7 +43,7 @@ sprag.LostError = class extends Error {
     bar.className = "link-lost";
     bar.setAttribute("role", "alert");
     const text = document.createElement("strong"), rest = document.createElement("span"), button = document.createElement("button");
-    text.textContent = "The connection to the service is lost; what is shown may be old.";
+    text.textContent = "The connection to the service is lost; the page may be out of date.";
     button.type = "button";
     button.textContent = "Try now";
     button.addEventListener("click", probe);
@@ -60,7 +60,7 @@ sprag.LostError = class extends Error {
       sprag.lost();
       throw new sprag.LostError();
     }
-    // What stands before the service speaks for it when it is away; the service itself explains a 503 as JSON.
+    // A proxy answers for a service that is down; the service itself explains a 503 as JSON.
     const explained = (answer.headers.get("Content-Type") || "").includes("json");
     if ([502, 504].includes(answer.status) || (answer.status === 503 && !explained)) {
       sprag.lost();
@@ -73,12 +73,12 @@ sprag.LostError = class extends Error {
 
 sprag.fetchJson = async (address, options) => {
   const answer = await sprag.fetch(address, { headers: { Accept: "application/json" }, ...options });
-  const body = await answer.json().catch(() => ({ detail: "What answers is not Sprag." }));
+  const body = await answer.json().catch(() => ({ detail: "The answer does not come from Sprag." }));
   if (!answer.ok) throw new Error(body.detail || `The service answered with status ${answer.status}.`);
   return body;
 };
 
-// A page as the server makes it now; 422 is a page too, with what is wrong in the choices.
+// The current page from the server; 422 is a page too, with the faults of the choices.
 sprag.page = async (address, options) => {
   const answer = await sprag.fetch(address, { headers: { Accept: "text/html" }, ...options });
   if (answer.redirected && new URL(answer.url).pathname === "/login") {
@@ -90,7 +90,7 @@ sprag.page = async (address, options) => {
   return page;
 };
 
-// Put a part of another page into this one, and the focus back to where it was in it; the part that stands now.
+// Insert a part of another page into this one and restore the focus; returns the current part.
 sprag.take = (page, selector) => {
   const mine = document.querySelector(selector), theirs = page.querySelector(selector);
   if (!mine || !theirs) return mine;

@@ -1,4 +1,4 @@
-// The list of studies, kept as the service has it; what is ticked stays ticked.
+// The list of studies, kept up to date; ticked boxes stay ticked.
 "use strict";
 
 const SECONDS = 5;

@@ -1,4 +1,4 @@
-// Draws every element that has data-figure: the server makes the figure, this gives it the colours of the page.
+// Draws every element with data-figure: the server makes the figure, this script applies the colours of the page.
 "use strict";
 
 // plotly gives some shapes a style attribute, which the policy of the pages refuses; the same as properties is allowed.
@@ -110,7 +110,7 @@ sprag.draw = async (element) => {
     await sprag.show(element, await sprag.fetchJson(address));
     element.classList.remove("stale");
   } catch (error) {
-    if (error instanceof sprag.LostError) { // what is shown is old, until the connection is there again
+    if (error instanceof sprag.LostError) { // the picture is out of date until the connection is restored
       element.classList.add("stale");
       return;
     }

@@ -1,4 +1,4 @@
-// Pages of a study: choices take effect at once, and a study that runs tells how far it is. Every part is the server's own.
+// Pages of a study: choices take effect immediately, and a running study shows its progress. The server makes every part.
 "use strict";
 
 // A form with data-swap: a change shows the new page's part, and puts its address into the window.
@@ -9,7 +9,7 @@ for (const form of document.querySelectorAll("form[data-swap]")) {
     const chosen = new URLSearchParams([...new FormData(form)].filter(([, value]) => value !== ""));
     const address = asked = `${location.pathname}?${chosen}`;
     const old = document.querySelector(form.dataset.swap);
-    old.classList.add("stale"); // it is not what is chosen now
+    old.classList.add("stale"); // it does not match the current choices
     let page = null;
     try {
       page = await sprag.page(address);
@@ -37,7 +37,7 @@ for (const form of document.querySelectorAll("form[data-swap]")) {
   document.addEventListener("sprag:found", () => { if (asked) swap(); });
 }
 
-// A study that runs: each event of its progress brings the page's own words up to date, at most once a second.
+// A running study: each progress event updates the page, at most once a second.
 const running = document.querySelector("[data-events]");
 if (running) {
   const address = running.dataset.events;
@@ -57,7 +57,7 @@ if (running) {
     source = new EventSource(address);
     source.addEventListener("progress", () => { timer = timer || setTimeout(refresh, 700); });
     source.addEventListener("end", () => { ended = true; source.close(); clearTimeout(timer); refresh(); });
-    // A stream ends when the service does, or when something between cuts it: asking tells which.
+    // A stream ends when the service stops or the connection is cut; a request shows which.
     source.addEventListener("error", () => { if (!ended) sprag.fetch("/livez", { cache: "no-store" }).catch(() => {}); });
   };
   document.addEventListener("sprag:found", () => {
