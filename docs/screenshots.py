@@ -77,6 +77,7 @@ def shots(ids: list[str]) -> list[tuple[str, str, tuple[int, int], bool]]:
             DESKTOP,
             True,
         ),
+        ("map-order", f"/studies/{one}/map?x=shaft.load&y=excitation.frequency&z=regime.order", DESKTOP, True),
         ("cases", f"/studies/{one}/cases?sort=-power.useful.mean", DESKTOP, False),
         ("case", f"/studies/{two}/cases/45", DESKTOP, True),
         ("laboratory", "/laboratory?machine=press", (1280, 1000), False),
@@ -109,6 +110,7 @@ def main() -> None:
         browser = playwright.chromium.launch(**options)
         for name, path, (width, height), whole in shots(ids):
             page = browser.new_page(viewport={"width": width, "height": height})
+            page.set_default_timeout(SECONDS * 1e3)
             page.goto(address + path)
             content = take(page, name, whole)
             (folder / f"{name}.png").write_bytes(content)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from dataclasses import dataclass
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sqlalchemy as sa
+from cachetools import LRUCache
 
 from sprag.service.storage.order import Orders
 from sprag.service.storage.part import MAX_INTEGER
@@ -23,10 +25,15 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from sprag.service.storage.session import Session
+    from sprag.worker.ports import Clock
+
 #: Most cases listed in one statement.
 CASES_AT_ONCE = 5_000
 #: Rows of one block of a stream.
 BLOCK_ROWS = 2_000
+#: Studies whose counts of regimes and flags are kept.
+_MOST_COUNTED = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +49,11 @@ class _Rows:
 
 class Cases(Orders):
     """Rows of finished cases, and the cases that a cancelled study never ran, which have no rows in the database."""
+
+    def __init__(self, session: Session, clock: Clock) -> None:
+        super().__init__(session, clock)
+        self._counted: LRUCache[tuple[str, int], Kinds] = LRUCache(_MOST_COUNTED)
+        self._counting = Lock()
 
     def _rows(self, connection: sa.Connection, study_id: str) -> _Rows:
         c = STUDIES.c
@@ -85,20 +97,20 @@ class Cases(Orders):
         return _block(rows.infos, found)
 
     def kinds(self, study_id: str) -> Kinds:
-        """Numbers of finished cases by regime and by flag; raises StudyNotFound."""
+        """How many finished cases have which regime and which flag; raises StudyNotFound.
+
+        Counting reads every row of the study, so that the counts of a revision, with which its rows change, are kept.
+        """
         with self.session.read() as connection:
-            rows = self._rows(connection, study_id)
-            info, c = regime_info(rows.infos), rows.table.c
-            keys = [c.flags] if info is None else [c.flags, c[info.column]]
-            query = sa.select(sa.func.count(), *keys).where(c.study == rows.number).group_by(*keys)
-            found = connection.execute(query).all()
-        regimes, flags = Counter[str](), Counter[str]()
-        for cases, joined, *code in found:
-            flags.update(dict.fromkeys(filter(None, joined.split(",")), cases))
-            if info is not None and code[0] is not None:
-                regimes[info.categories[code[0]]] += cases
-        order = {} if info is None else {name: place for place, name in enumerate(info.categories)}
-        return Kinds(_by_frequency(regimes, order), _by_frequency(flags, {}))
+            revision = self._row(connection, study_id, STUDIES.c.revision).revision
+            with self._counting:
+                kept = self._counted.get((study_id, revision))
+            if kept is not None:
+                return kept
+            kinds = _count_kinds(connection, self._rows(connection, study_id))
+        with self._counting:
+            self._counted[study_id, revision] = kinds
+        return kinds
 
     def cases_of_kind(self, study_id: str, regime: str | None = None, flag: str | None = None) -> NDArray[np.int64]:
         """Numbers of the cases of a regime or with a flag, ascending; raises StudyNotFound."""
@@ -206,6 +218,19 @@ def _read(
             return []
         query, limit = query.where(c.ending == ending), min(limit, ended)
     return connection.execute(query.order_by(c.case_number).limit(limit)).all()
+
+
+def _count_kinds(connection: sa.Connection, rows: _Rows) -> Kinds:
+    info, c = regime_info(rows.infos), rows.table.c
+    keys = [c.flags] if info is None else [c.flags, c[info.column]]
+    found = connection.execute(sa.select(sa.func.count(), *keys).where(c.study == rows.number).group_by(*keys)).all()
+    regimes, flags = Counter[str](), Counter[str]()
+    for cases, joined, *code in found:
+        flags.update(dict.fromkeys(filter(None, joined.split(",")), cases))
+        if info is not None and code[0] is not None:
+            regimes[info.categories[code[0]]] += cases
+    order = {} if info is None else {name: place for place, name in enumerate(info.categories)}
+    return Kinds(_by_frequency(regimes, order), _by_frequency(flags, {}))
 
 
 def _of_kind(rows: _Rows, regime: str | None, flag: str | None) -> list[sa.ColumnElement[bool]] | None:

@@ -181,6 +181,24 @@ def test_a_study_tells_how_many_cases_have_which_regime(service: Service, study_
     assert "Settled motions" not in service.http.get(f"/studies/{timed}").text
 
 
+def test_kinds_are_counted_once_for_each_revision(service: Service, study_id: str) -> None:
+    counted = service.store.kinds(study_id)
+    assert service.store.kinds(study_id) is counted
+    record, epoch = service.store.get_study(study_id), service.store.take_over("again")
+    service.store.retry_study(study_id)
+    assert service.store.get_study(study_id).revision > record.revision
+    chunks = service.store.claim(epoch, service.store.open_chunks(record.number))
+    assert chunks
+    whole = rows_of(service.store.study(study_id))
+    column = [info.name for info in models.study_results(service.store.study(study_id))].index("regime")
+    whole.values[2, column] = Regime.HELD
+    for chunk in chunks:
+        part = slice(chunk.first, chunk.first + chunk.count)
+        result = ChunkResult(chunk.first, ["ok"] * chunk.count, whole.flags[part], whole.values[part])
+        assert service.store.commit(epoch, chunk, result)
+    assert service.store.kinds(study_id).regimes.get("held") == 1
+
+
 def test_cases_are_filtered_by_regime(service: Service, study_id: str) -> None:
     cases = f"/studies/{study_id}/cases"
     assert [case["case"] for case in service.get(cases, regime="irregular")["cases"]] == [1]
