@@ -13,15 +13,13 @@ from sprag.engine.taylor.straight import same_everywhere
 from sprag.engine.vibration_drive.cases import STOPS, stop_column
 from sprag.engine.vibration_drive.characteristics import sum_columns
 from sprag.engine.vibration_drive.kernel import Kernel
+from sprag.engine.vibration_drive.layout import pendulum_samples
 from sprag.engine.vibration_drive.pieces import piece_width
 from sprag.engine.vibration_drive.states import LANE_INTEGERS
 from sprag.engine.vibration_drive.strobes import from_rest, width
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-#: Numbers sampled for the shaft and for each pendulum by ``window.sample``.
-SHAFT_SAMPLES, PENDULUM_SAMPLES = 4, 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +73,7 @@ def integrate(
     sums = np.full((cases, sum_columns(lay)), np.nan) if before is None else before.copy()
     recorded = np.full((cases, strobes, width(n)), np.nan)
     end = matrix[:, stop_column(STOPS - 1)]
-    samples = np.empty((len(asked), SHAFT_SAMPLES + n * PENDULUM_SAMPLES))
+    samples = np.empty((len(asked), pendulum_samples(n).start))
     states = np.zeros((len(asked), 1 + n), dtype=np.int64)
     steps = np.full((pieces, piece_width(lay)), np.nan)
     # Guards (7 a pendulum and shaft at most) and extrema (13) that all lanes together can list in a step.

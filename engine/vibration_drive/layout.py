@@ -4,9 +4,36 @@ The workspace is one flat float64 array; quantity ``row`` of lane ``lane`` is at
 pendulum i start at ``pendulums + i * stride``; fields that begin with ``p_`` are offsets into that block.
 """
 
+from enum import IntEnum
 from typing import NamedTuple, cast
 
 import numpy as np
+
+
+class ShaftSample(IntEnum):
+    """Columns of a sample that are the shaft's; those of each pendulum follow."""
+
+    TURN = 0
+    SPEED = 1
+    ACCELERATION = 2
+    TORQUE = 3
+
+
+class PendulumSample(IntEnum):
+    """Columns of one pendulum in a sample; ``DRIVE`` is the acceleration of the base as it drives the pendulum."""
+
+    ANGLE = 0
+    SPEED = 1
+    ACCELERATION = 2
+    TORQUE = 3
+    WINDUP = 4
+    DRIVE = 5
+
+
+def pendulum_samples(i: int) -> slice:
+    """The columns of pendulum ``i`` in a sample."""
+    first = len(ShaftSample) + i * len(PendulumSample)
+    return slice(first, first + len(PendulumSample))
 
 
 class Layout(NamedTuple):

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine.vibration_drive.cases import Column, PendulumColumn, pendulum_column, with_lengths
-from sprag.engine.vibration_drive.integration import PENDULUM_SAMPLES, SHAFT_SAMPLES, integrate
-from sprag.engine.vibration_drive.layout import Layout
+from sprag.engine.vibration_drive.integration import integrate
+from sprag.engine.vibration_drive.layout import Layout, PendulumSample, pendulum_samples
 from sprag.engine.vibration_drive.search import Search
 from sprag.engine.vibration_drive.strobes import BEGIN
 
@@ -137,8 +137,9 @@ def limit_of(search: Search, case: int, point: Floats, order: int) -> float:
     times = places[: done.recorded] * search.matrix[case, Column.PERIOD]
     best = math.nan
     for i in range(search.kernel.LAYOUT.n):
-        column = SHAFT_SAMPLES + PENDULUM_SAMPLES * i
-        angle, speed, acceleration = done.samples[: done.recorded, column : column + 3].T
+        block = done.samples[: done.recorded, pendulum_samples(i)]
+        wanted = (PendulumSample.ANGLE, PendulumSample.SPEED, PendulumSample.ACCELERATION)
+        angle, speed, acceleration = (block[:, column] for column in wanted)
         speed_limit = limit_speed(times, angle, speed, acceleration, backlash(search.kernel.LAYOUT, matrix, i))
         best = float(np.fmax(best, speed_limit))
     return best

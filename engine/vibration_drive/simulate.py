@@ -14,9 +14,10 @@ from sprag.engine.run import Run, SettledRun
 from sprag.engine.vibration_drive.automaton import Clutch, Shaft
 from sprag.engine.vibration_drive.cases import case_matrix, pendulum_count, scalars
 from sprag.engine.vibration_drive.characteristics import characteristics
-from sprag.engine.vibration_drive.integration import PENDULUM_SAMPLES, SHAFT_SAMPLES, Integration, integrate
+from sprag.engine.vibration_drive.integration import Integration, integrate
 from sprag.engine.vibration_drive.kernel import kernel_of, order_for
 from sprag.engine.vibration_drive.lanes import OUT_ENDING
+from sprag.engine.vibration_drive.layout import PendulumSample, ShaftSample, pendulum_samples
 from sprag.engine.vibration_drive.parameters import PARAMETERS
 
 Floats = NDArray[np.float64]
@@ -138,7 +139,7 @@ def sampled(values: Mapping[str, float], found: Integration, times: Floats) -> T
         "base.displacement_x": value["excitation.amplitude_x"] * np.cos(nu * times_done),
         "base.displacement_y": value["excitation.amplitude_y"] * np.sin(nu * times_done + value["excitation.phase"]),
     }
-    for column, name in enumerate(("shaft.angle", "shaft.speed", "shaft.acceleration", "torque")):
+    for column, name in zip(ShaftSample, ("shaft.angle", "shaft.speed", "shaft.acceleration", "torque"), strict=True):
         out[name] = samples[:, column]
     if value["shaft.load"] > 0.0:
         # As for the minimum in ``characteristics``: only rounding errors can turn back a loaded shaft.
@@ -146,15 +147,16 @@ def sampled(values: Mapping[str, float], found: Integration, times: Floats) -> T
     out["power.useful"] = value["shaft.load"] * out["shaft.speed"]
     out["power.clutch"] = out["torque"] * out["shaft.speed"]
     for i in range(n):
-        block = samples[:, SHAFT_SAMPLES + PENDULUM_SAMPLES * i :]
-        for column, name in enumerate(("angle", "speed", "acceleration", "torque")):
-            out[f"pendulums.{i}.{name}"] = block[:, column]
+        block = samples[:, pendulum_samples(i)]
+        speed = block[:, PendulumSample.SPEED]
+        for name in ("angle", "speed", "acceleration", "torque"):
+            out[f"pendulums.{i}.{name}"] = block[:, PendulumSample[name.upper()]]
         engaged = states[:, 1 + i] >= Clutch.ENGAGED
-        out[f"pendulums.{i}.windup"] = np.where(engaged, block[:, 4], 0.0)
+        out[f"pendulums.{i}.windup"] = np.where(engaged, block[:, PendulumSample.WINDUP], 0.0)
         moment = value[f"pendulums.{i}.mass"] * value[f"pendulums.{i}.arm"]
         damping = values.get(f"pendulums.{i}.damping", 0.0)
-        out[f"pendulums.{i}.power.input"] = moment * block[:, 5] * block[:, 1]
-        out[f"pendulums.{i}.power.loss"] = damping * block[:, 1] ** 2
+        out[f"pendulums.{i}.power.input"] = moment * block[:, PendulumSample.DRIVE] * speed
+        out[f"pendulums.{i}.power.loss"] = damping * speed**2
     out["power.input"] = sum((out[f"pendulums.{i}.power.input"] for i in range(n)), np.zeros(done))
     out["power.loss"] = sum((out[f"pendulums.{i}.power.loss"] for i in range(n)), np.zeros(done))
     named = {"shaft": [SHAFT_NAMES[int(s)] for s in states[:, 0]]}

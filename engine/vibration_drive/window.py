@@ -8,13 +8,16 @@ from sprag.engine.taylor.batch import HARD, KNOWN, RESULT, SLOTS, STATUS, slot_s
 from sprag.engine.taylor.elementary import cosine
 from sprag.engine.taylor.roots import RECIPROCAL, evaluate, largest
 from sprag.engine.vibration_drive.automaton import Clutch
-from sprag.engine.vibration_drive.layout import Layout
+from sprag.engine.vibration_drive.layout import Layout, PendulumSample, ShaftSample
 from sprag.engine.vibration_drive.states import NEVER, stored_energy, total
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _ENGAGED, _BEYOND = int(Clutch.ENGAGED), int(Clutch.BEYOND)
+_SHAFT_SAMPLES, _PENDULUM_SAMPLES = len(ShaftSample), len(PendulumSample)
+_TURN, _SHAFT_SPEED, _SHAFT_ACCELERATION, _SHAFT_TORQUE = map(int, ShaftSample)
+_ANGLE, _SPEED, _ACCELERATION, _TORQUE, _WINDUP, _DRIVE = map(int, PendulumSample)
 
 
 @inlined
@@ -198,33 +201,33 @@ def energy(W: Floats, Z: Ints, lay: Layout, lane: int) -> float:
 def sample(W: Floats, Z: Ints, lay: Layout, lane: int, x: float, g: Floats, out: Floats, states: Ints) -> None:
     """Write every variable at the fraction ``x`` of the step into ``out``.
 
-    Columns: shaft turn, speed, acceleration, total torque; then per pendulum angle, speed, acceleration, clutch torque,
-    windup, acceleration of the base as it drives the pendulum. ``states`` gets the shaft's state and the clutches'.
+    Columns: ``ShaftSample``, then ``PendulumSample`` of each pendulum. ``states`` gets the shaft's state and the
+    clutches'.
     """
     lanes = lay.lanes
     primitive(W, lay, lane, W[lay.turn * lanes + lane], lay.speed, -1, g)
-    out[0] = evaluate(g, lay.order, x)
+    out[_TURN] = evaluate(g, lay.order, x)
     series(W, lay, lane, lay.speed, g)
-    out[1] = evaluate(g, lay.order, x)
+    out[_SHAFT_SPEED] = evaluate(g, lay.order, x)
     rate(W, lay, lane, lay.speed, g)
-    out[2] = evaluate(g, lay.order, x)
+    out[_SHAFT_ACCELERATION] = evaluate(g, lay.order, x)
     total(W, lay, lane, g)
-    out[3] = evaluate(g, lay.order, x)
+    out[_SHAFT_TORQUE] = evaluate(g, lay.order, x)
     states[0] = int(W[lay.rotating * lanes + lane])
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
         speed = base + lay.p_speed
-        column = 4 + 6 * i
+        column = _SHAFT_SAMPLES + _PENDULUM_SAMPLES * i
         primitive(W, lay, lane, W[(base + lay.p_phi) * lanes + lane], speed, -1, g)
-        out[column] = evaluate(g, lay.order, x)
+        out[column + _ANGLE] = evaluate(g, lay.order, x)
         series(W, lay, lane, speed, g)
-        out[column + 1] = evaluate(g, lay.order, x)
+        out[column + _SPEED] = evaluate(g, lay.order, x)
         rate(W, lay, lane, speed, g)
-        out[column + 2] = evaluate(g, lay.order, x)
+        out[column + _ACCELERATION] = evaluate(g, lay.order, x)
         series(W, lay, lane, base + lay.p_torque, g)
-        out[column + 3] = evaluate(g, lay.order, x)
+        out[column + _TORQUE] = evaluate(g, lay.order, x)
         primitive(W, lay, lane, W[(base + lay.p_u) * lanes + lane], speed, lay.speed, g)
-        out[column + 4] = evaluate(g, lay.order, x)
+        out[column + _WINDUP] = evaluate(g, lay.order, x)
         series(W, lay, lane, base + lay.p_drive, g)
-        out[column + 5] = evaluate(g, lay.order - 1, x)
+        out[column + _DRIVE] = evaluate(g, lay.order - 1, x)
         states[1 + i] = Z[lane, i]
