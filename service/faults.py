@@ -1,12 +1,12 @@
 """Faults of input: their place, the given value, what is allowed, and a stable code.
 
-Wording may change; programs and tests rely on the codes, which ``docs/faults.md`` lists.
+Wording may change; programs and tests rely on the codes, which ``docs/faults.md`` explains.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -61,51 +61,6 @@ Code = Literal[
     "wrong-type",
     "wrong-unit",
 ]
-CODES: Final[dict[Code, str]] = {
-    "cannot-assemble": "The mechanism cannot be assembled at some angle.",
-    "conflict": "Fields contradict each other.",
-    "empty": "Nothing is left, or nothing was given, where there must be something.",
-    "exactly-one": "Exactly one of several fields must be given.",
-    "inertia-insufficient": "The shaft would stop, or nearly stop, within the cycle.",
-    "invalid-choice": "The value is not one of the choices.",
-    "invalid-formula": "The formula cannot be read, or its value is not a number.",
-    "invalid-machine": "The named parts do not form a machine, or a name in its formulas is invalid.",
-    "invalid-path": "The path does not name a number that can vary.",
-    "invalid-range": "The ends, the step or the count of a range contradict each other.",
-    "invalid-table": "A table is too short, not ascending, or not closed over the cycle.",
-    "invalid-text": "The text does not have the required form.",
-    "invalid-time": "The text is not a time, or the time never occurs.",
-    "missing-unit": "A text needs a unit.",
-    "motor-overrun": "The load drives the shaft harder than the motor can brake it.",
-    "motor-stalled": "The load stalls the motor.",
-    "near-singular": "The mechanism passes too close to a singular position.",
-    "negative-inertia": "The reduced inertia is not positive at every angle.",
-    "no-clutch-law": "The coefficients are not a clutch law, or no law fits the measured data.",
-    "not-a-grid": "The axes vary together, and a grid is required.",
-    "not-a-number": "The text does not begin with a number.",
-    "not-an-axis": "The path is not an axis of the study.",
-    "not-finite": "The number is not finite.",
-    "not-fixed": "An axis needs one value and has none.",
-    "not-numeric": "The result is a category, and a number is required.",
-    "not-used": "The field has no effect here and is therefore refused.",
-    "nothing-varies": "The study has one case only, or no axis.",
-    "out-of-range": "The value is outside the allowed range.",
-    "quadrature-not-reached": "Torque or inertia is too rough to be integrated to the required accuracy.",
-    "repeated": "The same field, value or case is given more than once.",
-    "required": "A required field is missing.",
-    "too-long": "The text is too long.",
-    "too-many": "There are more values, cases or parameters than allowed.",
-    "too-many-faults": "There are more faults than are listed.",
-    "unbalanced-work": "Drive and resistance do not do opposite work over the cycle.",
-    "unequal-lengths": "Lists that go together have different lengths.",
-    "unknown-field": "There is no field or parameter of this name.",
-    "unknown-name": "There is no item of this name or number.",
-    "unknown-value": "The axis does not have this value.",
-    "unreadable": "The document cannot be read: its size, encoding or syntax.",
-    "unsupported-version": "This version of the spec is not supported.",
-    "wrong-type": "The value has the wrong type: an object, a list, a text, a number or true or false is required.",
-    "wrong-unit": "The unit cannot be read, or it is a unit of another quantity.",
-}
 
 #: Kinds of failures as a whole; over HTTP the last part of a problem's type.
 Kind = Literal[
@@ -159,28 +114,6 @@ Kind = Literal[
     "write-failed",
     "wrong-revision",
 ]
-#: Kinds that only commands and the Python client report; `sprag.service.http.problems` explains the others.
-LOCAL_KINDS: Final[dict[Kind, str]] = {
-    "database-busy": "Another process locked the database for too long.",
-    "database-damaged": "The database is damaged.",
-    "database-forbidden": "The user lacks the rights for this in the database.",
-    "database-read-only": "The database, or its folder, is read-only.",
-    "database-replaced": "The file of the database was deleted, moved or replaced while it was in use.",
-    "database-unreachable": "The database cannot be reached or opened.",
-    "file-exists": "The file exists already and is not replaced.",
-    "invalid-data": "The measured data cannot be read, or no clutch law fits them.",
-    "invalid-database-url": "The URL does not name a database.",
-    "invalid-file": "The file cannot be read.",
-    "invalid-settings": "A setting is not valid.",
-    "missing-extra": "A package is not installed; the message names the extra that installs it.",
-    "not-a-database": "The file or database is not one of Sprag.",
-    "not-done": "The study was not finished.",
-    "token-not-found": "There is no such token.",
-    "unreachable": "No service answered at this address.",
-    "unsupported-database": "This kind, version or place of a database is not supported.",
-    "write-failed": "The output cannot be written.",
-    "wrong-revision": "The database has another revision than this program; the message names the command to run.",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +125,7 @@ class Fault:
     where : str or None JSON Pointer (RFC 6901) to the field, "" for the whole document; for a file a line, for a
         command an option.
     code : str
-        One of `CODES`.
+        One of `Code`.
     message : str Description of the fault, without the value.
     value : object
         The value received, shortened, always plain JSON data.

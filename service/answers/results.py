@@ -44,16 +44,21 @@ class ValueAxis(TypedDict):
     unit: str
 
 
-class Trajectory(TypedDict):
+class TimedValues(TypedDict):
+    """Values of one case at some times."""
+
+    times: Annotated[list[float], Doc("s, from the start of the run")]
+    variables: Annotated[dict[str, dict[str, str]], Doc("unit of each variable")]
+    values: Annotated[dict[str, list[Number]], Doc("values at the times, by variable")]
+    states: Annotated[dict[str, list[str]], Doc("states of shaft and clutches at the times")]
+
+
+class Trajectory(TimedValues):
     """Instantaneous values of one case."""
 
     case: int
     parameters: dict[str, float]
     axis: Annotated[ValueAxis, Doc("what the values stand over")]
-    times: Annotated[list[float], Doc("s, from the start of the run")]
-    variables: Annotated[dict[str, dict[str, str]], Doc("unit of each variable")]
-    values: Annotated[dict[str, list[Number]], Doc("values at the times, by variable")]
-    states: Annotated[dict[str, list[str]], Doc("states of shaft and clutches at the times")]
     ending: str
 
 
@@ -222,15 +227,6 @@ class EngagementTables(TypedDict):
     engagements: list[EngagementRow]
     periods: Annotated[list[PeriodRow], Doc("whole excitation periods")]
     ending: str
-
-
-class TimedValues(TypedDict):
-    """Values of one case at some times."""
-
-    times: Annotated[list[float], Doc("s")]
-    variables: Annotated[dict[str, dict[str, str]], Doc("unit of each variable")]
-    values: Annotated[dict[str, list[Number]], Doc("values at the times, by variable")]
-    states: Annotated[dict[str, list[str]], Doc("states of shaft and clutches at the times")]
 
 
 class Portrait(TypedDict):

@@ -81,21 +81,3 @@ WaitTimeout = Annotated[
         help="Longest time to wait, then exit code 3; default: no limit.",
     ),
 ]
-
-__all__ = [
-    "DEFAULT_SERVER",
-    "ChunkCases",
-    "Database",
-    "FinishBy",
-    "Fresh",
-    "JsonFlag",
-    "OutputFile",
-    "PointsFile",
-    "Processes",
-    "Server",
-    "SpecFile",
-    "StudyId",
-    "Token",
-    "Wait",
-    "WaitTimeout",
-]

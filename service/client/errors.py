@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import Any, cast, get_args
 
-from sprag.service.faults import CODES, Code, Fault, FaultError, Kind, ParameterFault
+from sprag.service.faults import Code, Fault, FaultError, Kind, ParameterFault
 
 
 class ServiceError(FaultError):
@@ -58,7 +58,7 @@ class RefusedError(ServiceError):
 
 def _fault(error: Mapping[str, Any]) -> Fault:
     """A fault from the service's answer; a code unknown to this version becomes "invalid-text"."""
-    code = cast("Code", error["code"] if error.get("code") in CODES else "invalid-text")
+    code = cast("Code", error["code"] if error.get("code") in get_args(Code) else "invalid-text")
     made = ParameterFault if error.get("parameter") is not None else Fault
     where = error.get("parameter", error.get("pointer"))
     told = (str(error.get("message", "is wrong")), error.get("value"), error.get("allowed"), error.get("unit"))

@@ -85,7 +85,7 @@ def new_study(
 ) -> Submission:
     """The study of the spec in a request's body; raises SpecError."""
     parsed, store = parse_spec(load_spec(content, form)), library.store
-    return submission(parsed, store.chunking, store.reusable, now, fresh, finish, given)
+    return submission(parsed, store, now, fresh, finish, given)
 
 
 def extended_study(
@@ -100,7 +100,7 @@ def extended_study(
     """A study extended by the body of a request; raises SpecError and StudyNotFound."""
     store = library.store
     parsed = parse_extended(store.spec(study_id), store.study(study_id), load_spec(content, form))
-    return submission(parsed, store.chunking, store.reusable, now, finish_by=finish, given=given)
+    return submission(parsed, store, now, finish_by=finish, given=given)
 
 
 def longer_study(
@@ -119,7 +119,7 @@ def longer_study(
     named = {"regime" if models.is_settled(store.study(study_id).run) else "flag": kind}
     cases = store.cases_of_kind(study_id, **named)
     parsed = parse_spec(longer_spec(store.spec(study_id), store.study(study_id), cases, at_most))
-    return submission(parsed, store.chunking, store.reusable, now, given=given)
+    return submission(parsed, store, now, given=given)
 
 
 def clutch_fit(content: bytes, form: Format) -> bytes:

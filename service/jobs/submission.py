@@ -15,14 +15,12 @@ from sprag.service.storage.studies import study_row
 from sprag.worker.limits import MAX_WAITING_STUDIES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
     from datetime import datetime
 
     from sprag.service.spec.document import ParsedSpec
     from sprag.service.storage.records import StudyRecord
     from sprag.service.storage.store import Store
-    from sprag.worker.chunking import Chunking
-    from sprag.worker.study import Study
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,26 +52,25 @@ def hash_of(asked: object) -> str:
 
 def submission(
     parsed: ParsedSpec,
-    chunking: Chunking,
-    reusable: Callable[[Study], int],
+    store: Store,
     now: datetime,
     fresh: bool = False,
     finish_by: datetime | None = None,
     given: Mapping[str, object] | None = None,
 ) -> Submission:
-    """The submission of ``parsed`` with all its warnings; ``reusable`` counts the cases of a study that can be reused.
+    """The submission of ``parsed`` to ``store``, with all its warnings.
 
     An idempotency key stands for one spec with one set of ``given`` parameters, as the client wrote them, because a
     deadline "8 h" is a different time in each request.
     """
     asked = [parsed.spec, dict(given)] if given else parsed.spec
-    warnings = (*parsed.warnings, *chunking.warnings(parsed.study))
+    warnings = (*parsed.warnings, *store.chunking.warnings(parsed.study))
     if finish_by is not None:
-        to_run = parsed.study.cases - (0 if fresh else reusable(parsed.study))
-        seconds = estimated_seconds(parsed.study, chunking, to_run)
+        to_run = parsed.study.cases - (0 if fresh else store.reusable(parsed.study))
+        seconds = estimated_seconds(parsed.study, store.chunking, to_run)
         warnings += finish_warnings(parsed.study, seconds, (finish_by - now).total_seconds())
     return Submission(
-        study_row(parsed.spec, parsed.study, chunking, warnings),
+        study_row(parsed.spec, parsed.study, store.chunking, warnings),
         hash_of(asked),
         estimated_bytes(parsed.study),
         fresh,
@@ -94,7 +91,7 @@ def accept(
 
     ``given`` as for `submission`.
     """
-    made = submission(parsed, store.chunking, store.reusable, store.clock.now(), fresh, finish_by, given)
+    made = submission(parsed, store, store.clock.now(), fresh, finish_by, given)
     return take_in(store, made, idempotency_key, priority)
 
 

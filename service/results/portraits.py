@@ -5,15 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, Literal
 
 from sprag.service.answers.results import Portrait as PortraitData
-from sprag.service.answers.results import TimedValues
 from sprag.service.faults import FaultError
-from sprag.service.json_text import numbers, to_bytes
-from sprag.service.results.trajectories import trajectory_csv
+from sprag.service.json_text import to_bytes
+from sprag.service.results.trajectories import timed_values, trajectory_csv
 from sprag.worker import models
 
 if TYPE_CHECKING:
     from sprag.service.results.exports import Format
-    from sprag.worker.models import Portrait, Trajectory
+    from sprag.worker.models import Portrait
     from sprag.worker.study import Study
 
 Table = Literal["strobes", "orbit"]
@@ -42,16 +41,7 @@ def portrait_json(made: Portrait, case: int, parameters: dict[str, float]) -> Po
         "parameters": parameters,
         "regime": made.regime or None,
         "order": made.order or None,
-        "strobes": _values(made.strobes),
-        "orbit": _values(made.orbit) if made.orbit.times.size else None,
+        "strobes": timed_values(made.strobes),
+        "orbit": timed_values(made.orbit) if made.orbit.times.size else None,
         "ending": made.ending,
-    }
-
-
-def _values(made: Trajectory) -> TimedValues:
-    return {
-        "times": made.times.tolist(),
-        "variables": {name: {"unit": unit} for name, unit in zip(made.names, made.units, strict=True)},
-        "values": {name: numbers(made.values[:, column]) for column, name in enumerate(made.names)},
-        "states": {name: list(states) for name, states in made.states.items()},
     }

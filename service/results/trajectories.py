@@ -12,7 +12,7 @@ from sprag.service.spec.units import PERIOD_NAMES, QuantityError, parse_quantity
 from sprag.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.answers.results import AngleTable
+    from sprag.service.answers.results import AngleTable, TimedValues, ValueAxis
     from sprag.service.answers.results import Trajectory as TrajectoryData
     from sprag.service.results.exports import Format
     from sprag.worker.models import Extent, Trajectory
@@ -63,28 +63,29 @@ def trajectory_file(study: Study, case: int, start: float, end: float, points: i
 
 def trajectory_json(made: Trajectory, case: int, parameters: dict[str, float]) -> AngleTable | TrajectoryData:
     """The values as JSON data; ``parameters`` are the axis parameters of the case, SI."""
-    variables = {name: {"unit": unit} for name, unit in zip(made.names, made.units, strict=True)}
-    values = {name: numbers(made.values[:, column]) for column, name in enumerate(made.names)}
-    if made.along == "angle":
-        return {
-            "case": case,
-            "parameters": parameters,
-            "axis": {"name": "angles", "unit": "rad"},
-            "angles": made.times.tolist(),
-            "variables": variables,
-            "values": values,
-            "phi_c": list(made.phi_c),
-            "ending": made.ending,
-        }
+    values = timed_values(made)
+    if made.along == "time":
+        axis: ValueAxis = {"name": "times", "unit": "s"}
+        return {"case": case, "parameters": parameters, "axis": axis, **values, "ending": made.ending}
     return {
         "case": case,
         "parameters": parameters,
-        "axis": {"name": "times", "unit": "s"},
-        "times": made.times.tolist(),
-        "variables": variables,
-        "values": values,
-        "states": {name: list(states) for name, states in made.states.items()},
+        "axis": {"name": "angles", "unit": "rad"},
+        "angles": values["times"],
+        "variables": values["variables"],
+        "values": values["values"],
+        "phi_c": list(made.phi_c),
         "ending": made.ending,
+    }
+
+
+def timed_values(made: Trajectory) -> TimedValues:
+    """Every variable and state at the times, or angles."""
+    return {
+        "times": made.times.tolist(),
+        "variables": {name: {"unit": unit} for name, unit in zip(made.names, made.units, strict=True)},
+        "values": {name: numbers(made.values[:, column]) for column, name in enumerate(made.names)},
+        "states": {name: list(states) for name, states in made.states.items()},
     }
 
 

@@ -8,8 +8,9 @@ from zoneinfo import ZoneInfo
 
 from sprag.service.schedules.deadline import ALLOWED_OF_RUNS, FinishError, check_run_finish, run_finish_at
 from sprag.service.schedules.times import Timing, TimingError, Window, check_cron, read_moment, read_time_of_day, zones
+from sprag.service.spec.described import Described, named
 from sprag.service.spec.document import parse_spec
-from sprag.service.spec.fields import read_flag, read_object, read_whole
+from sprag.service.spec.fields import read_object
 from sprag.service.spec.report import Report, SpecError, did_you_mean
 from sprag.worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
 
@@ -17,7 +18,12 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from datetime import datetime
 
-FIELDS: Final = ("name", "spec", "cron", "at", "zone", "window", "priority", "fresh", "finish_by", "enabled")
+PLAIN: Final = named(
+    Described("priority", "", "priority of its studies", "whole", -MAX_PRIORITY, MAX_PRIORITY, 0),
+    Described("fresh", "", "run every case, including those that other studies already have", "flag", default=False),
+    Described("enabled", "", "whether it is due at all", "flag", default=True),
+)
+FIELDS: Final = ("name", "spec", "cron", "at", "zone", "window", "finish_by", *PLAIN)
 _CRON_ALLOWED: Final = 'five fields, such as "0 22 * * 1-5": at 22:00 from Monday to Friday'
 _AT_ALLOWED: Final = 'a future time, such as "2027-01-31T22:00"'
 _WINDOW_ALLOWED: Final = 'two different times of day, such as ["22:00", "06:00"]'
@@ -95,15 +101,13 @@ def _read(data: object, now: datetime, old: ScheduleFields | None = None) -> Sch
     zone = _read_zone(report, found.get("zone", "UTC"))
     timing = _read_timing(report, found, zone, now, old)
     window = _read_window(report, found.get("window"), zone)
-    priority = read_whole(report, "/priority", found.get("priority", 0), -MAX_PRIORITY, MAX_PRIORITY)
-    fresh = read_flag(report, "/fresh", found.get("fresh", False))
+    priority, fresh, enabled = (field.read(report, "", found) for field in PLAIN.values())
     finish_by = _read_finish(report, found.get("finish_by"))
-    enabled = read_flag(report, "/enabled", found.get("enabled", True))
     title, spec = _read_spec(report, found, old)
     name = _read_name(report, found.get("name"), title)
     report.raise_if_any()
     assert timing is not None
-    fields = ScheduleFields(name, spec, timing, window, priority or 0, bool(fresh), bool(enabled), finish_by)
+    fields = ScheduleFields(name, spec, timing, window, priority, fresh, enabled, finish_by)
     if old is None or fields.times != old.times:
         _require_open_window(report, fields, now)
         report.raise_if_any()

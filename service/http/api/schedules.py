@@ -22,10 +22,11 @@ from sprag.service.http.schedule_views import detail, schedule_address, summary
 from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
 from sprag.service.jobs import checks
 from sprag.service.schedules.deadline import ALLOWED_OF_RUNS
-from sprag.service.schedules.fields import ScheduleFields
+from sprag.service.schedules.fields import PLAIN, ScheduleFields
+from sprag.service.spec.described import schemas
 from sprag.service.spec.report import SpecError
 from sprag.service.storage.schedules import ScheduleRecord
-from sprag.worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
+from sprag.worker.limits import MAX_NAME_LENGTH
 
 router = APIRouter(tags=["schedules"], dependencies=[Depends(strict_query)])
 
@@ -55,12 +56,7 @@ _FIELDS: Final[dict[str, Any]] = {
         "items": _TIME_OF_DAY,
         "description": "its studies run between these times of day, in `zone`, and are held outside",
     },
-    "priority": {"type": "integer", "minimum": -MAX_PRIORITY, "maximum": MAX_PRIORITY, "default": 0},
-    "fresh": {
-        "type": "boolean",
-        "default": False,
-        "description": "run every case, including those that other studies already have",
-    },
+    **schemas(PLAIN),
     "finish_by": {
         "type": ["string", "null"],
         "maxLength": 80,

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.spec.fields import missing, read_number
+from sprag.service.spec.fields import missing, read_number, read_object
 from sprag.service.spec.report import Report, did_you_mean, join
 
 if TYPE_CHECKING:
@@ -50,18 +50,10 @@ class Machine:
 def read_plain(report: Report, data: object, catalogue: tuple[Parameter, ...]) -> Machine:
     """Read the machine of a model that is fully described by ``catalogue``: plain numbers, no lists, no choices."""
     machine = Machine(parameters={entry.path: entry for entry in catalogue})
-    if not isinstance(data, Mapping):
-        message = "is required" if data is None else "must be an object"
-        report.fault(
-            "/base",
-            "required" if data is None else "wrong-type",
-            message,
-            data,
-            allowed="an object with the fields " + ", ".join(_fields("", machine)),
-        )
-        return machine
-    _unknown_fields(report, "", data, machine)
-    read_numbers(report, data, machine)
+    found = read_object(report, "/base", data, _fields("", machine))
+    if found is not None:
+        _check_parts(report, "", found, machine)
+        read_numbers(report, found, machine)
     return machine
 
 
@@ -79,19 +71,14 @@ def _fields(prefix: str, machine: Machine) -> list[str]:
     return list(dict.fromkeys(rest.split(".")[0] for rest in rests))
 
 
-def _unknown_fields(report: Report, prefix: str, data: Mapping[str, Any], machine: Machine) -> None:
-    """Record every field that leads to no parameter, and every part that is not an object."""
-    pointer = join("/base", *prefix.split(".")[:-1])
-    fields = _fields(prefix, machine)
-    report.unknown_fields(pointer, data, tuple(fields))
-    for name in fields:
+def _check_parts(report: Report, prefix: str, data: Mapping[str, Any], machine: Machine) -> None:
+    """Note every part of an object that is not an object itself, or has a field that no parameter is in."""
+    for name in _fields(prefix, machine):
         part = f"{prefix}{name}"
-        if part in machine.parameters or name not in data:
-            continue
-        if isinstance(data[name], Mapping):
-            _unknown_fields(report, f"{part}.", data[name], machine)
-        else:
-            report.fault(join(pointer, name), "wrong-type", "must be an object", data[name])
+        if part not in machine.parameters and name in data:
+            found = read_object(report, join("/base", *part.split(".")), data[name], _fields(f"{part}.", machine))
+            if found is not None:
+                _check_parts(report, f"{part}.", found, machine)
 
 
 def _read(report: Report, found: Mapping[str, Any], path: str, entry: Parameter) -> float | None:

@@ -27,5 +27,5 @@ def form_study(library: Library, values: Mapping[str, str], now: datetime) -> tu
     checked = look_over(values, store.chunking, store.reusable, now)
     made = None
     if checked.parsed is not None:
-        made = submission(checked.parsed, store.chunking, store.reusable, now, finish_by=checked.finish)
+        made = submission(checked.parsed, store, now, finish_by=checked.finish)
     return replace(checked, parsed=None), made
