@@ -156,4 +156,4 @@ def test_an_id_is_never_cut(capsys: pytest.CaptureFixture[str], monkeypatch: pyt
 
 def test_endings_are_told_with_their_meaning() -> None:
     (line,) = ending_lines({"ok": 49, "inertia_insufficient": 3})
-    assert line.startswith("  3 inertia_insufficient: The inertia is insufficient for the mean speed")
+    assert line.startswith("  3 inertia_insufficient: The inertia is insufficient for the required mean speed")
