@@ -44,8 +44,7 @@ def badcases(
             service.finish(service.submit(harness.spec(64, 4.0)))  # its processes load the kernel
             plain = _run(service, made)[1]
     with harness.running(folder, *options, **limit, **_faults(made, odd)) as service:
-        if timed:
-            service.finish(service.submit(harness.spec(64, 4.0)))
+        service.finish(service.submit(harness.spec(64, 4.0)))  # no process compiles within the limit of a bad case
         study, bad = _run(service, made)
     # Where a case takes long, the values around the bad ones are compared, and some others.
     around = [(max(0, min(case - 8, cases - 16)), min(16, cases)) for case in [*odd, *draw.sample(range(cases), 5)]]
