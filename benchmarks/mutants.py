@@ -19,6 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 _FOLDERS = ("sprag", "engine", "worker", "service", "migrations", "tests", "benchmarks")
 _FAULTS = "tests/acceptance/test_faults.py::"
+_KILLS = "tests/acceptance/test_kills.py::"
 _CERTIFICATE = "tests/engine/test_certificate.py::"
 
 
@@ -39,14 +40,14 @@ MUTANTS = (
         "service/storage/part.py",
         "        if latest != epoch:",
         "        if latest != epoch and not latest:",
-        (f"{_FAULTS}test_a_dispatcher_that_was_stopped_commits_nothing_and_gives_up",),
+        (f"{_KILLS}test_a_dispatcher_that_was_stopped_commits_nothing_and_gives_up",),
     ),
     Mutant(
         "claims of older epochs are not returned",
         "service/storage/work.py",
         "    connection.execute(sa.update(CHUNKS).where(CLAIMED).values(_WAITING))",
         "    connection.execute(sa.update(CHUNKS).where(CLAIMED, CHUNKS.c.epoch < 0).values(_WAITING))",
-        (f"{_FAULTS}test_killed_processes_lose_nothing",),
+        (f"{_KILLS}test_killed_processes_lose_nothing",),
     ),
     Mutant(
         "no IMMEDIATE transaction",

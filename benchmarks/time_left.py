@@ -162,14 +162,14 @@ STRUCTURES: dict[str, Callable[[np.random.Generator, int], Costs]] = {
 }
 
 
-def simulate(costs: Costs, processes: int, sampled: bool, cases: int = 16) -> Iterator[Look]:
+def simulate(costs: Costs, processes: int, sampled: bool, uneven: bool, cases: int = 16) -> Iterator[Look]:
     """Run chunks of ``cases`` cases with those costs (s) and look at the time left now and then."""
     free = [0.0] * processes
     done: list[FinishedChunk] = []
-    for cost in costs.tolist():
+    for seconds in costs.tolist():
         begin = heapq.heappop(free)
-        heapq.heappush(free, begin + cost)
-        done.append(FinishedChunk(begin, begin + cost, cases))
+        heapq.heappush(free, begin + seconds)
+        done.append(FinishedChunk(begin, begin + seconds, cases))
     done.sort(key=lambda chunk: chunk.end)
     end = done[-1].end
     for look in sorted(set(np.linspace(1, len(done) - 1, _LOOKS, dtype=int).tolist())):
@@ -177,7 +177,7 @@ def simulate(costs: Costs, processes: int, sampled: bool, cases: int = 16) -> It
         recent = done[max(0, look - RECENT_CHUNKS) : look][::-1]
         # What is claimed and not done: a chunk for each process, and those that wait for one.
         running = [RunningChunk(chunk.begin, cases) for chunk in done[look:] if chunk.begin <= now]
-        _, left = estimate((len(done) - look) * cases, recent, running, now, look * cases, sampled)
+        _, left = estimate((len(done) - look) * cases, recent, running, now, look * cases, sampled, uneven)
         if left is not None and now < end:
             yield Look(now / end, *left, end - now)
 
@@ -240,7 +240,8 @@ def main() -> None:
     for name, cost in STRUCTURES.items():
         for _ in range(options.studies):
             count, processes = int(np.exp(rng.uniform(np.log(20), np.log(2000)))), int(rng.choice([1, 2, 8, 32]))
-            every[name] += simulate(cost(rng, count), processes, name.endswith("refined"))
+            uneven = name.startswith("settled")
+            every[name] += simulate(cost(rng, count), processes, name.endswith("refined"), uneven)
         told(name, every[name])
     told("all synthetic ones", [look for looks in every.values() for look in looks])
     if options.real:

@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine.vibration_drive.cases import Column, PendulumColumn, pendulum_column, stop_column
-from sprag.engine.vibration_drive.lanes import OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS
-from sprag.engine.vibration_drive.layout import Layout
+from sprag.engine.vibration_drive.layout import OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS, Layout
 from sprag.engine.vibration_drive.results import result_infos
 
 Floats = NDArray[np.float64]

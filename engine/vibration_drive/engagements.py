@@ -17,7 +17,7 @@ from sprag.engine.vibration_drive.automaton import Clutch
 from sprag.engine.vibration_drive.cases import Column, case_matrix, pendulum_count, with_lengths
 from sprag.engine.vibration_drive.integration import integrate
 from sprag.engine.vibration_drive.kernel import Kernel, kernel_of
-from sprag.engine.vibration_drive.lanes import OUT_ENDING
+from sprag.engine.vibration_drive.layout import OUT_ENDING
 from sprag.engine.vibration_drive.pieces import Pieces, integrals, largest, products
 from sprag.engine.vibration_drive.regimes import Regime, settled_infos
 from sprag.engine.vibration_drive.settle import settle

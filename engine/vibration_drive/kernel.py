@@ -36,9 +36,10 @@ import numpy as np
 
 from sprag.engine.compile.jit import compiled, constant_record, lane_loops, lane_mask, lowest, unmanaged
 from sprag.engine.vibration_drive.events import settle_guards
-from sprag.engine.vibration_drive.lanes import highest, load_case, look_for_events, next_stop, pack, record, settle
+from sprag.engine.vibration_drive.lanes import highest, load_case, look_for_events, pack, record, settle
 from sprag.engine.vibration_drive.layout import Layout, as_record
 from sprag.engine.vibration_drive.pieces import keep
+from sprag.engine.vibration_drive.stops import next_stop
 from sprag.engine.vibration_drive.strobes import FRACTION
 from sprag.engine.vibration_drive.window import collect_peaks, settle_peaks
 

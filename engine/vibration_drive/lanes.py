@@ -1,4 +1,4 @@
-"""One lane between two steps: loading a case, stops, budgets, output of the case's sums."""
+"""One lane between two steps: loading a case, budgets, output of the case's sums."""
 
 import math
 
@@ -16,10 +16,11 @@ from sprag.engine.vibration_drive.automaton import Clutch, Shaft
 from sprag.engine.vibration_drive.bounds import TOO_LONG
 from sprag.engine.vibration_drive.cases import PENDULUM_COLUMNS, STOPS, Column, PendulumColumn, stop_column
 from sprag.engine.vibration_drive.events import collect_guards, transit
-from sprag.engine.vibration_drive.layout import Layout
+from sprag.engine.vibration_drive.layout import OUT_ENDING, OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS, Layout
 from sprag.engine.vibration_drive.states import count_event, law, set_clutch, set_shaft
+from sprag.engine.vibration_drive.stops import next_stop
 from sprag.engine.vibration_drive.strobes import FRACTION, begin_at, note
-from sprag.engine.vibration_drive.window import energy, primitive, sample, series, watch_extrema
+from sprag.engine.vibration_drive.window import primitive, sample, series, watch_extrema
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -43,12 +44,9 @@ _RUNNING = -1
 _NU, _PERIOD, _ACC_X, _ACC_Y = int(Column.NU), int(Column.PERIOD), int(Column.ACC_X), int(Column.ACC_Y)
 _CHI, _GRAVITY, _LOAD, _INERTIA = int(Column.CHI), int(Column.GRAVITY), int(Column.LOAD), int(Column.INERTIA)
 _INVERSE_RATE, _SPEED, _MOST_STEPS = int(Column.INVERSE_RATE), int(Column.SPEED), int(Column.MOST_STEPS)
-_STOPS, _FIRST_PENDULUM = stop_column(0), stop_column(STOPS)
+_FIRST_PENDULUM = stop_column(STOPS)
 _P_COPIED = int(PendulumColumn.LIMIT) + 1
 _P_ANGLE, _P_SPEED = int(PendulumColumn.ANGLE), int(PendulumColumn.SPEED)
-
-# Whole-run values of a case, in the first columns of its row of sums.
-OUT_ENDING, OUT_STEPS, OUT_EVENTS, OUT_RUNUP, OUT_SUMS = 0, 1, 2, 3, 4
 
 
 @part
@@ -94,104 +92,6 @@ def load_case(
     set_shaft(W, Z, lay, lane, _HELD if row[_SPEED] == 0.0 and row[_LOAD] > 0.0 else _ROTATING)
     begin_at(W, Z, lay, lane, starts[case])
     watch_extrema(W, lay, lane, False)
-
-
-@part
-def _zero_sums(W: Floats, lay: Layout, lane: int) -> None:
-    for row in range(lay.sum_held, lay.work_clutch + 1):
-        W[row * lay.lanes + lane] = 0.0
-    W[lay.energy_lost * lay.lanes + lane] = 0.0
-    W[lay.driving_max * lay.lanes + lane] = 0.0
-    for i in range(lay.n):
-        base = lay.pendulums + i * lay.stride
-        for row in range(lay.p_sum_phi, lay.p_engagements + 1):
-            W[(base + row) * lay.lanes + lane] = 0.0
-        W[lay.driving_max * lay.lanes + lane] += W[(base + lay.p_engaged) * lay.lanes + lane]
-
-
-@part
-def _go_on_from_extrema(W: Floats, lay: Layout, lane: int, sums: Floats) -> None:
-    """Take extrema that the row of sums holds already for those of the window: lesser ones are not looked for."""
-    for row in range(lay.speed_max, lay.power_max + 1):
-        value = sums[OUT_SUMS + row - lay.sum_held]
-        if not math.isnan(value):
-            W[row * lay.lanes + lane] = value
-    first = OUT_SUMS + lay.energy_lost - lay.sum_held + 1
-    for i in range(lay.n):
-        base = lay.pendulums + i * lay.stride
-        for row in range(lay.p_phi_max, lay.p_u_max + 1):
-            value = sums[first + row - lay.p_sum_phi]
-            if not math.isnan(value):
-                W[(base + row) * lay.lanes + lane] = value
-        first += lay.p_u_max - lay.p_sum_phi + 1
-
-
-@part
-def _input_work(W: Floats, lay: Layout, lane: int) -> float:
-    total = 0.0
-    for i in range(lay.n):
-        base = lay.pendulums + i * lay.stride
-        moment = W[(base + lay.p_ml) * lay.lanes + lane] * W[(base + lay.p_inertia) * lay.lanes + lane]
-        total += moment * W[(base + lay.p_work_input) * lay.lanes + lane]
-    return total
-
-
-@part
-def _pass_stop(W: Floats, Z: Ints, lay: Layout, lane: int, stop: int, sums: Floats) -> None:
-    """Do what a stop asks: 0 starts the window, 1 its whole periods, 2 ends it (3, the end of the run, asks
-    nothing).
-    """
-    lanes = lay.lanes
-    if stop == 0:
-        _zero_sums(W, lay, lane)
-        watch_extrema(W, lay, lane, True)
-        _go_on_from_extrema(W, lay, lane, sums)
-        W[lay.turn_0 * lanes + lane] = W[lay.turn * lanes + lane]
-        W[lay.speed_0 * lanes + lane] = W[lay.speed * lanes + lane]
-        W[lay.energy_0 * lanes + lane] = energy(W, Z, lay, lane)
-    elif stop == 1:
-        W[lay.turn_1 * lanes + lane] = W[lay.turn * lanes + lane]
-        W[lay.input_1 * lanes + lane] = _input_work(W, lay, lane)
-    elif stop == 2:
-        W[lay.turn_2 * lanes + lane] = W[lay.turn * lanes + lane]
-        W[lay.speed_2 * lanes + lane] = W[lay.speed * lanes + lane]
-        W[lay.energy_2 * lanes + lane] = energy(W, Z, lay, lane)
-        column = OUT_SUMS
-        for row in range(lay.sum_held, lay.energy_lost + 1):
-            sums[column] = W[row * lanes + lane]
-            column += 1
-        for i in range(lay.n):
-            base = lay.pendulums + i * lay.stride
-            for row in range(lay.p_sum_phi, lay.p_u_max + 1):
-                sums[column] = W[(base + row) * lanes + lane]
-                column += 1
-        watch_extrema(W, lay, lane, False)
-
-
-@part
-def next_stop(W: Floats, Z: Ints, lay: Layout, lane: int, cases: Floats, strobe: float, sums: Floats) -> bool:
-    """Pass every stop that is due, set the next one (at the latest the period's end); False when the run is over.
-
-    ``strobe`` is the part of each period at which a step ends too.
-
-    Stops are pairs (whole periods, fraction), so that a window given in periods is met exactly.
-    """
-    row = cases[Z[lane, ev.CASE]]
-    f = W[lay.f * lay.lanes + lane]
-    period_end = strobe if f < strobe else 1.0
-    while Z[lane, ev.NEXT_STOP] < STOPS:
-        stop = Z[lane, ev.NEXT_STOP]
-        whole = row[_STOPS + 2 * stop]
-        fraction = row[_STOPS + 2 * stop + 1]
-        if whole > Z[lane, ev.PERIOD]:
-            break
-        if whole == Z[lane, ev.PERIOD] and fraction > f:
-            W[lay.f_stop * lay.lanes + lane] = min(fraction, period_end)
-            return True
-        _pass_stop(W, Z, lay, lane, stop, sums)
-        Z[lane, ev.NEXT_STOP] = stop + 1
-    W[lay.f_stop * lay.lanes + lane] = period_end
-    return bool(Z[lane, ev.NEXT_STOP] < STOPS)
 
 
 @part

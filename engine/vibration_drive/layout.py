@@ -9,6 +9,9 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+# Whole-run values of a case, in the first columns of its row of sums.
+OUT_ENDING, OUT_STEPS, OUT_EVENTS, OUT_RUNUP, OUT_SUMS = 0, 1, 2, 3, 4
+
 
 class ShaftSample(IntEnum):
     """Columns of a sample that are the shaft's; those of each pendulum follow."""

@@ -12,7 +12,7 @@ from sprag.engine.vibration_drive.automaton import Clutch
 from sprag.engine.vibration_drive.cases import case_matrix, pendulum_count, scalars, with_lengths
 from sprag.engine.vibration_drive.integration import integrate
 from sprag.engine.vibration_drive.kernel import kernel_of
-from sprag.engine.vibration_drive.lanes import OUT_ENDING
+from sprag.engine.vibration_drive.layout import OUT_ENDING
 from sprag.engine.vibration_drive.regimes import Regime, settled_infos
 from sprag.engine.vibration_drive.settle import settle
 from sprag.engine.vibration_drive.simulate import CLUTCH_NAMES, SHAFT_NAMES, sampled

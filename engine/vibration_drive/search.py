@@ -17,7 +17,7 @@ from sprag.engine.vibration_drive.cases import Column, with_lengths
 from sprag.engine.vibration_drive.characteristics import characteristics, tied_clutches
 from sprag.engine.vibration_drive.integration import Integration, integrate
 from sprag.engine.vibration_drive.kernel import Kernel
-from sprag.engine.vibration_drive.lanes import OUT_ENDING, OUT_EVENTS, OUT_STEPS
+from sprag.engine.vibration_drive.layout import OUT_ENDING, OUT_EVENTS, OUT_STEPS
 from sprag.engine.vibration_drive.strobes import (
     BEGIN,
     CLUTCH,

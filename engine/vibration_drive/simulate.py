@@ -16,8 +16,7 @@ from sprag.engine.vibration_drive.cases import case_matrix, pendulum_count, scal
 from sprag.engine.vibration_drive.characteristics import characteristics
 from sprag.engine.vibration_drive.integration import Integration, integrate
 from sprag.engine.vibration_drive.kernel import kernel_of, order_for
-from sprag.engine.vibration_drive.lanes import OUT_ENDING
-from sprag.engine.vibration_drive.layout import PendulumSample, ShaftSample, pendulum_samples
+from sprag.engine.vibration_drive.layout import OUT_ENDING, PendulumSample, ShaftSample, pendulum_samples
 from sprag.engine.vibration_drive.parameters import PARAMETERS
 
 Floats = NDArray[np.float64]

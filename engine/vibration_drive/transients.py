@@ -16,7 +16,7 @@ from sprag.engine.vibration_drive.cases import STOPS, Column, case_matrix, pendu
 from sprag.engine.vibration_drive.characteristics import characteristics
 from sprag.engine.vibration_drive.integration import integrate
 from sprag.engine.vibration_drive.kernel import kernel_of
-from sprag.engine.vibration_drive.lanes import OUT_ENDING
+from sprag.engine.vibration_drive.layout import OUT_ENDING
 from sprag.engine.vibration_drive.results import result_infos
 from sprag.engine.vibration_drive.search import ROUND, Search
 from sprag.engine.vibration_drive.simulate import simulate

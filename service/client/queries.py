@@ -45,7 +45,7 @@ def spec_of(spec: Spec | str | PathLike[str]) -> Spec:
         return cast("Spec", json.loads(text))
     except ValueError as error:
         kind = "TOML" if path.suffix.lower() == ".toml" else "JSON"
-        raise SpecFileError(f"the file {str(path)!r} is not a valid {kind}: {error}") from error
+        raise SpecFileError(f"the file {str(path)!r} is not valid {kind}: {error}") from error
 
 
 def curve_query(

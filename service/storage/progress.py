@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -28,15 +28,33 @@ RECENT_CHUNKS = 256
 STRETCHES = 8
 #: Half width of the interval in standard errors of the pace.
 STANDARD_ERRORS = 2.2
-#: Unknown share of the time left at the beginning of a study, and its minimum.
-UNSEEN_SHARE = 0.45
-LEAST_SHARE = 0.04
-#: The same where cases run coarse to fine: the finished cases represent the others.
-SAMPLED_SHARE = 0.15
 #: Relative spread of the pace that is assumed while there are too few chunks to derive it.
 FIRST_SPREAD = 0.6
 #: Limits of the effect of a trend on the time left: the largest and the smallest factor.
 LONGER, SHORTER = 3.0, 0.4
+
+
+class _Unknown(NamedTuple):
+    """What is unknown of the time left in any case.
+
+    Attributes
+    ----------
+    unseen, sampled : share of the time left at the beginning of a study; ``sampled`` where cases run coarse to fine, so
+        that the finished cases represent the others
+    least : minimum of this share
+    earlier, later : the end of the last chunks, as a share of a typical chunk
+    """
+
+    unseen: float
+    sampled: float
+    least: float
+    earlier: float
+    later: float
+
+
+#: Cases of a similar cost; and cases whose cost differs many times, as that of settled motions does.
+_EVEN = _Unknown(0.45, 0.15, 0.04, 0.6, 0.8)
+_UNEVEN = _Unknown(2.5, 0.3, 0.1, 1.0, 1.5)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +104,7 @@ def estimate(
     now: float | None = None,
     cases_done: int | None = None,
     sampled: bool = False,
+    uneven: bool = False,
 ) -> tuple[float | None, tuple[float, float] | None]:
     """Rate in cases/s and the (low, high) seconds left; None where there is no basis for them.
 
@@ -97,6 +116,7 @@ def estimate(
     cases_done : int, optional
         Cases with an ending; those of ``recent`` unless given.
     sampled : bool Whether the finished cases are spread among the remaining ones (`sprag.worker.order`).
+    uneven : bool Whether the cost of cases differs many times, as that of settled motions does.
     """
     if not recent:
         return None, None
@@ -112,10 +132,11 @@ def estimate(
     left = max(cases_left - credit, 0.0) / rate
     left += 0.5 * typical * (1.0 - 1.0 / beside) if cases_left else 0.0
     done = sum(chunk.cases for chunk in recent) if cases_done is None else cases_done
-    unseen = (SAMPLED_SHARE if sampled else UNSEEN_SHARE) * cases_left / max(1, cases_left + done)
-    low, high = _factors(past, len(recent), left / busy, max(LEAST_SHARE, unseen))
+    unknown = _UNEVEN if uneven else _EVEN
+    unseen = (unknown.sampled if sampled else unknown.unseen) * cases_left / max(1, cases_left + done)
+    low, high = _factors(past, len(recent), left / busy, max(unknown.least, unseen))
     grain = min(left, typical)
-    return rate, (max(0.0, left * low - 0.6 * grain), left * high + 0.8 * grain)
+    return rate, (max(0.0, left * low - unknown.earlier * grain), left * high + unknown.later * grain)
 
 
 def _past(recent: Sequence[FinishedChunk], running: Sequence[RunningChunk], now: float) -> tuple[_Past, float]:

@@ -245,6 +245,7 @@ class Studies(Orders):
             micros_of(now) / 1e6,
             row.done,
             bool(row.coarse),
+            models.regime_info(models.result_infos(row.model, row.variant)) is not None,
         )
         times = (optional_moment(row.finish_by), now)
         left = left if state.going else None

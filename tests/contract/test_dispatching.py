@@ -118,7 +118,7 @@ def test_a_result_of_other_cases_is_a_fault_of_the_program(store: Store) -> None
     epoch = store.take_over("test")
     chunk = store.open_chunks(record.number)[0]
     store.claim(epoch, [chunk])
-    with pytest.raises(ValueError, match="is not that of"):
+    with pytest.raises(ValueError, match="does not belong to"):
         store.commit(epoch, chunk, fakes.result(0, 9))
 
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from sprag.engine.run import Run
-from sprag.engine.vibration_drive import simulate as front
+from sprag.engine.vibration_drive import kernel as kernels
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, drive, periods
 
 CASES = 64
@@ -74,8 +74,8 @@ def test_neighbours_that_end_badly_change_nothing(whole: Whole) -> None:
 def test_lane_count_does_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     cases = study(1)
     expected = values(cases)
-    other = 8 if front.lane_count() == 40 else 40
-    monkeypatch.setattr(front, "lane_count", lambda: other)
+    other = 8 if kernels.lane_count() == 40 else 40
+    monkeypatch.setattr(kernels, "lane_count", lambda: other)
     np.testing.assert_array_equal(values(cases), expected)
 
 
@@ -86,8 +86,8 @@ def test_no_cases_give_no_rows() -> None:
 @pytest.mark.parametrize("quantity", ["shaft.speed.mean", "torque.max", "pendulums.0.angle.max", "power.input.mean"])
 def test_error_falls_with_the_tolerance(quantity: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # One kernel of fixed order serves every tolerance, so that only the step size differs.
-    order = front.order_for(1e-9)
-    monkeypatch.setattr(front, "order_for", lambda tolerance: order)
+    order = kernels.order_for(1e-9)
+    monkeypatch.setattr(kernels, "order_for", lambda tolerance: order)
     cases = study(1)[:24]
     exponents = np.arange(4, 12)
 

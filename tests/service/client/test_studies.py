@@ -122,8 +122,8 @@ def test_specs_come_from_files_too(client: Client, examples: Path) -> None:
     ("name", "content", "part"),
     [
         ("none.toml", None, "No such file"),
-        ("bad.toml", b"a = = 1", "is no TOML"),
-        ("bad.json", b"{", "is no JSON"),
+        ("bad.toml", b"a = = 1", "is not valid TOML"),
+        ("bad.json", b"{", "is not valid JSON"),
         ("binary.json", b"\xff\xfe", "can't decode"),
     ],
 )

@@ -305,3 +305,12 @@ def test_a_backup_removes_what_killed_ones_left_and_writes_the_folder_to_disk(
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["a", "copy.sqlite3", other.name])
     assert synced[-1] == tmp_path
     assert synced[-2].name.endswith(".part")
+
+
+def test_an_interval_is_wider_where_the_cost_of_cases_differs_many_times() -> None:
+    chunks = [FinishedChunk(float(i), float(i + 1), 10) for i in range(20)]
+    for sampled in (False, True):
+        (_, even), (_, uneven) = (estimate(1000, chunks, sampled=sampled, uneven=uneven) for uneven in (False, True))
+        assert even is not None
+        assert uneven is not None
+        assert uneven[0] < even[0] < 100.0 < even[1] < uneven[1]

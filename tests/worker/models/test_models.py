@@ -25,7 +25,7 @@ def test_every_ending_has_a_sentence() -> None:
 def test_unknown_models_are_named() -> None:
     assert models.model_names() == ("vibration-drive", "machine-shaft")
     for ask in (models.parameter_catalogue, models.variants, lambda model: models.result_infos(model, "")):
-        with pytest.raises(ValueError, match="unknown model 'steam-engine'; there is: vibration-drive, machine-shaft"):
+        with pytest.raises(ValueError, match="'steam-engine'; known models: vibration-drive, machine-shaft"):
             ask("steam-engine")
 
 
