@@ -17,7 +17,7 @@ class TimeoutProtocol(H11Protocol):
     """HTTP/1.1 with header and write timeouts. The guard limits the time for the body of a request.
 
     ``head_seconds`` are allowed from the first byte of a connection or request to the end of its head,
-    ``write_seconds`` between two reads of the client from a long answer.
+    ``write_seconds`` between two reads of the client from a long answer, however much it reads.
     """
 
     head_seconds = HEAD_SECONDS
@@ -50,8 +50,7 @@ class TimeoutProtocol(H11Protocol):
     def pause_writing(self) -> None:
         """The client stops reading."""
         super().pause_writing()
-        _stopped(self._write)
-        self._write = self.loop.call_later(self.write_seconds, self.transport.abort)
+        self._await_read()
 
     def resume_writing(self) -> None:
         """The client reads again."""
@@ -65,6 +64,17 @@ class TimeoutProtocol(H11Protocol):
 
     def _await_head(self) -> None:
         self._head = self.loop.call_later(self.head_seconds, self.transport.abort)
+
+    def _await_read(self) -> None:
+        _stopped(self._write)
+        self._write = self.loop.call_later(self.write_seconds, self._look, self.transport.get_write_buffer_size())
+
+    def _look(self, unread: int) -> None:
+        """Disconnect a client that has read nothing of its answer since ``unread`` bytes were left of it."""
+        if self.transport.get_write_buffer_size() < unread:
+            self._await_read()
+        else:
+            self.transport.abort()
 
     def _busy(self) -> bool:
         return self.cycle is not None and not self.cycle.response_complete

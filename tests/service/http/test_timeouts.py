@@ -12,6 +12,8 @@ from typing import Any
 import httpx
 import pytest
 import uvicorn
+from uvicorn.protocols.http.flow_control import FlowControl
+from uvicorn.server import ServerState
 
 from sprag.service.http import guard
 from sprag.service.http.api import events
@@ -108,15 +110,50 @@ def test_who_takes_nothing_of_an_answer_is_left() -> None:
         assert closed.wait(60)
 
 
-def test_a_long_answer_to_a_client_that_takes_it_is_not_cut() -> None:
-    size = 40_000_000
+def test_a_long_answer_is_cut_only_where_nothing_of_it_is_read() -> None:
+    class Clock(asyncio.SelectorEventLoop):
+        """A clock that stands still until the test turns it."""
 
-    async def long(_scope: Any, _receive: Any, send: Any) -> None:
-        await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"%d" % size)]})
-        await send({"type": "http.response.body", "body": bytes(size)})
+        now = 0.0
 
-    with serving(long) as address:
-        assert len(httpx.get(f"http://localhost:{address[1]}/", timeout=60).content) == size
+        def time(self) -> float:
+            return self.now
+
+    class Connection(asyncio.Transport):
+        """A connection that counts what its client has not read."""
+
+        unread, open = 40_000_000, True
+
+        def get_write_buffer_size(self) -> int:
+            return self.unread
+
+        def abort(self) -> None:
+            self.open = False
+
+    clock, connection = Clock(), Connection()
+
+    async def pass_time(seconds: float) -> None:
+        clock.now += seconds
+        await asyncio.sleep(0.0)
+        await asyncio.sleep(0.0)
+
+    async def read_slowly() -> list[bool]:
+        config = uvicorn.Config(lambda: None, http=TimeoutProtocol, log_config=None)
+        config.load()
+        protocol = TimeoutProtocol(config, ServerState(), {}, _loop=clock)
+        protocol.transport, protocol.flow = connection, FlowControl(connection)
+        protocol.pause_writing()
+        found = []
+        for read in (65536, 1, 65536, 0):
+            connection.unread -= read
+            await pass_time(TimeoutProtocol.write_seconds + 1.0)
+            found.append(connection.open)
+        return found
+
+    try:
+        assert clock.run_until_complete(read_slowly()) == [True, True, True, False]
+    finally:
+        clock.close()
 
 
 async def take_all(places: asyncio.Semaphore) -> None:
