@@ -1,5 +1,6 @@
 """The documentation names what the program has, and nothing that it has not."""
 
+import ast
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -64,6 +65,13 @@ def test_every_command_and_option_of_the_pages_exists(page: Path) -> None:
 def test_the_pages_mention_commands() -> None:
     found = {name for page in PAGES for name, _ in mentioned(page.read_text())}
     assert {"run", "serve", "fit", "db upgrade"} <= found
+
+
+def test_python_of_the_pages_can_be_read() -> None:
+    blocks = [block for page in PAGES for block in re.findall(r"(?ms)^```python\n(.*?)^```", page.read_text("utf-8"))]
+    assert len(blocks) > 3
+    for block in blocks:
+        ast.parse(block)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
