@@ -50,9 +50,10 @@ class ResultInfo:
     unit : str
         SI unit; "1" where it has none.
     description : str
-    kind : {"real", "count", "category"} Kind of its numbers; those of a category are indices into ``categories``.
-    categories : tuple of str Names of a category's values. A name never changes its position, because the numbers are
-        stored.
+    kind : {"real", "count", "category"}
+        Kind of its numbers; those of a category are indices into ``categories``.
+    categories : tuple of str
+        Names of a category's values. A name never changes its position, because the numbers are stored.
     """
 
     name: str

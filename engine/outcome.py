@@ -30,8 +30,9 @@ class Trajectory:
 
     Attributes
     ----------
-    times : float64 array, shape (points,) Times, or angles of the shaft, according to ``along``, in SI units. Only
-        reached ones: all requested ones unless the case ended early, none where it has no motion.
+    times : float64 array, shape (points,)
+        Times, or angles of the shaft, according to ``along``, in SI units. Only reached ones: all requested ones unless
+        the case ended early, none where it has no motion.
     names, units : tuples, length V
         Name and SI unit of each variable.
     values : float64 array, shape (points, V)
@@ -70,7 +71,8 @@ class Portrait:
     orbit : Trajectory
         Whole turns of the settled motion, equally spaced, the first point again at the end; no points where there is
         no orbit. Its times count from the start of an excitation period.
-    points : int Points of the orbit per excitation period; every such number of points there is a strobe.
+    points : int
+        Points of the orbit per excitation period; every such number of points there is a strobe.
     ending : Ending
         Of the run to the settled motion, or of the given time.
     """
@@ -99,8 +101,8 @@ class Engagement:
         Largest torque, in N*m.
     work_shaft, work_pendulum : float
         Work in J that the clutch does on the shaft, and that its pendulum does on the clutch.
-    complete : bool Whether it begins and ends within the examined part of the run; otherwise only its part within is
-        given.
+    complete : bool
+        Whether it begins and ends within the examined part of the run; otherwise only its part within is given.
     """
 
     clutch: int
@@ -139,7 +141,8 @@ class Engagements:
 
     Attributes
     ----------
-    start, end : float The examined part of the run, in s.
+    start, end : float
+        The examined part of the run, in s.
     regime : str
         Name of the settled motion's regime; "" for a run of a given time.
     rows : tuple of Engagement

@@ -35,8 +35,8 @@ class Run:
         Part of the run over which the characteristics are taken; by default the last third.
     tolerance : float
         Local relative error of a step, 1e-14 .. 1e-4.
-    reset : {"contact", "literal"} Interpretation of equation (5) while torque is transmitted (docs/theory.md, "The
-        automaton").
+    reset : {"contact", "literal"}
+        Interpretation of equation (5) while torque is transmitted (docs/theory.md, "The automaton").
     max_steps : int, optional
     max_events_per_period : int
         Budgets that end a case as ``step_budget`` or ``chatter`` instead of letting it hang.

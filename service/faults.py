@@ -122,11 +122,12 @@ class Fault:
 
     Attributes
     ----------
-    where : str or None JSON Pointer (RFC 6901) to the field, "" for the whole document; for a file a line, for a
-        command an option.
+    where : str or None
+        JSON Pointer (RFC 6901) to the field, "" for the whole document; for a file a line, for a command an option.
     code : str
         One of `Code`.
-    message : str Description of the fault, without the value.
+    message : str
+        Description of the fault, without the value.
     value : object
         The value received, shortened, always plain JSON data.
     allowed : str or None
@@ -181,7 +182,8 @@ class FaultError(Exception):
     ----------
     code : str
         Kind of the fault, stable: one of `Kind`.
-    detail : str Description of this failure, as a sentence.
+    detail : str
+        Description of this failure, as a sentence.
     faults : tuple of Fault
         Every faulty place, where there can be several.
     retry_after : int or None

@@ -38,11 +38,12 @@ def run(
     ----------
     spec : mapping, str or path
         A spec, or the name of a JSON or TOML file with one.
-    processes : int, optional Number of processes; 0 runs the cases in this process. By default one per core, or 0 where
-        the study takes about a second. A script that starts processes needs ``if __name__ == "__main__":`` around its
-        own code.
-    database : str, optional Database that stores the study, as in ``sprag run --db``; cases that it already has are not
-        run again, unless ``fresh``. By default a temporary one.
+    processes : int, optional
+        Number of processes; 0 runs the cases in this process. By default one per core, or 0 where the study takes about
+        a second. A script that starts processes needs ``if __name__ == "__main__":`` around its own code.
+    database : str, optional
+        Database that stores the study, as in ``sprag run --db``; cases that it already has are not run again, unless
+        ``fresh``. By default a temporary one.
     finish_by : datetime, optional
         An aware time at which the run ends with what is done, coarse to fine.
     on_progress : function, optional

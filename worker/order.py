@@ -33,8 +33,8 @@ class Order(Protocol):
 
     Attributes
     ----------
-    passes : tuple of int The positions before each entry form a complete, coarser study; ascending, the last is the
-        number of cases.
+    passes : tuple of int
+        The positions before each entry form a complete, coarser study; ascending, the last is the number of cases.
     """
 
     @property

@@ -44,9 +44,10 @@ class Known:
 
     Attributes
     ----------
-    missing : int64 array The cases of the chunk to run, ascending.
-    cases, studies, there : int64 arrays of one length The other cases, ascending; the number of the study that has
-        each, and its case number there.
+    missing : int64 array
+        The cases of the chunk to run, ascending.
+    cases, studies, there : int64 arrays of one length
+        The other cases, ascending; the number of the study that has each, and its case number there.
     """
 
     missing: NDArray[np.int64]

@@ -99,10 +99,11 @@ class Study:
         ``{"duration": [60.0, "periods"], "window": [[40.0, "periods"], [60.0, "periods"]] or None, "tolerance": 1e-9,
         "reset": "contact"}``; times in "periods" or "s". Empty for a model without a run.
     axes : tuple of Axis
-    structure : dict or None The non-numeric part of the machine as plain JSON data, where the model has one (a machine
-        shaft's mechanism, tables and formulas); immutable.
-    combine : "grid" or "zip" Grid: every combination, the first axis varies slowest. Zip: the axes side by side, all of
-        one length.
+    structure : dict or None
+        The non-numeric part of the machine as plain JSON data, where the model has one (a machine shaft's mechanism,
+        tables and formulas); immutable.
+    combine : "grid" or "zip"
+        Grid: every combination, the first axis varies slowest. Zip: the axes side by side, all of one length.
 
     Raises
     ------

@@ -22,7 +22,8 @@ class Balanced:
     ----------
     drive : array, shape (cases, panels, nodes)
         M_d in N*m.
-    wrong : array of bool, shape (cases,) Where the works cannot be balanced in the requested way.
+    wrong : array of bool, shape (cases,)
+        Where the works cannot be balanced in the requested way.
     drive_work, resistance_work : arrays, shape (cases,)
         Works over a cycle in J of the torques as given.
     """

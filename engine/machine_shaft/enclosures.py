@@ -101,9 +101,10 @@ class Program:
 
         Returns
         -------
-        errors : array, shape (n,) Bound of the error of the best polynomial of degree below ORDERS on each interval;
-            infinite where unknown.
-        least : array, shape (n,) Lower bound of the formula's modulus on the interval.
+        errors : array, shape (n,)
+            Bound of the error of the best polynomial of degree below ORDERS on each interval; infinite where unknown.
+        least : array, shape (n,)
+            Lower bound of the formula's modulus on the interval.
         """
         errors, least = np.empty(len(low)), np.empty(len(low))
         series = np.zeros((1, ORDERS)) if ways is None else _series(ways)

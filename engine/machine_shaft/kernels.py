@@ -108,14 +108,15 @@ def highest(
     values : array, shape (cases, panels, nodes)
     sign : float
         1, or -1 for the lowest.
-    half : array, shape (cases or 1, panels) Half lengths; panels of zero length are skipped.
+    half : array, shape (cases or 1, panels)
+        Half lengths; panels of zero length are skipped.
     places : array, shape (nodes + 2,)
         Ends and nodes within -1 .. 1.
     ends, slopes, to_series, to_slope : arrays
         Matrices from the nodes' values to the ends' values, the slopes at ``places``, the Legendre series, and from
         that to the series of its derivative.
-    value, panel, t : arrays, shape (cases,), written The value (with its own sign), and its position; NaN for a case
-        with a NaN among its values.
+    value, panel, t : arrays, shape (cases,), written
+        The value (with its own sign), and its position; NaN for a case with a NaN among its values.
     """
     cases, panels, nodes = values.shape
     samples = np.empty(nodes + 2)

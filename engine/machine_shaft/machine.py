@@ -148,7 +148,8 @@ class Fields:
     ----------
     inertia, slope : arrays
         I in kg*m^2 and dI/dphi.
-    drive, resistance : arrays M_d as given and M_r in N*m; M_d is zero where it is still to be determined.
+    drive, resistance : arrays
+        M_d as given and M_r in N*m; M_d is zero where it is still to be determined.
     """
 
     inertia: Floats

@@ -48,8 +48,8 @@ class Motion:
     ----------
     inertia, inertia_slope : arrays
         I'' in kg*m^2 and dI''/dphi.
-    way, way_slope : arrays Travel of the working part from the start of its forward stroke, in m, and its derivative,
-        in m/rad.
+    way, way_slope : arrays
+        Travel of the working part from the start of its forward stroke, in m, and its derivative, in m/rad.
     """
 
     inertia: Floats

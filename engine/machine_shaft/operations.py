@@ -27,7 +27,8 @@ class Stroke:
     ----------
     start, end : arrays, shape (cases or 1, 1, 1)
         Angles at which the forward stroke starts and ends, ``end`` within a revolution after ``start``.
-    length : array of that shape Length of a stroke in m.
+    length : array of that shape
+        Length of a stroke in m.
     """
 
     mechanism: Mechanism

@@ -98,8 +98,9 @@ class Panels:
 
     Attributes
     ----------
-    cuts : array, shape (cases, panels + 1) Ends of the panels in rad, from 0 to the cycle. Panels of zero length are
-        allowed and ignored. A first axis of length 1 means that all cases share them.
+    cuts : array, shape (cases, panels + 1)
+        Ends of the panels in rad, from 0 to the cycle. Panels of zero length are allowed and ignored. A first axis of
+        length 1 means that all cases share them.
     angles : array, shape (cases, panels, NODES)
         Gauss nodes in rad.
     """

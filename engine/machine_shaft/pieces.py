@@ -46,7 +46,8 @@ class Formula:
     expression : Expression
     constants : mapping
         Values of its names beside ``phi`` and ``x``, each of shape (cases or 1, 1, 1).
-    stroke : Stroke or None The stroke of which ``x`` is the fraction.
+    stroke : Stroke or None
+        The stroke of which ``x`` is the fraction.
     """
 
     part: Part
@@ -90,7 +91,8 @@ class Pieces:
         0 throughout where all cases share the formula.
     low, high : arrays, shape (n,)
         Ends in rad.
-    breaks : array, shape (cases or 1, m) Jumps and kinks inside panels, in rad; NaN where a case has fewer.
+    breaks : array, shape (cases or 1, m)
+        Jumps and kinks inside panels, in rad; NaN where a case has fewer.
     unknown : array of bool, shape (cases or 1,)
         Where the formula cannot be enclosed.
     """
@@ -225,11 +227,13 @@ def missed(
     Parameters
     ----------
     own : Pieces
-    rows : array, shape (cases,) The cases of the panels, among those of the pieces.
+    rows : array, shape (cases,)
+        The cases of the panels, among those of the pieces.
     panels : Panels
     values : array, shape (cases, panels, NODES)
         The field that the formula enters, at the panels' nodes.
-    exact : callable Returns that field for indices into ``rows`` (n,) at angles (n, 1, m).
+    exact : callable
+        Returns that field for indices into ``rows`` (n,) at angles (n, 1, m).
     largest : array, shape (cases,)
         Largest size of the field if that is the inertia, else the largest work.
     """

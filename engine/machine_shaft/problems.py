@@ -10,8 +10,8 @@ class MachineError(ValueError):
 
     Attributes
     ----------
-    ending : Ending or None Ending of a case of a grid with the same fault; None for faults that no numeric parameter
-        can remove.
+    ending : Ending or None
+        Ending of a case of a grid with the same fault; None for faults that no numeric parameter can remove.
     """
 
     ending: Ending | None = None
@@ -30,8 +30,10 @@ class ExpressionError(MachineError):
 
     Attributes
     ----------
-    position : int or None Position in the text, from 0; None where there is no single position.
-    part : str "mechanism", "drive" or "operation"; "" where only the text was checked.
+    position : int or None
+        Position in the text, from 0; None where there is no single position.
+    part : str
+        "mechanism", "drive" or "operation"; "" where only the text was checked.
     """
 
     def __init__(self, message: str, position: int | None, part: str = "") -> None:
@@ -47,7 +49,8 @@ class RelationError(MachineError):
     path : str
         Of the number.
     value : float
-    allowed : str Its range given the others, with the unit.
+    allowed : str
+        Its range given the others, with the unit.
     """
 
     def __init__(self, path: str, value: float, message: str, allowed: str) -> None:

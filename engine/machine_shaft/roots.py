@@ -31,7 +31,8 @@ def bracketed_roots(
         Brackets.
     f_low, f_high : arrays of that shape
         Values there; of opposite signs, or zero at the root itself.
-    iterations : int Largest number of evaluations.
+    iterations : int
+        Largest number of evaluations.
     precision : float
         Width of the bracket, over the larger of 1 and its ends' size, at which an element is done.
 

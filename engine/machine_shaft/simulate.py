@@ -61,11 +61,11 @@ class Solved:
     results : dict
         Every result but the angle of assembly by name, each (cases,).
     endings : int8 array, shape (cases,)
-    rough, slow, rough_pace : arrays of bool, shape (cases, panels) Panels that do not resolve their torques or inertia;
-        those in which the shaft is too close to rest to resolve the speed, or its mean over time where that is
-        required; and those that do not resolve 1/omega.
-    unknown : array of bool, shape (cases,) Cases with a formula that cannot be enclosed and may have hidden features
-        between any two angles.
+    rough, slow, rough_pace : arrays of bool, shape (cases, panels)
+        Panels that do not resolve their torques or inertia; those in which the shaft is too close to rest to resolve
+        the speed, or its mean over time where that is required; and those that do not resolve 1/omega.
+    unknown : array of bool, shape (cases,)
+        Cases with a formula that cannot be enclosed and may have hidden features between any two angles.
     """
 
     decomposition: Decomposition

@@ -61,12 +61,13 @@ class OperationChoice:
         compressed by it.
     form : {"constant", "table", "formula", "steps"}
         How a torque or force is given.
-    over : {"angle", "stroke"} Against the shaft's angle (rad, over the whole cycle), or the completed fraction 0 .. 1
-        of the stroke, measured from the start of the forward stroke.
+    over : {"angle", "stroke"}
+        Against the shaft's angle (rad, over the whole cycle), or the completed fraction 0 .. 1 of the stroke, measured
+        from the start of the forward stroke.
     during : {"forward", "return", "both"}
         The strokes in which a diagram over the stroke holds.
-    sense : {"resisting", "fixed"} A positive force is against the motion in either direction, or always against the
-        forward stroke.
+    sense : {"resisting", "fixed"}
+        A positive force is against the motion in either direction, or always against the forward stroke.
     steps : int
         Number of steps.
     """
@@ -91,13 +92,14 @@ class MachineSpec:
         Revolutions of a cycle, 1 to 3.
     mean_speed_is : {"midrange", "angle", "time"}
         Which mean of the speed the required mean speed and the irregularity refer to.
-    balance : {"scale", "constant", "refuse", "motor"} How the work over a cycle is made zero.
+    balance : {"scale", "constant", "refuse", "motor"}
+        How the work over a cycle is made zero.
     drive, mechanism, operation :
         Its parts.
-    constants : tuple of str Names used in its formulas besides ``phi`` (and ``x``, the fraction of the stroke); given
-        as ``constants.NAME``.
-    phi_c : int, optional The angle, among those with T = T_mean, from which S3 and S4 count; by default the first at
-        which T rises.
+    constants : tuple of str
+        Names used in its formulas besides ``phi`` (and ``x``, the fraction of the stroke); given as ``constants.NAME``.
+    phi_c : int, optional
+        The angle, among those with T = T_mean, from which S3 and S4 count; by default the first at which T rises.
     """
 
     cycle: int = 1

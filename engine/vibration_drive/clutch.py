@@ -63,9 +63,10 @@ def fit_clutch(
         Highest degree to try, 1 .. 11. Degrees with more unknowns than different windups are not tried.
     through_origin : bool
         True: c_1 = 0, no torque at zero windup, degrees from 1. False: the source's full polynomial, degrees from 0.
-    angles_include_backlash : bool True: the angles count from the start of contact, and ``backlash`` (rad) is
-        subtracted to get windups. Rows within the backlash are left out of the fit; they must show no torque (beyond
-        ``accuracy``). A row at zero windup stays. False: the angles are windups, and ``backlash`` is not used.
+    angles_include_backlash : bool
+        True: the angles count from the start of contact, and ``backlash`` (rad) is subtracted to get windups. Rows
+        within the backlash are left out of the fit; they must show no torque (beyond ``accuracy``). A row at zero
+        windup stays. False: the angles are windups, and ``backlash`` is not used.
 
     Returns
     -------

@@ -9,7 +9,8 @@ class ClutchError(ValueError):
 
     Attributes
     ----------
-    message : str The sentence, without name, value and range.
+    message : str
+        The sentence, without name, value and range.
     name : str
         Dotted path of the field inside the clutch's own fields: ``accuracy``, ``coefficients.2``, ``data.4.0`` (row 4,
         angle), ``data.4.1`` (row 4, torque). Rows and coefficients are counted from 0, as in paths of a spec.

@@ -29,9 +29,9 @@ class Integration:
     Attributes
     ----------
     sums : array, shape (cases, sum_columns(layout))
-    strobes : array, shape (cases, strobes, strobes.width(n)) States at the strobes; the shaft's turn counts from the
-        start of the call. For a run with more strobes, the last ones, each at its number modulo their count
-        (``strobes.in_order``).
+    strobes : array, shape (cases, strobes, strobes.width(n))
+        States at the strobes; the shaft's turn counts from the start of the call. For a run with more strobes, the last
+        ones, each at its number modulo their count (``strobes.in_order``).
     samples, states : arrays, shape (times, columns)
         Instantaneous values of case 0, and states of its shaft and clutches.
     recorded : int

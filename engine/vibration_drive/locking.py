@@ -276,8 +276,8 @@ def decide(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float, targ
     ----------
     size : float
         A typical speed of pendulum ``i``, rad/s, against which others are near.
-    target : int The state that the torque of the locked clutch ``i`` just enters (FREE or ENGAGED); -1 where it is
-        undecided.
+    target : int
+        The state that the torque of the locked clutch ``i`` just enters (FREE or ENGAGED); -1 where it is undecided.
 
     Returns
     -------

@@ -178,7 +178,8 @@ def step(
     Parameters
     ----------
     points : array, shape (points, columns)
-    ends : array, shape (rows, columns) End states of the rows of `disturb`.
+    ends : array, shape (rows, columns)
+        End states of the rows of `disturb`.
     first, units, size, steady_shaft :
         As of `disturb`.
     tied : array, shape (points, pendulums)

@@ -44,9 +44,10 @@ class SettledBatch:
         Index into ``sprag.engine.endings.ENDING_CODES``.
     regimes : int8 array, shape (cases,)
         Members of ``Regime``.
-    points : array, shape (cases, strobes.width(n)) State at a strobe on the orbit, or where the search ended, from
-        which it can be continued.
-    spent : array, shape (cases,) Total excitation periods computed for each case, including disturbed runs.
+    points : array, shape (cases, strobes.width(n))
+        State at a strobe on the orbit, or where the search ended, from which it can be continued.
+    spent : array, shape (cases,)
+        Total excitation periods computed for each case, including disturbed runs.
     """
 
     values: Floats

@@ -55,7 +55,8 @@ def in_order(recorded: Floats, periods: Ints) -> Floats:
     Parameters
     ----------
     recorded : array, shape (cases, kept, columns)
-    periods : array, shape (cases,) Whole periods for which each case was run.
+    periods : array, shape (cases,)
+        Whole periods for which each case was run.
 
     Returns
     -------

@@ -50,7 +50,8 @@ class JudgedBatch:
     off : bool array, shape (cases,)
         Whether the motion in the window was not the settled one: its mean speed is off by more than ``OFF``, or, with
         the shaft held, the swing of a pendulum.
-    spent : array, shape (cases,) Excitation periods computed for this beyond the run itself.
+    spent : array, shape (cases,)
+        Excitation periods computed for this beyond the run itself.
     """
 
     batch: Batch

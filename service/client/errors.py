@@ -37,7 +37,8 @@ class RefusedError(ServiceError):
         HTTP status.
     code : str
         Kind of the problem, the last part of its type: "invalid-spec", "study-not-found".
-    faults : tuple of Fault Faults of the input.
+    faults : tuple of Fault
+        Faults of the input.
     problem : dict
         The problem document (RFC 9457): title, detail, and for wrong input ``errors``.
     """

@@ -40,7 +40,8 @@ class ServiceClient:
         Address such as "http://127.0.0.1:8000".
     token : str, optional
         Sent as a bearer token.
-    transport : httpx.BaseTransport, optional Replaces the network, for instance in tests.
+    transport : httpx.BaseTransport, optional
+        Replaces the network, for instance in tests.
 
     Raises
     ------

@@ -47,7 +47,8 @@ class Client:
         Its address; by default that in ``SPRAG_SERVER``, else ``http://127.0.0.1:8000``.
     token : str, optional
         Its token; by default that in ``SPRAG_TOKEN``.
-    transport : httpx.BaseTransport, optional Replaces the network, for instance in tests.
+    transport : httpx.BaseTransport, optional
+        Replaces the network, for instance in tests.
 
     Every method may raise `UnreachableError` when no service answers, and `RefusedError`, whose ``errors`` list each
     fault with its field, value and allowed range.
@@ -131,8 +132,8 @@ class Study:
         ----------
         progress : bool or callable
             True shows a bar on standard error; a function is called with the study from time to time.
-        timeout : float, optional Seconds after which StudyTimeoutError is raised; the study continues. NaN raises
-            ValueError.
+        timeout : float, optional
+            Seconds after which StudyTimeoutError is raised; the study continues. NaN raises ValueError.
         """
         with reporting(progress) as tell:
             wait_for(self._client.plain, self.id, Waiting(tell, timeout))

@@ -37,9 +37,10 @@ class Waiting:
     ----------
     tell : callable
         Called with the study at every poll.
-    timeout : float, optional Seconds after which StudyTimeoutError is raised; None waits indefinitely. NaN raises
-        ValueError.
-    patient : bool Whether to wait while the service does not answer; otherwise the error is raised.
+    timeout : float, optional
+        Seconds after which StudyTimeoutError is raised; None waits indefinitely. NaN raises ValueError.
+    patient : bool
+        Whether to wait while the service does not answer; otherwise the error is raised.
     notify : callable
         Called with a sentence when the service stops answering, and when it answers again; by default the log.
     """

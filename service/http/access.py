@@ -72,7 +72,8 @@ class Access:
     ----------
     settings : Settings
         `token`, `loopback`.
-    store : TokenStore, optional Holds further tokens.
+    store : TokenStore, optional
+        Holds further tokens.
     """
 
     def __init__(self, settings: Settings, store: TokenStore | None = None) -> None:

@@ -53,7 +53,8 @@ class Attempts:
     Parameters
     ----------
     trusted : networks of proxies whose X-Forwarded-For is trusted
-    sleep, clock : functions Wait for a number of seconds; seconds since any fixed time. Replaced in tests.
+    sleep, clock : functions
+        Wait for a number of seconds; seconds since any fixed time. Replaced in tests.
     """
 
     def __init__(

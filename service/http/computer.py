@@ -47,15 +47,20 @@ class Limits:
 
     Attributes
     ----------
-    seconds : float Processor time after which it is killed. By the clock it may take `WALL_TIMES` as long, because
-        small computations take long on a busy machine.
+    seconds : float
+        Processor time after which it is killed. By the clock it may take `WALL_TIMES` as long, because small
+        computations take long on a busy machine.
     memory : int
         Bytes that it may take beyond what its process has at the start.
-    waiting : int Most simultaneous computations; further ones are refused immediately.
-    problem : str Kind of the problem reported to the client.
-    setting : str Name of the setting of the time limit, if any.
-    leave_seconds : float Time for a computation to end after its client disconnected, before its process is killed;
-        about the start time of another process. Until then it counts toward its client's share.
+    waiting : int
+        Most simultaneous computations; further ones are refused immediately.
+    problem : str
+        Kind of the problem reported to the client.
+    setting : str
+        Name of the setting of the time limit, if any.
+    leave_seconds : float
+        Time for a computation to end after its client disconnected, before its process is killed; about the start time
+        of another process. Until then it counts toward its client's share.
     """
 
     seconds: float
@@ -71,10 +76,12 @@ class ProcessComputer:
 
     Parameters
     ----------
-    limits : Limits Limits of each computation.
-    processes : int Number of parallel processes.
-    prepare, load : functions Called first in each process; compiles a kernel into the cache on disk or loads it. Both
-        are importable by name.
+    limits : Limits
+        Limits of each computation.
+    processes : int
+        Number of parallel processes.
+    prepare, load : functions
+        Called first in each process; compiles a kernel into the cache on disk or loads it. Both are importable by name.
     """
 
     def __init__(

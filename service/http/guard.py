@@ -53,7 +53,8 @@ class Guard:
     app : ASGI application behind the guard
     settings : Settings
         `host_names`; by default also those of ``access``.
-    access : Access, optional Checks the tokens.
+    access : Access, optional
+        Checks the tokens.
     """
 
     def __init__(self, app: ASGIApp, settings: Settings, access: Access | None = None) -> None:

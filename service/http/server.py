@@ -69,8 +69,10 @@ class Supervisor(threading.Thread):
     ----------
     start : function
         Starts the child.
-    delays : (first, longest) Seconds before it is restarted.
-    leaving : Event Set when the shutdown begins: the child is ended while current requests are still answered.
+    delays : (first, longest)
+        Seconds before it is restarted.
+    leaving : Event
+        Set when the shutdown begins: the child is ended while current requests are still answered.
     """
 
     def __init__(
@@ -132,9 +134,12 @@ class Server(uvicorn.Server):
     config : uvicorn.Config
     ending : Event
         Set by the first signal.
-    cut : function Called in a thread when the grace period is over; makes the remaining requests answer.
-    give_up : function Called when the service is still running long after the signal.
-    listening : function Called once the service listens.
+    cut : function
+        Called in a thread when the grace period is over; makes the remaining requests answer.
+    give_up : function
+        Called when the service is still running long after the signal.
+    listening : function
+        Called once the service listens.
     """
 
     def __init__(

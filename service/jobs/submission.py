@@ -31,7 +31,8 @@ class Submission:
     ----------
     row : dict
         See `sprag.service.storage.studies.study_row`.
-    body_hash : str Hash of the spec and the parameters of the request, for the idempotency key.
+    body_hash : str
+        Hash of the spec and the parameters of the request, for the idempotency key.
     bytes : int
         Rough size of its results.
     fresh, finish_by

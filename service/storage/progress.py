@@ -110,13 +110,16 @@ def estimate(
 
     Parameters
     ----------
-    cases_left : int Cases without an ending, including those being run.
+    cases_left : int
+        Cases without an ending, including those being run.
     recent : finished chunks, the latest `RECENT_CHUNKS` or all of them
     running : chunks being run ``now`` (s); without it, the end of the latest finished one
     cases_done : int, optional
         Cases with an ending; those of ``recent`` unless given.
-    sampled : bool Whether the finished cases are spread among the remaining ones (`sprag.worker.order`).
-    uneven : bool Whether the cost of cases differs many times, as that of settled motions does.
+    sampled : bool
+        Whether the finished cases are spread among the remaining ones (`sprag.worker.order`).
+    uneven : bool
+        Whether the cost of cases differs many times, as that of settled motions does.
     """
     if not recent:
         return None, None

@@ -183,7 +183,8 @@ class CaseColumns:
     Attributes
     ----------
     cases : int64 array, shape (m,)
-    endings : list, length m None where the case has no row yet, "cancelled" where it never gets one.
+    endings : list, length m
+        None where the case has no row yet, "cancelled" where it never gets one.
     values : dict of float64 arrays, each shape (m,)
         By result name; NaN for null and for missing rows.
     """

@@ -70,12 +70,16 @@ class DaskExecutor:
         ``dask://host:port`` of a scheduler; "" starts a cluster of ``processes`` workers on this machine, for this
         executor alone.
     processes : int
-    chunk_timeout : float Seconds of processor time after which a chunk ends with its worker; `WALL_TIMES` times as many
-        of elapsed time.
-    run, load : functions Called in a worker for a chunk and for a new kernel; importable by name. Replaced in tests.
-    expected : mapping, optional Fingerprint required of workers; default: that of this process.
-    scheduler_seconds : float Seconds without a scheduler after which the executor gives up.
-    renew : bool Whether every host first deletes its compiled kernels, because they may be damaged.
+    chunk_timeout : float
+        Seconds of processor time after which a chunk ends with its worker; `WALL_TIMES` times as many of elapsed time.
+    run, load : functions
+        Called in a worker for a chunk and for a new kernel; importable by name. Replaced in tests.
+    expected : mapping, optional
+        Fingerprint required of workers; default: that of this process.
+    scheduler_seconds : float
+        Seconds without a scheduler after which the executor gives up.
+    renew : bool
+        Whether every host first deletes its compiled kernels, because they may be damaged.
     """
 
     def __init__(

@@ -41,14 +41,18 @@ class ProcessPoolExecutor:
     ----------
     processes : int
         At least 1.
-    chunk_timeout : float Seconds of processor time after which a running chunk is killed with its process.
-    wall_timeout : float, optional The limit of elapsed time, for chunks that hang without using the processor; default:
-        `WALL_TIMES` times as long.
-    run, load, prepare : functions Called for a chunk, for a new kernel, and at the start of a process; importable by
-        name. Replaced in tests. By default processes load the engine and exit where their fingerprint is not that of
-        this process.
-    compiled : function Whether a kernel is already in the cache on disk.
-    load_timeout : float Seconds after which the compilation of a kernel is abandoned.
+    chunk_timeout : float
+        Seconds of processor time after which a running chunk is killed with its process.
+    wall_timeout : float, optional
+        The limit of elapsed time, for chunks that hang without using the processor; default: `WALL_TIMES` times as
+        long.
+    run, load, prepare : functions
+        Called for a chunk, for a new kernel, and at the start of a process; importable by name. Replaced in tests. By
+        default processes load the engine and exit where their fingerprint is not that of this process.
+    compiled : function
+        Whether a kernel is already in the cache on disk.
+    load_timeout : float
+        Seconds after which the compilation of a kernel is abandoned.
     """
 
     def __init__(

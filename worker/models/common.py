@@ -82,8 +82,10 @@ class Extent:
     unit : str
         Its SI unit.
     end : float
-    period : float Length of "1 period" in that unit.
-    begin : float Start of the part that is returned by default.
+    period : float
+        Length of "1 period" in that unit.
+    begin : float
+        Start of the part that is returned by default.
     """
 
     along: str

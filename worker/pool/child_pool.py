@@ -69,7 +69,8 @@ class ChildPool:
     ----------
     processes : int
         At least 1.
-    prepare : function Called first in a new process; importable by name.
+    prepare : function
+        Called first in a new process; importable by name.
     """
 
     def __init__(self, processes: int, prepare: Callable[[], None]) -> None:

@@ -15,7 +15,8 @@ def thin(y: NDArray[np.float64], most: int) -> NDArray[np.int64]:
 
     Parameters
     ----------
-    y : float64 array, shape (m,) Values along the line; NaN is a gap, of which each bucket keeps one point.
+    y : float64 array, shape (m,)
+        Values along the line; NaN is a gap, of which each bucket keeps one point.
     most : int
         At most this many points are kept (at least 5 for each of one bucket).
 
