@@ -211,7 +211,7 @@ def real_studies() -> Iterator[tuple[str, Study]]:
     yield "fixed time, frequencies outside", replace(example, axes=by_load[::-1], run=fixed)
 
 
-def told(name: str, looks: list[Look]) -> None:
+def print_line(name: str, looks: list[Look]) -> None:
     """Print one line: share of correct intervals and their width, for each part."""
     cells = []
     for _, begin, end in _PARTS:
@@ -242,11 +242,11 @@ def main() -> None:
             count, processes = int(np.exp(rng.uniform(np.log(20), np.log(2000)))), int(rng.choice([1, 2, 8, 32]))
             uneven = name.startswith("settled")
             every[name] += simulate(cost(rng, count), processes, name.endswith("refined"), uneven)
-        told(name, every[name])
-    told("all synthetic ones", [look for looks in every.values() for look in looks])
+        print_line(name, every[name])
+    print_line("all synthetic studies", [look for looks in every.values() for look in looks])
     if options.real:
         for name, study in real_studies():
-            told(name, list(real_looks(study)))
+            print_line(name, list(real_looks(study)))
 
 
 if __name__ == "__main__":

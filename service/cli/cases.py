@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import islice
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -12,9 +12,6 @@ from sprag.service.cli.console import WrongInputError, show_table, write_json
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
 from sprag.service.cli.remote import connection
 from sprag.service.faults import Fault
-
-if TYPE_CHECKING:
-    from sprag.service.client import Query, ServiceClient
 
 #: Most cases of one request.
 _PAGE = 500
@@ -41,24 +38,14 @@ def cases(
     from sprag.service.client.queries import case_query
 
     with connection(server, token) as client:
-        pages = _pages(client, study_id, case_query(ending, regime, flag), min(limit, _PAGE))
-        found = list(islice((case for page in pages for case in page["cases"]), limit))
+        query = [*case_query(ending, regime, flag), ("page_size", str(min(limit, _PAGE)))]
+        found = list(islice(client.cases(study_id, query), limit))
     if as_json:
         write_json({"cases": found})
     elif found:
         _show(found, result or ())
     else:
         show_table("", (("case", True), ("ending", False)), ())
-
-
-def _pages(client: ServiceClient, study_id: str, query: Query, size: int) -> Iterator[dict[str, Any]]:
-    token: str | None = None
-    while True:
-        more = [] if token is None else [("page_token", token)]
-        page = client.cases(study_id, [*query, ("page_size", str(size)), *more])
-        yield page
-        if (token := page["next_page_token"]) is None:
-            return
 
 
 def _show(found: Sequence[dict[str, Any]], results: Sequence[str]) -> None:

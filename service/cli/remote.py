@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import islice
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast, get_args
 
 import typer
@@ -43,6 +44,9 @@ from sprag.worker.states import TERMINAL, StudyState
 
 if TYPE_CHECKING:
     from sprag.service.client import Query, RefusedError, ServiceClient
+
+#: Most studies of one request.
+_PAGE = 100
 
 #: A parameter as in the service's messages: "by=", "at=shaft.load=0.2".
 _PARAMETER_IN_TEXT = re.compile(r"(?<![\w.-])(x|y|by|at)=(?=(\w?))")
@@ -225,7 +229,8 @@ def list_studies(
 ) -> None:
     """List the studies of the service, newest first."""
     with connection(server, token) as client:
-        studies = list(_pages(client, state, limit))
+        query = [("page_size", str(min(limit, _PAGE))), *([] if state is None else [("state", state.value)])]
+        studies = list(islice(client.studies(query), limit))
     if as_json:
         write_json({"studies": studies})
         return
@@ -236,22 +241,6 @@ def list_studies(
         for s in studies
     ]
     show_table("", columns, rows)
-
-
-def _pages(client: ServiceClient, state: StudyState | None, limit: int) -> Iterator[dict[str, Any]]:
-    token: str | None = None
-    while limit > 0:
-        query = [("page_size", str(min(limit, 100)))]
-        if state is not None:
-            query.append(("state", state.value))
-        if token:
-            query.append(("page_token", token))
-        page = client.studies(query)
-        yield from page["studies"][:limit]
-        limit -= len(page["studies"])
-        token = page.get("next_page_token")
-        if not token:
-            return
 
 
 def _act(study_id: str, verb: str, server: str, token: str | None, as_json: bool, query: Query = ()) -> None:

@@ -146,14 +146,19 @@ class AsyncClient:
 
     async def studies(self, state: str | None = None) -> AsyncIterator[StudySummary]:
         """Every study, newest first, or those in one state."""
-        query = {"state": state} if state else {}
+        async for study in self.items("/studies", "studies", [("state", state)] if state else []):
+            yield cast("StudySummary", study)
+
+    async def items(self, path: str, name: str, query: Query) -> AsyncIterator[dict[str, Any]]:
+        """The items of a list under the API, page by page."""
+        token: list[tuple[str, str]] = []
         while True:
-            page = await self.request("GET", "/studies", params=query)
-            for study in page["studies"]:
-                yield study
+            page = await self.request("GET", path, params=[*query, *token])
+            for item in page[name]:
+                yield item
             if page["next_page_token"] is None:
                 return
-            query["page_token"] = page["next_page_token"]
+            token = [("page_token", page["next_page_token"])]
 
 
 class AsyncStudy:
@@ -233,15 +238,8 @@ class AsyncStudy:
         self, *, ending: str | None = None, regime: str | None = None, flag: str | None = None
     ) -> AsyncIterator[Case]:
         """Finished cases, as `Study.cases` gives them."""
-        query = case_query(ending, regime, flag)
-        token: list[tuple[str, str]] = []
-        while True:
-            page = await self._get("/cases", [*query, *token])
-            for case in page["cases"]:
-                yield case
-            if page["next_page_token"] is None:
-                return
-            token = [("page_token", page["next_page_token"])]
+        async for case in self._client.items(f"{self._path}/cases", "cases", case_query(ending, regime, flag)):
+            yield cast("Case", case)
 
     async def table(self) -> pd.DataFrame:
         """All rows as a pandas table."""

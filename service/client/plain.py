@@ -102,9 +102,9 @@ class ServiceClient:
         """One study with its state, progress and time left, requested with ``timeout`` s."""
         return self._json("GET", study_path(study_id), timeout=within(timeout))
 
-    def studies(self, query: Query = ()) -> dict[str, Any]:
-        """A page of studies, newest first."""
-        return self._json("GET", "/studies", params=list(query))
+    def studies(self, query: Query = ()) -> Iterator[dict[str, Any]]:
+        """All studies, newest first; ``page_size`` in the query sets how many are requested at a time."""
+        return self._items("/studies", "studies", query)
 
     def act(self, study_id: str, verb: str, query: Query = ()) -> dict[str, Any]:
         """Request a change of a study: "cancel", "pause", "resume", "retry" or "prioritize"."""
@@ -118,9 +118,19 @@ class ServiceClient:
         """The same as a picture, "svg", "png" or "pdf"."""
         return self.download(f"{study_path(study_id)}/{part}", [*query, ("format", form)])
 
-    def cases(self, study_id: str, query: Query = ()) -> dict[str, Any]:
-        """A page of case rows."""
-        return self._json("GET", f"{study_path(study_id)}/cases", params=list(query))
+    def cases(self, study_id: str, query: Query = ()) -> Iterator[dict[str, Any]]:
+        """All case rows, in order of their numbers; ``page_size`` as for `studies`."""
+        return self._items(f"{study_path(study_id)}/cases", "cases", query)
+
+    def _items(self, path: str, name: str, query: Query) -> Iterator[dict[str, Any]]:
+        """The items of a list, page by page."""
+        token: list[tuple[str, str]] = []
+        while True:
+            page = self._json("GET", path, params=[*query, *token])
+            yield from page[name]
+            if page["next_page_token"] is None:
+                return
+            token = [("page_token", page["next_page_token"])]
 
     def engagements(self, study_id: str, case: int) -> dict[str, Any]:
         """The engagements of the clutches of one case, and the means of its excitation periods."""

@@ -98,14 +98,7 @@ class Client:
 
     def studies(self, state: str | None = None) -> Iterator[StudySummary]:
         """Every study, newest first, or those in one state."""
-        query = [("state", state)] if state else []
-        token: list[tuple[str, str]] = []
-        while True:
-            page = self.plain.studies([*query, *token])
-            yield from page["studies"]
-            if page["next_page_token"] is None:
-                return
-            token = [("page_token", page["next_page_token"])]
+        return cast("Iterator[StudySummary]", self.plain.studies([("state", state)] if state else []))
 
 
 class Study:
@@ -169,14 +162,7 @@ class Study:
 
     def cases(self, *, ending: str | None = None, regime: str | None = None, flag: str | None = None) -> Iterator[Case]:
         """Every finished case in order of the numbers, or those with an ending, a regime and a flag only."""
-        query = case_query(ending, regime, flag)
-        token: list[tuple[str, str]] = []
-        while True:
-            page = self._client.plain.cases(self.id, [*query, *token])
-            yield from page["cases"]
-            if page["next_page_token"] is None:
-                return
-            token = [("page_token", page["next_page_token"])]
+        return cast("Iterator[Case]", self._client.plain.cases(self.id, case_query(ending, regime, flag)))
 
     def table(self) -> pd.DataFrame:
         """All rows with all results as a pandas table, NaN for missing values."""

@@ -245,7 +245,7 @@ def test_both_clients_have_the_same_methods() -> None:
     both = public(Client)
     assert {name: signature for name, signature in public(AsyncClient).items() if name in both} == both
     # What the asynchronous one has in the place of `Client.plain`.
-    assert set(public(AsyncClient)) - set(both) == {"request", "read", "pieces", "events"}
+    assert set(public(AsyncClient)) - set(both) == {"request", "read", "pieces", "events", "items"}
 
 
 @pytest.mark.parametrize("value", [float("nan"), np.float64("inf")])

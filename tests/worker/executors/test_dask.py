@@ -6,7 +6,6 @@ import os
 import random
 import re
 import shutil
-import sys
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -16,17 +15,14 @@ from threading import Event
 import numpy as np
 import pytest
 from distributed import Client, Future
-from pydantic import ValidationError
 
 from sprag.service.jobs.dispatching import WorkerSettings, pool
-from sprag.service.settings import Settings
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.store import Store
 from sprag.worker import fingerprint, models
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.dask import DaskExecutor
-from sprag.worker.executors.dask_tasks import scheduler_address
 from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.executors.process_pool import SPARE_CHUNKS, ProcessPoolExecutor
 from sprag.worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
@@ -322,13 +318,6 @@ def test_damaged_kernels_are_compiled_anew(tmp_path: Path, caplog: pytest.LogCap
         assert not damaged.exists()
 
 
-def test_other_machines_need_certificates(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ExecutorError, match="TLS is required: set DASK_DISTRIBUTED__COMM__TLS__CA_FILE"):
-        scheduler_address("dask://cluster.example:8786")
-    assert scheduler_address("dask://localhost:8786") == ("tcp://localhost:8786", None)
-    assert scheduler_address("dask://[::1]:8786") == ("tcp://[::1]:8786", None)
-
-
 def test_a_scheduler_that_stays_away_ends_the_executor_with_a_sentence() -> None:
     with clusters() as made:
         executor = DaskExecutor(made.url, 0, chunk_timeout=1.0, scheduler_seconds=0.0)
@@ -388,17 +377,3 @@ def test_a_study_survives_what_happens_to_a_cluster(tmp_path: Path, capfd: pytes
         assert np.concatenate([block.cases for block in blocks]).tolist() == list(range(cases))
         np.testing.assert_array_equal(np.concatenate([block.values for block in blocks]), fakes.values(0, cases))
     assert "Traceback" not in capfd.readouterr().err
-
-
-def test_the_setting_is_checked() -> None:
-    for good in ("pool", "dask", "dask://head.example:8786", "dask://[::1]:8786"):
-        assert Settings(executor=good).executor == good
-    for wrong in ("dusk", "dask://", "dask://head.example", "dask://head.example:0", "tcp://head.example:8786"):
-        with pytest.raises(ValidationError, match="must be pool, dask, or dask://host:port"):
-            Settings(executor=wrong)
-
-
-def test_without_dask_the_command_that_brings_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "sprag.worker.executors.dask", None)
-    with pytest.raises(ExecutorError, match=r"pip install 'sprag\[cluster\]'"):
-        pool(WorkerSettings("", 1, 60.0, executor="dask"))

@@ -1,0 +1,34 @@
+"""Which cluster is meant, and what it needs, before there is one."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+from pydantic import ValidationError
+
+from sprag.service.jobs.dispatching import WorkerSettings, pool
+from sprag.service.settings import Settings
+from sprag.worker.executors.dask_tasks import scheduler_address
+from sprag.worker.ports import ExecutorError
+
+
+def test_other_machines_need_certificates() -> None:
+    with pytest.raises(ExecutorError, match="TLS is required: set DASK_DISTRIBUTED__COMM__TLS__CA_FILE"):
+        scheduler_address("dask://cluster.example:8786")
+    assert scheduler_address("dask://localhost:8786") == ("tcp://localhost:8786", None)
+    assert scheduler_address("dask://[::1]:8786") == ("tcp://[::1]:8786", None)
+
+
+def test_the_setting_is_checked() -> None:
+    for good in ("pool", "dask", "dask://head.example:8786", "dask://[::1]:8786"):
+        assert Settings(executor=good).executor == good
+    for wrong in ("dusk", "dask://", "dask://head.example", "dask://head.example:0", "tcp://head.example:8786"):
+        with pytest.raises(ValidationError, match="must be pool, dask, or dask://host:port"):
+            Settings(executor=wrong)
+
+
+def test_without_dask_the_command_that_brings_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "sprag.worker.executors.dask", None)
+    with pytest.raises(ExecutorError, match=r"pip install 'sprag\[cluster\]'"):
+        pool(WorkerSettings("", 1, 60.0, executor="dask"))
