@@ -1,8 +1,14 @@
 """Settings of a run: its length, the evaluated part, and the accuracy."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+#: A frequency, or those of a batch.
+Frequency = TypeVar("Frequency", float, Floats)
 Unit = Literal["periods", "s"]
 Reset = Literal["contact", "literal"]
 
@@ -18,7 +24,7 @@ class Span:
     value: float
     unit: Unit = "periods"
 
-    def in_periods(self, frequency: float) -> float:
+    def in_periods(self, frequency: Frequency) -> Frequency | float:
         """The same time in excitation periods of a machine excited at ``frequency`` (Hz)."""
         return self.value if self.unit == "periods" else self.value * frequency
 
@@ -49,14 +55,17 @@ class Run:
     max_steps: int | None = None
     max_events_per_period: int = 2_000
 
-    def step_budget(self, cycles: float) -> float:
-        """Steps after which a case ends.
+    def step_budget(self, cycles: Floats) -> Floats:
+        """Steps after which each case ends, shape (cases,).
 
-        ``cycles`` are those that what is fastest in it, excitation or a motion of its own, goes through in the run.
+        ``cycles`` (shape (cases,)) are those that what is fastest in a case, excitation or a motion of its own, goes
+        through in the run.
         """
-        return self.max_steps if self.max_steps is not None else max(_LEAST_STEPS, _STEPS_PER_CYCLE * cycles)
+        if self.max_steps is not None:
+            return np.full_like(cycles, self.max_steps)
+        return np.maximum(_LEAST_STEPS, _STEPS_PER_CYCLE * cycles)
 
-    def window_in_periods(self, frequency: float) -> tuple[float, float]:
+    def window_in_periods(self, frequency: Frequency) -> tuple[Frequency | float, Frequency | float]:
         """Start and end of the window in excitation periods at ``frequency`` (Hz)."""
         if self.window is None:
             end = self.duration.in_periods(frequency)

@@ -158,10 +158,11 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
         }  # fmt: skip
         pendulums += [values[place] for place in P]
         pendulums += [column(f"{law}coefficients.{k}", 0.0) for k in range(count)]
-    end_of_run = np.array([run.duration.in_periods(f) for f in frequency])
+    end_of_run = np.broadcast_to(run.duration.in_periods(frequency), (cases,))
+    window_start, window_end = run.window_in_periods(frequency)
     # Seconds times frequency may round past the end of the run.
-    end = np.minimum([run.window_in_periods(f)[1] for f in frequency], end_of_run)
-    start = np.minimum([run.window_in_periods(f)[0] for f in frequency], end)
+    end = np.minimum(window_end, end_of_run)
+    start = np.minimum(window_start, end)
     whole = np.floor(end - start + 1e-9)
     # Without a whole period in the window its "start of whole periods" is its end, and there is no efficiency.
     times = (start, np.where(whole > 0, np.maximum(start, end - whole), end), end, end_of_run)
@@ -171,7 +172,7 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
         C.NU: nu, C.PERIOD: 1.0 / frequency, C.ACC_X: acc_x, C.ACC_Y: acc_y,
         C.CHI: parameter("excitation.phase"), C.GRAVITY: gravity, C.LOAD: parameter("shaft.load"),
         C.INERTIA: shaft_inertia, C.INVERSE_RATE: 1.0 / rate, C.SPEED: parameter("shaft.initial_speed"),
-        C.MOST_STEPS: np.array([run.step_budget(count) for count in cycles]),
+        C.MOST_STEPS: run.step_budget(cycles),
     }  # fmt: skip
     stops = [part for time in times for part in _stop(time)]
     return np.ascontiguousarray(np.column_stack([*(shaft[place] for place in C), *stops, *pendulums]))

@@ -147,6 +147,9 @@ def test_the_step_budget_follows_the_duration_and_the_fastest_motion_of_each_cas
     assert budgets(periods(1e6, 0.0, 1.0, max_steps=7)) == [7.0] * 3
     stiff = budgets(Run(duration=Span(1e4, "s")), **{"pendulums.0.spring_rate": 1e12})
     assert stiff == pytest.approx([1e9] * 3), "what is faster than 1 kHz is hardly meant"
+    # One call gives those of a whole batch.
+    assert Run().step_budget(np.array([1.0, 1e6])).tolist() == [5e6, 1e8]
+    assert Run(max_steps=7).step_budget(np.array([1.0, 1e6])).tolist() == [7.0, 7.0]
 
 
 def test_a_slow_excitation_has_steps_for_the_motion_of_the_pendulum_itself(monkeypatch: pytest.MonkeyPatch) -> None:
