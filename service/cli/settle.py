@@ -102,10 +102,13 @@ def _blocks(study: Study, cases: list[int]) -> list[RowBlock]:
 
 def _show(block: RowBlock) -> None:
     """One case as a table, without missing values."""
-    from sprag.worker.models import ENDING_SENTENCES, OK, REGIME_SENTENCES
+    from sprag.service.results.regimes import ORDER
+    from sprag.worker.models import ENDING_SENTENCES, OK, motion_sentence
 
     (row,) = block.rows()
-    meaning = REGIME_SENTENCES[str(row.results["regime"])] if row.ending == OK else ENDING_SENTENCES[row.ending]
+    regime, order = (row.results[name] for name in ("regime", ORDER))
+    found = motion_sentence(str(regime), order if isinstance(order, int) else None) if row.ending == OK else ""
+    meaning = found or ENDING_SENTENCES[row.ending]
     values = zip(block.infos, block.values[0].tolist(), strict=True)
     rows = [(info.name, info.cell(value), info.unit) for info, value in values if math.isfinite(value)]
     show_table(f"Case {row.case}: {meaning}", [("result", False, True), ("value", True), ("unit", False)], rows)

@@ -36,7 +36,7 @@ from sprag.worker.models import machine_shaft, vibration_drive
 from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
 from sprag.worker.models.model import Model, all_models, model_names, model_of, register, unregister
 from sprag.worker.models.presentation import Panel, Presentation
-from sprag.worker.models.settled import REGIME_SENTENCES, SETTLED, is_settled, settled_study
+from sprag.worker.models.settled import REGIME_SENTENCES, SETTLED, is_settled, motion_sentence, settled_study
 from sprag.worker.models.vibration_drive import (
     NOT_SETTLED,
     WINDUP_OUT_OF_DATA,
@@ -114,6 +114,7 @@ __all__ = [
     "load",
     "model_names",
     "model_of",
+    "motion_sentence",
     "parameter_catalogue",
     "parameters_of",
     "prepare",

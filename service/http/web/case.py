@@ -57,10 +57,7 @@ def _motion(row: CaseRow) -> str:
     regime, order, after = (row.results.get(name) for name in ("regime", ORDER, "regime.settled_after"))
     if not isinstance(regime, str) or regime in row.flags:
         return ""
-    sentence = models.REGIME_SENTENCES[regime]
-    if regime == "periodic" and isinstance(order, int):
-        turn = "every excitation period" if order == 1 else f"every {order} excitation periods"
-        sentence = f"The motion repeats itself {turn}, and disturbances of it die away."
+    sentence = models.motion_sentence(regime, order if isinstance(order, int) else None)
     if isinstance(after, float):
         sentence += f" From its start it is settled after {number(after, 3)} periods."
     return sentence

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from sprag.engine.vibration_drive.regimes import settled_infos
+from sprag.worker.models import motion_sentence
 from tests.conftest import Finished
 
 Sprag = Callable[..., Finished]
@@ -22,6 +23,7 @@ def test_one_case_is_shown_with_its_regime(sprag: Sprag, examples: Path) -> None
     done = sprag("settle", examples / _DRIVE, "--case", 178)
     assert done.code == 0
     assert "22.835" in done.out
+    assert motion_sentence("periodic", 2) in " ".join(done.out.split())
     assert "regime.multiplier" in done.out
     assert "regime.exponent" not in done.out
     assert "1 periodic" in done.err
