@@ -30,11 +30,12 @@ from scipy.stats import binom
 from benchmarks.workloads import CASES, PERIODS, W1, W2, Workload, cores, pin
 from sprag.engine.compile.jit import inlined
 from sprag.engine.run import Run, SettledRun
-from sprag.engine.vibration_drive import settle as settle_module
-from sprag.engine.vibration_drive import simulate as simulate_module
+from sprag.engine.vibration_drive import kernel as kernels_of_engine
 from sprag.engine.vibration_drive.kernel import source
 from sprag.engine.vibration_drive.layout import make_layout
 from sprag.engine.vibration_drive.results import result_infos
+from sprag.engine.vibration_drive.settle import settle
+from sprag.engine.vibration_drive.simulate import simulate
 
 Ints = NDArray[np.int64]
 
@@ -90,14 +91,19 @@ def _read(ticks: Ints, stage: int) -> None:
 read = inlined(_read)
 
 
+def with_reads(text: str) -> str:
+    """The source of a kernel with readings between its stages, and one more argument for their sums."""
+    for anchor, replacement in _READINGS:
+        assert text.count(anchor) == 1, anchor
+        text = text.replace(anchor, replacement.format(anchor=anchor))
+    return text
+
+
 class Readings:
     """A kernel with readings, and their sums."""
 
     def __init__(self, pendulums: int, coefficients: int, order: int, lanes: int) -> None:
-        text = source(make_layout(pendulums, coefficients, order, lanes))
-        for anchor, replacement in _READINGS:
-            assert text.count(anchor) == 1, anchor
-            text = text.replace(anchor, replacement.format(anchor=anchor))
+        text = with_reads(source(make_layout(pendulums, coefficients, order, lanes)))
         path = Path(tempfile.mkdtemp()) / f"readings_{pendulums}.py"
         path.write_text(text, encoding="utf-8")
         spec = importlib.util.spec_from_file_location(path.stem, path)
@@ -124,7 +130,7 @@ def with_readings() -> Iterator[dict[Any, Readings]]:
             kernels[shape] = Readings(*shape)
         return kernels[shape]
 
-    with patch.object(simulate_module, "kernel", kernel), patch.object(settle_module, "kernel", kernel):
+    with patch.object(kernels_of_engine, "kernel", kernel):
         yield kernels
 
 
@@ -166,12 +172,12 @@ def runs(workload: Workload, tolerance: float) -> tuple[Callable[[], float], Cal
 
     def timed() -> float:
         nonlocal rate
-        total = float(simulate_module.simulate(columns, Run(tolerance=tolerance), cases=CASES).values[:, steps].sum())
+        total = float(simulate(columns, Run(tolerance=tolerance), cases=CASES).values[:, steps].sum())
         rate = total / (CASES * PERIODS)
         return total
 
     def settled() -> float:
-        spent = settle_module.settle(columns, SettledRun(tolerance=tolerance), cases=CASES).spent.sum()
+        spent = settle(columns, SettledRun(tolerance=tolerance), cases=CASES).spent.sum()
         return float(spent) * (rate or timed() / (CASES * PERIODS))
 
     return timed, settled
