@@ -122,32 +122,40 @@ def cpu_seconds(pids: Iterable[int | None]) -> float:
     return sum(sum(member.cpu_times()[:2]) for member in family)
 
 
+def own_seconds(pid: int | None) -> float:
+    """Processor time of a process without its children so far."""
+    return sum(psutil.Process(pid).cpu_times()[:2])
+
+
 def measure(store: Store, study: Study, processes: int, repeats: int, dispatcher: int | None) -> None:
     """Alternate the two; print every pair, and the ratios of the least times (the least disturbed) and the medians.
 
     The ratio of processor times is that of the times on a machine with nothing else to do and no core to spare.
     """
-    alone, service, work = [], [], []
+    alone, service, work, own = [], [], [], []
     with warm_pool(study, processes) as pool:
         members = [process.pid for process in active_children() if process.pid != dispatcher]
         for _ in range(repeats):
-            before = cpu_seconds([dispatcher])
+            before, own_before = cpu_seconds([dispatcher]), own_seconds(dispatcher)
             seconds, chunk = through_the_service(store, study)
             service.append(seconds)
             between = cpu_seconds([dispatcher])
+            own.append(own_seconds(dispatcher) - own_before)
             start = cpu_seconds(members)
             alone.append(engine_alone(pool, study, chunk))
             work.append((between - before, cpu_seconds(members) - start))
             print(
                 f"service {service[-1]:6.2f} s   engine alone {alone[-1]:6.2f} s   ratio {service[-1] / alone[-1]:.3f}"
                 f"   processor time {work[-1][0]:6.2f} s against {work[-1][1]:6.2f} s"
-                f"   dispatcher {resident_mib(dispatcher):.0f} MiB"
+                f"   dispatcher alone {own[-1]:.2f} s, {resident_mib(dispatcher):.0f} MiB"
             )
     ratios = [pick(service) / pick(alone) for pick in (min, statistics.median)]
     spent = min(ours for ours, _ in work) / min(theirs for _, theirs in work)
     print(f"{study.cases} cases, {processes} processes, chunks of {chunk}: {study.cases / min(service):.0f} cases/s")
     print(f"service / engine alone: ratio of least times {ratios[0]:.3f}, of medians {ratios[1]:.3f}")
     print(f"processor time, least of each: ratio {spent:.3f}")
+    share = statistics.median(seconds / total for seconds, (total, _) in zip(own, work, strict=True))
+    print(f"processor time of the dispatcher: {share:.1%} of the service's (median)")
 
 
 if __name__ == "__main__":
