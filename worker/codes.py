@@ -1,6 +1,6 @@
-"""Numbers of endings and flags for formats without texts; they are stable in all files.
+"""Numbers of endings, regimes and flags for formats without texts; they are stable in all files.
 
-A number is never assigned again, even when its ending or flag is no longer used.
+A number is never assigned again, even when its ending, regime or flag is no longer used.
 """
 
 from __future__ import annotations
@@ -29,6 +29,16 @@ ENDING_CODES: Final[dict[str, int]] = {
     "crashed": 100,
     "timed_out": 101,
     "cancelled": 102,
+}
+
+#: Number of each regime of settled motion; "none" for a case without one.
+REGIME_CODES: Final[dict[str, int]] = {
+    "none": 0,
+    "periodic": 1,
+    "held": 2,
+    "coasting": 3,
+    "irregular": 4,
+    "unsettled": 5,
 }
 
 #: Bit of each flag; the flags of a case are their sum.

@@ -4,16 +4,50 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.extras import naming_extra
-from sprag.worker.codes import ENDING_CODES, PENDING
+from sprag.worker.codes import ENDING_CODES, PENDING, REGIME_CODES
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
     from sprag.service.answers.results import CurvesData
+
+
+@dataclass(frozen=True, slots=True)
+class _Coded:
+    """A column of names that grids have as numbers: those of the NetCDF files, and the name where there is none."""
+
+    codes: dict[str, int]
+    missing: str
+    dtype: str
+    meaning: str
+
+    def numbers(self, column: pd.Series[Any]) -> pd.Series[int]:
+        """The numbers of the names of a column; raises ValueError for an unknown name."""
+        names = column.where(column.notna(), self.missing)
+        if unknown := set(names) - set(self.codes):
+            told = f"the {column.name} {min(unknown)!r} is unknown to this version of the client"
+            raise ValueError(f"{told}; see `to_pandas`")
+        return names.map(self.codes)
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """The attributes of a variable of such numbers."""
+        return {
+            "long_name": self.meaning,
+            "flag_values": list(self.codes.values()),
+            "flag_meanings": " ".join(self.codes),
+        }
+
+
+_CODED: Final = {
+    "regime": _Coded(REGIME_CODES, "none", "int8", f"what the motion settles to: {', '.join(list(REGIME_CODES)[1:])}"),
+    "ending": _Coded(ENDING_CODES, PENDING, "int16", "how the case ended"),
+}
+_ORDER_MEANING: Final = "excitation periods after which the motion repeats itself"
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,9 +89,11 @@ class Curves:
         """A grid of the results over x and the parameters of the curves, with units as attributes.
 
         ``ending`` has the codes of the NetCDF files (attributes ``flag_values`` and ``flag_meanings``, -1 pending), and
-        ``case`` the number of the case, a coordinate; both are -1 where the grid has no point.
+        ``case`` the number of the case, a coordinate; both are -1 where the grid has no point. Of a settled study,
+        ``regime`` has codes as well (0 none), and ``order`` is NaN where the motion does not repeat.
 
-        Raises ValueError when two points have the same parameters, which zipped cases can, or for an unknown ending.
+        Raises ValueError when two points have the same parameters, which zipped cases can, or for an unknown ending or
+        regime.
         """
         with naming_extra("Curves.to_xarray", "tables"):
             import xarray  # noqa: F401 - pandas uses it
@@ -65,10 +101,11 @@ class Curves:
         names = list(self.data["results"])
         dims = [*self.data["curves"][0]["by"], self.data["x"]["path"]]
         table = self.to_pandas()
-        if unknown := set(table["ending"]) - set(ENDING_CODES):
-            raise ValueError(f"the ending {min(unknown)!r} is unknown to this version of the client; see `to_pandas`")
-        table["ending"] = table["ending"].map(ENDING_CODES)
-        indexed = table.set_index(dims)[[*names, "ending", "case"]]
+        coded = {name: kind for name, kind in _CODED.items() if name in table}
+        for name, kind in coded.items():
+            table[name] = kind.numbers(table[name])
+        order = ["order"] if "order" in table else []
+        indexed = table.set_index(dims)[[*names, *coded, *order, "case"]]
         if not indexed.index.is_unique:
             raise ValueError("several points have the same parameters, so they do not form a grid; see `to_pandas`")
         grid = indexed.to_xarray()
@@ -76,12 +113,12 @@ class Curves:
             grid[name].attrs["units"] = self.units[name]
         for name in names:
             grid[name].attrs["long_name"] = self.data["results"][name]["description"]
-        grid["ending"] = grid["ending"].fillna(ENDING_CODES[PENDING]).astype("int16")
-        grid["ending"].attrs = {
-            "long_name": "how the case ended",
-            "flag_values": list(ENDING_CODES.values()),
-            "flag_meanings": " ".join(ENDING_CODES),
-        }
+        for name, kind in coded.items():
+            grid[name] = grid[name].fillna(kind.codes[kind.missing]).astype(kind.dtype)
+            grid[name].attrs = kind.attributes
+        for name in order:
+            grid[name] = grid[name].astype("float64")
+            grid[name].attrs = {"units": "1", "long_name": _ORDER_MEANING}
         grid["case"] = grid["case"].fillna(-1).astype("int64")
         grid["case"].attrs = {"units": "1", "long_name": "number of the case"}
         return grid.set_coords("case")

@@ -1,7 +1,8 @@
-"""Numbers of endings and flags: files written long ago still mean the same."""
+"""Numbers of endings, regimes and flags: files written long ago still mean the same."""
 
+from sprag.engine.vibration_drive.regimes import Regime
 from sprag.worker import models
-from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING
+from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, REGIME_CODES
 
 #: What files that exist hold. Lines are added here, never changed or taken away.
 GIVEN = {
@@ -23,11 +24,13 @@ GIVEN = {
     "timed_out": 101,
     "cancelled": 102,
 }
+GIVEN_REGIMES = {"none": 0, "periodic": 1, "held": 2, "coasting": 3, "irregular": 4, "unsettled": 5}
 GIVEN_FLAGS = {"windup_out_of_data": 1, "not_settled": 2}
 
 
 def test_numbers_once_given_stay() -> None:
     assert {name: ENDING_CODES[name] for name in GIVEN} == GIVEN
+    assert {name: REGIME_CODES[name] for name in GIVEN_REGIMES} == GIVEN_REGIMES
     assert {name: FLAG_MASKS[name] for name in GIVEN_FLAGS} == GIVEN_FLAGS
 
 
@@ -37,3 +40,7 @@ def test_every_ending_and_flag_has_a_number_of_its_own() -> None:
     assert all(-1 <= code < 1 << 15 for code in ENDING_CODES.values())
     assert FLAG_MASKS.keys() >= {flag for model in models.model_names() for flag in models.flags_of(model)}
     assert sorted(FLAG_MASKS.values()) == [1 << bit for bit in range(len(FLAG_MASKS))]
+
+
+def test_the_numbers_of_regimes_are_those_of_the_engine() -> None:
+    assert {regime.name.lower(): regime.value for regime in Regime} == REGIME_CODES

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import httpx
@@ -11,11 +13,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import xarray as xr
+from anyio.from_thread import BlockingPortal
 
 from sprag.engine.run import SettledRun
 from sprag.engine.vibration_drive.regimes import Regime
 from sprag.engine.vibration_drive.settle import settle
-from sprag.service.client import Client
+from sprag.service.client import AsyncClient, Client
 from sprag.service.client.plain import ServiceClient
 from sprag.service.spec.document import parse_spec
 from sprag.worker import models
@@ -42,6 +45,22 @@ def rows_of(study: Study) -> ChunkResult:
     endings = ["ok" if name else "chatter" for name in REGIMES]
     flags = [name if name in {"irregular", "unsettled"} else "" for name in map(str, REGIMES)]
     return ChunkResult(0, endings, flags, rows.values)
+
+
+Linked = Callable[[str], None]
+
+
+@pytest.fixture
+def linked(service: Service, portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch) -> Linked:
+    """Lets the commands of a module of `sprag.service.cli` talk to the service of the test."""
+
+    def connected(*_: object) -> ServiceClient:
+        return ServiceClient("http://localhost", transport=PortalTransport(service.app, portal))
+
+    def link(module: str) -> None:
+        monkeypatch.setattr(f"sprag.service.cli.{module}.connection", connected)
+
+    return link
 
 
 @pytest.fixture
@@ -116,6 +135,39 @@ def test_curves_have_the_regime_of_every_point(service: Service, study_id: str) 
     response = service.http.get(API + curves, params={"x": "shaft.load", "y": "regime"})
     assert response.status_code == 422
     assert "category" in response.text
+
+
+def test_a_grid_of_curves_has_regime_and_order_of_every_point(
+    service: Service, study_id: str, portal: BlockingPortal
+) -> None:
+    with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
+        study = client.study(study_id)
+        curves, rows = study.curves("shaft.load", "shaft.speed.mean"), study.grid()
+    grid = curves.to_xarray()
+    for name, stored in (("regime", "regime"), ("order", "regime.order"), ("ending", "ending")):
+        np.testing.assert_array_equal(grid[name].values, rows[stored].values)
+        assert grid[name].dtype == rows[stored].dtype
+        assert grid[name].attrs["long_name"] == rows[stored].attrs["long_name"]
+    for name in ("flag_values", "flag_meanings"):
+        assert list(grid["regime"].attrs[name]) == list(rows["regime"].attrs[name])
+    curves.data["curves"][0]["regime"] = ["unheard-of", *REGIMES[1:]]
+    with pytest.raises(ValueError, match="regime 'unheard-of' is unknown"):
+        curves.to_xarray()
+
+
+def test_the_command_shows_the_regime_of_every_point_of_a_curve(
+    service: Service, study_id: str, linked: Linked, sprag: Any
+) -> None:
+    linked("pictures")
+    done = sprag("curve", study_id, "--x", "shaft.load", "--y", "shaft.speed.mean")
+    assert done.code == 0, done.err
+    lines = [line.split() for line in done.out.splitlines()]
+    head = next(place for place, line in enumerate(lines) if line[:1] == ["shaft.load"])
+    assert lines[head] == ["shaft.load", "[N*m]", "shaft.speed.mean", "[rad/s]", "regime", "ending"]
+    shown = {line[0]: line[1:] for line in lines[head + 1 :] if len(line) > 1 and line[0][:1].isdigit()}
+    (curve,) = service.get(f"/studies/{study_id}/curves", x="shaft.load", y="shaft.speed.mean")["curves"]
+    assert [line[1:] for line in shown.values()] == [["periodic"], ["irregular"], ["-", "chatter"], ["unsettled"]]
+    assert [float(load) for load in shown] == curve["x"]
 
 
 def test_maps_have_the_order_of_every_point(service: Service) -> None:
@@ -310,22 +362,24 @@ def test_runs_of_a_given_time_that_had_not_settled_are_run_longer(
     assert refused.json()["errors"][0]["parameter"] == "regime"
 
 
-def test_client_and_command_list_cases_by_ending_regime_and_flag(
-    service: Service, study_id: str, portal: Any, monkeypatch: pytest.MonkeyPatch, sprag: Any
+def test_clients_and_command_list_cases_by_ending_regime_and_flag(
+    service: Service, study_id: str, portal: BlockingPortal, linked: Linked, sprag: Any
 ) -> None:
     kinds: tuple[tuple[dict[str, str], list[int]], ...] = (
         ({}, [0, 1, 2, 3]), ({"regime": "irregular"}, [1]), ({"flag": "unsettled"}, [3]), ({"ending": "chatter"}, [2]),
         ({"regime": "held"}, []), ({"regime": "irregular", "flag": "unsettled"}, []),
     )  # fmt: skip
 
-    def connected(*_: object) -> ServiceClient:
-        return ServiceClient("http://localhost", transport=PortalTransport(service.app, portal))
+    async def listed(**kind: str) -> list[Any]:
+        async with AsyncClient("http://localhost", transport=httpx.ASGITransport(service.app)) as client:
+            return [case async for case in (await client.study(study_id)).cases(**kind)]
 
-    monkeypatch.setattr("sprag.service.cli.cases.connection", connected)
+    linked("cases")
     with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
         for kind, numbers in kinds:
             found = list(client.study(study_id).cases(**kind))
             assert [case["case"] for case in found] == numbers
+            assert portal.call(partial(listed, **kind)) == found
             options = [text for name, value in kind.items() for text in (f"--{name}", value)]
             done = [sprag("cases", study_id, *options, *more) for more in (["--json"], [])]
             assert [ended.code for ended in done] == [0, 0], done[0].err
@@ -337,14 +391,10 @@ def test_client_and_command_list_cases_by_ending_regime_and_flag(
 
 
 def test_the_command_runs_longer_what_the_button_does(
-    service: Service, study_id: str, portal: Any, monkeypatch: pytest.MonkeyPatch, sprag: Any
+    service: Service, study_id: str, linked: Linked, sprag: Any
 ) -> None:
     timed = flagged(service, {"duration": "60 periods"})
-
-    def connected(*_: object) -> ServiceClient:
-        return ServiceClient("http://localhost", transport=PortalTransport(service.app, portal))
-
-    monkeypatch.setattr("sprag.service.cli.extend.connection", connected)
+    linked("extend")
     for study, at_most in ((study_id, 2000), (timed, 500)):
         done = sprag("longer", study, "--at-most", at_most, "--json")
         assert done.code == 0, done.err
@@ -377,12 +427,12 @@ def test_the_page_of_a_study_has_a_button_that_runs_cases_longer(service: Servic
 
 def test_the_page_of_a_case_tells_its_motion(service: Service, study_id: str) -> None:
     pages = [service.http.get(f"/studies/{study_id}/cases/{case}").text for case in range(4)]
-    assert "The motion repeats itself every excitation period, and" in pages[0]
+    assert models.motion_sentence("periodic", 1) in pages[0]
     assert "From its start it is settled after" in pages[0]
     assert models.REGIME_SENTENCES["irregular"] not in pages[0]
     for page, flag in ((pages[1], "irregular"), (pages[3], "unsettled")):
         assert page.count(f'<p class="warning"><span class="flag">{flag}</span>') == 1
-        assert "The motion repeats itself" not in page
+        assert models.motion_sentence("periodic", 1).partition(" after ")[0] not in page
     assert " ± " in pages[1]
 
 

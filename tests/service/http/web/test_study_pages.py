@@ -22,6 +22,8 @@ MANY = {
         {"path": "excitation.frequency", "linspace": [20, 35, 1000]},
     ]
 }
+#: Settled after 31 and after 290 excitation periods.
+HARD = {"axes": [{"path": "shaft.load", "values": [0.5, 0.2]}]}
 LOADS = {"axes": [{"path": "shaft.load", "values": [0, 0.1, 0.2]}]}
 
 
@@ -41,6 +43,26 @@ def test_progress_is_watched_held_and_cancelled(visitor: Visitor, office: Office
     told = office.get(f"/studies/{study_id}")
     assert told["state"] == "cancelled"
     assert 0 < told["progress"]["done"] <= told["cases"]
+
+
+def test_cases_that_are_not_settled_are_run_longer(visitor: Visitor, office: Office) -> None:
+    page = visitor.page
+    study_id = office.submit(name="Too short", run={"until": "settled", "at_most": "100 periods"}, **HARD)
+    assert office.get(f"/studies/{study_id}")["regimes"] == {"periodic": 1, "unsettled": 1}
+    page.goto(f"/studies/{study_id}")
+    page.get_by_role("button", name="Run these longer").click()
+    page.wait_for_url(re.compile(rf"/studies/st_(?!{study_id.removeprefix('st_')})\w+$"))
+    longer = page.url.rpartition("/")[2]
+    office.wait(longer)
+    found = office.get(f"/studies/{longer}")
+    assert found["regimes"] == {"periodic": 1}
+    page.reload()
+    expect(page.locator("main")).to_contain_text("1 periodic")
+    expect(page.get_by_role("button", name="Run these longer")).to_have_count(0)
+    # Pressed again, it shows the same study.
+    page.goto(f"/studies/{study_id}")
+    page.get_by_role("button", name="Run these longer").click()
+    page.wait_for_url(f"**/studies/{longer}")
 
 
 def test_failed_cases_are_seen_and_run_again(visitor: Visitor, office: Office) -> None:
