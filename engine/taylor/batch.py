@@ -149,7 +149,7 @@ def roots_loop(order: int) -> str:
     guess = code.let("guess", f"{g[0]}/({g[0]} - {shape.end})")
     low = code.let("kept", larger(guess, "0.05"))
     chord = code.let("kept", smaller(low, "0.95"))
-    x = code.let("start", f"{chord} if {shape.derivative(1, chord)} < 0.0 else {shape.arch}")
+    x: str = code.let("start", f"{chord} if {shape.derivative(1, chord)} < 0.0 else {shape.arch}")
     moved = "1.0"
     for _ in range(_ROOT_ITERATIONS):
         new = shape.inside(code.let("new", f"{x} - {shape.derivative(0, x)}/{shape.derivative(1, x)}"))

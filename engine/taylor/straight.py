@@ -6,9 +6,30 @@ Python, here and in the model's ``equations``, and unrolled into the source text
 """
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 Names = Sequence[str]
+
+
+class Term(str):
+    """The text of an operand; arithmetic with it gives the text of the result.
+
+    So a formula that is written as an ordinary function of numbers also writes generated code.
+    """
+
+    __slots__ = ()
+
+    def __add__(self, other: object) -> "Term":
+        return Term(f"({self} + {other})")
+
+    def __sub__(self, other: object) -> "Term":
+        return Term(f"({self} - {other})")
+
+    def __mul__(self, other: object) -> "Term":
+        return Term(f"({self}*{other})")
+
+    def __neg__(self) -> "Term":
+        return Term(f"(-{self})")
 
 
 class LaneCode:
@@ -28,14 +49,14 @@ class LaneCode:
         """The element of workspace row ``row`` that belongs to this lane."""
         return f"W[{row * self.lanes} + lane]"
 
-    def let(self, name: str, expression: str) -> str:
+    def let(self, name: str, expression: str) -> Term:
         """Define a local variable; returns its actual name, which is unique."""
         use = self._uses[name] = self._uses.get(name, 0) + 1
         unique = name + self.tag if use == 1 else f"{name}{self.tag}_again{use}"
         self.lines.append(f"{unique} = {expression}")
-        return unique
+        return Term(unique)
 
-    def load(self, name: str, row: int) -> str:
+    def load(self, name: str, row: int) -> Term:
         """Define a local variable from a workspace row."""
         return self.let(name, self.row(row))
 
@@ -43,7 +64,7 @@ class LaneCode:
         """Write an expression into a workspace row."""
         self.lines.append(f"{self.row(row)} = {expression}")
 
-    def series(self, name: str, row: int, count: int) -> list[str]:
+    def series(self, name: str, row: int, count: int) -> list[Term]:
         """Load ``count`` consecutive rows as the coefficients of a series."""
         return [self.load(f"{name}{k}", row + k) for k in range(count)]
 
@@ -68,18 +89,32 @@ def square(a: Names, k: int) -> str:
     return " + ".join(part for part in (middle, twice) if part)
 
 
-def horner(coefficients: Names, x: str) -> str:
-    """Value of a series at ``x``."""
-    text = coefficients[-1]
-    for name in reversed(coefficients[:-1]):
-        text = f"{name} + {x}*({text})"
-    return text
+def horner(coefficients: Any, x: Any) -> Any:
+    """Value of a series at ``x``; of terms, or of numbers in Python and in compiled code, where ``x`` may be an array.
+
+    ``coefficients`` is a sequence of at least one, that of ``x^0`` first.
+    """
+    value = coefficients[len(coefficients) - 1]
+    for k in range(len(coefficients) - 2, -1, -1):
+        value = coefficients[k] + x * value
+    return value
 
 
-def integral(coefficients: Names, x: str) -> str:
-    """Integral of a series from 0 to ``x``, in the unit of ``x``."""
-    terms = [name if k == 0 else f"{name}*{1.0 / (k + 1)!r}" for k, name in enumerate(coefficients)]
-    return f"{x}*({horner(terms, x)})"
+def slope(coefficients: Any, x: Any) -> Any:
+    """Derivative of the series at ``x``; arguments as of ``horner``, numbers only."""
+    value = 0.0 * x
+    for k in range(len(coefficients) - 1, 0, -1):
+        value = coefficients[k] * float(k) + x * value
+    return value
+
+
+def integral(coefficients: Any, x: Any) -> Any:
+    """Integral of the series from 0 to ``x``, in the unit of ``x``; arguments as of ``horner``."""
+    count = len(coefficients)
+    value = coefficients[count - 1] * (1.0 / count)
+    for k in range(count - 2, -1, -1):
+        value = coefficients[k] * (1.0 / (k + 1)) + x * value
+    return x * value
 
 
 def same_everywhere(value: float) -> float:
@@ -99,10 +134,10 @@ class Span(NamedTuple):
     k >= 2. For the short steps of a high order this is nearly sharp, and it needs no branches.
     """
 
-    start: str
-    end: str
-    slope: str
-    bulge: str
+    start: Term
+    end: Term
+    slope: Term
+    bulge: Term
     order: int
 
     @property
@@ -131,7 +166,7 @@ class Span(NamedTuple):
         return f"abs({self.slope}) > {max(k / chord_constant(k) for k in range(2, self.order + 1))!r}*{self.bulge}"
 
 
-def span(code: LaneCode, tag: str, coefficients: Names) -> Span:
+def span(code: LaneCode, tag: str, coefficients: Sequence[Term]) -> Span:
     """The span of a polynomial."""
     end = code.let(f"end_{tag}", " + ".join(coefficients))
     bulge = _bulge(coefficients[2:], lambda _: 1.0)
@@ -148,7 +183,7 @@ def rate_span(code: LaneCode, tag: str, coefficients: Names, inverse_h: str) -> 
     return Span(start, end, slope, bulge, len(coefficients) - 2)
 
 
-def primitive_span(code: LaneCode, tag: str, start: str, coefficients: Names, h: str) -> Span:
+def primitive_span(code: LaneCode, tag: str, start: Term, coefficients: Names, h: str) -> Span:
     """The span of the time integral, from the value ``start``, of a polynomial in fractions of the step ``h``."""
     terms = [name if k == 0 else f"{1.0 / (k + 1)!r}*{name}" for k, name in enumerate(coefficients)]
     end = code.let(f"end_{tag}", f"{start} + {h}*({' + '.join(terms)})")
@@ -178,24 +213,24 @@ HALF_PI = ("1.57079632673412561417e+00", "6.07710050630396597660e-11", "2.022266
 ROUND = "6755399441055744.0"  # 1.5 * 2^52: adding and subtracting it rounds to the nearest integer
 # Minimax coefficients of sin and cos on [-pi/4, pi/4] (the classic ones of fdlibm's kernels, error below 2^-58).
 SINE = (
-    "-1.66666666666666324348e-01",
-    "8.33333333332248946124e-03",
-    "-1.98412698298579493134e-04",
-    "2.75573137070700676789e-06",
-    "-2.50507602534068634195e-08",
-    "1.58969099521155010221e-10",
+    Term("-1.66666666666666324348e-01"),
+    Term("8.33333333332248946124e-03"),
+    Term("-1.98412698298579493134e-04"),
+    Term("2.75573137070700676789e-06"),
+    Term("-2.50507602534068634195e-08"),
+    Term("1.58969099521155010221e-10"),
 )
 COSINE = (
-    "4.16666666666666019037e-02",
-    "-1.38888888888741095749e-03",
-    "2.48015872894767294178e-05",
-    "-2.75573143513906633035e-07",
-    "2.08757232129817482790e-09",
-    "-1.13596475577881948265e-11",
+    Term("4.16666666666666019037e-02"),
+    Term("-1.38888888888741095749e-03"),
+    Term("2.48015872894767294178e-05"),
+    Term("-2.75573143513906633035e-07"),
+    Term("2.08757232129817482790e-09"),
+    Term("-1.13596475577881948265e-11"),
 )
 
 
-def sincos(code: LaneCode, x: str, tag: str) -> tuple[str, str]:
+def sincos(code: LaneCode, x: str, tag: str) -> tuple[Term, Term]:
     """Sine and cosine of ``|x|`` up to 1e6 within an ulp or so, without calls or branches."""
     q = code.let(f"q_{tag}", f"({x}*0.6366197723675814 + {ROUND}) - {ROUND}")
     r = code.let(f"r_{tag}", f"(({x} - {q}*{HALF_PI[0]}) - {q}*{HALF_PI[1]}) - {q}*{HALF_PI[2]}")

@@ -1,6 +1,6 @@
 """State and sums of every lane at the end of the part x of its step, from the stored series."""
 
-from sprag.engine.taylor.straight import LaneCode, horner, integral, product, square
+from sprag.engine.taylor.straight import LaneCode, Term, horner, integral, product, square
 from sprag.engine.vibration_drive.layout import Layout
 
 #: Smallest step, in excitation periods: below it a step no longer moves the phase.
@@ -21,13 +21,13 @@ class _Advance:
         self.taken = code.let("taken", f"{self.x}*{self.h}")
         self.shaft = code.series("W", layout.speed, layout.order + 1)
         self.attention = code.load("at_stop", layout.at_stop)
-        self.torques: list[list[str]] = []
+        self.torques: list[list[Term]] = []
 
     def add(self, row: int, amount: str) -> None:
         """Add to the sum at ``row``."""
         self.code.store(row, f"{self.code.row(row)} + {amount}")
 
-    def over(self, names: list[str]) -> str:
+    def over(self, names: list[Term]) -> str:
         """Integral of a series over the time taken."""
         return self.code.let("over", f"{self.h}*({integral(names, self.x)})")
 

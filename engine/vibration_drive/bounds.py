@@ -4,7 +4,7 @@ They are computed in the vector loop from the stored series; only lanes whose bo
 extremum get a second look (``lanes.look_for_events``, ``window.collect_peaks``).
 """
 
-from sprag.engine.taylor.straight import LaneCode, Span, horner, larger, primitive_span, rate_span, smaller, span
+from sprag.engine.taylor.straight import LaneCode, Span, Term, horner, larger, primitive_span, rate_span, smaller, span
 from sprag.engine.vibration_drive.layout import Layout
 
 #: Margin that indicates that the step itself is too long, not that a guard is close.
@@ -24,7 +24,7 @@ class _Watch:
         self.h = code.load("h", layout.h)
         self.inverse_h = code.let("inverse_h", f"1.0/{self.h}")
         self.speed = code.series("W", layout.speed, layout.order + 1)
-        self.torques: list[list[str]] = []
+        self.torques: list[list[Term]] = []
 
     def guard(self, bounds: Span, block: int, low: int | None, high: int | None) -> None:
         """``low`` and ``high`` are rows of a band's edges; the distances to them go ``block`` rows further.
@@ -91,7 +91,7 @@ class _Watch:
         self.peak(span(code, "w", w), block, row("speed_max"), row("speed_min"))
         self.peak(rate_span(code, "a", w, self.inverse_h), block, row("acc_max"), row("acc_min"))
 
-    def _check_law(self, torque: list[str], force: list[str], u_end: str, locked: int, allowed: int) -> None:
+    def _check_law(self, torque: list[Term], force: list[Term], u_end: str, locked: int, allowed: int) -> None:
         """Lower the margin where the step is too long for the clutch's law.
 
         The step is chosen by two coefficients. A law without a linear term, entered from uniform motion, has a series

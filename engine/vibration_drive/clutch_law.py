@@ -13,7 +13,9 @@ import numpy as np
 from numpy.polynomial import polynomial as poly
 from numpy.typing import ArrayLike, NDArray
 
+from sprag.engine.taylor.straight import horner, integral, slope
 from sprag.engine.vibration_drive.clutch_report import ClutchLaw, ClutchLawError
+from sprag.engine.vibration_drive.formulas import beyond
 from sprag.engine.vibration_drive.parameters import CLUTCH_COEFFICIENT, MAX_COEFFICIENTS
 
 #: A value counts as negative when it is below zero by more than this share of the sum of its terms' magnitudes;
@@ -61,14 +63,14 @@ def torque(coefficients: ArrayLike, windup_limit: float, u: ArrayLike) -> _Array
     ndarray of u's shape
         0 below zero windup; c_1 (the limit from above) at zero; straight beyond ``windup_limit``.
     """
-    law, derivative, inner, over, windup = _split(coefficients, windup_limit, u)
-    return np.asarray(np.where(windup < 0.0, 0.0, poly.polyval(inner, law) + over * _at_end(derivative, windup_limit)))
+    law, inner, over, negative = _split(coefficients, windup_limit, u)
+    return np.asarray(np.where(negative, 0.0, horner(law, inner) + over * slope(law, inner)))
 
 
 def stiffness(coefficients: ArrayLike, windup_limit: float, u: ArrayLike) -> _Array:
     """Stiffness dT/du, N*m/rad, of the law :func:`torque` describes (same parameters); 0 below zero windup."""
-    _, derivative, inner, _, windup = _split(coefficients, windup_limit, u)
-    return np.asarray(np.where(windup < 0.0, 0.0, poly.polyval(inner, derivative)))
+    law, inner, _, negative = _split(coefficients, windup_limit, u)
+    return np.asarray(np.where(negative, 0.0, slope(law, inner)))
 
 
 def stored_energy(coefficients: ArrayLike, windup_limit: float, u: ArrayLike) -> _Array:
@@ -76,10 +78,8 @@ def stored_energy(coefficients: ArrayLike, windup_limit: float, u: ArrayLike) ->
 
     Parameters as in :func:`torque`; beyond ``windup_limit`` the energy of the straight continuation is added.
     """
-    law, derivative, inner, over, windup = _split(coefficients, windup_limit, u)
-    energy = poly.polyval(inner, poly.polyint(law))
-    beyond = over * (_at_end(law, windup_limit) + 0.5 * over * _at_end(derivative, windup_limit))
-    return np.asarray(np.where(windup < 0.0, 0.0, energy + beyond))
+    law, inner, over, _ = _split(coefficients, windup_limit, u)
+    return np.asarray(integral(law, inner) + beyond(horner(law, inner), slope(law, inner), over))
 
 
 def check_law(coefficients: Sequence[float], windup_limit: float = math.inf) -> ClutchLaw:
@@ -189,12 +189,11 @@ def _ranges(law: _Array, limit: float) -> list[float]:
     return [widest, *(end for end in (4.0 * math.exp(size) for size in sizes) if end < widest)]
 
 
-def _split(coefficients: ArrayLike, limit: float, u: ArrayLike) -> tuple[_Array, _Array, _Array, _Array, _Array]:
-    """The law, its derivative, the windup inside the range, the windup beyond it, and the windup itself."""
-    law = np.asarray(coefficients, dtype=np.float64)
+def _split(coefficients: ArrayLike, limit: float, u: ArrayLike) -> tuple[_Array, _Array, _Array, NDArray[np.bool_]]:
+    """The law, the windup inside its range, the windup beyond it, and where the windup is negative."""
     windup = np.asarray(u, dtype=np.float64)
     inner = np.asarray(np.clip(windup, 0.0, limit), dtype=np.float64)
-    return law, _derivative(law), inner, np.asarray(np.maximum(windup - limit, 0.0)), windup
+    return np.asarray(coefficients, dtype=np.float64), inner, np.asarray(np.maximum(windup - limit, 0.0)), windup < 0.0
 
 
 def _at_end(law: _Array, limit: float) -> float:

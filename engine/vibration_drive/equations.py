@@ -15,6 +15,7 @@ import math
 
 from sprag.engine.taylor.straight import (
     LaneCode,
+    Term,
     exp2,
     log2,
     product,
@@ -23,6 +24,7 @@ from sprag.engine.taylor.straight import (
     smaller,
     square,
 )
+from sprag.engine.vibration_drive.formulas import base_series, drive, free_acceleration
 from sprag.engine.vibration_drive.layout import Layout
 
 #: Share of the estimated convergence-limited step that is taken (Jorba and Zou 2005 take e^-2, which is far too careful
@@ -50,34 +52,33 @@ class _Pendulum:
         self.u = [code.load(f"u{index}_0", self.row(layout, "u"))]
         s, c = sincos(code, self.phi[0], f"{index}")
         self.sin, self.cos = [s], [c]
-        self.torque: list[str] = []
-        self.drive: list[str] = []
-        self.squared: list[str] = []  # u^2
-        self.levels: list[list[str]] = [[] for _ in range((layout.coefficients - 1) // 2)]
+        self.torque: list[Term] = []
+        self.drive: list[Term] = []
+        self.squared: list[Term] = []  # u^2
+        self.levels: list[list[Term]] = [[] for _ in range((layout.coefficients - 1) // 2)]
         self.free = ""
 
-    ml: str
-    spring: str
-    damping: str
-    inverse_inertia: str
-    inertia: str
-    locked: str
+    ml: Term
+    weight: Term
+    spring: Term
+    damping: Term
+    inverse_inertia: Term
+    inertia: Term
+    locked: Term
 
     def row(self, layout: Layout, name: str) -> int:
         offset: int = getattr(layout, f"p_{name}")
         return self.base + offset
 
 
-def _excitation(code: LaneCode, layout: Layout) -> tuple[list[str], list[str]]:
-    """Series of the base's accelerations (2): x'' = -d nu^2 cos(nu t), y'' = -b nu^2 sin(nu t + chi)."""
+def _excitation(code: LaneCode, layout: Layout) -> tuple[list[Term], list[Term]]:
+    """Series of the base's accelerations (2)."""
     names = ("f", "nu", "acc_x", "acc_y", "cos_chi", "sin_chi")
     f, nu, acc_x, acc_y, cos_chi, sin_chi = (code.load(name, getattr(layout, name)) for name in names)
     s, c = sincos(code, code.let("theta", f"6.283185307179586*{f}"), "t")
-    x = [code.let("X0", f"-{acc_x}*{c}"), code.let("X1", f"{acc_x}*{nu}*{s}")]
-    y = [
-        code.let("Y0", f"-{acc_y}*({s}*{cos_chi} + {c}*{sin_chi})"),
-        code.let("Y1", f"-{acc_y}*{nu}*({c}*{cos_chi} - {s}*{sin_chi})"),
-    ]
+    first_x, first_y = base_series(acc_x, acc_y, nu, s, c, sin_chi, cos_chi)
+    x = [code.let(f"X{k}", term) for k, term in enumerate(first_x)]
+    y = [code.let(f"Y{k}", term) for k, term in enumerate(first_y)]
     code.let("nu2", f"{nu}*{nu}")
     for k in range(2, layout.order):
         factor = code.let(f"nu2_{k}", f"nu2*{-1.0 / (k * (k - 1))!r}")
@@ -86,7 +87,7 @@ def _excitation(code: LaneCode, layout: Layout) -> tuple[list[str], list[str]]:
     return x, y
 
 
-def _torque(code: LaneCode, p: _Pendulum, k: int) -> str:
+def _torque(code: LaneCode, p: _Pendulum, k: int) -> Term:
     """Coefficient k of the clutch torque (3) by Horner's scheme in u^2: c_1 + c_2 u + u^2 (c_3 + c_4 u + ...)."""
     top, *lower = [p.force[j : j + 2] for j in reversed(range(0, len(p.force), 2))]
     value = _straight(top, p.u, k)
@@ -102,32 +103,24 @@ def _torque(code: LaneCode, p: _Pendulum, k: int) -> str:
     return code.let(f"T{p.index}_{k}", value)
 
 
-def _straight(pair: list[str], u: list[str], k: int) -> str:
+def _straight(pair: list[Term], u: list[Term], k: int) -> str:
     """Coefficient k of ``c + d u`` for the numbers c and, where there is one, d."""
     terms = [pair[0]] if k == 0 else []
     return " + ".join([*terms, *(f"{d}*{u[k]}" for d in pair[1:])]) or "0.0"
 
 
-def _free_acceleration(code: LaneCode, p: _Pendulum, x: list[str], y: list[str], k: int) -> None:
-    """Coefficient k of a pendulum's acceleration without its clutch, and of the base's drive x'' cos phi + y'' sin
-    phi.
-    """
+def _free_acceleration(code: LaneCode, p: _Pendulum, x: list[Term], y: list[Term], k: int) -> None:
+    """Coefficient k of a pendulum's acceleration without its clutch, and of the base's drive."""
     i = p.index
-    # Terms known before the newest coefficients are summed first: the time of a step depends on the chain of operations
-    # from one order to the next, more than on their number.
-    rest = code.let(f"R{i}_{k}", f"-{p.damping}*{p.w[k]} - {p.spring}*{p.phi[k]}")
-    older = ""
     if k > 0:
         p.sin.append(_turned(code, f"s{i}_{k}", p.cos, p, k, 1.0))
         p.cos.append(_turned(code, f"c{i}_{k}", p.sin, p, k, -1.0))
-        older = " + ".join(f"{a[j]}*{b[k - j]}" for j in range(1, k + 1) for a, b in ((x, p.cos), (y, p.sin))) + " + "
-    # The weight is kept separate, so that a base at rest drives nothing, not even by a rounding error.
-    p.drive.append(code.let(f"D{i}_{k}", f"{older}{x[0]}*{p.cos[k]} + {y[0]}*{p.sin[k]}"))
-    weight = code.let(f"G{i}_{k}", f"{rest} + weight{i}*{p.sin[k]}")
-    p.free = code.let(f"F{i}_{k}", f"{weight} + {p.ml}*{p.drive[k]}")
+    p.drive.append(code.let(f"D{i}_{k}", drive(x, y, p.sin, p.cos, k)))
+    free = free_acceleration(p.ml, p.weight, p.spring, p.damping, p.phi[k], p.w[k], p.sin[k], p.drive[k])
+    p.free = code.let(f"F{i}_{k}", free)
 
 
-def _turned(code: LaneCode, name: str, other: list[str], p: _Pendulum, k: int, sign: float) -> str:
+def _turned(code: LaneCode, name: str, other: list[Term], p: _Pendulum, k: int, sign: float) -> Term:
     """Coefficient k of the angle's sine from its cosine or, with ``sign`` -1, of its cosine from its sine.
 
     It is the integral of ``other`` times the speed; the term with the newest coefficient comes last.
@@ -141,12 +134,11 @@ def series_loop(layout: Layout) -> str:
     """Source of the loop that finds the series of every lane, in fractions of the step they allow, and stores them."""
     code = LaneCode(layout.lanes)
     order = layout.order
-    for name in ("gravity", "load", "mobility"):
-        code.load(name, getattr(layout, name))
+    gravity, *_ = (code.load(name, getattr(layout, name)) for name in ("gravity", "load", "mobility"))
     x, y = _excitation(code, layout)
     pendulums = [_Pendulum(code, layout, i) for i in range(layout.n)]
     for p in pendulums:
-        code.let(f"weight{p.index}", f"{p.ml}*gravity")
+        p.weight = code.let(f"weight{p.index}", p.ml * gravity)
     shaft = [code.load("W0", layout.speed)]
     for k in range(order + 1):
         for p in pendulums:
@@ -172,7 +164,7 @@ def series_loop(layout: Layout) -> str:
     return code.loop()
 
 
-def _in_fractions(code: LaneCode, order: int, pendulums: list[_Pendulum], shaft: list[str]) -> None:
+def _in_fractions(code: LaneCode, order: int, pendulums: list[_Pendulum], shaft: list[Term]) -> None:
     """Rescale every series from seconds to fractions of the step: coefficient k times h^k."""
     power = "h"
     for k in range(1, order + 1):
@@ -187,7 +179,7 @@ def _in_fractions(code: LaneCode, order: int, pendulums: list[_Pendulum], shaft:
                 p.drive[k] = code.let(f"Dx{i}_{k}", f"{p.drive[k]}*{power}")
 
 
-def _store_series(code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft: list[str]) -> None:
+def _store_series(code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft: list[Term]) -> None:
     for k in range(layout.order + 1):
         if k > 0:
             code.store(layout.speed + k, shaft[k])
@@ -199,7 +191,7 @@ def _store_series(code: LaneCode, layout: Layout, pendulums: list[_Pendulum], sh
                 code.store(p.row(layout, "drive") + k, p.drive[k])
 
 
-def _step_size(code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft: list[str]) -> None:
+def _step_size(code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft: list[Term]) -> None:
     """Step from the last two coefficients of every speed, relative to the size of that speed's motion."""
     order = layout.order
     code.load("inverse_rate", layout.inverse_rate)
@@ -207,14 +199,14 @@ def _step_size(code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft
     for p in pendulums:
         # The share of the base's drive is for the instant at which a locked pendulum starts from rest without
         # acceleration.
-        drive = f"abs({p.ml})*{DRIVE_SHARE}*({code.row(layout.acc_x)} + {code.row(layout.acc_y)})"
+        least = f"abs({p.ml})*{DRIVE_SHARE}*({code.row(layout.acc_x)} + {code.row(layout.acc_y)})"
         scale = code.let(
             f"scale{p.index}",
-            f"abs({p.w[0]}) + inverse_rate*(abs({p.w[1]}) + {drive} + inverse_rate*abs({p.w[2]})) + 1e-300",
+            f"abs({p.w[0]}) + inverse_rate*(abs({p.w[1]}) + {least} + inverse_rate*abs({p.w[2]})) + 1e-300",
         )
         series.append((p.w, scale, code.let(f"unit{p.index}", f"1.0/{scale}")))
-    code.let("scale_shaft", " + ".join(scale for _, scale, _ in series) + f" + abs({shaft[0]})")
-    series.append((shaft, "scale_shaft", code.let("unit_shaft", "1.0/scale_shaft")))
+    whole = code.let("scale_shaft", " + ".join(scale for _, scale, _ in series) + f" + abs({shaft[0]})")
+    series.append((shaft, whole, code.let("unit_shaft", f"1.0/{whole}")))
     for last in (order, order - 1):
         worst = code.let(f"r{last}", "0.0")
         for number, (names, _, unit) in enumerate(series):

@@ -10,9 +10,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import part
+from sprag.engine.compile.jit import inlined, part
 from sprag.engine.taylor.elementary import cosine, sine
 from sprag.engine.vibration_drive.automaton import Band
+from sprag.engine.vibration_drive.formulas import base_series, drive, free_acceleration
 from sprag.engine.vibration_drive.layout import Layout
 from sprag.engine.vibration_drive.states import (
     ENGAGED,
@@ -46,46 +47,54 @@ _PULL, _LEAST, _MOST, _MEETS, _SHARE = range(5)
 _T_LOW, _T_HIGH = int(Band.T_LOW), int(Band.T_HIGH)
 
 
+_base_series, _drive, _free_acceleration = inlined(base_series), inlined(drive), inlined(free_acceleration)
+
+
 @part
-def acceleration(W: Floats, lay: Layout, lane: int, i: int) -> float:
-    """Acceleration of pendulum ``i`` without its clutch, at the lane's state (equation (1))."""
+def _coefficient(W: Floats, lay: Layout, lane: int, i: int, k: int, rate: float) -> float:
+    """Coefficient ``k``, 0 or 1, of the acceleration of pendulum ``i`` without its clutch, from the lane's state on;
+    its acceleration there is ``rate``.
+    """
     lanes = lay.lanes
     base = lay.pendulums + i * lay.stride
-    phi = W[(base + lay.p_phi) * lanes + lane]
     theta = 2.0 * math.pi * W[lay.f * lanes + lane]
-    x = -W[lay.acc_x * lanes + lane] * cosine(theta)
-    y = -W[lay.acc_y * lanes + lane] * (
-        sine(theta) * W[lay.cos_chi * lanes + lane] + cosine(theta) * W[lay.sin_chi * lanes + lane]
+    x, y = _base_series(
+        W[lay.acc_x * lanes + lane],
+        W[lay.acc_y * lanes + lane],
+        W[lay.nu * lanes + lane],
+        sine(theta),
+        cosine(theta),
+        W[lay.sin_chi * lanes + lane],
+        W[lay.cos_chi * lanes + lane],
     )
-    push = x * cosine(phi) + (y + W[lay.gravity * lanes + lane]) * sine(phi)
-    return float(
-        W[(base + lay.p_ml) * lanes + lane] * push
-        - W[(base + lay.p_spring) * lanes + lane] * phi
-        - W[(base + lay.p_damping) * lanes + lane] * W[(base + lay.p_speed) * lanes + lane]
+    phi = (W[(base + lay.p_phi) * lanes + lane], W[(base + lay.p_speed) * lanes + lane])
+    w = (phi[1], rate)
+    s, c = sine(phi[0]), cosine(phi[0])
+    sin, cos = (s, c * phi[1]), (c, -s * phi[1])
+    ml = W[(base + lay.p_ml) * lanes + lane]
+    acceleration = _free_acceleration(
+        ml,
+        ml * W[lay.gravity * lanes + lane],
+        W[(base + lay.p_spring) * lanes + lane],
+        W[(base + lay.p_damping) * lanes + lane],
+        phi[k],
+        w[k],
+        sin[k],
+        _drive(x, y, sin, cos, k),
     )
+    return float(acceleration)
+
+
+@part
+def acceleration(W: Floats, lay: Layout, lane: int, i: int) -> float:
+    """Acceleration of pendulum ``i`` without its clutch, at the lane's state."""
+    return _coefficient(W, lay, lane, i, 0, 0.0)
 
 
 @part
 def _jerk(W: Floats, lay: Layout, lane: int, i: int, rate: float) -> float:
     """Rate of ``acceleration`` while the pendulum moves with the shaft, whose acceleration is ``rate``."""
-    lanes = lay.lanes
-    base = lay.pendulums + i * lay.stride
-    phi = W[(base + lay.p_phi) * lanes + lane]
-    speed = W[(base + lay.p_speed) * lanes + lane]
-    theta = 2.0 * math.pi * W[lay.f * lanes + lane]
-    nu = W[lay.nu * lanes + lane]
-    cos_chi, sin_chi = W[lay.cos_chi * lanes + lane], W[lay.sin_chi * lanes + lane]
-    x = -W[lay.acc_x * lanes + lane] * cosine(theta)
-    y = -W[lay.acc_y * lanes + lane] * (sine(theta) * cos_chi + cosine(theta) * sin_chi)
-    x_rate = nu * W[lay.acc_x * lanes + lane] * sine(theta)
-    y_rate = -nu * W[lay.acc_y * lanes + lane] * (cosine(theta) * cos_chi - sine(theta) * sin_chi)
-    along = x_rate + (y + W[lay.gravity * lanes + lane]) * speed
-    push = along * cosine(phi) + (y_rate - x * speed) * sine(phi)
-    return float(
-        W[(base + lay.p_ml) * lanes + lane] * push
-        - W[(base + lay.p_spring) * lanes + lane] * speed
-        - W[(base + lay.p_damping) * lanes + lane] * rate
-    )
+    return _coefficient(W, lay, lane, i, 1, rate)
 
 
 @part

@@ -4,7 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine.compile.jit import inlined, part
+from sprag.engine.taylor.straight import horner, integral, slope
 from sprag.engine.vibration_drive.automaton import CLUTCH_THRESHOLD, Band, Clutch, Shaft, Threshold
+from sprag.engine.vibration_drive.formulas import beyond
 from sprag.engine.vibration_drive.layout import Layout
 
 Floats = NDArray[np.float64]
@@ -42,22 +44,25 @@ NO_EVENT = -2
 OF_SHAFT = -1
 
 
+_horner, _slope, _integral, _beyond = part(horner), part(slope), part(integral), inlined(beyond)
+
+
+@inlined
+def _coefficients(W: Floats, first: int, count: int, lanes: int, lane: int) -> Floats:
+    """The lane's elements of ``count`` workspace rows from ``first`` on."""
+    return W[first * lanes + lane : (first + count) * lanes : lanes]
+
+
 @part
 def law(W: Floats, first: int, count: int, lanes: int, lane: int, u: float) -> float:
     """Clutch torque at windup ``u`` by the polynomial whose coefficients start at workspace row ``first``."""
-    value = 0.0
-    for k in range(count - 1, -1, -1):
-        value = value * u + W[(first + k) * lanes + lane]
-    return value
+    return float(_horner(_coefficients(W, first, count, lanes, lane), u))
 
 
 @part
 def law_slope(W: Floats, first: int, count: int, lanes: int, lane: int, u: float) -> float:
     """Derivative of ``law``."""
-    value = 0.0
-    for k in range(count - 1, 0, -1):
-        value = value * u + k * W[(first + k) * lanes + lane]
-    return value
+    return float(_slope(_coefficients(W, first, count, lanes, lane), u))
 
 
 @inlined
@@ -78,14 +83,11 @@ def stored_energy(W: Floats, lay: Layout, lane: int, i: int, u: float) -> float:
     limit = W[(base + lay.p_limit) * lay.lanes + lane]
     inside = min(u, limit)
     first = base + lay.p_law
-    value = 0.0
-    for k in range(lay.coefficients - 1, -1, -1):
-        value = value * inside + W[(first + k) * lay.lanes + lane] / (k + 1)
-    value *= inside
+    value = _integral(_coefficients(W, first, lay.coefficients, lay.lanes, lane), inside)
     if u > limit:
         end = law(W, first, lay.coefficients, lay.lanes, lane, limit)
         rate = law_slope(W, first, lay.coefficients, lay.lanes, lane, limit)
-        value += (u - limit) * (end + 0.5 * rate * (u - limit))
+        value += _beyond(end, rate, u - limit)
     return float(value)
 
 
