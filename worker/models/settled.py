@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 #: Value of "until" in `Study.run` for settled runs.
 SETTLED: Final = "settled"
+#: Value of the result "regime" of a motion that never repeats.
+IRREGULAR: Final = float(Regime.IRREGULAR)
 #: Each regime by name, and its description.
 REGIME_SENTENCES: Final[dict[str, str]] = {regime.name.lower(): regime.sentence for regime in Regime}
 #: Flags of cases without a periodic motion: the names of their regimes.

@@ -1,0 +1,237 @@
+"""Curves on nested dyadic grids: which intervals are resolved, what their errors are, and where the jumps lie.
+
+An interval between two neighbouring known points is half of its parent, whose midpoint is one of the two. What the
+parent's midpoint misses the straight line between the parent's ends by is the parent's *difference*. A smooth curve's
+error in the interval is about a quarter of it (docs/refinement.md, "The test of an interval").
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sprag.worker.planning.samples import Samples
+
+    Bools = NDArray[np.bool_]
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+
+#: Factor by which the difference of a smooth curve shrinks under halving.
+_SHRINKS: Final = 4.0
+#: No interval is longer than the first round's divided by this.
+_DIVIDED: Final = 4
+
+
+class Why(Enum):
+    """Why an interval is not interpolated: the value is the word in summaries, the sentence is for people."""
+
+    FAILED = "failed"
+    IRREGULAR = "irregular"
+    REGIME = "regime"
+    ORDER = "order"
+    NO_VALUE = "no_value"
+    STEEP = "steep"
+
+    @property
+    def sentence(self) -> str:
+        """Description of the reason."""
+        return _SENTENCES[self]
+
+
+_SENTENCES: Final = {
+    Why.FAILED: "Cases failed.",
+    Why.IRREGULAR: "The motion is irregular, and results scatter by more than the error.",
+    Why.REGIME: "The regime changes, and results jump.",
+    Why.ORDER: "The order of the motion changes, and results jump.",
+    Why.NO_VALUE: "Cases do not have the result.",
+    Why.STEEP: "Results jump, or are too steep for the finest grid.",
+}
+#: The reasons by the numbers in `Intervals.why`.
+REASONS: Final = tuple(Why)
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """The intervals between neighbouring known points of all curves, curve by curve, ascending.
+
+    Attributes
+    ----------
+    curve, low, width : int64 arrays, shape (intervals,)
+        Curve, position of the low end, length in steps of the finest grid.
+    resolved : bool array, shape (intervals,)
+        Whether the interval needs no more points: it passed, or is of the finest width.
+    errors : float64 array, shape (intervals, results)
+        Estimated error of the straight line, relative to the range; NaN where nothing is known of it.
+    jumps : bool array, shape (intervals, results)
+        Where the result must not be interpolated.
+    why : int64 array, shape (intervals,)
+        Indices into `REASONS`, meaningful where there is a jump.
+    worth : float64 array, shape (intervals,)
+        How much a point in the middle is worth: the larger the more.
+    """
+
+    curve: Ints
+    low: Ints
+    width: Ints
+    resolved: Bools
+    errors: Floats
+    jumps: Bools
+    why: Ints
+    worth: Floats
+
+
+@dataclass(frozen=True)
+class _Triples:
+    """Every dyadic interval with its midpoint, for one length.
+
+    ``raw`` (curves, intervals, results) are the differences, relative to the range; ``worst`` (curves, intervals)
+    is the largest difference that more points would make smaller, infinite where the motions are different.
+    """
+
+    raw: Floats
+    worst: Floats
+
+
+def intervals(samples: Samples) -> Intervals:
+    """The intervals of all curves."""
+    plan, ranges = samples.plan, samples.ranges()
+    triples = _all_triples(samples, ranges)
+    curve, place = np.nonzero(samples.known)
+    inner = np.flatnonzero(curve[1:] == curve[:-1])
+    curve, low, width = curve[inner], place[inner], place[inner + 1] - place[inner]
+    if not len(curve):
+        none = np.zeros((0, len(plan.results)))
+        nothing = np.zeros(0, dtype=bool)
+        return Intervals(curve, low, width, nothing, none, none > 0.0, curve, np.zeros(0))
+    raw, worst = _of_ancestor(triples, curve, low, 2 * width)
+    _, before = _of_ancestor(triples, curve, low, 4 * width)
+    most = max(1, plan.finest // (plan.start - 1) // _DIVIDED)
+    narrow, error = width <= most, plan.error
+    passed = narrow & (worst <= error) & ((worst <= error / _SHRINKS) | (before <= error * _SHRINKS))
+    resolved = passed | (width == 1)
+    jumps, bends = _jumps(samples, ranges, curve, low, width, passed)
+    errors = np.where(width[:, None] == 1, np.where(np.isnan(bends), raw, bends), raw)
+    both = samples.irregular[curve, low] & samples.irregular[curve, low + width]
+    scatter = both[:, None] & (errors > error)
+    jumps = _through_zones(curve, low, width, both, jumps | scatter)
+    worth = np.where(width > plan.finest // (plan.start - 1), 2.0 * width, np.minimum(worst, 1.0))
+    return Intervals(curve, low, width, resolved, errors, jumps, _reasons(samples, curve, low, width, both), worth)
+
+
+def _all_triples(samples: Samples, ranges: Floats) -> dict[int, _Triples]:
+    """`_Triples` by the length of the interval."""
+    found: dict[int, _Triples] = {}
+    length = samples.plan.finest
+    while length >= 2:
+        found[length] = _triples(samples, ranges, length)
+        length //= 2
+    return found
+
+
+def _triples(samples: Samples, ranges: Floats, length: int) -> _Triples:
+    error, codes = samples.plan.error, samples.codes
+    ends, middles = slice(0, None, length), slice(length // 2, None, length)
+
+    def three(array: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        return array[:, ends][:, :-1], array[:, middles], array[:, ends][:, 1:]
+
+    left, middle, right = three(samples.values)
+    with np.errstate(invalid="ignore"):
+        raw = np.abs(middle - 0.5 * (left + right)) / ranges[:, None, :]
+    known = np.logical_and.reduce(three(samples.known))
+    raw = np.where(known[:, :, None], raw, np.nan)
+    width = np.maximum.reduce(three(samples.widths))
+    irregular = np.logical_and.reduce(three(samples.irregular))
+    # More points do not tell a scattering result better: a mean stops within two half widths, an extreme at once.
+    scatter = np.where(samples.has_width, raw * ranges[:, None, :] <= 2.0 * width, irregular[:, :, None])
+    differences = np.where(scatter, np.minimum(raw, error), raw)
+    nowhere = ~np.isfinite(left) & ~np.isfinite(middle) & ~np.isfinite(right)
+    differences = np.where(nowhere, 0.0, np.where(np.isfinite(differences), differences, np.inf))
+    a, b, c = three(codes)
+    worst = np.where(known & (a == b) & (b == c), differences.max(axis=2), np.inf)
+    return _Triples(raw, worst)
+
+
+def _of_ancestor(triples: dict[int, _Triples], curve: Ints, low: Ints, length: Ints) -> tuple[Floats, Floats]:
+    """``raw`` and ``worst`` of the interval of that length that contains each interval; NaN, infinity where none."""
+    some = next(iter(triples.values()))
+    raw, worst = np.full((len(curve), some.raw.shape[2]), np.nan), np.full(len(curve), np.inf)
+    for one, own in triples.items():
+        here = np.flatnonzero(length == one)
+        at = curve[here], low[here] // one
+        raw[here], worst[here] = own.raw[at], own.worst[at]
+    return raw, worst
+
+
+def _jumps(
+    samples: Samples, ranges: Floats, curve: Ints, low: Ints, width: Ints, passed: Bools
+) -> tuple[Bools, Floats]:
+    """Intervals that hold a jump of a result, and how far the curve bends at their straighter end.
+
+    Both of shape (intervals, results), the second relative to the range. A jump bends the curve at both ends, one way
+    and then the other; smooth parts beside it are straight at their other end.
+    """
+    error = samples.plan.error
+    start, end = samples.values[curve, low], samples.values[curve, low + width]
+    rise = (end - start) / ranges[curve]
+    slope = rise / width[:, None]
+    neighbours = (curve[1:] == curve[:-1])[:, None]
+    gap = np.full((1, rise.shape[1]), np.nan)
+    turn = np.where(neighbours, np.diff(slope, axis=0), np.nan)
+    before, after = np.vstack([gap, turn]) * width[:, None], np.vstack([turn, gap]) * width[:, None]
+    # At an end of the curve only the other side tells.
+    before, after = np.where(np.isnan(before), -after, before), np.where(np.isnan(after), -before, after)
+    least = np.minimum(np.abs(before), np.abs(after))
+    bends = 0.5 * least
+    missing = ~np.isfinite(start) | ~np.isfinite(end)
+    wide = np.maximum(samples.widths[curve, low], samples.widths[curve, low + width]) > error * ranges[curve]
+    jump = np.where(before * after < 0.0, least, bends) > error
+    codes = samples.codes
+    change = codes[curve, low] != codes[curve, low + width]
+    jump |= change[:, None] & (np.abs(rise) > error)
+    jump &= ~passed[:, None]
+    jump = _along_slopes(jump, (np.abs(rise) > 2.0 * error) & ~passed[:, None], neighbours)
+    return jump | missing | wide, bends
+
+
+def _along_slopes(jump: Bools, steep: Bools, neighbours: Bools) -> Bools:
+    """Jumps with the steep intervals next to them."""
+    while True:
+        wider = jump.copy()
+        wider[1:] |= jump[:-1] & steep[1:] & neighbours
+        wider[:-1] |= jump[1:] & steep[:-1] & neighbours
+        if (wider == jump).all():
+            return jump
+        jump = wider
+
+
+def _through_zones(curve: Ints, low: Ints, width: Ints, irregular: Bools, jump: Bools) -> Bools:
+    """Jumps, and whole zones of irregular motion in which a result scatters anywhere."""
+    if not irregular.any():
+        return jump
+    same = (curve[1:] == curve[:-1]) & irregular[1:] & irregular[:-1] & (low[1:] == low[:-1] + width[:-1])
+    zone = np.concatenate([[0], np.cumsum(~same)])
+    starts = np.concatenate([[0], np.flatnonzero(~same) + 1])
+    anywhere = np.logical_or.reduceat(jump, starts, axis=0)[zone]
+    return np.where(irregular[:, None], anywhere, jump)
+
+
+def _reasons(samples: Samples, curve: Ints, low: Ints, width: Ints, irregular: Bools) -> Ints:
+    high = low + width
+    missing = ~np.isfinite(samples.values[curve, low]) | ~np.isfinite(samples.values[curve, high])
+    regimes, orders = samples.regimes, samples.orders
+    tests = {
+        Why.FAILED: ~samples.ok[curve, low] | ~samples.ok[curve, high],
+        Why.IRREGULAR: irregular,
+        Why.REGIME: regimes[curve, low] != regimes[curve, high],
+        Why.ORDER: orders[curve, low] != orders[curve, high],
+        Why.NO_VALUE: missing.any(axis=1),
+    }
+    fallback = REASONS.index(Why.STEEP)
+    return np.select(list(tests.values()), [REASONS.index(why) for why in tests], fallback).astype(np.int64)

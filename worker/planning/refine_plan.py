@@ -1,0 +1,234 @@
+"""The plan of a refinement, its axes and the points of its grid. Plain values; no rows and no decisions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+
+#: Value of "kind" in the plan.
+REFINE: Final = "refine"
+#: Results of settled studies that tell regimes apart.
+REGIME, ORDER = "regime", "regime.order"
+_HALF_WIDTH: Final = ".half_width"
+_MAX_FINEST: Final = 65_536
+#: Numbers that a planner holds at most: results at every point of the finest grids.
+_MAX_NUMBERS: Final = 8_000_000
+
+
+@dataclass(frozen=True)
+class AdaptiveAxis:
+    """An axis along which the planner chooses the values, from ``low`` to ``high`` (SI)."""
+
+    paths: tuple[str, ...]
+    low: float
+    high: float
+
+    def at(self, positions: Ints, finest: int) -> Floats:
+        """Values at positions 0 .. ``finest``: those of ``numpy.linspace`` with any power of two of intervals."""
+        values = self.low + (self.high - self.low) * positions / finest
+        return np.where(positions == finest, self.high, values)
+
+    def positions(self, values: Floats, finest: int) -> Ints:
+        """Positions of values; ValueError for one that is not on the grid."""
+        found = np.rint((values - self.low) / (self.high - self.low) * finest)
+        valid = (found >= 0) & (found <= finest)
+        positions = np.where(valid, found, 0).astype(np.int64)
+        valid &= np.abs(self.at(positions, finest) - values) <= 1e-9 * (self.high - self.low)
+        if not valid.all():
+            raise ValueError(f"{self.paths[0]}: {values[~valid][0]} is not a point of this refinement")
+        return positions
+
+
+@dataclass(frozen=True)
+class FixedAxis:
+    """An axis with given values (SI); each combination of all fixed axes is one curve or map."""
+
+    paths: tuple[str, ...]
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class RefinePlan:
+    """What a refinement asks for. The columns of its points are the fixed axes in their order, then the adaptive ones.
+
+    Attributes
+    ----------
+    results : tuple of str
+        Results that must be right to the error.
+    error : float
+        Largest error, relative to the range of the result over its curve or map.
+    start : int
+        Values of each adaptive axis in the first round: a power of two plus one.
+    finest : int
+        Intervals of the finest grid of each adaptive axis: a power of two.
+    adaptive : tuple of AdaptiveAxis
+        One for curves, two for maps.
+    fixed : tuple of FixedAxis
+    most : int or None
+        Cases at most.
+    regime : bool
+        Whether the motions are settled: changes of regime and order are jumps, irregular motion scatters.
+    half_widths : tuple of str
+        Those of the results that have a half width ("NAME.half_width") where the motion is irregular.
+
+    Raises
+    ------
+    ValueError
+        With the name of the field, its value and what is allowed.
+    """
+
+    results: tuple[str, ...]
+    error: float
+    start: int
+    finest: int
+    adaptive: tuple[AdaptiveAxis, ...]
+    fixed: tuple[FixedAxis, ...] = ()
+    most: int | None = None
+    regime: bool = False
+    half_widths: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        _check(bool(self.results), "results", list(self.results), "at least one name")
+        _check(len(set(self.results)) == len(self.results), "results", list(self.results), "different names")
+        _check(set(self.half_widths) <= set(self.results), "half_widths", list(self.half_widths), "names of results")
+        _check(0.0 < self.error < 1.0, "error", self.error, "between 0 and 1, exclusive")
+        _check(_power(self.finest) and self.finest <= _MAX_FINEST, "finest", self.finest, "a power of two up to 65,536")
+        allowed = f"a power of two plus one, from 3 to {self.finest + 1}"
+        _check(3 <= self.start <= self.finest + 1 and _power(self.start - 1), "start", self.start, allowed)
+        _check(self.most is None or self.most >= 1, "most", self.most, "at least 1")
+        _check(len(self.adaptive) in {1, 2}, "adaptive", len(self.adaptive), "one axis or two")
+        for axis in self.adaptive:
+            allowed = "finite numbers, the first below the second"
+            valid = math.isfinite(axis.low) and math.isfinite(axis.high) and axis.low < axis.high
+            _check(valid, f"adaptive {axis.paths[0]}", [axis.low, axis.high], allowed)
+        for fixed in self.fixed:
+            _check(bool(fixed.values), f"fixed {fixed.paths[0]}", [], "at least one value")
+            different = len(set(fixed.values)) == len(fixed.values)
+            _check(different, f"fixed {fixed.paths[0]}", list(fixed.values), "different values")
+        numbers = self.combinations * self.grid_points * len(self.results)
+        allowed = f"at most {_MAX_NUMBERS:,} for all points of the finest grids and all results"
+        _check(numbers <= _MAX_NUMBERS, "finest", self.finest, f"{allowed}, not {numbers:,}")
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> RefinePlan:
+        """The plan from plain JSON data; the inverse of `to_json`."""
+        if data.get("kind") != REFINE:
+            raise ValueError(f"kind: {data.get('kind')!r} is not {REFINE!r}")
+        adaptive = [AdaptiveAxis(tuple(a["paths"]), float(a["low"]), float(a["high"])) for a in data["adaptive"]]
+        fixed = [FixedAxis(tuple(a["paths"]), tuple(map(float, a["values"]))) for a in data.get("fixed", ())]
+        most = data.get("most")
+        return cls(
+            results=tuple(data["results"]),
+            error=float(data["error"]),
+            start=int(data["start"]),
+            finest=int(data["finest"]),
+            adaptive=tuple(adaptive),
+            fixed=tuple(fixed),
+            most=None if most is None else int(most),
+            regime=bool(data.get("regime", False)),
+            half_widths=tuple(data.get("half_widths", ())),
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """The plan as plain JSON data, SI."""
+        return {
+            "kind": REFINE,
+            "results": list(self.results),
+            "error": self.error,
+            "start": self.start,
+            "finest": self.finest,
+            "most": self.most,
+            "adaptive": [{"paths": list(a.paths), "low": a.low, "high": a.high} for a in self.adaptive],
+            "fixed": [{"paths": list(a.paths), "values": list(a.values)} for a in self.fixed],
+            "regime": self.regime,
+            "half_widths": list(self.half_widths),
+        }
+
+    @property
+    def paths(self) -> tuple[tuple[str, ...], ...]:
+        """Paths of each column."""
+        return (*(axis.paths for axis in self.fixed), *(axis.paths for axis in self.adaptive))
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """Every result that the planner must be told."""
+        own = (REGIME, ORDER) if self.regime else ()
+        widths = (name + _HALF_WIDTH for name in self.half_widths)
+        return tuple(dict.fromkeys((*self.results, *own, *widths)))
+
+    @property
+    def most_cases(self) -> int:
+        """Cases at most: ``most``, or every point of the finest grids."""
+        points = self.combinations * self.grid_points
+        return points if self.most is None else min(self.most, points)
+
+    @property
+    def combinations(self) -> int:
+        """Number of curves or maps."""
+        return math.prod(len(axis.values) for axis in self.fixed)
+
+    @property
+    def grid_points(self) -> int:
+        """Points of the finest grid of one curve or map."""
+        return math.prod(self.finest + 1 for _ in self.adaptive)
+
+    @cached_property
+    def _grid(self) -> Floats:
+        """Values of the fixed axes, shape (combinations, axes); the last varies fastest."""
+        axes = np.meshgrid(*(np.array(axis.values) for axis in self.fixed), indexing="ij")
+        return np.stack([axis.ravel() for axis in axes], axis=1) if axes else np.empty((1, 0))
+
+    def fixed_values(self, combination: int) -> dict[str, float]:
+        """Values of the fixed axes by path of one curve or map."""
+        values = self._grid[combination].tolist()
+        return {path: value for axis, value in zip(self.fixed, values, strict=True) for path in axis.paths}
+
+    def points(self, combinations: Ints, positions: Sequence[Ints]) -> Floats:
+        """Points of curves or maps at positions along each adaptive axis, shape (m, columns)."""
+        own = [axis.at(at, self.finest)[:, None] for axis, at in zip(self.adaptive, positions, strict=True)]
+        return np.hstack([self._grid[combinations], *own])
+
+    def places(self, points: Floats) -> tuple[Ints, list[Ints]]:
+        """Combination and positions of points, the inverse of `points`; ValueError for a point not of the plan."""
+        count = len(self.fixed)
+        combination = np.zeros(len(points), dtype=np.int64)
+        for column, axis in enumerate(self.fixed):
+            same = points[:, column, None] == np.array(axis.values)
+            if not same.any(axis=1).all():
+                other = points[~same.any(axis=1)][0, column]
+                raise ValueError(f"{axis.paths[0]}: {other} is not a value of this refinement")
+            combination = combination * len(axis.values) + same.argmax(axis=1)
+        own = [axis.positions(points[:, count + i], self.finest) for i, axis in enumerate(self.adaptive)]
+        return combination, own
+
+
+def half_widths_of(results: Iterable[str], names: Iterable[str]) -> tuple[str, ...]:
+    """Those of the results for which there also is a result "NAME.half_width" among all ``names`` of a study."""
+    every = set(names)
+    return tuple(name for name in results if name + _HALF_WIDTH in every)
+
+
+def half_width(name: str) -> str:
+    """Name of the half width of a result."""
+    return name + _HALF_WIDTH
+
+
+def _power(number: int) -> bool:
+    return number >= 1 and number & (number - 1) == 0
+
+
+def _check(valid: bool, name: str, value: object, allowed: str) -> None:
+    if not valid:
+        raise ValueError(f"{name}: {value} is not allowed; it must be {allowed}")

@@ -1,0 +1,93 @@
+"""The rows of a refinement on its finest grids: what is known where, ranges of the results."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sprag.worker.models.settled import IRREGULAR
+from sprag.worker.planning.refine_plan import ORDER, REGIME, half_width
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from sprag.worker.planning.refine_plan import RefinePlan
+    from sprag.worker.planning.rounds import Rows
+
+    Bools = NDArray[np.bool_]
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+
+#: A result that varies by less than this, relative to its size, is constant: settled results are not more exact.
+_CONSTANT: Final = 1e-7
+#: Code of a case without results; those of regimes are not negative.
+FAILED: Final = -1.0
+
+
+class Samples:
+    """Rows of all curves or maps of a plan.
+
+    Attributes
+    ----------
+    known, ok, irregular : bool arrays, shape (combinations, places...)
+        Where there is a row, whether it has results, and whether its motion is irregular; one dimension of places for
+        each adaptive axis, ``finest + 1`` long.
+    values, widths : float64 arrays, shape (combinations, places..., results)
+        Results (NaN where there is none) and their half widths (0 where there is none).
+    regimes, orders : float64 arrays, shape (combinations, places...)
+        Regime, or `FAILED`, and order; 0 in studies that are not settled.
+    has_width : bool array, shape (results,)
+        Whether irregular motions have a half width of the result.
+    """
+
+    def __init__(self, plan: RefinePlan) -> None:
+        shape = (plan.combinations, *(plan.finest + 1 for _ in plan.adaptive))
+        self.plan = plan
+        self.known = np.zeros(shape, dtype=bool)
+        self.ok = np.zeros(shape, dtype=bool)
+        self.irregular = np.zeros(shape, dtype=bool)
+        self.values = np.full((*shape, len(plan.results)), np.nan)
+        self.widths = np.zeros((*shape, len(plan.results)))
+        self.regimes = np.zeros(shape)
+        self.orders = np.zeros(shape)
+        self.has_width = np.array([name in plan.half_widths for name in plan.results])
+
+    def add(self, rows: Rows) -> None:
+        """Add rows, in any order and any number; ValueError for a point that is not of the plan."""
+        combination, positions = self.plan.places(rows.points)
+        self.put(combination, positions, rows.ok, rows.values)
+
+    def put(self, combination: Ints, positions: Sequence[Ints], ok: Bools, values: Mapping[str, Floats]) -> None:
+        """Add rows at places of the grids."""
+        at: tuple[Ints, ...] = (combination, *positions)
+        self.known[at] = True
+        self.ok[at] = ok
+        for k, name in enumerate(self.plan.results):
+            self.values[..., k][at] = np.where(ok & np.isfinite(values[name]), values[name], np.nan)
+            if name in self.plan.half_widths:
+                width = values[half_width(name)]
+                self.widths[..., k][at] = np.where(ok & np.isfinite(width), width, 0.0)
+        if self.plan.regime:
+            self.regimes[at] = np.nan_to_num(values[REGIME])
+            self.orders[at] = np.nan_to_num(values[ORDER])
+        self.regimes[at] = np.where(ok, self.regimes[at], FAILED)
+        self.orders[at] = np.where(ok, self.orders[at], 0.0)
+        self.irregular[at] = ok & (self.regimes[at] == IRREGULAR) if self.plan.regime else False
+
+    @property
+    def codes(self) -> Floats:
+        """One number for each kind of motion: equal where regime and order are."""
+        return self.regimes * 1e6 + self.orders
+
+    def ranges(self) -> Floats:
+        """Range of each result over each curve or map, shape (combinations, results); 1 where there is no value."""
+        flat = self.values.reshape(len(self.values), -1, self.values.shape[-1])
+        present = np.isfinite(flat)
+        low = np.where(present, flat, np.inf).min(axis=1)
+        high = np.where(present, flat, -np.inf).max(axis=1)
+        size = _CONSTANT * np.maximum(np.abs(low), np.abs(high))
+        ranges = np.where(present.any(axis=1), np.maximum(high - low, size), 1.0)
+        return np.where(ranges > 0.0, ranges, 1.0)
