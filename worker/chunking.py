@@ -38,12 +38,13 @@ class Chunking:
     processes: int = 1
     timeout: float = math.inf
 
-    def cases_of(self, study: Study) -> int:
-        """Cases of one chunk of ``study``."""
+    def cases_of(self, study: Study, count: int | None = None) -> int:
+        """Cases of one chunk of ``study``, or of a round of ``count`` of its cases."""
+        cases = study.cases if count is None else count
         if self.cases:
-            return chunk_cases(study.cases, 0.0, self.processes, fixed=self.cases)
+            return chunk_cases(cases, 0.0, self.processes, fixed=self.cases)
         seconds = models.estimate_seconds_per_case(study)
-        return chunk_cases(study.cases, seconds, self.processes, timeout=self.timeout)
+        return chunk_cases(cases, seconds, self.processes, timeout=self.timeout)
 
     def warnings(self, study: Study) -> tuple[str, ...]:
         """Warnings about ``study`` before it runs: a single case may exceed the time limit."""

@@ -36,12 +36,14 @@ FAULT_CRASHES = 3
 class Offered:
     """A study may run; ``chunks`` are its unfinished ones. Studies of higher ``priority`` run first.
 
-    For an active study, this only ends a pause and updates the priority.
+    For an active study, this only ends a pause and updates the priority. ``proven``: an earlier round of the study has
+    results.
     """
 
     study: int
     chunks: Sequence[Chunk] = ()
     priority: int = 0
+    proven: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,7 +253,7 @@ class Dispatch:
     def _offered(self, event: Offered) -> list[Instruction]:
         known = self._open.get(event.study)
         if known is None:
-            known = self._open[event.study] = _Open(deque(event.chunks))
+            known = self._open[event.study] = _Open(deque(event.chunks), proven=event.proven)
         known.held = False
         known.priority = event.priority
         return self._settled(event.study, known)

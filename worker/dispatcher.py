@@ -11,6 +11,7 @@ from sprag.worker import dispatch
 from sprag.worker.dispatch import Dispatch
 from sprag.worker.ports import Chunk, EpochLostError, Fate, KernelError, Outcome, StoreFullError
 from sprag.worker.reuse import no_cases, taken
+from sprag.worker.rounds import PlanError, Rounds
 from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
@@ -63,6 +64,7 @@ class Dispatcher:
         self._renew = renew
         self._news = news
         self._machine = Dispatch(executor.capacity)
+        self._rounds = Rounds(store)
         self._studies: dict[int, Study] = {}
         self._ids: dict[int, str] = {}
         #: Studies waiting for their kernels, and those that cannot run at present; with the time when this began.
@@ -183,7 +185,7 @@ class Dispatcher:
                 chunks = self._store.open_chunks(study.number)
                 self._say("The study %s starts: %d cases in %d chunks to be run.", study.number,
                     sum(chunk.count for chunk in chunks), len(chunks))  # fmt: skip
-                self._handle(dispatch.Offered(study.number, chunks, study.priority))
+                self._handle(dispatch.Offered(study.number, chunks, study.priority, study.proven))
 
     def _time_is_over(self, number: int) -> None:
         """The deadline of the study has passed: chunks in flight finish, then the study is held."""
@@ -254,6 +256,7 @@ class Dispatcher:
 
     def _forget(self, number: int) -> None:
         self._studies.pop(number, None)
+        self._rounds.forget(number)
         self._ids.pop(number, None)
         for known in (self._compiling, self._short, self._notes):
             known.pop(number, None)
@@ -308,6 +311,24 @@ class Dispatcher:
         else:
             self._had_all.append(Outcome(ticket, Fate.DONE, no_cases(study)))
 
+    def _settle(self, number: int) -> None:
+        """End a study without open chunks, or let it choose its next ones."""
+        study = self._studies.get(number)
+        if study is not None and study.plan is not None:
+            try:
+                appended = self._rounds.advance(self._epoch, number, study)
+            except PlanError as error:
+                self._hold(number, str(error))
+                return
+            if appended is not None:
+                self._studies[number] = appended.study
+                priority = self._priorities.get(number, 0)
+                self._handle(dispatch.Offered(number, appended.chunks, priority, proven=True))
+                return
+        ended = self._store.settle(self._epoch, number)
+        self._say("The study %s is %s.", number, ended.value)
+        self._forget(number)
+
     def _do(self, instruction: dispatch.Instruction, result: ChunkResult | None) -> None:
         match instruction:
             case dispatch.Commit(ticket=ticket, chunk=chunk):
@@ -329,9 +350,7 @@ class Dispatcher:
             case dispatch.Renew(study=number, reason=reason):
                 self._begin_again(number, reason)
             case dispatch.Settle(study=number):
-                ended = self._store.settle(self._epoch, number)
-                self._say("The study %s is %s.", number, ended.value)
-                self._forget(number)
+                self._settle(number)
             case dispatch.Run():
                 self._start([instruction])
             case _:

@@ -7,13 +7,15 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from datetime import datetime
+    from typing import Any
 
     import numpy as np
     from numpy.typing import NDArray
 
     from sprag.worker.models import ChunkResult
+    from sprag.worker.planning.rounds import Rows
     from sprag.worker.states import StudyState
     from sprag.worker.study import Study
 
@@ -61,7 +63,8 @@ class ActiveStudy:
     """An unfinished study, as polled by the dispatcher.
 
     Higher ``priority`` runs first. ``waits_for_room`` marks a paused study that resumes when there is room, ``goes_on``
-    one that resumes by itself for any reason. No chunk starts after ``finish_by``.
+    one that resumes by itself for any reason. No chunk starts after ``finish_by``. ``proven``: an earlier round of the
+    study has results, which shows that the engine works.
     """
 
     number: int
@@ -71,6 +74,7 @@ class ActiveStudy:
     waits_for_room: bool = False
     finish_by: datetime | None = None
     goes_on: bool = False
+    proven: bool = False
 
 
 class StoreError(Exception):
@@ -174,8 +178,29 @@ class Store(Protocol):
     def let_go(self, epoch: int) -> None:
         """Queue again every study that `hold` paused and nobody has changed since."""
 
-    def settle(self, epoch: int, number: int) -> StudyState:
-        """End a study without open claims: as cancelled when that was requested, otherwise as finished or failed."""
+    def settle(self, epoch: int, number: int, summary: Mapping[str, Any] | None = None) -> StudyState:
+        """End a study without open claims: as cancelled when that was requested, otherwise as finished or failed.
+
+        A study with rounds ends by itself only with the ``summary`` of them; without one its state stays.
+        """
+
+    def rounds_done(self, number: int) -> list[range] | None:
+        """The cases of every round of a study that needs its next one; None where it needs none now.
+
+        It needs one when it is queued or running, chooses its own cases, and all its cases have their rows.
+        """
+
+    def round_rows(self, number: int, study: Study, cases: range, results: Sequence[str]) -> Rows:
+        """The rows of one round."""
+
+    def append_round(
+        self, epoch: int, number: int, study: Study, first: int, summary: Mapping[str, Any]
+    ) -> list[Chunk] | None:
+        """Give a study its next round: the cases of ``study`` from number ``first`` on, as waiting chunks.
+
+        ``summary`` is what the rows before them show. None, and no change, where the study does not need that round:
+        it was held, cancelled or deleted, or it has the round already.
+        """
 
 
 class Fate(StrEnum):

@@ -102,6 +102,9 @@ class Study:
     structure : dict or None
         The non-numeric part of the machine as plain JSON data, where the model has one (a machine shaft's mechanism,
         tables and formulas); immutable.
+    plan : dict or None
+        How a study that chooses its own cases does so, as plain JSON data (`sprag.worker.planning`); immutable. Its
+        axes are zipped and have the cases of the rounds so far.
     combine : "grid" or "zip"
         Grid: every combination, the first axis varies slowest. Zip: the axes side by side, all of one length.
 
@@ -118,10 +121,13 @@ class Study:
     axes: tuple[Axis, ...] = ()
     combine: Combine = "grid"
     structure: dict[str, Any] | None = None
+    plan: dict[str, Any] | None = None
 
     def __post_init__(self) -> None:
         if self.combine not in get_args(Combine):
             raise ValueError(f"combine must be 'grid' or 'zip', not {self.combine!r}")
+        if self.plan is not None and self.combine != "zip":
+            raise ValueError("a study with a plan lists its cases (zip)")
         paths = [path for axis in self.axes for path in axis.paths]
         if len(set(paths)) != len(paths):
             raise ValueError("a path is on two axes")
@@ -255,6 +261,22 @@ class Study:
         for row in range(len(cases)):
             yield {path: column[row] for path, column in columns.items()}
 
+    def points(self, cases: range) -> NDArray[np.float64]:
+        """The values on every axis of consecutive cases, SI: shape (cases, axes)."""
+        indices = self.indices(cases)
+        columns = [axis.array[index] for axis, index in zip(self.axes, indices, strict=True)]
+        return np.stack(columns, axis=1) if columns else np.empty((len(cases), 0))
+
+    def with_points(self, points: NDArray[np.float64]) -> Study:
+        """The study with further cases at its end, given as `points` gives them; its axes must be zipped."""
+        if self.combine != "zip":
+            raise ValueError("only a study that lists its cases (zip) takes further ones")
+        axes = tuple(
+            Axis(axis.paths, np.concatenate([axis.array, column]))
+            for axis, column in zip(self.axes, points.T, strict=True)
+        )
+        return replace(self, axes=axes)
+
     def to_json(self) -> dict[str, Any]:
         """The study as plain JSON data; `from_json` gives an equal study."""
         return {
@@ -266,6 +288,7 @@ class Study:
             "combine": self.combine,
             # Omitted where there is none, so that older studies and their hashes stay unchanged.
             **({} if self.structure is None else {"structure": self.structure}),
+            **({} if self.plan is None else {"plan": self.plan}),
         }
 
     def to_text(self) -> str:
@@ -289,6 +312,7 @@ class Study:
             axes=tuple(Axis(tuple(axis["paths"]), _unpacked(axis["values"])) for axis in data["axes"]),
             combine=cast("Combine", data["combine"]),
             structure=data.get("structure"),
+            plan=data.get("plan"),
         )
 
     def physics_hash(self, engine_version: str) -> str:

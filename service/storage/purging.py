@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import sqlalchemy as sa
 
 from sprag.service.storage.part import Part
-from sprag.service.storage.tables import CHUNKS, STUDIES, results_table
+from sprag.service.storage.tables import CHUNKS, ROUNDS, STUDIES, results_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -34,6 +34,7 @@ class Purging(Part):
             yield from self._emptied(rows, rows.c.case_number, number)
             yield from self._emptied(CHUNKS, CHUNKS.c["first"], number)
             with self.session.write() as connection:
+                connection.execute(sa.delete(ROUNDS).where(ROUNDS.c.study == number))
                 connection.execute(sa.delete(STUDIES).where(c.number == number))
             yield 1
 

@@ -31,7 +31,8 @@ class StudyRecord:
     ``ok`` those that ended ok. ``reason`` states why the study is held or failed. ``revision`` increases with every
     change of the record or its rows: together with ``id`` it forms the ETag. Studies of higher ``priority`` run first.
     ``reused`` counts the cases whose rows were copied from earlier studies. A study is held at ``finish_by``;
-    ``coarse`` states that its cases run coarse to fine, and ``time_over`` that its deadline holds it.
+    ``coarse`` states that its cases run coarse to fine, and ``time_over`` that its deadline holds it. A study that
+    chooses its own cases has at most ``most_cases`` of them, in at most ``most_rounds``; None for any other.
     """
 
     number: int
@@ -57,6 +58,8 @@ class StudyRecord:
     finish_by: datetime | None
     coarse: bool
     time_over: bool
+    most_cases: int | None
+    most_rounds: int | None
 
     @property
     def over(self) -> bool:
@@ -70,6 +73,28 @@ class StudyPage:
 
     studies: tuple[StudyRecord, ...]
     next_token: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class RoundRecord:
+    """A round of a study: its cases, and the ``summary`` of the rows before it.
+
+    The last round of a study that has ended has no cases; its summary is that of the whole study.
+    """
+
+    round: int
+    cases: range
+    summary: dict[str, Any]
+    planned_at: datetime
+
+
+@dataclass(frozen=True, slots=True)
+class RoundProgress:
+    """Rounds of a study: the ``latest`` one, and how many rounds and cases there can be at ``most``."""
+
+    latest: RoundRecord
+    most: int
+    most_cases: int
 
 
 class InTime(StrEnum):
@@ -86,7 +111,8 @@ class Progress:
 
     ``rate`` is in cases/s over the recent chunks, None before the first; ``seconds_left`` is a (low, high) interval,
     None where the rate is None, or when the study is held or ended. ``covered`` describes the completed part of a study
-    that is run coarse to fine; it is None for others. The study is held at ``finish_by``; ``asked_at`` is the time of
+    that is run coarse to fine; it is None for others. ``rounds`` are those of a study that chooses its own cases, and
+    ``total`` its cases so far. The study is held at ``finish_by``; ``asked_at`` is the time of
     the request.
     """
 
@@ -98,6 +124,7 @@ class Progress:
     rate: float | None
     seconds_left: tuple[float, float] | None
     covered: Coverage | None = None
+    rounds: RoundProgress | None = None
     finish_by: datetime | None = None
     asked_at: datetime | None = None
 

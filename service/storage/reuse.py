@@ -14,12 +14,13 @@ from cachetools import LRUCache
 
 from sprag.service.storage.cases import conditions
 from sprag.service.storage.order import Orders
+from sprag.service.storage.round_table import latest_round
 from sprag.service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, results_table
 from sprag.worker import fingerprint, models
 from sprag.worker.models import WorkerEnding
 from sprag.worker.order import order_of
 from sprag.worker.ports import Known
-from sprag.worker.reuse import Wanted, kin_hash, shared_cases, span
+from sprag.worker.reuse import Wanted, kin_hash, shared_cases, span, taken
 from sprag.worker.states import ChunkState, StudyState
 from sprag.worker.study import Study
 
@@ -102,7 +103,11 @@ class Reuse(Orders):
                 kin, fresh = connection.execute(
                     sa.select(STUDIES.c.kin_hash, STUDIES.c.fresh).where(STUDIES.c.number == number)
                 ).one()
-                self._found[number] = None if fresh else _find(connection, self._spans, study, kin, number)
+                # The rows of earlier rounds are there already.
+                first = 0 if fresh or study.plan is None else latest_round(connection, number).cases.start
+                asked = taken(study, np.arange(first, study.cases)) if first else study
+                found = None if fresh else _find(connection, self._spans, asked, kin, number)
+            self._found[number] = found and _Found(found.cases + first, found.studies, found.there)
         return self._found[number]
 
     def _forget_reuse(self, number: int) -> None:
@@ -111,7 +116,7 @@ class Reuse(Orders):
 
 
 class _Spans:
-    """The `span` of every study examined; it never changes, and it alone rules out most studies."""
+    """The `span` of every study examined, which alone rules out most studies. Only further rounds change it."""
 
     def __init__(self) -> None:
         self._of: LRUCache[int, NDArray[np.float64]] = LRUCache(_KEPT_SPANS)
@@ -139,13 +144,16 @@ class _Spans:
     def _get(self, connection: sa.Connection, numbers: list[int]) -> dict[int, NDArray[np.float64]]:
         with self._lock:
             spans = {number: self._of[number] for number in numbers if number in self._of}
-        missing = [number for number in numbers if number not in spans]
+        missing, growing = [number for number in numbers if number not in spans], set[int]()
         if missing:
-            query = sa.select(STUDIES.c.number, STUDIES.c.study).where(STUDIES.c.number.in_(missing))
-            for number, text in connection.execute(query):
+            c = STUDIES.c
+            query = sa.select(c.number, c.study, c.most_cases, c.finished_at).where(c.number.in_(missing))
+            for number, text, most_cases, finished_at in connection.execute(query):
                 spans[number] = span(Study.from_text(text))
+                if most_cases is not None and finished_at is None:  # the span grows with each round
+                    growing.add(number)
         with self._lock:
-            self._of.update(spans)
+            self._of.update({number: spans[number] for number in spans.keys() - growing})
         return spans
 
 

@@ -5,18 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Self
 
 from sprag.service.storage import maintenance
-from sprag.service.storage.cases import Cases
 from sprag.service.storage.figures import Totals
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.purging import Purging
 from sprag.service.storage.retry import Retries
 from sprag.service.storage.room import Room
+from sprag.service.storage.rounds import Rounds
 from sprag.service.storage.schedules import Schedules
 from sprag.service.storage.session import Session
 from sprag.service.storage.sessions import Sessions
-from sprag.service.storage.studies import Studies
 from sprag.service.storage.tokens import Tokens
-from sprag.service.storage.work import Work
 from sprag.worker.chunking import Chunking
 
 if TYPE_CHECKING:
@@ -27,7 +25,7 @@ if TYPE_CHECKING:
     from sprag.worker.ports import Clock
 
 
-class Store(Studies, Purging, Retries, Cases, Room, Schedules, Sessions, Tokens, Totals, Work):
+class Store(Rounds, Purging, Retries, Room, Schedules, Sessions, Tokens, Totals):
     """One database. Safe to use from several threads; close it at the end (it is a context manager)."""
 
     @classmethod

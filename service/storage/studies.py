@@ -17,7 +17,8 @@ from sprag.service.storage.errors import IdempotencyConflict, PageTokenError, St
 from sprag.service.storage.order import Orders
 from sprag.service.storage.part import MAX_INTEGER, SILENT_SECONDS, announce, micros_of, moment, optional_moment
 from sprag.service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
-from sprag.service.storage.records import Progress, StudyPage, StudyRecord, record_of
+from sprag.service.storage.records import Progress, RoundProgress, StudyPage, StudyRecord, record_of
+from sprag.service.storage.round_table import add_round, latest_round
 from sprag.service.storage.schedules import lift_window
 from sprag.service.storage.tables import (
     CHUNKS,
@@ -31,6 +32,7 @@ from sprag.service.storage.tables import (
 from sprag.worker import models
 from sprag.worker.chunking import Chunking, spans
 from sprag.worker.limits import MAX_AXIS_VALUES
+from sprag.worker.planning import planner_of
 from sprag.worker.reuse import kin_hash
 from sprag.worker.states import TERMINAL, ChunkState, StudyEvent, StudyState
 from sprag.worker.study import Study
@@ -110,7 +112,8 @@ class Studies(Orders):
             "priority": priority,
             "fresh": int(fresh),
             "finish_by": None if finish_by is None else micros_of(finish_by),
-            "coarse": int(finish_by is not None),
+            # The cases of a round are in order of their value already.
+            "coarse": int(finish_by is not None and row["most_cases"] is None),
             "revision": 1,
             "created_at": self._now(),
         }
@@ -120,6 +123,8 @@ class Studies(Orders):
                 if earlier is not None:
                     return earlier
             number = connection.execute(sa.insert(STUDIES).values(values).returning(STUDIES.c.number)).scalar_one()
+            if row["most_cases"] is not None:
+                add_round(connection, number, 0, row["cases"], {}, values["created_at"])
             connection.execute(
                 sa.insert(CHUNKS),
                 [
@@ -166,10 +171,20 @@ class Studies(Orders):
         return spec
 
     def study(self, study_id: str) -> Study:
-        """The study in SI numbers; raises StudyNotFound. Studies never change, so some are kept in memory."""
+        """The study in SI numbers; raises StudyNotFound.
+
+        Some are kept in memory, because they change only by further rounds.
+        """
         with self._lock:
-            if study_id in self._studies:
-                return self._studies[study_id]
+            kept = self._studies.get(study_id)
+        if kept is not None and kept.plan is not None:
+            with self.session.read() as connection:
+                if self._row(connection, study_id, STUDIES.c.cases).cases != kept.cases:
+                    with self._lock:
+                        self._studies.pop(study_id, None)
+                    kept = None
+        if kept is not None:
+            return kept
         with self._reading:  # one long study at a time, read once for all who wait for it
             return self._read_study(study_id)
 
@@ -235,9 +250,13 @@ class Studies(Orders):
                 )
             ).all()
             covered = self._coverage(connection, row.number, row.cases)
+            rounds = None
+            if row.most_cases is not None:
+                rounds = RoundProgress(latest_round(connection, row.number), row.most_rounds, row.most_cases)
             record = self._told(connection, record_of(row))
         now = self.clock.now()
         state = StudyState(row.state)
+        uneven = models.regime_info(models.result_infos(row.model, row.variant)) is not None
         rate, left = estimate(
             row.cases - row.done,
             [FinishedChunk(begin / 1e6, end / 1e6, count) for begin, end, count in recent],
@@ -245,11 +264,14 @@ class Studies(Orders):
             micros_of(now) / 1e6,
             row.done,
             bool(row.coarse),
-            models.regime_info(models.result_infos(row.model, row.variant)) is not None,
+            uneven,
         )
+        if left is not None and rounds is not None and rate:
+            # How many further rounds there will be is unknown: perhaps none, at most all.
+            left = left[0], max(left[1], (rounds.most_cases - row.done) / rate)
         times = (optional_moment(row.finish_by), now)
         left = left if state.going else None
-        return record, Progress(state, row.cases, row.done, row.ok, dict(endings), rate, left, covered, *times)
+        return record, Progress(state, row.cases, row.done, row.ok, dict(endings), rate, left, covered, rounds, *times)
 
     def pause_study(self, study_id: str) -> StudyRecord:
         """Hold the study until it is resumed; raises StudyNotFound, TransitionError when it has ended."""
@@ -336,6 +358,7 @@ def study_row(
 
     This takes about a second for a million values, so it is computed in the processes that check studies.
     """
+    planner = None if study.plan is None else planner_of(study.plan)
     return {
         "name": study.name,
         "model": study.model,
@@ -348,6 +371,8 @@ def study_row(
         "study": study.to_text(),
         "warnings": json.dumps(list(warnings)),
         "kin_hash": kin_hash(study, models.ENGINE_VERSION),
+        "most_cases": None if planner is None else planner.most_cases,
+        "most_rounds": None if planner is None else planner.most_rounds,
     }
 
 

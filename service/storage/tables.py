@@ -8,7 +8,7 @@ from sprag.worker import models
 from sprag.worker.states import ChunkState
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0015"
+HEAD_REVISION = "0016"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -62,6 +62,9 @@ STUDIES = sa.Table(
     # Fingerprint of the processes that computed its rows (`sprag.worker.fingerprint`); NULL: no rows yet, "": unknown,
     # or several.
     sa.Column("fingerprint", sa.String(64)),
+    # Of a study that chooses its own cases: more cases and rounds than this it never has; NULL for any other.
+    sa.Column("most_cases", sa.Integer),
+    sa.Column("most_rounds", sa.Integer),
     sqlite_autoincrement=True,
 )
 
@@ -98,6 +101,20 @@ CHUNKS = sa.Table(
     sa.Column("claimed_at", sa.BigInteger),
     sa.Column("finished_at", sa.BigInteger),
     sa.Index("ix_chunks_study_state_finished_at", "study", "state", "finished_at"),
+    sqlite_with_rowid=False,
+)
+
+#: Rounds of the studies that choose their own cases. The last one of a study that has ended has no cases.
+ROUNDS = sa.Table(
+    "rounds",
+    METADATA,
+    sa.Column("study", sa.Integer, sa.ForeignKey("studies.number"), primary_key=True),
+    sa.Column("round", sa.Integer, primary_key=True),
+    sa.Column("first", sa.Integer, nullable=False),
+    sa.Column("count", sa.Integer, nullable=False),
+    # What the rows of the rounds before it show, as JSON data.
+    sa.Column("summary", sa.Text, nullable=False),
+    sa.Column("planned_at", sa.BigInteger, nullable=False),
     sqlite_with_rowid=False,
 )
 

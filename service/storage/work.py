@@ -12,6 +12,7 @@ from sprag.service.storage.owners import own_study, why_abandoned
 from sprag.service.storage.part import micros_of, moment, optional_moment
 from sprag.service.storage.records import DispatcherRecord
 from sprag.service.storage.reuse import Reuse, copy_rows, endings_of, mark_origin
+from sprag.service.storage.round_table import add_round, latest_round
 from sprag.service.storage.rows import target, tuples, without_collector
 from sprag.service.storage.tables import (
     CHUNKS,
@@ -29,8 +30,9 @@ from sprag.worker.states import GOING, TERMINAL, ChunkState, StudyEvent, StudySt
 from sprag.worker.study import Study
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from datetime import datetime
+    from typing import Any
 
     from sprag.worker.ports import Known
 
@@ -124,7 +126,7 @@ class Work(Reuse):
         c = STUDIES.c
         with self.session.read() as connection:
             rows = connection.execute(
-                sa.select(c.number, c.id, c.state, c.priority, c.waits_for, c.finish_by)
+                sa.select(c.number, c.id, c.state, c.priority, c.waits_for, c.finish_by, c.most_cases, c.ok)
                 .where(c.state.not_in(_TERMINAL), c.waits_for.is_distinct_from(HELD_AT_DEADLINE))
                 .order_by(c.priority.desc(), c.number)
             ).all()
@@ -137,6 +139,7 @@ class Work(Reuse):
                 row.waits_for == WAITS_FOR_ROOM,
                 optional_moment(row.finish_by),
                 row.waits_for in GO_ON,
+                row.most_cases is not None and row.ok > 0,
             )
             for row in rows
         ]
@@ -326,15 +329,18 @@ class Work(Reuse):
         c = STUDIES.c
         with self.session.write() as connection:
             self._own(connection, epoch)
-            state, waits_for, cases, done, finish_by = connection.execute(
-                sa.select(c.state, c.waits_for, c.cases, c.done, c.finish_by).where(c.number == number)
+            state, waits_for, cases, done, finish_by, most_rounds = connection.execute(
+                sa.select(c.state, c.waits_for, c.cases, c.done, c.finish_by, c.most_rounds).where(c.number == number)
             ).one()
             paused = StudyState(state) is StudyState.PAUSED and waits_for in GO_ON
             if not paused and not StudyState(state).going:
                 return
-            if done < cases:
+            if done < cases or most_rounds is not None:
                 covered = self._coverage(connection, number, cases)
                 complete = f"; {covered}" if covered else ""
+                if most_rounds is not None:
+                    rounds = latest_round(connection, number).round + (done == cases)
+                    complete = f"; round {rounds} of at most {most_rounds} is done" if rounds else "; no round is done"
                 reason = (
                     f"its deadline passed at {moment(finish_by).isoformat(timespec='seconds')}: {done:,} of {cases:,} "
                     f"cases are done{complete}. Resume it to run the others too."
@@ -354,21 +360,29 @@ class Work(Reuse):
                 sa.update(CHUNKS).where(CHUNKS.c.study == number, CHUNKS.c.state != ChunkState.DONE).values(failures=0)
             )
 
-    def settle(self, epoch: int, number: int) -> StudyState:
-        """End a study without open claims: as cancelled when that was requested, otherwise as finished or failed."""
+    def settle(self, epoch: int, number: int, summary: Mapping[str, Any] | None = None) -> StudyState:
+        """End a study without open claims: as cancelled when that was requested, otherwise as finished or failed.
+
+        A study with rounds ends by itself only with the ``summary`` of them; without one its state stays.
+        """
         self._forget_reuse(number)
         open_chunks = (CHUNKS.c.study == number) & (CHUNKS.c.state != ChunkState.DONE)
         with self.session.write() as connection:
             self._own(connection, epoch)
-            state, cases, ok = connection.execute(
-                sa.select(STUDIES.c.state, STUDIES.c.cases, STUDIES.c.ok).where(STUDIES.c.number == number)
+            c = STUDIES.c
+            state, cases, ok, most_cases = connection.execute(
+                sa.select(c.state, c.cases, c.ok, c.most_cases).where(c.number == number)
             ).one()
+            goes_on = most_cases is not None and summary is None
             left = connection.execute(sa.select(sa.func.count()).select_from(CHUNKS).where(open_chunks)).scalar_one()
-            if StudyState(state).terminal or (left and StudyState(state) is not StudyState.CANCELLING):
+            cancelling = StudyState(state) is StudyState.CANCELLING
+            if StudyState(state).terminal or ((left or goes_on) and not cancelling):
                 return StudyState(state)
-            if left:
+            if left or goes_on:
                 connection.execute(sa.delete(CHUNKS).where(open_chunks))
                 return self._move(connection, number, StudyEvent.CANCEL_DONE)
+            if summary is not None:
+                add_round(connection, number, cases, 0, summary, self._now())
             if ok:
                 return self._move(connection, number, StudyEvent.ALL_DONE)
             return self._move(connection, number, StudyEvent.NONE_OK, _why_failed(connection, number, cases))

@@ -1,0 +1,93 @@
+"""Rounds of studies that choose their own cases: what they have, and the next one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sqlalchemy as sa
+
+from sprag.service.storage.cases import Cases
+from sprag.service.storage.round_table import add_round, rounds_of
+from sprag.service.storage.studies import Studies
+from sprag.service.storage.tables import CHUNKS, STUDIES
+from sprag.service.storage.work import Work
+from sprag.worker import models
+from sprag.worker.chunking import spans
+from sprag.worker.planning.rounds import Rows
+from sprag.worker.ports import Chunk
+from sprag.worker.states import ChunkState, StudyState
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from sprag.service.storage.records import RoundRecord
+    from sprag.worker.study import Study
+
+
+class Rounds(Studies, Cases, Work):
+    """The rounds of studies."""
+
+    def rounds(self, study_id: str) -> list[RoundRecord]:
+        """The rounds of a study, in order; none where its cases were given. Raises StudyNotFound."""
+        with self.session.read() as connection:
+            return rounds_of(connection, self._row(connection, study_id, STUDIES.c.number).number)
+
+    def rounds_done(self, number: int) -> list[range] | None:
+        """The cases of every round of a study that needs its next one; None where it needs none now."""
+        with self.session.read() as connection:
+            if not _needs_round(connection, number):
+                return None
+            return [found.cases for found in rounds_of(connection, number) if found.cases]
+
+    def round_rows(self, number: int, study: Study, cases: range, results: Sequence[str]) -> Rows:
+        """The rows of one round."""
+        with self.session.read() as connection:
+            study_id = connection.execute(sa.select(STUDIES.c.id).where(STUDIES.c.number == number)).scalar_one()
+        columns = self.rows_for_cases(study_id, np.arange(cases.start, cases.stop), results)
+        ok = np.array([ending == models.OK for ending in columns.endings], dtype=np.bool_)
+        return Rows(study.points(cases), ok, columns.values)
+
+    def append_round(
+        self, epoch: int, number: int, study: Study, first: int, summary: Mapping[str, Any]
+    ) -> list[Chunk] | None:
+        """Give a study its next round: the cases of ``study`` from number ``first`` on, as waiting chunks.
+
+        ``summary`` is what the rows before them show. None, and no change, where the study does not need that round.
+        """
+        count = study.cases - first
+        sizes = list(spans(count, self.chunking.cases_of(study, count)))
+        text = study.to_text()
+        with self.session.write() as connection:
+            self._own(connection, epoch)
+            if not _needs_round(connection, number, first):
+                return None
+            add_round(connection, number, first, count, summary, self._now())
+            chunks = [Chunk(number, first + start, size) for start, size in sizes]
+            connection.execute(
+                sa.insert(CHUNKS),
+                [
+                    {
+                        "study": number,
+                        "first": chunk.first,
+                        "count": chunk.count,
+                        "state": ChunkState.WAITING,
+                        "failures": 0,
+                    }
+                    for chunk in chunks
+                ],
+            )
+            self._change(connection, number, cases=study.cases, study=text)
+        self._forget_reuse(number)
+        return chunks
+
+
+def _needs_round(connection: sa.Connection, number: int, cases: int | None = None) -> bool:
+    """Whether a study with that many cases waits for its next round."""
+    c = STUDIES.c
+    row = connection.execute(
+        sa.select(c.state, c.cases, c.done, c.most_cases).where(c.number == number, c.deleted_at.is_(None))
+    ).one_or_none()
+    if row is None or row.most_cases is None or not StudyState(row.state).going:
+        return False
+    return row.done == row.cases and cases in {None, row.cases}

@@ -1,0 +1,289 @@
+"""What every store does for studies that choose their own cases."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import timedelta
+from typing import Any
+
+import numpy as np
+import pytest
+import sqlalchemy as sa
+
+from sprag.service.storage.errors import StudyNotFound
+from sprag.service.storage.part import SystemClock
+from sprag.service.storage.records import StudyRecord
+from sprag.service.storage.store import Store
+from sprag.service.storage.tables import ROUNDS
+from sprag.worker import models
+from sprag.worker.dispatcher import Dispatcher
+from sprag.worker.models import ChunkResult, ChunkTask
+from sprag.worker.ports import EpochLostError
+from sprag.worker.rounds import PlanError, Rounds
+from sprag.worker.states import StudyState
+from sprag.worker.study import Study
+from tests.contract.filling import SPEC
+from tests.worker import fakes
+from tests.worker.planning import toy
+
+
+@pytest.fixture(autouse=True)
+def kind() -> Iterator[None]:
+    with toy.known():
+        yield
+
+
+def create(store: Store, study: Study | None = None, **options: Any) -> StudyRecord:
+    return store.create_study(SPEC, study or toy.study(), **options)
+
+
+def results(study: Study, first: int, count: int) -> ChunkResult:
+    """Numbers that follow from the parameters of the cases."""
+    loads = study.points(range(first, first + count))[:, 0]
+    values = loads[:, None] * np.arange(1.0, 1.0 + fakes.RESULTS)
+    return ChunkResult(first, [models.OK] * count, [""] * count, values)
+
+
+def run_chunks(store: Store, epoch: int, number: int) -> None:
+    study = store.study_of(number)
+    for chunk in store.open_chunks(number):
+        assert store.claim(epoch, [chunk]) == [chunk]
+        known = store.known(study, chunk)
+        assert known is None
+        assert store.commit(epoch, chunk, results(study, chunk.first, chunk.count))
+
+
+def finish(store: Store, record: StudyRecord, rounds: int = 9) -> int:
+    epoch = store.take_over("test")
+    planner = Rounds(store)
+    for _ in range(rounds):
+        run_chunks(store, epoch, record.number)
+        if planner.advance(epoch, record.number, store.study_of(record.number)) is None:
+            break
+    return epoch
+
+
+def whole(store: Store, record: StudyRecord) -> list[Any]:
+    """Everything about a study that may not depend on how it was run."""
+    with store.session.read() as connection:
+        query = sa.select(ROUNDS.c.round, ROUNDS.c.first, ROUNDS.c["count"], ROUNDS.c.summary)
+        rounds = connection.execute(query.where(ROUNDS.c.study == record.number).order_by(ROUNDS.c.round)).all()
+    block = store.case_rows(record.id, limit=10_000)
+    found = store.get_study(record.id)
+    study = store.study_of(record.number).to_json()
+    return [rounds, block.cases.tolist(), block.endings, block.values.tobytes(), found.state, found.cases, study]
+
+
+def test_a_study_has_its_rounds_and_ends_with_the_last(store: Store) -> None:
+    record = create(store)
+    assert (record.cases, record.most_cases, record.most_rounds) == (25, 100, 4)
+    assert store.look(record.id)[1].rounds is not None
+    finish(store, record)
+    ended, progress = store.look(record.id)
+    assert (ended.state, ended.cases, ended.done, ended.ok) == (StudyState.FINISHED, 100, 100, 100)
+    rounds = store.rounds(record.id)
+    assert [found.cases for found in rounds] == [
+        range(25), range(25, 50), range(50, 75), range(75, 100), range(100, 100)
+    ]  # fmt: skip
+    assert [found.summary.get("told") for found in rounds] == [None, 1, 2, 3, 4]
+    assert progress.rounds is not None
+    assert (progress.rounds.latest, progress.rounds.most, progress.rounds.most_cases) == (rounds[-1], 4, 100)
+    # The study in memory is the one with all its cases.
+    assert store.study(record.id).cases == 100
+    assert len(store.case_rows(record.id, limit=200)) == 100
+
+
+def test_a_study_in_memory_grows_with_its_rounds(store: Store) -> None:
+    record = create(store)
+    assert store.study(record.id).cases == 25
+    epoch = store.take_over("test")
+    run_chunks(store, epoch, record.number)
+    Rounds(store).advance(epoch, record.number, store.study_of(record.number))
+    assert store.study(record.id) == store.study_of(record.number)
+    assert store.study(record.id).cases == 50
+
+
+@pytest.mark.parametrize("kills", [1, 2, 5, 11])
+def test_an_interrupted_study_ends_as_an_undisturbed_one(store: Store, kills: int) -> None:
+    other = create(store, fresh=True)
+    finish(store, other)
+    record = create(store, fresh=True)
+    # A process that ends before or after any step knows nothing of the steps before.
+    steps = 0
+    while not store.get_study(record.id).over:
+        epoch = store.take_over("test")
+        for _ in range(kills):
+            study = store.study_of(record.number)
+            waiting = store.open_chunks(record.number)
+            if waiting:
+                (chunk,) = store.claim(epoch, waiting[:1])
+                if steps % 3:
+                    store.commit(epoch, chunk, results(study, chunk.first, chunk.count))
+                else:
+                    store.put_back(epoch, chunk, "")
+            else:
+                Rounds(store).advance(epoch, record.number, study)
+            steps += 1
+    assert whole(store, record)[0:] == whole(store, other)[0:]
+
+
+def test_a_round_is_appended_once_and_only_while_the_study_is_going(store: Store) -> None:
+    record = create(store)
+    number = record.number
+    epoch = store.take_over("test")
+    study = store.study_of(number)
+    grown = study.with_points(np.array([[0.5], [0.25]]))
+    assert store.rounds_done(number) is None  # its cases are still to be run
+    assert store.append_round(epoch, number, grown, 25, {}) is None
+    run_chunks(store, epoch, number)
+    assert store.rounds_done(number) == [range(25)]
+    assert store.append_round(epoch, number, grown, 20, {}) is None  # another round
+    store.pause_study(record.id)
+    assert store.rounds_done(number) is None
+    assert store.append_round(epoch, number, grown, 25, {}) is None
+    assert store.settle(epoch, number) is StudyState.PAUSED
+    store.resume_study(record.id)
+    before = store.get_study(record.id).revision
+    chunks = store.append_round(epoch, number, grown, 25, {"error": 0.5})
+    assert chunks is not None
+    assert chunks == store.open_chunks(number)
+    assert [(chunk.first, chunk.count) for chunk in chunks] == [(25, 2)]
+    after = store.get_study(record.id)
+    assert (after.cases, after.done, after.revision > before) == (27, 25, True)
+    assert store.append_round(epoch, number, grown, 25, {}) is None  # once more
+    assert store.study_of(number) == grown
+    assert store.rounds(record.id)[-1].summary == {"error": 0.5}
+    new = store.take_over("another")
+    run_chunks(store, new, number)
+    with pytest.raises(EpochLostError):
+        store.append_round(epoch, number, grown.with_points(np.array([[0.75]])), 27, {})
+    assert store.get_study(record.id).cases == 27
+
+
+def test_a_study_with_rounds_is_not_ended_between_them(store: Store) -> None:
+    record = create(store)
+    epoch = store.take_over("test")
+    run_chunks(store, epoch, record.number)
+    assert store.settle(epoch, record.number) is StudyState.RUNNING
+    store.cancel_study(record.id)
+    assert store.rounds_done(record.number) is None
+    assert store.settle(epoch, record.number) is StudyState.CANCELLED
+    assert len(store.case_page(record.id, limit=200)) == 25
+
+
+def test_a_deadline_between_two_rounds_holds_the_study(store: Store, clock: fakes.HandClock) -> None:
+    record = create(store, finish_by=clock.now() + timedelta(hours=1))
+    assert not record.coarse
+    epoch = store.take_over("test")
+    run_chunks(store, epoch, record.number)
+    clock.seconds += 7200.0
+    store.time_is_over(epoch, record.number)
+    held = store.get_study(record.id)
+    assert (held.state, held.time_over) == (StudyState.PAUSED, True)
+    assert held.reason is not None
+    assert "round 1 of at most 4 is done" in held.reason
+    store.resume_study(record.id)
+    finish(store, record)
+    assert store.get_study(record.id).cases == 100
+
+
+def test_cases_that_are_run_again_may_lead_to_another_end(store: Store) -> None:
+    record = create(store, toy.study(rounds=2))
+    epoch = store.take_over("test")
+    study = store.study_of(record.number)
+    for chunk in store.open_chunks(record.number):
+        store.claim(epoch, [chunk])
+        failed = results(study, chunk.first, chunk.count)
+        failed.endings[0] = models.Ending.DIVERGED.value
+        store.commit(epoch, chunk, failed)
+    planner = Rounds(store)
+    while planner.advance(epoch, record.number, store.study_of(record.number)) is not None:
+        run_chunks(store, epoch, record.number)
+    first_end = store.rounds(record.id)[-1]
+    assert store.get_study(record.id).state is StudyState.FINISHED
+    store.retry_study(record.id)
+    finish(store, record)
+    ended = store.get_study(record.id)
+    assert (ended.state, ended.cases, ended.ok) == (StudyState.FINISHED, 50, 50)
+    rounds = store.rounds(record.id)
+    assert [len(found.cases) for found in rounds] == [25, 25, 0]
+    assert rounds[-1].summary != first_end.summary
+
+
+def test_rows_of_an_equal_study_are_copied_round_by_round(store: Store) -> None:
+    first = create(store)
+    finish(store, first)
+    second = create(store)
+    epoch = store.take_over("test")
+    planner = Rounds(store)
+    while True:
+        study = store.study_of(second.number)
+        for chunk in store.open_chunks(second.number):
+            store.claim(epoch, [chunk])
+            known = store.known(study, chunk)
+            assert known is not None
+            assert known.missing.size == 0
+            assert known.cases.tolist() == list(range(chunk.first, chunk.last + 1))
+            nothing = ChunkResult(0, [], [], np.empty((0, fakes.RESULTS)))
+            assert store.commit(epoch, chunk, nothing, known)
+        if planner.advance(epoch, second.number, study) is None:
+            break
+    assert store.get_study(second.id).reused == 100
+    assert whole(store, second) == whole(store, first)
+
+
+def test_a_growing_study_is_a_source_with_all_its_cases(store: Store) -> None:
+    first, second = create(store), create(store)
+    epoch = store.take_over("test")
+    assert store.reusable(toy.study()) == 0  # its span is known from here on
+    finish(store, first)
+    late = store.study_of(first.number)
+    assert store.reusable(late) == 100
+    store.cancel_study(second.id)
+    store.settle(epoch + 1, second.number)
+
+
+def test_a_deleted_study_takes_its_rounds_with_it(store: Store) -> None:
+    record = create(store)
+    finish(store, record)
+    store.delete_study(record.id)
+    with pytest.raises(StudyNotFound):
+        store.rounds(record.id)
+    store.purge()
+    with store.session.read() as connection:
+        assert connection.execute(sa.select(sa.func.count()).select_from(ROUNDS)).scalar_one() == 0
+
+
+def test_a_round_that_cannot_be_planned_says_why(store: Store) -> None:
+    record = create(store, toy.study(broken_at=1))
+    epoch = store.take_over("test")
+    run_chunks(store, epoch, record.number)
+    with pytest.raises(PlanError, match="cannot be planned: ValueError: there is no such round"):
+        Rounds(store).advance(epoch, record.number, store.study_of(record.number))
+    assert store.get_study(record.id).cases == 25
+
+
+def spread(task: ChunkTask) -> ChunkResult:
+    """Numbers that follow from the parameters of the cases."""
+    loads = np.asarray(task.columns["shaft.load"], dtype=np.float64)
+    values = loads[:, None] * np.arange(1.0, 1.0 + fakes.RESULTS)
+    return ChunkResult(task.first, [models.OK] * task.count, [""] * task.count, values)
+
+
+def dispatch(store: Store, record: StudyRecord, steps: int) -> None:
+    executor = fakes.pool(2, run=spread)
+    dispatcher = Dispatcher(store, executor, SystemClock())
+    left = iter(range(steps))
+    dispatcher.run(lambda: store.get_study(record.id).state in {StudyState.FINISHED, StudyState.PAUSED}
+                   or next(left, None) is None)  # fmt: skip
+
+
+def test_the_dispatcher_runs_all_rounds_and_holds_what_cannot_be_planned(store: Store) -> None:
+    record, broken = create(store), create(store, toy.study(broken_at=2), fresh=True)
+    dispatch(store, record, 10_000)
+    dispatch(store, broken, 10_000)
+    assert store.get_study(record.id).state is StudyState.FINISHED
+    assert store.get_study(record.id).cases == 100
+    held = store.get_study(broken.id)
+    assert (held.state, held.cases) == (StudyState.PAUSED, 50)
+    assert held.reason == "the next round cannot be planned: ValueError: there is no such round"
