@@ -10,6 +10,8 @@ MAX_COLUMNS: Final = 256
 MAX_CASES: Final = 10_000_000
 #: Values on all axes of one study together (they are stored with the study).
 MAX_AXIS_VALUES: Final = 1_000_000
+#: Cases of a study that chooses its own ones, rounds together: its cases are listed, and planned again and again.
+MAX_PLANNED_CASES: Final = 100_000
 #: Paths tied to one axis.
 MAX_TIED_PATHS: Final = 256
 

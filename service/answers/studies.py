@@ -33,6 +33,33 @@ class Passes(TypedDict):
     values: Annotated[list[int], Doc("values of each axis in the complete grid; empty where cases are written out")]
 
 
+class Rounds(TypedDict):
+    """Rounds of a study that chooses its own cases."""
+
+    round: Annotated[int, Doc("number of the round that is being run, from 1; of an ended study, of all rounds")]
+    most: Annotated[int, Doc("there are never more rounds")]
+    most_cases: Annotated[int, Doc("there are never more cases")]
+    sentence: Annotated[str, Doc("for people: round, error now, error asked for")]
+    state: Annotated[dict[str, Any], Doc("what the rounds before show, in single values; `rounds` has all of it")]
+
+
+class Round(TypedDict):
+    """One round of a study."""
+
+    round: Annotated[int, Doc("its number, from 1")]
+    first_case: Annotated[int, Doc("number of its first case")]
+    cases: Annotated[int, Doc("number of its cases; 0 for the end of the study")]
+    planned_at: Moment
+    summary: Annotated[dict[str, Any], Doc("what the rounds before it show")]
+
+
+class RoundList(TypedDict):
+    """All rounds of a study."""
+
+    study: str
+    rounds: list[Round]
+
+
 class FullProgress(Progress):
     """Progress of a study, its rate and its time left."""
 
@@ -45,6 +72,7 @@ class FullProgress(Progress):
     ]
     done_by_then: Annotated[int | None, Doc("estimated number of cases done at `finish_by`")]
     passes: Annotated[Passes | None, Doc("the complete part of a study that is run coarse to fine")]
+    rounds: Annotated[Rounds | None, Doc("rounds of a study that chooses its own cases; its `total` grows with them")]
 
 
 class _Study(TypedDict):
@@ -138,14 +166,16 @@ class Preview(TypedDict):
 
     model: str
     name: str
-    cases: int
+    cases: Annotated[int, Doc("number of cases; of a study that chooses its own cases, those of its first round")]
+    most_cases: Annotated[int, Doc("cases at most, all rounds together")]
+    most_rounds: Annotated[int, Doc("rounds at most; 1 where the cases are given")]
     shape: Annotated[list[int], Doc("number of values of each axis; of a zip, the common number")]
     combine: str
     axes: list[AxisInfo]
     results: Annotated[int, Doc("number of results of each case")]
     reusable: Annotated[int, Doc("cases that need not be run, because other studies of the database have them")]
-    estimated_seconds: Annotated[float, Doc("rough time on the processes of this service, s")]
-    estimated_bytes: Annotated[int, Doc("rough size in the database")]
+    estimated_seconds: Annotated[float, Doc("rough time of `most_cases` on the processes of this service, s")]
+    estimated_bytes: Annotated[int, Doc("rough size of `most_cases` in the database")]
     warnings: list[str]
     fits: Annotated[dict[str, ClutchFitReport], Doc("fitted clutch laws, by JSON Pointer into the spec")]
     first_cases: Annotated[list[dict[str, Any]], Doc("parameters of the first cases, SI")]

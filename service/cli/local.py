@@ -106,9 +106,13 @@ def preview(
     if as_json:
         write_json(made)
         return
+    count = f"{made['cases']} cases ({' x '.join(map(str, made['shape'])) or 'no axes'})"
+    if made["most_rounds"] > 1:
+        count = (
+            f"at most {made['most_cases']} cases in at most {made['most_rounds']} rounds, {made['cases']} in the first"
+        )
     write_text(
-        f"{made['name'] or made['model']}: {made['cases']} cases ({' x '.join(map(str, made['shape'])) or 'no axes'}), "
-        f"{made['results']} results each\n"
+        f"{made['name'] or made['model']}: {count}, {made['results']} results each\n"
         f"about {duration_text(made['estimated_seconds'])} and {made['estimated_bytes'] / 1e6:.3g} MB\n"
     )
     if reusable:
@@ -269,7 +273,7 @@ def run(
             ),
         ) as done,
     ):
-        for piece in _rows(done, parsed.study, table_format(form, file, as_json)):
+        for piece in _rows(done, table_format(form, file, as_json)):
             write(piece)
         record, unaffecting = done.record, Unaffected().of(done.store, done.record)
         endings = done.store.progress(record.id).endings
@@ -315,7 +319,7 @@ def _finish(text: str | None) -> datetime | None:
         raise wrong_option("--finish-by", error.code, str(error), text, allowed=ALLOWED) from None
 
 
-def _rows(done: LocalRun, study: Study, form: Format | ReportFormat) -> Iterator[bytes]:
+def _rows(done: LocalRun, form: Format | ReportFormat) -> Iterator[bytes]:
     """The rows of a finished study as the service exports them, or its report."""
     from sprag.service.results.exports import export, stored
     from sprag.service.results.report import write_report
@@ -323,4 +327,4 @@ def _rows(done: LocalRun, study: Study, form: Format | ReportFormat) -> Iterator
 
     if form == "html" or form == "pdf":  # noqa: PLR1714 - so that the types are told apart
         return iter([write_report(report_of(done.store, done.record.id), form)])
-    return export(stored(done.store, done.record, study), form)
+    return export(stored(done.store, done.record, done.store.study(done.record.id)), form)

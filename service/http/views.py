@@ -10,6 +10,7 @@ from sprag.service.answers import filled
 from sprag.service.answers.catalogue import Preset
 from sprag.service.answers.studies import FullProgress, StudyDetail, StudySummary
 from sprag.service.presets import ABOUT, preset_text
+from sprag.service.results.rounds import rounds_json
 from sprag.service.spec.catalogue import axes_json
 from sprag.service.spec.document import format_of, load_spec, parse_spec
 
@@ -28,7 +29,10 @@ def study_address(study_id: str) -> str:
 def study_links(study_id: str) -> dict[str, str]:
     """URLs of the resources of a study."""
     own = study_address(study_id)
-    parts = {name: f"{own}/{name}" for name in ("cases", "results", "curves", "map", "sensitivity", "report", "events")}
+    parts = {
+        name: f"{own}/{name}"
+        for name in ("cases", "results", "curves", "map", "sensitivity", "report", "rounds", "events")
+    }
     return {"self": own, **parts, "cancel": f"{own}:cancel", "page": f"/studies/{study_id}"}
 
 
@@ -51,6 +55,7 @@ def progress_json(progress: Progress) -> FullProgress:
         progress,
         seconds_left=None if left is None else {"low": left[0], "high": left[1]},
         passes=None if covered is None else asdict(covered),
+        rounds=None if progress.rounds is None else rounds_json(progress.rounds),
     )
 
 

@@ -21,6 +21,7 @@ from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.models import estimate_seconds_per_case
+from sprag.worker.planning import most_cases
 from sprag.worker.ports import ExecutorError, StoreError
 from sprag.worker.states import StudyState, TransitionError
 
@@ -118,7 +119,7 @@ def pool_size(study: Study, most: int, *, asked: bool) -> int:
 
     ``asked`` states that the user gave the number.
     """
-    if not asked and study.cases * estimate_seconds_per_case(study) < _NO_POOL_SECONDS:
+    if not asked and most_cases(study) * estimate_seconds_per_case(study) < _NO_POOL_SECONDS:
         return 0
     return most
 

@@ -9,6 +9,7 @@ from sprag.service.schedules.deadline import finish_warnings
 from sprag.service.spec.catalogue import axes_json
 from sprag.worker import models
 from sprag.worker.chunking import work_of
+from sprag.worker.planning import most_cases, planner_of
 
 if TYPE_CHECKING:
     from sprag.service.answers.studies import Preview
@@ -23,8 +24,8 @@ _NUMBER_BYTES = 10
 
 
 def estimated_bytes(study: Study) -> int:
-    """Rough size of the results of ``study`` in the database."""
-    return study.cases * (_ROW_BYTES + _NUMBER_BYTES * len(models.study_results(study)))
+    """Rough size of the results of ``study`` in the database, all rounds included."""
+    return most_cases(study) * (_ROW_BYTES + _NUMBER_BYTES * len(models.study_results(study)))
 
 
 def estimated_seconds(study: Study, chunking: Chunking, to_run: int) -> float:
@@ -51,13 +52,16 @@ def preview_json(
     hardly suffice.
     """
     study = parsed.study
-    seconds = start_seconds + estimated_seconds(study, chunking, study.cases - reusable)
+    most = most_cases(study)
+    seconds = start_seconds + estimated_seconds(study, chunking, most - reusable)
     late = () if seconds_left is None else finish_warnings(study, seconds, seconds_left)
     first = range(min(_FIRST_CASES, study.cases))
     return {
         "model": study.model,
         "name": study.name,
         "cases": study.cases,
+        "most_cases": most,
+        "most_rounds": 1 if study.plan is None else planner_of(study.plan).most_rounds,
         "shape": list(study.shape),
         "combine": study.combine,
         "axes": axes_json(study),

@@ -13,6 +13,7 @@ from sprag.service.schedules.deadline import finish_warnings
 from sprag.service.storage.room import RESERVE_BYTES
 from sprag.service.storage.studies import study_row
 from sprag.worker.limits import MAX_WAITING_STUDIES
+from sprag.worker.planning import most_cases
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -67,7 +68,7 @@ def submission(
     asked = [parsed.spec, dict(given)] if given else parsed.spec
     warnings = (*parsed.warnings, *store.chunking.warnings(parsed.study))
     if finish_by is not None:
-        to_run = parsed.study.cases - (0 if fresh else store.reusable(parsed.study))
+        to_run = most_cases(parsed.study) - (0 if fresh else store.reusable(parsed.study))
         seconds = estimated_seconds(parsed.study, store.chunking, to_run)
         warnings += finish_warnings(parsed.study, seconds, (finish_by - now).total_seconds())
     return Submission(

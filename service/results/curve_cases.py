@@ -34,6 +34,8 @@ from sprag.worker.limits import MAX_CURVE_VALUES
 from sprag.worker.models import regime_info
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 
@@ -195,15 +197,21 @@ def _zip_lines(
     at = {path: axes[i].value(index) for i, (path, index) in fixed.items()}
     x_all = axes[x_axis].array
 
+    def line(values: dict[str, float], part: NDArray[np.int64]) -> Line:
+        if study.plan is not None:  # its cases are in the order in which they were chosen
+            part = part[np.argsort(x_all[part], kind="stable")]
+        return Line(values, at, tuple(x_all[part].tolist()), part)
+
     def lines() -> Iterator[Line]:
         if not by:
-            yield Line({}, at, tuple(x_all[cases].tolist()), cases)
+            yield line({}, cases)
             return
         keys = np.stack([axes[i].array[cases] for i in by.values()], axis=1)
         groups, member = np.unique(keys, axis=0, return_inverse=True)
         order = np.argsort(member.reshape(-1), kind="stable")
         parts = np.split(cases[order], np.cumsum(np.bincount(member.reshape(-1)))[:-1])
         for values, part in zip(groups.tolist(), parts, strict=True):
-            yield Line(dict(zip(by, values, strict=True)), at, tuple(x_all[part].tolist()), part)
+            yield line(dict(zip(by, values, strict=True)), part)
 
-    return tuple(x_all[cases].tolist()), lines()
+    x_values = x_all[cases] if study.plan is None else np.unique(x_all[cases])
+    return tuple(x_values.tolist()), lines()

@@ -106,6 +106,11 @@ def finish_warnings(study: Study, seconds: float, left: float) -> tuple[str, ...
     """Warnings about a study that takes about ``seconds`` of work when ``left`` seconds are left for it."""
     if seconds <= left:
         return ()
+    if study.plan is not None:
+        return (
+            f"All its rounds may need about {_hours(seconds)}, and {_hours(left)} are left until its deadline: what is "
+            "done by then is kept, with its error.",
+        )
     done = int(study.cases * left / seconds)
     return (
         f"By estimate it will not be finished by then: it needs about {_hours(seconds)} and {_hours(left)} are left, "

@@ -7,13 +7,14 @@ Its parts are the modules beside it (`text`, `units`, `run`, `warnings`, the `re
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.spec.axes.design import read_design
 from sprag.service.spec.fields import read_object
 from sprag.service.spec.machine.registry import part_of
+from sprag.service.spec.plan.outline import Outline, chooses, first_round, read_outline
 from sprag.service.spec.report import Report, SpecError, did_you_mean
 from sprag.service.spec.text import Format, load_spec
 from sprag.worker import models
@@ -23,6 +24,7 @@ from sprag.worker.study import Study
 if TYPE_CHECKING:
     from sprag.service.spec.machine.machine import Machine
     from sprag.worker.models import ClutchFit
+    from sprag.worker.study import Combine
 
 __all__ = ["VERSION", "ParsedSpec", "SpecError", "format_of", "load_spec", "parse_spec"]
 
@@ -31,7 +33,7 @@ VERSION: Final = 1
 #: Name of a study that gives none.
 UNNAMED: Final = "untitled"
 
-FIELDS: Final = ("sprag", "model", "name", "base", "run", "axes", "combine", "exclude")
+FIELDS: Final = ("sprag", "model", "name", "base", "run", "axes", "combine", "exclude", "refine", "goal")
 
 
 @dataclass(frozen=True)
@@ -81,11 +83,19 @@ def parse_spec(data: object) -> ParsedSpec:
         raise report.error()
     part = part_of(model)
     machine = part.read_base(report, found.get("base"))
-    axes, combine = read_design(report, found, machine)
+    outline: Outline | None = None
+    combine: Combine = "zip"
+    if chooses(found):
+        outline = read_outline(report, found, machine)
+        axes = None if outline is None else outline.axes
+    else:
+        axes, combine = read_design(report, found, machine)
     run = part.read_run(report, found.get("run", {}), machine, axes)
     part.check(report, machine, axes or (), combine)
     report.raise_if_any()
-    study = Study(model, name, _in_order(machine), run, axes or (), combine, machine.structure)
+    study = Study(model, name, _in_order(machine), run, structure=machine.structure)
+    given = replace(study, axes=axes or (), combine=combine)
+    study = given if outline is None else first_round(report, study, outline)
     part.warn(report, study)
     return ParsedSpec(study, tuple(report.warnings), machine.fits, dict(found))
 

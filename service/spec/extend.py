@@ -65,6 +65,12 @@ def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> di
     if len(given) != 1:
         report.fault("", "exactly-one", "needs either `axes` or `cases`", given, allowed="one of axes, cases")
         raise report.error()
+    if study.plan is not None:
+        report.fault(
+            "", "conflict", "the study chooses its own cases", given,
+            allowed="a new study with another error, other results or other goals: it reuses the cases of this one",
+        )  # fmt: skip
+        raise report.error()
     items = found[given[0]]
     if not isinstance(items, list) or not items:
         report.fault(

@@ -33,7 +33,7 @@ def longer_spec(
     cases : numbers of cases, at least one
     at_most : by default `TIMES` times as many as the study allows
     """
-    kept = {key: value for key, value in spec.items() if key not in {"axes", "combine", "exclude"}}
+    kept = {key: value for key, value in spec.items() if key not in {"axes", "combine", "exclude", "refine", "goal"}}
     if is_settled(study.run):
         most = min(TIMES * study.run["at_most"], MAX_SETTLED_PERIODS) if at_most is None else at_most
         run = {key: value for key, value in spec.get("run", {}).items() if key not in TIMED_FIELDS}

@@ -4,13 +4,27 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from sprag.worker.planning.refine import CurveRefiner
+from sprag.worker.planning.refine_plan import REFINE, RefinePlan
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from sprag.worker.planning.rounds import Planner
+    from sprag.worker.study import Study
+
+
+def _refiner(plan: Mapping[str, Any]) -> Planner:
+    return CurveRefiner(RefinePlan.from_json(plan))
+
 
 #: The planners by the kind of their plan.
-PLANNERS: dict[str, Callable[[Mapping[str, Any]], Planner]] = {}
+PLANNERS: dict[str, Callable[[Mapping[str, Any]], Planner]] = {REFINE: _refiner}
+
+
+def most_cases(study: Study) -> int:
+    """Cases of ``study`` at most: those that it has, or of all its rounds."""
+    return study.cases if study.plan is None else planner_of(study.plan).most_cases
 
 
 def planner_of(plan: Mapping[str, Any]) -> Planner:

@@ -23,6 +23,7 @@ from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import Submission, take_in
 from sprag.service.results.regimes import UNSETTLED
+from sprag.service.results.rounds import round_json
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
 from sprag.worker.limits import MAX_PAGE_SIZE, MAX_PRIORITY, MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
 from sprag.worker.models import ENDING_SENTENCES, NOT_SETTLED, OK, REGIME_SENTENCES, WorkerEnding, is_settled
@@ -157,6 +158,16 @@ def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
     response = json_response(data)
     # While it runs, the time left changes with no change of the study.
     return tagged(response, tag) if record.state.terminal else response
+
+
+@router.get(
+    "/studies/{study_id:study}/rounds",
+    response_model=m.RoundList,
+    responses=problems("invalid-parameter", "study-not-found"),
+)
+def get_rounds(context: Ctx, study_id: StudyId) -> m.RoundList:
+    """The rounds of a study that chooses its own cases, each with what was known before it; none for other studies."""
+    return {"study": study_id, "rounds": [round_json(found) for found in context.store.rounds(study_id)]}
 
 
 @router.delete(

@@ -7,6 +7,7 @@ from sprag.service.spec.axes.design import COMBINE, GROUPED
 from sprag.service.spec.axes.exclude import FIELDS as EXCLUDE_FIELDS
 from sprag.service.spec.axes.sample import RANGES, SAMPLE, SCALE
 from sprag.service.spec.described import Listed, schemas
+from sprag.service.spec.schema.plan import adaptive_schema
 from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema, one_of
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_TIED_PATHS
 
@@ -25,12 +26,12 @@ def axis_schema() -> Schema:
         "geomspace": three(count, "[from, to, count], each value the same multiple of the previous one"),
         "range": three(QUANTITY, "[from, to, step], the end included when a whole number of steps leads there"),
     }
-    return one_of(object_schema({"path": _path_schema(), **ways}, required=("path",)), ways)
+    return one_of(object_schema({"path": path_schema(), **ways}, required=("path",)), ways)
 
 
 def sample_schema() -> Schema:
     """Schema of points drawn over ranges."""
-    fields = {"path": _path_schema(), "from": QUANTITY, "to": QUANTITY}
+    fields = {"path": path_schema(), "from": QUANTITY, "to": QUANTITY}
     ranges = RANGES.schema(object_schema({**fields, "scale": SCALE.schema()}, required=fields))
     return object_schema(
         {**schemas(SAMPLE), "ranges": ranges},
@@ -58,7 +59,8 @@ def group_schema() -> Schema:
 
 def axes_schema() -> Schema:
     """Schema of all that varies in a study."""
-    return {**AXES.schema(_anything()), "default": []}
+    adaptive = adaptive_schema(path_schema())
+    return {**AXES.schema({"anyOf": [*_anything()["anyOf"], adaptive]}), "default": []}
 
 
 def _anything() -> Schema:
@@ -95,7 +97,8 @@ def extension_schema() -> Schema:
     )
 
 
-def _path_schema() -> Schema:
+def path_schema() -> Schema:
+    """Schema of what varies: one path or several."""
     path = {"type": "string", "examples": ["excitation.frequency", "pendulums.0.spring_rate", "clutch.coefficients.1"]}
     paths = {"type": "array", "items": path, "minItems": 1, "maxItems": MAX_TIED_PATHS, "uniqueItems": True}
     return {"anyOf": [path, paths], "description": "what varies; several paths take the same values"}

@@ -9,7 +9,8 @@ from __future__ import annotations
 from sprag.service.spec.axes.design import COMBINE
 from sprag.service.spec.document import UNNAMED, VERSION
 from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.schema.axes import axes_schema, exclude_schema
+from sprag.service.spec.schema.axes import axes_schema, exclude_schema, path_schema
+from sprag.service.spec.schema.plan import goal_schema, refine_schema
 from sprag.service.spec.schema.quantity import Schema, object_schema
 from sprag.worker import models
 from sprag.worker.limits import MAX_NAME_LENGTH
@@ -33,6 +34,8 @@ def spec_schema() -> Schema:
             "axes": axes_schema(),
             "combine": COMBINE.schema(),
             "exclude": exclude_schema(),
+            "refine": refine_schema(),
+            "goal": goal_schema(path_schema()),
         },
         required=("sprag", "model", "base"),
         description="a study: a machine, a run, and what varies",

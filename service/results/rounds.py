@@ -1,0 +1,55 @@
+"""Rounds of studies that choose their own cases, as answers and in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sprag.service.answers.studies import Round, Rounds
+    from sprag.service.storage.records import RoundProgress, RoundRecord
+
+
+def rounds_json(rounds: RoundProgress) -> Rounds:
+    """Where a study stands, in short."""
+    state = {name: value for name, value in rounds.latest.summary.items() if not isinstance(value, dict | list)}
+    return {
+        "round": _number(rounds),
+        "most": rounds.most,
+        "most_cases": rounds.most_cases,
+        "sentence": sentence(rounds),
+        "state": state,
+    }
+
+
+def round_json(record: RoundRecord) -> Round:
+    """One round with everything that was known when it was planned."""
+    return {
+        "round": record.round + 1,
+        "first_case": record.cases.start,
+        "cases": len(record.cases),
+        "planned_at": record.planned_at.isoformat(),
+        "summary": record.summary,
+    }
+
+
+def sentence(rounds: RoundProgress) -> str:
+    """For people: "round 3 of at most 12, error now 2.1 %, asked 1 %"."""
+    told = [f"round {_number(rounds)} of at most {rounds.most}"]
+    if not rounds.latest.cases:
+        number = _number(rounds)
+        told = [f"{number} round" if number == 1 else f"{number} rounds"]
+    return ", ".join([*told, *_state(rounds.latest.summary)])
+
+
+def _number(rounds: RoundProgress) -> int:
+    """The number of the round, from 1; the number of all rounds where they have ended."""
+    return rounds.latest.round + (1 if rounds.latest.cases else 0)
+
+
+def _state(summary: dict[str, Any]) -> list[str]:
+    """What a summary says of the error that was asked for."""
+    asked, error = summary.get("asked"), summary.get("error")
+    if asked is None:
+        return []
+    now = "error not known yet" if error is None else f"error now {100.0 * error:.2g} %"
+    return [now, f"asked {100.0 * asked:.2g} %"]

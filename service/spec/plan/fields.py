@@ -1,0 +1,130 @@
+"""Readings that refinement and goals share: ends of a range, shares, results and values of them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from sprag.service.spec.axes.axes import read_paths
+from sprag.service.spec.catalogue import result_of, unknown_result
+from sprag.service.spec.fields import read_number
+from sprag.service.spec.report import Report, join, quantity_text
+from sprag.service.spec.units import QuantityError, example, parse_quantity, split_quantity, to_float
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.spec.machine.machine import Machine
+    from sprag.worker.models import ResultInfo
+
+
+def read_ends(
+    report: Report, pointer: str, paths: Sequence[str], ends: Sequence[tuple[str, object]], machine: Machine
+) -> tuple[float, float] | None:
+    """The ends of a range (SI), the lower first; None, and the faults recorded, where they are none.
+
+    ``ends`` are the two pointers, each with its value.
+    """
+    read: list[float] = []
+    for where, value in ends:
+        numbers = [read_number(report, where, value, machine.parameters[path]) for path in paths]
+        if numbers[0] is None or None in numbers:
+            return None
+        read.append(numbers[0])
+    low, high = sorted(read)
+    if low == high:
+        unit = machine.parameters[paths[0]].unit
+        report.fault(pointer, "invalid-range", "begins where it ends", quantity_text(low, unit), allowed="two values")
+        return None
+    return low, high
+
+
+def read_path_of(report: Report, pointer: str, data: object, machine: Machine) -> tuple[str, ...] | None:
+    """The path or the tied paths of what varies, each once; None, and the faults recorded, where they are none."""
+    paths = read_paths(report, join(pointer, "path"), data, machine)
+    if paths is not None and len(set(paths)) < len(paths):
+        report.fault(join(pointer, "path"), "repeated", "names the same path twice", list(paths))
+        return None
+    return paths
+
+
+def read_share(report: Report, pointer: str, value: object, low: float, high: float) -> float | None:
+    """A share between ``low`` and ``high``, a plain number or a text such as "1 %"; None, and a fault, for others."""
+    allowed = f'{100 * low:g} % to {100 * high:g} %, as in "1 %" or 0.01'
+    share = share_of(value)
+    if share is None:
+        report.fault(pointer, "not-a-number", "must be a share", value, allowed=allowed)
+    elif not low <= share <= high:
+        report.fault(pointer, "out-of-range", "is out of range", value, allowed=allowed)
+    else:
+        return share
+    return None
+
+
+def share_of(value: object) -> float | None:
+    """The number of "2 %", 0.02 or "0.02"; None for anything else."""
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, int | float):
+        return float(value) if math.isfinite(value) else None
+    return in_percent(value, plain=True)
+
+
+def in_percent(value: object, *, plain: bool = False) -> float | None:
+    """The number of a text "2 %", also of one without a unit where ``plain``; None for anything else."""
+    if not isinstance(value, str):
+        return None
+    try:
+        number, unit = split_quantity(value)
+    except QuantityError:
+        return None
+    if unit == "%":
+        return to_float(number) / 100.0
+    return to_float(number) if plain and not unit else None
+
+
+def read_result(report: Report, pointer: str, value: object, infos: Sequence[ResultInfo]) -> ResultInfo | None:
+    """The result of that name; None, and a fault recorded, where there is none."""
+    allowed = "the name of a result of this study, such as 'shaft.speed.mean'"
+    if not isinstance(value, str):
+        missing = value is None
+        message = "is required" if missing else "must be the name of a result"
+        report.fault(pointer, "required" if missing else "wrong-type", message, value, allowed=allowed)
+        return None
+    info = result_of(infos, value)
+    if info is None:
+        report.fault(pointer, "unknown-name", unknown_result(infos, value), value, allowed=allowed)
+    return info
+
+
+def read_value(report: Report, pointer: str, value: object, info: ResultInfo) -> float | None:
+    """A value of a result (SI; of a category its number); None, and a fault recorded, where it is none."""
+    if info.kind == "category":
+        if value in info.categories:
+            return float(info.categories.index(str(value)))
+        allowed = ", ".join(f"'{name}'" for name in info.categories)
+        report.fault(pointer, "invalid-choice", "is not a valid choice", value, allowed=allowed)
+        return None
+    try:
+        return parse_quantity(value, info.unit)
+    except QuantityError as error:
+        allowed = f"a number of {info.unit}, for example {example(info.unit)}"
+        report.fault(pointer, error.code, str(error), value, allowed=allowed, unit=info.unit)
+        return None
+
+
+def read_results(report: Report, pointer: str, names: Sequence[Any], infos: Sequence[ResultInfo]) -> list[str]:
+    """Names of results that are numbers, each once; faults are recorded."""
+    found: list[str] = []
+    for index, name in enumerate(names):
+        where = join(pointer, index)
+        info = read_result(report, where, name, infos)
+        if info is None:
+            continue
+        if info.kind == "category":
+            report.fault(where, "not-numeric", "is a category, not a number", name, allowed="a result with a number")
+        elif name in found:
+            report.fault(where, "repeated", "is named twice", name, allowed="each result once")
+        else:
+            found.append(name)
+    return found

@@ -1,0 +1,222 @@
+"""Goals: what a design should reach, and what may vary for it (`goal` of a spec)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+from sprag.service.spec.axes.axes import check_paths, expand
+from sprag.service.spec.axes.values import plan_values
+from sprag.service.spec.described import Described, Listed, choice, named
+from sprag.service.spec.fields import read_number, read_object, read_one
+from sprag.service.spec.plan.fields import (
+    in_percent,
+    read_ends,
+    read_path_of,
+    read_result,
+    read_value,
+)
+from sprag.service.spec.report import Report, did_you_mean, join
+from sprag.worker.limits import MAX_PLANNED_CASES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.spec.machine.machine import Machine
+    from sprag.worker.models import ResultInfo
+
+VARY: Final = Listed("variables", 1, 64, "what may vary: over a range, or among listed values")
+BEST: Final = Listed("goals", 0, 8, "results that are to be as small, or with max as large, as possible")
+SUBJECT_TO: Final = Listed("constraints", 0, 32, "what a feasible design must fulfil")
+AT: Final = Listed("operating points", 0, 64, "parameters of each operating point; by default one, that of the base")
+MAX: Final = Described("max", "", "whether the largest value is the best", "flag", default=False)
+OVER: Final = choice(
+    "over", "what counts of several operating points: the worst one, or the mean", "worst", "mean", default="worst"
+)
+SEARCH: Final = named(
+    OVER,
+    Described("population", "", "designs of one generation", "whole", 4, 1000, 100),
+    Described("generations", "", "generations", "whole", 1, 10_000, 60),
+    Described("seed", "", "seed of the random numbers", "whole", 0, 2**32 - 1, 1),
+    Described("polish", "", "whether equalities are met exactly at the end", "flag", default=True),
+)
+FIELDS: Final = ("vary", "best", "subject_to", "at", *SEARCH)
+_KINDS: Final = ("is", "at_least", "at_most")
+_DEFAULT_WITHIN: Final = 0.01
+
+Variables = list[dict[str, Any]]
+
+
+def read_variables(report: Report, data: object, machine: Machine) -> Variables | None:
+    """What may vary: its paths with a range or a list of values (SI); None, and the faults recorded, if invalid."""
+    items = VARY.read(report, "/goal/vary", data)
+    if items is None:
+        return None
+    before = report.found
+    read = [_variable(report, join("/goal/vary", index), item, machine) for index, item in enumerate(items)]
+    check_paths(report, [tuple(found["paths"]) if found else () for found in read], "/goal/vary")
+    return None if report.found > before else [found for found in read if found]
+
+
+def _variable(report: Report, pointer: str, item: object, machine: Machine) -> dict[str, Any] | None:
+    found = read_object(report, pointer, item, ("path", "from", "to", "values"))
+    if found is None:
+        return None
+    paths = read_path_of(report, pointer, found.get("path"), machine)
+    way = read_one(report, pointer, {name: 0 for name in found if name in {"values", "from"}}, ("from", "values"))
+    if paths is None or way is None:
+        return None
+    if way == "from":
+        ends = [(join(pointer, name), found.get(name)) for name in ("from", "to")]
+        read = read_ends(report, pointer, paths, ends, machine)
+        return None if read is None else {"paths": list(paths), "low": read[0], "high": read[1]}
+    parameters = [machine.parameters[path] for path in paths]
+    plan = plan_values(report, join(pointer, "values"), found["values"], parameters[0])
+    values = None if plan is None else expand(report, plan, parameters, "grid")
+    return None if values is None else {"paths": list(paths), "values": values.tolist()}
+
+
+def read_points(
+    report: Report, data: object, machine: Machine, variables: Variables | None
+) -> list[dict[str, float]] | None:
+    """The operating points: path -> value (SI), the same paths for each; None, and the faults recorded, if invalid."""
+    items = AT.read(report, "/goal/at", data)
+    if items is None:
+        return None
+    before = report.found
+    varied = {path for found in variables or () for path in found["paths"]}
+    points: list[dict[str, float]] = []
+    for index, item in enumerate(items):
+        where = join("/goal/at", index)
+        if not isinstance(item, Mapping) or not item:
+            report.fault(where, "wrong-type", "must be an object", item, allowed='as in {"shaft.load": "0.2 N*m"}')
+            continue
+        point: dict[str, float] = {}
+        for path, value in item.items():
+            place = join(where, path)
+            if path not in machine.parameters:
+                known = did_you_mean(path, machine.parameters)
+                report.fault(place, "invalid-path", f"names no parameter{known}", path, allowed="a path of `base`")
+            elif path in varied:
+                report.fault(place, "repeated", "varies already", path, allowed="each path once")
+            else:
+                number = read_number(report, place, value, machine.parameters[path])
+                point |= {} if number is None else {path: number}
+        points.append(point)
+    if report.found > before:
+        return None
+    for index, point in enumerate(points[1:], 1):
+        if set(point) != set(points[0]):
+            report.fault(
+                join("/goal/at", index), "conflict", "has other parameters than the first point", sorted(point),
+                allowed=", ".join(sorted(points[0])),
+            )  # fmt: skip
+        elif point in points[:index]:
+            report.fault(join("/goal/at", index), "repeated", "is the same as a point before", list(point.values()))
+    return None if report.found > before else points
+
+
+def read_goal(
+    report: Report,
+    infos: Sequence[ResultInfo],
+    data: Mapping[str, Any],
+    variables: Variables,
+    points: list[dict[str, float]],
+) -> dict[str, Any] | None:
+    """The plan of a study with a goal as plain JSON data; None, and the faults recorded, where it is invalid.
+
+    Parameters
+    ----------
+    infos : the results of the study
+    data : the field `goal` of the spec
+    variables, points : as `read_variables` and `read_points` give them
+    """
+    before = report.found
+    best = _read_best(report, data.get("best", []), infos)
+    constraints = _read_constraints(report, data.get("subject_to", []), infos)
+    search = {name: field.read(report, "/goal", data) for name, field in SEARCH.items()}
+    if not report.found > before and not best and not constraints:
+        report.fault("/goal", "empty", "asks for nothing", allowed="`best` or `subject_to`, or both")
+    if report.found > before:
+        return None
+    most = search["population"] * search["generations"] * max(len(points), 1)
+    if most > MAX_PLANNED_CASES:
+        report.fault(
+            "/goal/generations", "too-many", f"the generations have {most:,} cases together", search["generations"],
+            allowed=f"at most {MAX_PLANNED_CASES:,} cases",
+        )  # fmt: skip
+        return None
+    return {"kind": "goal", "vary": variables, "best": best, "subject_to": constraints, "at": points, **search}
+
+
+def _read_best(report: Report, data: object, infos: Sequence[ResultInfo]) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = []
+    for index, item in enumerate(BEST.read(report, "/goal/best", data) or ()):
+        where = join("/goal/best", index)
+        fields = read_object(report, where, item, ("result", "max"))
+        if fields is None:
+            continue
+        info = read_result(report, join(where, "result"), fields.get("result"), infos)
+        largest = MAX.read(report, where, fields)
+        if info is None or largest is None:
+            continue
+        if info.kind == "category":
+            report.fault(
+                join(where, "result"), "not-numeric", "is a category, not a number", info.name,
+                allowed="a result with a number",
+            )  # fmt: skip
+        elif any(goal["result"] == info.name for goal in found):
+            report.fault(join(where, "result"), "repeated", "is a goal already", info.name, allowed="each result once")
+        else:
+            found.append({"result": info.name, "max": largest})
+    return found
+
+
+def _read_constraints(report: Report, data: object, infos: Sequence[ResultInfo]) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = []
+    for index, item in enumerate(SUBJECT_TO.read(report, "/goal/subject_to", data) or ()):
+        where = join("/goal/subject_to", index)
+        fields = read_object(report, where, item, ("result", *_KINDS, "within"))
+        if fields is None:
+            continue
+        info = read_result(report, join(where, "result"), fields.get("result"), infos)
+        kind = read_one(report, where, {name: 0 for name in fields if name in _KINDS}, _KINDS)
+        if info is None or kind is None:
+            continue
+        if info.kind == "category" and kind != "is":
+            report.fault(
+                join(where, kind), "not-numeric", "compares a category", fields[kind], allowed="`is` for a category"
+            )
+            continue
+        value = read_value(report, join(where, kind), fields[kind], info)
+        within = _read_within(report, where, fields, info, kind, value)
+        if value is not None and within is not None:
+            found.append({"result": info.name, kind: value, **({"within": within} if kind == "is" else {})})
+    return found
+
+
+def _read_within(
+    report: Report, where: str, fields: Mapping[str, Any], info: ResultInfo, kind: str, value: float | None
+) -> float | None:
+    """Half the width (SI) of an equality, given as a quantity or relative to its value; 0 for an inequality."""
+    if kind != "is" or info.kind != "real":
+        if "within" in fields:
+            report.fault(
+                join(where, "within"), "not-used", "has no meaning here", fields["within"],
+                allowed="only with `is` and a real number",
+            )  # fmt: skip
+        return 0.0 if kind != "is" else 0.5
+    if value is None:
+        return None
+    share = in_percent(fields["within"]) if "within" in fields else _DEFAULT_WITHIN
+    if share is not None:
+        width: float | None = abs(value) * share
+    else:
+        width = read_value(report, join(where, "within"), fields["within"], info)
+    if width is not None and width <= 0.0:
+        report.fault(
+            join(where, "within"), "out-of-range", "is no width", fields.get("within", "1 %"),
+            allowed='greater than 0, as in "2 %" of a value other than 0, or a quantity', unit=info.unit,
+        )  # fmt: skip
+        return None
+    return width

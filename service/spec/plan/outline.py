@@ -1,0 +1,102 @@
+"""Studies that choose their own cases: what they can vary, and their first round."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from sprag.service.spec.fields import read_object
+from sprag.service.spec.plan import goal, refine
+from sprag.service.spec.report import Report
+from sprag.worker import models
+from sprag.worker.planning import planner_of
+from sprag.worker.study import Axis, Study
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.spec.machine.machine import Machine
+    from sprag.worker.models import ResultInfo
+
+#: Fields of a spec by which a study chooses its own cases.
+FIELDS: Final = ("refine", "goal")
+
+
+@dataclass(frozen=True)
+class Outline:
+    """What a study can vary, as zipped axes with the ends of each range, and how its plan is read.
+
+    The plan needs the results of the study, which are only known with its machine and its run.
+    """
+
+    axes: tuple[Axis, ...]
+    plan: Callable[[Report, Sequence[ResultInfo]], dict[str, Any] | None]
+
+
+def chooses(found: Mapping[str, Any]) -> bool:
+    """Whether a spec describes a study that chooses its own cases."""
+    items = found.get("axes")
+    adaptive = isinstance(items, list) and any(map(refine.is_adaptive, items))
+    return adaptive or any(name in found for name in FIELDS)
+
+
+def read_outline(report: Report, found: Mapping[str, Any], machine: Machine) -> Outline | None:
+    """The outline of a study that `chooses` its cases; None, and the faults recorded, where it is invalid."""
+    kind = "goal" if "goal" in found and "refine" not in found else "refine"
+    before = report.found
+    for name in ("exclude", "combine", *(FIELDS if kind == "refine" else ("axes",))):
+        if name == kind or name not in found or (name == "combine" and found[name] == "grid"):
+            continue
+        report.fault(
+            f"/{name}", "conflict", f"does not go together with `{kind}`", found[name], allowed=f"without `{name}`"
+        )
+    outline = _goal(report, found, machine) if kind == "goal" else _refine(report, found, machine)
+    return None if report.found > before else outline
+
+
+def _refine(report: Report, found: Mapping[str, Any], machine: Machine) -> Outline | None:
+    axes = refine.read_refined_axes(report, found.get("axes", []), machine)
+    if axes is None:
+        return None
+
+    def plan(report: Report, infos: Sequence[ResultInfo]) -> dict[str, Any] | None:
+        read = refine.read_refine(report, found.get("refine"), axes, infos)
+        return None if read is None else read.to_json()
+
+    fixed, adaptive = axes
+    ends = [*((axis.paths, axis.values) for axis in fixed), *((axis.paths, (axis.low, axis.high)) for axis in adaptive)]
+    return Outline(_zipped(ends), plan)
+
+
+def _goal(report: Report, found: Mapping[str, Any], machine: Machine) -> Outline | None:
+    data = read_object(report, "/goal", found["goal"], goal.FIELDS)
+    if data is None:
+        return None
+    variables = goal.read_variables(report, data.get("vary"), machine)
+    points = goal.read_points(report, data.get("at", []), machine, variables)
+    if variables is None or points is None:
+        return None
+    ends = [(tuple(v["paths"]), v.get("values") or (v["low"], v["high"])) for v in variables]
+    ends += [((path,), [point[path] for point in points]) for path in (points[0] if points else ())]
+    return Outline(_zipped(ends), partial(goal.read_goal, data=data, variables=variables, points=points))
+
+
+def _zipped(ends: Sequence[tuple[tuple[str, ...], Sequence[float]]]) -> tuple[Axis, ...]:
+    """Axes of one length with all these values; shorter lists begin again."""
+    length = max((len(values) for _, values in ends), default=0)
+    return tuple(Axis(paths, np.resize(np.asarray(values, dtype=np.float64), length)) for paths, values in ends)
+
+
+def first_round(report: Report, study: Study, outline: Outline) -> Study:
+    """``study`` with its plan and the cases of its first round; SpecError where the plan is invalid."""
+    plan = outline.plan(report, models.study_results(study))
+    report.raise_if_any()
+    assert plan is not None
+    planner = planner_of(plan)
+    points = planner.ask().points
+    axes = tuple(Axis(paths, column) for paths, column in zip(planner.paths, points.T, strict=True))
+    return replace(study, axes=axes, combine="zip", plan=plan)

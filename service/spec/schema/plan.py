@@ -1,0 +1,89 @@
+"""The part of the spec's JSON Schema about studies that choose their own cases: adaptive axes, refinement, goals."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from sprag.service.spec.described import Listed
+from sprag.service.spec.plan.goal import AT, BEST, MAX, SEARCH, SUBJECT_TO, VARY
+from sprag.service.spec.plan.refine import DEFAULT_FINEST, MAX_FINEST, MIN_FINEST, MOST, RESULTS, START
+from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema
+
+_RESULT: Final[Schema] = {"type": "string", "examples": ["shaft.speed.mean", "efficiency", "torque.max"]}
+
+
+def adaptive_schema(path: Schema) -> Schema:
+    """Schema of an adaptive axis; ``path`` is that of its path."""
+    ends: Schema = {
+        "type": "array",
+        "prefixItems": [QUANTITY, QUANTITY],
+        "minItems": 2,
+        "maxItems": 2,
+        "description": "[from, to]: the values between them are chosen by `refine`",
+    }
+    return object_schema({"path": path, "adaptive": ends}, required=("path", "adaptive"))
+
+
+def refine_schema() -> Schema:
+    """Schema of `refine`."""
+    error: Schema = {
+        "type": ["number", "string"],
+        "default": "1 %",
+        "description": "largest error of straight lines between the points, relative to the range of the result",
+    }
+    finest: Schema = {
+        "type": ["integer", "string"],
+        "default": f"1/{DEFAULT_FINEST}",
+        "description": f"finest division of an adaptive axis, 1/{MIN_FINEST} to 1/{MAX_FINEST}, a power of 2",
+    }
+    return object_schema(
+        {
+            "results": RESULTS.schema(_RESULT),
+            "error": error,
+            "start": START.schema(),
+            "finest": finest,
+            "most": MOST.schema(),
+        },
+        required=("results",),
+        description="curves (one adaptive axis) or maps (two) that are refined until they are right to an error",
+    )
+
+
+def goal_schema(path: Schema) -> Schema:
+    """Schema of `goal`; ``path`` is that of the path of what varies."""
+    variable = object_schema(
+        {
+            "path": path,
+            "from": QUANTITY,
+            "to": QUANTITY,
+            "values": Listed("values", 1, 10_000, "the values to choose from").schema(QUANTITY),
+        },
+        required=("path",),
+    )
+    best = object_schema({"result": _RESULT, "max": MAX.schema()}, required=("result",))
+    constraint = object_schema(
+        {
+            "result": _RESULT,
+            "is": {**QUANTITY, "description": "value that the result must have"},
+            "within": {
+                **QUANTITY,
+                "description": "how far from that: a quantity or a share",
+                "default": "1 %",
+            },
+            "at_least": QUANTITY,
+            "at_most": QUANTITY,
+        },
+        required=("result",),
+    )
+    point = {"type": "object", "minProperties": 1, "additionalProperties": QUANTITY}
+    return object_schema(
+        {
+            "vary": VARY.schema(variable),
+            "best": BEST.schema(best),
+            "subject_to": SUBJECT_TO.schema(constraint),
+            "at": AT.schema(point),
+            **{name: field.schema() for name, field in SEARCH.items()},
+        },
+        required=("vary",),
+        description="what a design should reach, and what may vary for it",
+    )
