@@ -14,7 +14,7 @@ def rounds_json(rounds: RoundProgress) -> Rounds:
     state = {name: value for name, value in rounds.latest.summary.items() if not isinstance(value, dict | list)}
     return {
         "round": _number(rounds),
-        "most": rounds.most,
+        "most": _most(rounds),
         "most_cases": rounds.most_cases,
         "sentence": sentence(rounds),
         "state": state,
@@ -34,7 +34,7 @@ def round_json(record: RoundRecord) -> Round:
 
 def sentence(rounds: RoundProgress) -> str:
     """For people: "round 3 of at most 12, error now 2.1 %, asked 1 %"."""
-    told = [f"round {_number(rounds)} of at most {rounds.most}"]
+    told = [f"round {_number(rounds)} of at most {_most(rounds)}"]
     if not rounds.latest.cases:
         number = _number(rounds)
         told = [f"{number} round" if number == 1 else f"{number} rounds"]
@@ -44,6 +44,11 @@ def sentence(rounds: RoundProgress) -> str:
 def _number(rounds: RoundProgress) -> int:
     """The number of the round, from 1; the number of all rounds where they have ended."""
     return rounds.latest.round + (1 if rounds.latest.cases else 0)
+
+
+def _most(rounds: RoundProgress) -> int:
+    """Rounds at most; cases that are run again can lead to a further one."""
+    return max(rounds.most, _number(rounds))
 
 
 def _state(summary: dict[str, Any]) -> list[str]:
