@@ -312,10 +312,6 @@ def test_before_the_first_rows_nothing_is_known() -> None:
 
 
 def test_rows_of_other_points_are_refused() -> None:
-    planner = CurveRefiner(PLAN)
-    rows = rows_of(PLAN, planner.ask().points[::-1].copy(), lambda points: {"a": points[:, -1]})
-    with pytest.raises(ValueError, match="round 0: the rows are not those"):
-        planner.tell(rows)
     with pytest.raises(ValueError, match=r"shaft\.load: 0\.31 is not a point"):
         describe(PLAN, rows_of(PLAN, np.array([[0.31]]), lambda points: {"a": points[:, -1]}))
     with pytest.raises(ValueError, match=r"frequency: 21\.0 is not a value"):
