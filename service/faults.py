@@ -6,7 +6,7 @@ Wording may change; programs and tests rely on the codes, which ``docs/faults.md
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypedDict, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -60,6 +60,36 @@ Code = Literal[
     "unsupported-version",
     "wrong-type",
     "wrong-unit",
+]
+
+#: Codes of warnings: what is allowed but probably unintended.
+WarningCode = Literal[
+    "assumed-units",
+    "exceeds-chunk-timeout",
+    "falls-over",
+    "implausible-value",
+    "impossible-inertia",
+    "late",
+    "law-ends-falling",
+    "law-falls",
+    "law-jumps",
+    "mixed-origins",
+    "never-acts",
+    "no-compression",
+    "no-discharge",
+    "no-effect",
+    "no-such-angle",
+    "nothing-acts",
+    "nothing-moves",
+    "replaced-value",
+    "rows-in-backlash",
+    "short-search",
+    "short-window",
+    "slow-excitation",
+    "stays-upright",
+    "terms-cancel",
+    "too-few-rows",
+    "wraps-around",
 ]
 
 #: Kinds of failures as a whole; over HTTP the last part of a problem's type.
@@ -222,6 +252,19 @@ def choice_of(name: str, value: str, choices: Iterable[Choice]) -> Choice:
     if value in known:
         return value
     raise parameter_error(name, "invalid-choice", f"unknown {name}", value, ", ".join(known))
+
+
+class Warned(TypedDict):
+    """What an answer with warnings has."""
+
+    warnings: list[str]
+    warning_codes: list[str | None]
+
+
+def warned(warnings: Iterable[str]) -> Warned:
+    """The fields of an answer with warnings: the sentences, and their codes (None in databases of earlier versions)."""
+    texts = list(warnings)
+    return {"warnings": texts, "warning_codes": [getattr(text, "code", None) for text in texts]}
 
 
 def shown(value: Any) -> Any:

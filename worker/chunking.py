@@ -51,10 +51,11 @@ class Chunking:
         seconds = models.estimate_seconds_per_case(study) * work_of(1)
         if seconds <= self.timeout:
             return ()
-        return (
+        text = (
             f"One case takes about {seconds:.3g} s, and {self.timeout:g} s are allowed (SPRAG_CHUNK_TIMEOUT): cases "
-            "will probably end as timed_out.",
+            "will probably end as timed_out."
         )
+        return (models.WarningText(text, "exceeds-chunk-timeout"),)
 
 
 def work_of(cases: float) -> float:

@@ -21,6 +21,7 @@ from sprag.engine.vibration_drive.clutch_report import (
     DegreeReport,
 )
 from sprag.engine.vibration_drive.singular_values import singular_values
+from sprag.engine.warning_text import WarningText
 
 __all__ = [
     "HIGHEST_DEGREE",
@@ -215,26 +216,29 @@ def _accepted(
 
 def _data_warnings(
     rows: Rows, law: NDArray[np.float64], report: DegreeReport, backlash_rows: tuple[int, ...]
-) -> tuple[str, ...]:
+) -> tuple[WarningText, ...]:
     warnings = []
     if backlash_rows:
-        warnings.append(
+        text = (
             f"{len(backlash_rows)} of {rows.windup.size} rows lie within the backlash and were left out of the fit; "
             "their residuals compare them with no torque"
         )
+        warnings.append(WarningText(text, "rows-in-backlash"))
     if report.rank == rows.distinct:
-        warnings.append(
+        text = (
             f"degree {report.degree} has as many unknowns as the data has different windups, so the small residuals "
             "prove nothing; measure more rows"
         )
+        warnings.append(WarningText(text, "too-few-rows"))
     terms = float(np.abs(law * rows.limit ** np.arange(law.size)).sum())
     cancellation = terms / float(np.abs(rows.torque[rows.fitted]).max())
     if cancellation > _MAX_CANCELLATION:
-        warnings.append(
+        text = (
             f"the terms of the law of degree {report.degree} are together {cancellation:.0f} times as large as the "
             f"largest torque and all but cancel (condition number {report.condition_number:.2g}), so they follow the "
             "scatter of the rows; check the backlash and the units, or allow a larger residual"
         )
+        warnings.append(WarningText(text, "terms-cancel"))
     return tuple(warnings)
 
 

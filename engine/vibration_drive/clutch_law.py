@@ -17,6 +17,7 @@ from sprag.engine.taylor.straight import horner, integral, slope
 from sprag.engine.vibration_drive.clutch_report import ClutchLaw, ClutchLawError
 from sprag.engine.vibration_drive.formulas import beyond
 from sprag.engine.vibration_drive.parameters import CLUTCH_COEFFICIENT, MAX_COEFFICIENTS
+from sprag.engine.warning_text import WarningText
 
 #: A value counts as negative when it is below zero by more than this share of the sum of its terms' magnitudes;
 #: less than that is rounding of a law that touches zero.
@@ -113,26 +114,29 @@ def check_law(coefficients: Sequence[float], windup_limit: float = math.inf) -> 
     return ClutchLaw(law, limit, monotone, warnings)
 
 
-def describe(law: Sequence[float], limit: float) -> tuple[bool, tuple[str, ...]]:
+def describe(law: Sequence[float], limit: float) -> tuple[bool, tuple[WarningText, ...]]:
     """Whether a (non-negative) law is monotone in its range, and the warnings about it."""
     warnings = []
     if law[0] > 0.0:
-        warnings.append(
+        text = (
             f"c_1 = {law[0]:.6g} N*m > 0: the torque jumps to c_1 as soon as contact begins; without backlash the "
             "clutch can lock (state LOCKED) and carry anything between 0 and c_1 without relative motion"
         )
+        warnings.append(WarningText(text, "law-jumps"))
     derivative = _derivative(np.asarray(law, dtype=np.float64))
     fall = find_dip([float(c) for c in derivative], limit)
     if fall is not None:
-        warnings.append(f"the law is not monotone: its torque falls with growing windup {fall.place}")
+        text = f"the law is not monotone: its torque falls with growing windup {fall.place}"
+        warnings.append(WarningText(text, "law-falls"))
         if math.isfinite(limit):
             end, slope = _at_end(np.asarray(law), limit), _at_end(derivative, limit)
             if slope < 0.0:
-                warnings.append(
+                text = (
                     f"the slope at the end of the range (u = {limit:.6g} rad) is {slope:.6g} N*m/rad, negative: the "
                     f"straight continuation would fall to zero at u = {limit - max(end, 0.0) / slope:.6g} rad and pull "
                     "the shaft back beyond that; give a law measured further"
                 )
+                warnings.append(WarningText(text, "law-ends-falling"))
     return fall is None, tuple(warnings)
 
 

@@ -3,6 +3,8 @@
 import reprlib
 from dataclasses import dataclass
 
+from sprag.engine.warning_text import WarningText
+
 
 class ClutchError(ValueError):
     """Refused clutch input.
@@ -48,7 +50,7 @@ class ClutchLaw:
     coefficients: tuple[float, ...]
     windup_limit: float
     monotone: bool
-    warnings: tuple[str, ...]
+    warnings: tuple[WarningText, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +95,7 @@ class ClutchFit:
     monotone, negative : bool
         Whether the torque never falls, and whether it is negative, within 0 .. ``windup_limit``. A negative law is
         refused, so ``negative`` is always False here.
-    warnings : tuple of str
+    warnings : tuple of WarningText
         Sentences for the user.
     """
 
@@ -111,7 +113,7 @@ class ClutchFit:
     rows_in_backlash: tuple[int, ...]
     monotone: bool
     negative: bool
-    warnings: tuple[str, ...]
+    warnings: tuple[WarningText, ...]
 
 
 class ClutchFitError(ClutchError):

@@ -192,6 +192,7 @@ class SensitivityReport(TypedDict):
     study: str
     results: list[ResultSensitivity]
     warnings: Annotated[list[str], Doc("axes that change no result; given once the study has ended")]
+    warning_codes: Annotated[list[str | None], Doc("the code of each of `warnings`")]
 
 
 class EngagementRow(TypedDict):

@@ -85,6 +85,7 @@ class _Study(TypedDict):
     cases: Annotated[int, Doc("number of cases")]
     reused: Annotated[int, Doc("cases whose rows were copied from other studies instead of being run")]
     warnings: Annotated[list[str], Doc("warnings about what is allowed but probably unintended")]
+    warning_codes: Annotated[list[str | None], Doc("the code of each of `warnings`; null in studies of older versions")]
     priority: Annotated[int, Doc("waiting studies with the highest priority run first")]
     created_at: Moment
     started_at: Moment | None
@@ -159,6 +160,7 @@ class ClutchFitReport(TypedDict):
     negative: bool
     degrees_tried: Annotated[list[FitDegree], Doc("every degree that was tried")]
     warnings: list[str]
+    warning_codes: Annotated[list[str | None], Doc("the code of each of `warnings`")]
 
 
 class Preview(TypedDict):
@@ -177,5 +179,6 @@ class Preview(TypedDict):
     estimated_seconds: Annotated[float, Doc("rough time of `most_cases` on the processes of this service, s")]
     estimated_bytes: Annotated[int, Doc("rough size of `most_cases` in the database")]
     warnings: list[str]
+    warning_codes: Annotated[list[str | None], Doc("the code of each of `warnings`")]
     fits: Annotated[dict[str, ClutchFitReport], Doc("fitted clutch laws, by JSON Pointer into the spec")]
     first_cases: Annotated[list[dict[str, Any]], Doc("parameters of the first cases, SI")]

@@ -11,7 +11,7 @@ import typer
 from sprag.service.cli.console import WrongInputError, say, show_table, write_json, write_text, wrong_option
 from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes
 from sprag.service.cli.options import JsonFlag
-from sprag.service.faults import Fault
+from sprag.service.faults import Fault, warned
 from sprag.service.spec.numbers import parse_number
 from sprag.service.spec.report import shorten
 
@@ -63,8 +63,7 @@ def fit(
     if as_json:
         from sprag.service.results.fits import fit_json
 
-        report = fit_json(made)
-        write_json(report | {"warnings": [*measured.warnings, *report["warnings"]]})
+        write_json({**fit_json(made), **warned((*measured.warnings, *made.warnings))})
     else:
         _report(measured, made)
 

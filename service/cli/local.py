@@ -28,7 +28,7 @@ from sprag.service.cli.files import is_json, output, read_study, require_cases, 
 from sprag.service.cli.options import ChunkCases, FinishBy, Fresh, JsonFlag, OutputFile, PointsFile, Processes, SpecFile
 from sprag.service.cli.remote import TableFormat, table_format
 from sprag.service.cli.settings import read_settings
-from sprag.service.faults import Fault
+from sprag.service.faults import Fault, warned
 from sprag.worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def validate(spec: SpecFile, points: PointsFile = None, as_json: JsonFlag = Fals
                 "model": parsed.study.model,
                 "name": parsed.study.name,
                 "cases": parsed.study.cases,
-                "warnings": list(parsed.warnings),
+                **warned(parsed.warnings),
             }
         )
         return

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sprag.service.answers import filled
 from sprag.service.answers.catalogue import Preset
 from sprag.service.answers.studies import FullProgress, StudyDetail, StudySummary
+from sprag.service.faults import warned
 from sprag.service.presets import ABOUT, preset_text
 from sprag.service.results.rounds import rounds_json
 from sprag.service.spec.catalogue import axes_json
@@ -41,6 +42,7 @@ def summary(record: StudyRecord) -> StudySummary:
     return filled(
         StudySummary,
         record,
+        **warned(record.warnings),
         state_meaning=record.state.sentence,
         progress={"total": record.cases, "done": record.done, "ok": record.ok},
         links=study_links(record.id),

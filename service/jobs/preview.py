@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from sprag.service.faults import warned
 from sprag.service.results.fits import fit_json
 from sprag.service.schedules.deadline import finish_warnings
 from sprag.service.spec.catalogue import axes_json
@@ -69,7 +70,7 @@ def preview_json(
         "reusable": reusable,
         "estimated_seconds": seconds,
         "estimated_bytes": estimated_bytes(study),
-        "warnings": [*parsed.warnings, *chunking.warnings(study), *late],
+        **warned((*parsed.warnings, *chunking.warnings(study), *late)),
         "fits": {pointer: fit_json(fit) for pointer, fit in parsed.fits.items()},
         "first_cases": [
             {"case": case, "parameters": values} for case, values in zip(first, study.values_with(first), strict=True)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.service.answers import filled
 from sprag.service.answers.studies import ClutchFitReport, FitDegree
+from sprag.service.faults import warned
 from sprag.service.spec.described import FIT
 from sprag.service.spec.fields import placed, read_number, read_object
 from sprag.service.spec.machine.clutch import read_clutch
@@ -21,7 +22,8 @@ REQUEST_FIELDS: Final = ("data", "accuracy", *FIT, "backlash")
 
 def fit_json(fit: ClutchFit) -> ClutchFitReport:
     """The whole report of ``fit``, SI units; an infinite condition number is null."""
-    return filled(ClutchFitReport, fit, degrees_tried=[filled(FitDegree, report) for report in fit.degrees_tried])
+    degrees = [filled(FitDegree, report) for report in fit.degrees_tried]
+    return filled(ClutchFitReport, fit, degrees_tried=degrees, **warned(fit.warnings))
 
 
 def read_fit(data: object) -> ClutchFit:

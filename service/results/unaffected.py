@@ -49,7 +49,8 @@ def unaffected(study: Study, fetch: Fetch) -> tuple[str, ...]:
         if looked:
             everywhere = looked >= study.cases
             where = "any case" if everywhere else f"any of {looked:,} cases that were compared"
-            found.append(f"{' = '.join(axis.paths)} was varied, but changes no result in {where}")
+            text = f"{' = '.join(axis.paths)} was varied, but changes no result in {where}"
+            found.append(models.WarningText(text, "no-effect"))
     return tuple(found)
 
 

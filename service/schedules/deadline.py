@@ -10,6 +10,7 @@ from sprag.service.faults import Code
 from sprag.service.schedules.times import TimingError, read_time_of_day
 from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker.limits import MAX_FINISH_DAYS
+from sprag.worker.models import WarningText
 from sprag.worker.order import coverage, order_of
 
 if TYPE_CHECKING:
@@ -112,10 +113,11 @@ def finish_warnings(study: Study, seconds: float, left: float) -> tuple[str, ...
             "done by then is kept, with its error.",
         )
     done = int(study.cases * left / seconds)
-    return (
+    text = (
         f"By estimate it will not be finished by then: it needs about {_hours(seconds)} and {_hours(left)} are left, "
-        f"enough for about {done:,} of {study.cases:,} cases: then {coverage(order_of(study), done)}.",
+        f"enough for about {done:,} of {study.cases:,} cases: then {coverage(order_of(study), done)}."
     )
+    return (WarningText(text, "late"),)
 
 
 def _hours(seconds: float) -> str:

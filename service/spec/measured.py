@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from sprag.service.faults import Fault, FaultError
 from sprag.service.spec.numbers import parse_number
 from sprag.worker.limits import MAX_CLUTCH_ROWS
+from sprag.worker.models import WarningText
 
 #: Most faults reported for one file; a file of another kind would have one in every line.
 _MAX_PROBLEMS = 20
@@ -43,13 +44,13 @@ class MeasuredData:
         Angle in rad and torque in N*m.
     lines : tuple of int, length m
         Line number of each row in the file, from 1.
-    warnings : tuple of str
+    warnings : tuple of WarningText
         Units that were assumed because the file names none.
     """
 
     rows: NDArray[np.float64]
     lines: tuple[int, ...]
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[WarningText, ...] = ()
 
 
 class MeasuredDataError(FaultError):
@@ -147,7 +148,7 @@ def _factor(heading: str, unit: str, words: frozenset[str], convert: Callable[[s
     return convert(f"1 {text}", unit)
 
 
-def _assumed(factors: tuple[float | None, float | None], rows: NDArray[np.float64]) -> Iterator[str]:
+def _assumed(factors: tuple[float | None, float | None], rows: NDArray[np.float64]) -> Iterator[WarningText]:
     """Warnings about assumptions where the file names no units."""
     bare = [
         f"{name}s are taken in {unit}"
@@ -155,10 +156,12 @@ def _assumed(factors: tuple[float | None, float | None], rows: NDArray[np.float6
         if factor is None
     ]
     if bare:
-        yield f"the file does not name every unit: {' and '.join(bare)}; use a header such as angle_deg,torque_Nm"
+        text = f"the file does not name every unit: {' and '.join(bare)}; use a header such as angle_deg,torque_Nm"
+        yield WarningText(text, "assumed-units")
     largest = float(np.abs(rows[:, 0]).max())
     if factors[0] is None and largest > _LARGEST_PLAUSIBLE:
-        yield f"the largest angle would be {largest:g} rad, {math.degrees(largest):.4g} degrees; was it in degrees?"
+        text = f"the largest angle would be {largest:g} rad, {math.degrees(largest):.4g} degrees; was it in degrees?"
+        yield WarningText(text, "implausible-value")
 
 
 def _numbers(lines: list[tuple[int, str]], factors: tuple[float | None, float | None]) -> MeasuredData:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from sprag.service.faults import Code, Fault, FaultError
+from sprag.service.faults import Code, Fault, FaultError, WarningCode
 from sprag.worker.limits import MAX_PROBLEMS
+
+if TYPE_CHECKING:
+    from sprag.worker.models import WarningText
 
 _LONGEST_TEXT = 60
 _LONGEST_LIST = 6
@@ -30,7 +33,7 @@ class Report:
         self.faults: list[Fault] = []
         #: Number of faults, including those beyond the limit.
         self.found = 0
-        self.warnings: list[str] = []
+        self.warnings: list[WarningText] = []
 
     def fault(
         self,
@@ -53,10 +56,16 @@ class Report:
         """Whether the limit of faults is reached, so that further checks are useless."""
         return len(self.faults) >= MAX_PROBLEMS
 
-    def warn(self, message: str) -> None:
+    def warn(self, code: WarningCode, message: str) -> None:
         """Record a warning about something allowed but probably unintended; each sentence only once."""
-        if message not in self.warnings:
-            self.warnings.append(message)
+        from sprag.worker.models import WarningText  # the commands for a running service have no models
+
+        self.adopt_warning("", WarningText(message, code))
+
+    def adopt_warning(self, prefix: str, warning: WarningText) -> None:
+        """Record a warning of the engine after ``prefix``."""
+        if prefix + warning not in self.warnings:
+            self.warnings.append(type(warning)(prefix + warning, warning.code))
 
     def unknown_fields(self, pointer: str, found: Mapping[str, object], known: Iterable[str]) -> None:
         """Record a fault for every key of ``found`` that is not ``known``, with the nearest known one."""

@@ -79,8 +79,9 @@ def refuse_run(report: Report, data: object, why: str = "is not used: this model
 def _warn_of_few_periods(report: Report, at_most: int | None) -> None:
     if at_most is not None and at_most < MEANS_FROM_PERIODS:
         report.warn(
+            "short-search",
             f"/run/at_most: {at_most} periods are too few for the means of irregular motion, which takes "
-            f"{MEANS_FROM_PERIODS}: cases without a periodic motion will be unsettled"
+            f"{MEANS_FROM_PERIODS}: cases without a periodic motion will be unsettled",
         )
 
 
@@ -162,8 +163,9 @@ def _check_times(
         if run["window"] is None:
             if duration / 3.0 < 1.0 - _ROUNDING:
                 report.warn(
+                    "short-window",
                     f"/run/duration: the window, its last third, is shorter than one excitation period at "
-                    f"{frequency:.6g} Hz ({duration / 3.0:.3g} periods), so means over it depend on its position"
+                    f"{frequency:.6g} Hz ({duration / 3.0:.3g} periods), so means over it depend on its position",
                 )
             continue
         start, end = (in_periods(time, frequency) for time in run["window"])
@@ -184,8 +186,9 @@ def _check_times(
             return
         if end - start < 1.0 - _ROUNDING:
             report.warn(
+                "short-window",
                 f"/run/window: shorter than one excitation period at {frequency:.6g} Hz ({end - start:.3g} periods), "
-                "so means over it depend on its position"
+                "so means over it depend on its position",
             )
 
 

@@ -42,10 +42,10 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
     for path in dict.fromkeys((*study.base, *study.axis_paths)):
         _plausible(report, study, path)
     if not any(_values(study, f"excitation.amplitude_{axis}").any() for axis in "xy"):
-        report.warn("/base/excitation: both amplitudes are 0, so the base does not move")
+        report.warn("nothing-moves", "/base/excitation: both amplitudes are 0, so the base does not move")
     if _values(study, "excitation.frequency").min() < 0.1:
         where = _pointer(study, "excitation.frequency")
-        report.warn(f"{where}: below 0.1 Hz, which is slow for a vibration drive")
+        report.warn("slow-excitation", f"{where}: below 0.1 Hz, which is slow for a vibration drive")
     pendulums = sum(path.startswith("pendulums.") and path.endswith(".mass") for path in study.base)
     _upright(report, study, pendulums)
     for index in range(pendulums):
@@ -74,13 +74,14 @@ def warn_machine_shaft(report: Report, study: Study) -> None:
         structure["drive"]["form"] != "constant" or _values(study, "drive.torque").any()
     ):
         report.warn(
+            "replaced-value",
             '/base/drive/torque: is not used: the balance "constant" replaces it by the mean resistance; choose '
-            '"scale" or "refuse" to keep its shape'
+            '"scale" or "refuse" to keep its shape',
         )
     if structure["balance"] == "motor" and _values(study, "wanted_irregularity").size:
-        report.warn("/base/wanted_irregularity: is not used: with a motor no required inertia is computed")
+        report.warn("no-effect", "/base/wanted_irregularity: is not used: with a motor no required inertia is computed")
     if structure["operation"]["quantity"] == "none" and structure["mechanism"]["kind"] == "none":
-        report.warn("/base: has neither a mechanism nor an operation, so the shaft turns evenly")
+        report.warn("nothing-acts", "/base: has neither a mechanism nor an operation, so the shaft turns evenly")
     _shaft_relations(report, study)
 
 
@@ -103,11 +104,13 @@ def _discharge(report: Report, study: Study) -> None:
     beyond, below = high > most, high < low
     if beyond.any():
         report.warn(
+            "no-discharge",
             f"{where}: the compressor reaches {most[beyond].min():.6g} Pa at most and discharges nothing at a higher "
-            "pressure: its valves stay shut" + _share(beyond, weight)
+            "pressure: its valves stay shut" + _share(beyond, weight),
         )
     if below.any():
-        report.warn(f"{where}: is below the suction pressure: nothing is compressed" + _share(below, weight))
+        text = f"{where}: is below the suction pressure: nothing is compressed"
+        report.warn("no-compression", text + _share(below, weight))
 
 
 def _turned_step(report: Report, study: Study, index: int, *, wraps: bool) -> None:
@@ -122,7 +125,8 @@ def _turned_step(report: Report, study: Study, index: int, *, wraps: bool) -> No
         if wraps
         else "where `from` exceeds `to` the step over the stroke never acts"
     )
-    report.warn(f"{_pointer(study, varied[0])}: {what}" + _share(turned, weight))
+    text = f"{_pointer(study, varied[0])}: {what}" + _share(turned, weight)
+    report.warn("wraps-around" if wraps else "never-acts", text)
 
 
 def _chosen_angle(report: Report, study: Study) -> None:
@@ -135,8 +139,9 @@ def _chosen_angle(report: Report, study: Study) -> None:
     # Without any such angle, works count from the angle 0 whatever was chosen.
     if 0 < count <= chosen:
         report.warn(
+            "no-such-angle",
             f"/base/phi_c: {chosen} is out of range: the machine of base has {count:.0f} angles with T = T_mean, "
-            f"numbered 0 to {count - 1:.0f}; phi_c and the results of s3 and s4 stay empty"
+            f"numbered 0 to {count - 1:.0f}; phi_c and the results of s3 and s4 stay empty",
         )
 
 
@@ -152,7 +157,8 @@ def _plausible(report: Report, study: Study, path: str, known: dict[str, tuple[f
     values = _values(study, path)
     largest = float(values[np.abs(values).argmax()])
     if abs(largest) > limit:
-        report.warn(f"{_pointer(study, path)}: {largest:g} {unit} is more than {limit:.4g} {unit}; {question}")
+        text = f"{_pointer(study, path)}: {largest:g} {unit} is more than {limit:.4g} {unit}; {question}"
+        report.warn("implausible-value", text)
 
 
 def _pointer(study: Study, path: str) -> str:
@@ -171,9 +177,10 @@ def _upright(report: Report, study: Study, pendulums: int) -> None:
     still = (along != 0.0) & (across == 0.0) & ~np.any(starts_at, axis=0)
     if still.any():
         report.warn(
+            "stays-upright",
             "/base/pendulums: with vibration along y alone a pendulum that starts upright without speed stays upright, "
             "even at parametric resonance, and nothing moves; give an initial_angle such as 0.01 rad or an amplitude_x"
-            + _share(still, weight)
+            + _share(still, weight),
         )
 
 
@@ -186,9 +193,10 @@ def _stability(report: Report, study: Study, index: int) -> None:
     if unstable.any():
         worst = int(np.argmin(np.where(unstable, spring - gravity, np.inf)))
         report.warn(
+            "falls-over",
             f"/base/pendulums/{index}: c a^2 < M g l: the spring's {spring.flat[worst]:.4g} N*m/rad do not hold the "
             f"pendulum up against gravity's {gravity.flat[worst]:.4g} N*m/rad; without vibration it falls to one side"
-            + _share(unstable, weight)
+            + _share(unstable, weight),
         )
 
 
@@ -201,9 +209,10 @@ def _inertia(report: Report, study: Study, index: int) -> None:
     if wrong.any():
         worst = int(np.argmax(np.where(wrong, need - have, -np.inf)))
         report.warn(
+            "impossible-inertia",
             f"/base/pendulums/{index}: J < M l^2: an inertia of {have.flat[worst]:.4g} kg*m^2 about the axis is less "
             f"than the {need.flat[worst]:.4g} kg*m^2 of the mass at its arm alone, which no rigid body has"
-            + _share(wrong, weight)
+            + _share(wrong, weight),
         )
 
 

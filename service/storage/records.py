@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from sprag.service.storage.part import moment, optional_moment
 from sprag.service.storage.tables import HELD_AT_DEADLINE
+from sprag.service.storage.warning_texts import read_warnings
 from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
@@ -261,7 +261,7 @@ def record_of(row: sa.Row[Any]) -> StudyRecord:
     times = {name: optional_moment(getattr(row, name)) for name in ("started_at", "finished_at", "finish_by")}
     own = {
         "state": StudyState(row.state),
-        "warnings": tuple(json.loads(row.warnings)),
+        "warnings": read_warnings(row.warnings),
         "created_at": moment(row.created_at),
         "coarse": bool(row.coarse),
         "time_over": row.waits_for == HELD_AT_DEADLINE,

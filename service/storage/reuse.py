@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from dataclasses import dataclass
 from threading import Lock
@@ -16,8 +15,9 @@ from sprag.service.storage.cases import conditions
 from sprag.service.storage.order import Orders
 from sprag.service.storage.round_table import latest_round
 from sprag.service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, results_table
+from sprag.service.storage.warning_texts import read_warnings, write_warnings
 from sprag.worker import fingerprint, models
-from sprag.worker.models import WorkerEnding
+from sprag.worker.models import WarningText, WorkerEnding
 from sprag.worker.order import order_of
 from sprag.worker.ports import Known
 from sprag.worker.reuse import Wanted, kin_hash, shared_cases, span, taken
@@ -48,10 +48,11 @@ _SOURCE: Final[tuple[sa.ColumnElement[Any], ...]] = (
 #: Endings that do not result from the case itself; such cases are run anew.
 _NO_RESULT: Final = tuple(ending.value for ending in WorkerEnding)
 
-_MIXED: Final = (
+_MIXED: Final = WarningText(
     "The cases of this study were not all computed by one version of Sprag and its libraries on one kind of processor: "
     "they may differ in more than their parameters, so other studies do not reuse them. A fresh study runs all of "
-    "them alike."
+    "them alike.",
+    "mixed-origins",
 )
 
 
@@ -234,8 +235,8 @@ def mark_origin(connection: sa.Connection, number: int) -> None:
     origin, warnings = connection.execute(sa.select(STUDIES.c.fingerprint, STUDIES.c.warnings).where(this)).one()
     if origin is None:
         connection.execute(sa.update(STUDIES).where(this).values(fingerprint=fingerprint.digest()))
-    elif origin != fingerprint.digest() and _MIXED not in (told := json.loads(warnings)):
-        values = {"fingerprint": "", "warnings": json.dumps([*told, _MIXED])}
+    elif origin != fingerprint.digest() and _MIXED not in (told := read_warnings(warnings)):
+        values = {"fingerprint": "", "warnings": write_warnings([*told, _MIXED])}
         connection.execute(sa.update(STUDIES).where(this).values(values))
 
 

@@ -29,6 +29,7 @@ from sprag.service.storage.tables import (
     RECORD_COLUMNS,
     STUDIES,
 )
+from sprag.service.storage.warning_texts import write_warnings
 from sprag.worker import models
 from sprag.worker.chunking import Chunking, spans
 from sprag.worker.limits import MAX_AXIS_VALUES
@@ -369,7 +370,7 @@ def study_row(
         "physics_hash": study.physics_hash(models.ENGINE_VERSION),
         "spec": json.dumps(spec, allow_nan=False),
         "study": study.to_text(),
-        "warnings": json.dumps(list(warnings)),
+        "warnings": write_warnings(warnings),
         "kin_hash": kin_hash(study, models.ENGINE_VERSION),
         "most_cases": None if planner is None else planner.most_cases,
         "most_rounds": None if planner is None else planner.most_rounds,

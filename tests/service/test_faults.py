@@ -11,31 +11,41 @@ import pytest
 from sprag.engine import Ending
 from sprag.engine.machine_shaft import problems
 from sprag.service import faults
-from sprag.service.faults import Code, Fault, FaultError, Kind, ParameterFault
+from sprag.service.faults import Code, Fault, FaultError, Kind, ParameterFault, WarningCode
 from sprag.service.http.problems import PROBLEM_TYPES
 from sprag.service.results.selection import SelectionError
 from sprag.service.spec.report import SpecError
 from sprag.service.storage import errors as storage
+from sprag.service.storage.warning_texts import read_warnings, write_warnings
+from sprag.worker.models import WarningText
 from sprag.worker.ports import StoreError
 from tests.conftest import ROOT
 
 PAGE = (ROOT / "docs" / "faults.md").read_text(encoding="utf-8")
 SOURCES = "\n".join(
     path.read_text(encoding="utf-8")
-    for package in ("service", "worker", "sprag")
+    for package in ("service", "worker", "engine", "sprag")
     for path in (ROOT / package).rglob("*.py")
     if path.resolve() not in {(ROOT / "service" / name).resolve() for name in ("faults.py", "http/problems.py")}
 )
 
 
 def test_every_code_is_explained_once_on_the_page() -> None:
-    rows = re.findall(r"^\| `([a-z-]+)` \| .+ \|$", PAGE, re.MULTILINE)
+    page, _, warnings = PAGE.partition("## Warnings")
+    rows, warned = (re.findall(r"^\| `([a-z-]+)` \| .+ \|$", part, re.MULTILINE) for part in (page, warnings))
     # Kinds that are problems over HTTP are explained by the service itself.
     assert sorted(rows) == sorted([*get_args(Code), *({*get_args(Kind)} - {*PROBLEM_TYPES})])
     assert {*PROBLEM_TYPES} <= {*get_args(Kind)}
+    assert warned == sorted(get_args(WarningCode))
 
 
-@pytest.mark.parametrize("code", sorted({*get_args(Code), *get_args(Kind)}))
+def test_every_warning_of_engine_and_worker_has_a_listed_code() -> None:
+    told = re.findall(r"WarningText\(text, \"([a-z-]+)\"\)", SOURCES)
+    assert len(told) > 5
+    assert {*told} <= {*get_args(WarningCode)}
+
+
+@pytest.mark.parametrize("code", sorted({*get_args(Code), *get_args(Kind), *get_args(WarningCode)}))
 def test_every_code_is_raised_somewhere(code: str) -> None:
     assert f'"{code}"' in SOURCES or code.replace("-", "_") in [*Ending]
 
@@ -67,6 +77,16 @@ def test_every_fault_of_a_machine_is_told_with_a_code() -> None:
 def test_a_fault_is_the_same_in_another_process(error: Exception) -> None:
     again = pickle.loads(pickle.dumps(error))
     assert (type(again), str(again), vars(again)) == (type(error), str(error), vars(error))
+
+
+def test_a_warning_is_the_same_in_another_process_and_in_the_database() -> None:
+    warning = WarningText("odd", "no-effect")
+    again = pickle.loads(pickle.dumps(warning))
+    stored = read_warnings(write_warnings([warning, "older"]))
+    assert faults.warned([again, *stored]) == {
+        "warnings": ["odd", "odd", "older"],
+        "warning_codes": ["no-effect", "no-effect", None],
+    }
 
 
 def test_a_fault_as_text_and_as_data() -> None:

@@ -32,6 +32,7 @@ from sprag.engine.vibration_drive.parameters import (
     MAX_COEFFICIENTS,
     MAX_PENDULUMS,
 )
+from sprag.engine.warning_text import WarningText
 from sprag.worker.models import machine_shaft, vibration_drive
 from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
 from sprag.worker.models.model import Model, all_models, model_names, model_of, register, unregister
@@ -91,6 +92,7 @@ __all__ = [
     "Span",
     "TableError",
     "Trajectory",
+    "WarningText",
     "WorkerEnding",
     "cache_folder",
     "cache_is_wanted",

@@ -9,6 +9,7 @@ from fastapi import APIRouter, Depends, Query
 from starlette.responses import Response
 
 from sprag.service.answers import results as m
+from sprag.service.faults import warned
 from sprag.service.http.api.document import files, format_query, problems
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.context import StudyId
@@ -53,7 +54,7 @@ async def get_sensitivity(
         found = sensitivity(store.study(study_id), store.spec(study_id), names, fetch)
         if chosen == "json":
             data = {"study": study_id, "results": [item.to_json() for item in found]}
-            return json_response({**data, "warnings": list(work.context.unaffected.of(store, record))})
+            return json_response({**data, **warned(work.context.unaffected.of(store, record))})
         if chosen == "csv":
             return table(indices_csv(found), "csv", f"{study_id}-sensitivity")
         return picture(draw_sensitivity, chosen, found, record.name or record.model)

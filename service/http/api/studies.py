@@ -11,7 +11,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.answers import studies as m
-from sprag.service.faults import parameter_error
+from sprag.service.faults import parameter_error, warned
 from sprag.service.http import views
 from sprag.service.http.api import examples
 from sprag.service.http.api.document import body, key_header, located, one_of, problems
@@ -154,8 +154,8 @@ def get_study(context: Ctx, request: Request, study_id: StudyId) -> Response:
         return unchanged
     study = context.store.study(study_id)
     data = views.detail(record, progress, study, context.store.spec(study_id), context.store.kinds(study_id))
-    data["warnings"] += context.unaffected.of(context.store, record)
-    response = json_response(data)
+    unaffected = warned((*record.warnings, *context.unaffected.of(context.store, record)))
+    response = json_response({**data, **unaffected})
     # While it runs, the time left changes with no change of the study.
     return tagged(response, tag) if record.state.terminal else response
 

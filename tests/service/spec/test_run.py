@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from sprag.service.faults import warned
 from sprag.service.spec.run import in_periods, time_text
 from sprag.worker.limits import MAX_PROBLEMS
 from tests.service.spec_sample import parsed, problems
@@ -196,5 +197,5 @@ def test_settled_runs_that_are_refused(run: dict[str, Any], at: str, code: str) 
 
 def test_too_few_periods_for_irregular_motion_are_said() -> None:
     (warning,) = parsed({"/run": {"at_most": "900 periods"}, "/axes": []}).warnings
-    assert warning.startswith("/run/at_most: 900 periods are too few for the means of irregular motion")
+    assert (warned([warning])["warning_codes"], warning.split(":")[0]) == (["short-search"], "/run/at_most")
     assert parsed({"/run": {"at_most": "940 periods"}, "/axes": []}).warnings == ()

@@ -15,7 +15,7 @@ from sprag.worker import fingerprint, models
 from sprag.worker.chunking import Chunking
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.models import ChunkResult, ChunkTask
+from sprag.worker.models import ChunkResult, ChunkTask, WarningText
 from sprag.worker.study import Axis, Study
 from tests.worker.fakes import BASE, RUN
 
@@ -169,7 +169,8 @@ def test_a_study_whose_rows_have_several_origins_says_so_and_is_no_source(
     Dispatcher(store, InlineExecutor(engine), SystemClock()).run(lambda: store.get_study(record.id).state.terminal)
     odd, mixed = store.get_study(record.id).warnings
     assert odd == "odd"
-    assert mixed.startswith("The cases of this study were not all computed by one version of Sprag")
+    assert isinstance(mixed, WarningText)
+    assert mixed.code == "mixed-origins"
     assert store.reusable(study) == 0
     monkeypatch.undo()
     assert store.reusable(study) == 0

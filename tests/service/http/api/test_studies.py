@@ -163,7 +163,7 @@ def test_preview_and_submission_warn_of_cases_that_take_too_long(service: Servic
     for path, status in ((f"{STUDIES}:preview", 200), (STUDIES, 202)):
         response = service.http.post(path, json=spec)
         assert response.status_code == status
-        assert "SPRAG_CHUNK_TIMEOUT" in response.json()["warnings"][-1]
+        assert response.json()["warning_codes"][-1] == "exceeds-chunk-timeout"
 
 
 def test_a_preview_of_many_cases_is_quick_and_small(service: Service, spec: dict[str, Any]) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import jsonschema
 import pytest
 
-from sprag.service.faults import Fault
+from sprag.service.faults import Fault, warned
 from sprag.service.presets import preset_names, preset_text
 from sprag.service.spec.document import SpecError, format_of, load_spec, parse_spec
 from sprag.service.spec.schema.document import spec_schema
@@ -282,38 +282,44 @@ def test_every_number_of_a_machine_can_be_an_axis() -> None:
 
 
 def test_what_is_odd_is_warned_of() -> None:
-    def warnings(changes: dict[str, Any]) -> str:
-        return "\n".join(parse_spec(changed(changes)).warnings)
+    def warnings(changes: dict[str, Any]) -> dict[str, str]:
+        found = parse_spec(changed(changes)).warnings
+        return dict(zip(warned(found)["warning_codes"], found, strict=True))
 
-    assert warnings({}) == ""
-    assert "is not used" in warnings({"/base/drive/torque": 50})
-    assert "was it in mm?" in warnings({"/axes/1": {"path": "mechanism.slider_crank.rod", "values": [0.4, 400]}})
-    assert "/base/phi_c: 7 is out of range: the machine of base has 2 angles" in warnings({"/base/phi_c": 7})
-    assert warnings({"/base/phi_c": 1}) == ""
+    assert warnings({}) == {}
+    assert [*warnings({"/base/drive/torque": 50})] == ["replaced-value"]
+    rod = warnings({"/axes/1": {"path": "mechanism.slider_crank.rod", "values": [0.4, 400]}})
+    assert "mm?" in rod["implausible-value"]
+    assert warnings({"/base/phi_c": 7})["no-such-angle"].startswith("/base/phi_c: 7 ")
+    assert warnings({"/base/phi_c": 1}) == {}
     motor = {"/base/drive/motor": LINEAR, "/base/balance": ..., "/base/mean_speed": ..., "/axes": []}
-    assert "wanted_irregularity: is not used" in warnings(motor)
+    assert warnings(motor)["no-effect"].startswith("/base/wanted_irregularity: ")
+    idle = {"/base/mechanism": ..., "/base/operation": ..., "/axes": []}
+    assert "nothing-acts" in warnings(idle)
 
 
 def test_axes_that_lead_beyond_what_goes_together_are_warned_of() -> None:
-    def warnings(operation: dict[str, Any], axis: str, values: list[Any]) -> str:
+    def warnings(operation: dict[str, Any], axis: str, values: list[Any]) -> dict[str, str]:
         axes = [{"path": f"operation.{axis}", "values": values}]
-        return "\n".join(parse_spec(changed({"/base/operation": operation, "/axes": axes})).warnings)
+        found = parse_spec(changed({"/base/operation": operation, "/axes": axes})).warnings
+        return dict(zip(warned(found)["warning_codes"], found, strict=True))
 
     gas = {"gas": GAS | {"clearance": 0.25}}
-    above = warnings(gas, "gas.discharge_pressure", ["7 bar", "9 bar", "10 bar"])
-    assert "/axes/0 (operation.gas.discharge_pressure): the compressor reaches 810328 Pa at most" in above
+    above = warnings(gas, "gas.discharge_pressure", ["7 bar", "9 bar", "10 bar"])["no-discharge"]
+    assert above.startswith("/axes/0 (operation.gas.discharge_pressure): ")
+    assert "810328 Pa" in above
     assert "in 2 of 3 cases" in above
-    assert "below the suction pressure" in warnings(gas, "gas.suction_pressure", ["1 bar", "8 bar"])
-    assert warnings(gas, "gas.discharge_pressure", ["7 bar", "8 bar"]) == ""
+    assert "no-compression" in warnings(gas, "gas.suction_pressure", ["1 bar", "8 bar"])
+    assert warnings(gas, "gas.discharge_pressure", ["7 bar", "8 bar"]) == {}
 
     step = {"quantity": "force", "over": "stroke", "steps": [{"from": 0.2, "to": 0.8, "value": 100}]}
-    assert "never acts (in 1 of 2 cases)" in warnings(step, "steps.0.from", [0.5, 0.9])
+    assert warnings(step, "steps.0.from", [0.5, 0.9])["never-acts"].endswith("(in 1 of 2 cases)")
     over_angle = {"quantity": "torque", "steps": [{"from": 1, "to": 2, "value": 100}]}
-    assert "continues past the end of the cycle" in warnings(over_angle, "steps.0.to", [0.5, 2, 3])
-    assert warnings(over_angle, "steps.0.to", [1.5, 2, 3]) == ""
-    assert warnings(over_angle, "steps.0.value", [10, 20]) == ""
+    assert "wraps-around" in warnings(over_angle, "steps.0.to", [0.5, 2, 3])
+    assert warnings(over_angle, "steps.0.to", [1.5, 2, 3]) == {}
+    assert warnings(over_angle, "steps.0.value", [10, 20]) == {}
     over_angle["steps"][0]["from"] = 6  # type: ignore[index]
-    assert warnings(over_angle, "steps.0.to", [1, 2]) == ""
+    assert warnings(over_angle, "steps.0.to", [1, 2]) == {}
 
 
 def test_the_structure_is_part_of_the_physics() -> None:
