@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import itertools
 from collections.abc import Iterable, Mapping
+from functools import cache
+from pathlib import Path
 from typing import Any, TypeVar
 
 from starlette.concurrency import iterate_in_threadpool
@@ -13,9 +15,11 @@ from starlette.responses import Response, StreamingResponse
 from werkzeug.datastructures import MIMEAccept
 from werkzeug.http import parse_accept_header, parse_etags
 
+from sprag import service
 from sprag.service.faults import choice_of, shown
 from sprag.service.http.problems import ApiError
 from sprag.service.json_text import to_bytes
+from sprag.worker.models import source_hash
 
 JSON = "application/json"
 
@@ -27,9 +31,16 @@ def json_response(data: Any, status: int = 200, headers: Mapping[str, str] | Non
     return Response(to_bytes(data), status_code=status, media_type=JSON, headers=dict(headers or {}))
 
 
+@cache
+def program_hash() -> str:
+    """A hash of the service's sources: after an upgrade no client keeps answers that another version wrote."""
+    return source_hash(Path(service.__file__).parent)
+
+
 def entity_tag(*parts: object) -> str:
-    """A strong entity tag derived from everything that determines an answer."""
-    return '"' + hashlib.sha256("\n".join(map(str, parts)).encode("utf-8", "backslashreplace")).hexdigest()[:32] + '"'
+    """A strong entity tag derived from everything that determines an answer: ``parts`` and the program."""
+    text = "\n".join(map(str, (program_hash(), *parts)))
+    return '"' + hashlib.sha256(text.encode("utf-8", "backslashreplace")).hexdigest()[:32] + '"'
 
 
 def not_modified(request: Request, tag: str) -> Response | None:

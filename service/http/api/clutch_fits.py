@@ -22,7 +22,7 @@ from sprag.service.spec.schema.quantity import QUANTITY
 router = APIRouter(tags=["clutch"], dependencies=[Depends(strict_query)])
 
 SCHEMA: Final = measured_schema(
-    {"backlash": {**QUANTITY, "description": "lost motion to be taken off the angles (rad)", "default": 0}},
+    {"backlash": {**QUANTITY, "description": "backlash to be taken off the angles (rad)", "default": 0}},
     "Measured data of a clutch and how well it is to be fitted; numbers in SI or texts with a unit.",
 )
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from sprag.service.answers import results
+from sprag.service.http import respond
 from sprag.service.results.curve_cases import select
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.selection import SelectionError
@@ -282,7 +283,9 @@ def test_pictures_are_the_same_for_the_same_numbers(service: Service, spec: dict
         assert first.content == again.content
 
 
-def test_curves_have_a_tag_that_changes_with_the_rows(service: Service, spec: dict[str, Any]) -> None:
+def test_curves_have_a_tag_that_changes_with_the_rows_and_the_program(
+    service: Service, spec: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
     study_id = service.submit(spec)
     address = f"{API}/studies/{study_id}/curves?x=shaft.load&y=torque.max&by=excitation.frequency"
     tag = service.http.get(address).headers["etag"]
@@ -293,6 +296,8 @@ def test_curves_have_a_tag_that_changes_with_the_rows(service: Service, spec: di
     assert changed.status_code == 200
     assert changed.headers["etag"] != tag
     assert service.http.get(address + "&format=csv").headers["etag"] != changed.headers["etag"]
+    monkeypatch.setattr(respond, "program_hash", lambda: "after an upgrade")
+    assert service.http.get(address, headers={"If-None-Match": changed.headers["etag"]}).status_code == 200
 
 
 @pytest.mark.parametrize(
