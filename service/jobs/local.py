@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import tempfile
+import threading
 import time
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -10,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.jobs.dispatching import STANDBY_SECONDS, WorkerSettings, owner_name, pool, renewed_pool
+from sprag.service.jobs.dispatching import STANDBY_SECONDS, StopFlag, WorkerSettings, owner_name, pool, renewed_pool
 from sprag.service.stale_files import marked, sweep
 from sprag.service.storage.owners import run_owner
 from sprag.service.storage.part import SystemClock
@@ -28,6 +30,7 @@ from sprag.worker.states import StudyState, TransitionError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
     from datetime import datetime
+    from types import FrameType
 
     from sprag.service.storage.records import Progress, StudyRecord
     from sprag.worker.ports import Executor
@@ -86,12 +89,12 @@ def run_here(
     cancelled, so that no later worker continues it.
     """
     sweep(Path(tempfile.gettempdir()).glob(f"{_FOLDER_PREFIX}*"))
-    with tempfile.TemporaryDirectory(prefix=_FOLDER_PREFIX) as folder, marked(Path(folder)):
+    with tempfile.TemporaryDirectory(prefix=_FOLDER_PREFIX) as folder, marked(Path(folder)), _noted() as interrupted:
         url = database_url or f"sqlite:///{Path(folder) / 'run.sqlite3'}"
         with Store.open(url, chunking=Chunking(chunk_cases, max(processes, 1), chunk_timeout)) as store:
             record = store.create_study(spec, study, warnings=warnings, fresh=fresh, finish_by=finish_by)
             settings = WorkerSettings(url, processes, chunk_timeout)
-            watch = _Watch(store, record.id, on_progress)
+            watch = _Watch(store, record.id, on_progress, interrupted)
             lock = lock_of(store.session, owner_name())
             owner = run_owner(owner_name(), record.id)
             try:
@@ -112,6 +115,32 @@ def run_here(
             finally:
                 lock.release()
             yield LocalRun(store, watch.final(passing=database_url is None))
+            if interrupted():
+                raise KeyboardInterrupt
+
+
+@contextmanager
+def _noted() -> Iterator[StopFlag]:
+    """A flag that is set by every signal that raises KeyboardInterrupt.
+
+    Python drops exceptions that a signal raises in a finaliser or in a callback from C, so the exception alone is not
+    reliable.
+    """
+    flag = StopFlag()
+
+    def note(number: int, frame: FrameType | None) -> None:
+        flag.set()
+        signal.default_int_handler(number, frame)
+
+    numbers = signal.valid_signals() if threading.current_thread() is threading.main_thread() else ()
+    interrupting = [number for number in numbers if signal.getsignal(number) is signal.default_int_handler]
+    try:
+        for number in interrupting:
+            signal.signal(number, note)
+        yield flag
+    finally:
+        for number in interrupting:
+            signal.signal(number, signal.default_int_handler)
 
 
 def pool_size(study: Study, most: int, *, asked: bool) -> int:
@@ -136,14 +165,19 @@ def _cancelled(store: Store, study_id: str, *, ours: bool) -> StudyRecord:
 class _Watch:
     """Polls one study: reports its progress, detects its end."""
 
-    def __init__(self, store: Store, study_id: str, report: Callable[[Progress], None] | None) -> None:
+    def __init__(
+        self, store: Store, study_id: str, report: Callable[[Progress], None] | None, interrupted: Callable[[], bool]
+    ) -> None:
         self._store = store
         self._id = study_id
         self._report = report
+        self._interrupted = interrupted
         self._next_report = 0.0
 
     def ended(self) -> bool:
-        """Whether nothing more will be run."""
+        """Whether nothing more will be run; raises KeyboardInterrupt where an interrupt was lost."""
+        if self._interrupted():
+            raise KeyboardInterrupt
         now = time.monotonic()
         if self._report is not None and now >= self._next_report:
             self._report(self._store.progress(self._id))

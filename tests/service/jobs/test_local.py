@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -264,6 +266,32 @@ def test_a_run_that_is_interrupted_leaves_nothing_to_later_workers_and_its_rows_
         assert store.list_studies().studies[0].state is StudyState.CANCELLED
     with run_here({}, study, processes=0, database_url=url, chunk_cases=4) as run:
         assert (run.record.state, run.record.reused) == (StudyState.FINISHED, record.done)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_that_a_callback_swallows_ends_the_run_all_the_same(url: str, number: signal.Signals) -> None:
+    asked: list[signal.Signals] = []
+
+    def swallow(_: Progress) -> None:
+        asked.append(number)
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(number)
+
+    handlers = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        for each in handlers:
+            signal.signal(each, signal.default_int_handler)
+        with (
+            pytest.raises(RunInterruptedError) as caught,
+            run_here({}, fakes.study(20), processes=0, database_url=url, chunk_cases=4, on_progress=swallow),
+        ):
+            pass
+        assert [signal.getsignal(each) for each in handlers] == [signal.default_int_handler] * 2
+    finally:
+        for each, before in handlers.items():
+            signal.signal(each, before)
+    assert len(asked) == 1
+    assert caught.value.record.state is StudyState.CANCELLED
 
 
 def test_a_run_that_is_killed_leaves_its_study_held(url: str) -> None:
