@@ -68,6 +68,7 @@ def limits() -> Iterator[Row]:
     """What a study and a service are held to."""
     yield "axes of a study", f"{limit.MAX_AXES:,}"
     yield "columns of a table of cases", f"{limit.MAX_COLUMNS:,}"
+    yield "derived parameters of a study", f"{limit.MAX_DERIVED:,}"
     yield "cases of a study", f"{limit.MAX_CASES:,}"
     yield "values on all axes together", f"{limit.MAX_AXIS_VALUES:,}"
     yield "size of a spec", f"{limit.MAX_BODY_BYTES:,} bytes"

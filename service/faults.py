@@ -18,6 +18,7 @@ Choice = TypeVar("Choice", bound=str)
 #: Codes of the faults of one place of the input.
 Code = Literal[
     "cannot-assemble",
+    "circular",
     "conflict",
     "empty",
     "exactly-one",

@@ -81,7 +81,7 @@ def run(
     ) as done:
         source = stored(done.store, done.record, done.store.study(done.record.id))
         table = table_of(b"".join(export(source, "parquet")))
-    units = {path: unit_of(study, path) for path in study.axis_paths}
+    units = {path: unit_of(study, path) for path in study.column_paths}
     table.attrs["units"] = units | {info.name: info.unit for info in source.infos}
     table.attrs["warnings"] = list(parsed.warnings)
     return table

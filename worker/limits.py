@@ -6,6 +6,8 @@ from typing import Final
 MAX_AXES: Final = 16
 #: Columns of a table of cases: parameters that vary side by side. Eight pendulums have about 70.
 MAX_COLUMNS: Final = 256
+#: Derived parameters of one study.
+MAX_DERIVED: Final = 100
 #: Cases of one study.
 MAX_CASES: Final = 10_000_000
 #: Values on all axes of one study together (they are stored with the study).

@@ -1,7 +1,8 @@
 """Which cases of two studies are the same: equal parameters, equal run, same engine. Independent of the store.
 
 A case needs no hash of its own, because its parameters follow from the study and its number. Studies that can share
-cases have the same `kin_hash`; `shared_cases` finds the shared ones from the values of both studies' axes.
+cases have the same `kin_hash`; `shared_cases` finds the shared ones from the values of both studies' axes and of their
+derived parameters: it is the values that count, not the formulas.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.worker import models
+from sprag.worker.derived import distinct_values
 from sprag.worker.study import Axis
 
 if TYPE_CHECKING:
@@ -54,16 +56,17 @@ class Wanted:
     def __init__(self, study: Study) -> None:
         self.study = study
         self._sorted: dict[int, tuple[Cases, Values]] = {}
-        self._unique: dict[int, Values] = {}
+        self._unique: dict[int | str, Values] = {}
 
     def values(self, path: str) -> Values:
         """The distinct values (SI) of a parameter, ascending."""
         axis = self.study.axis_of(path)
-        if axis is None:
+        if axis is None and path not in self.study.derive:
             return np.array([self.study.base[path]])
-        if axis not in self._unique:
-            self._unique[axis] = np.unique(self.study.axes[axis].array)
-        return self._unique[axis]
+        key = path if axis is None else axis
+        if key not in self._unique:
+            self._unique[key] = distinct_values(self.study, path)
+        return self._unique[key]
 
     def may_share(self, spans: Values) -> NDArray[np.bool_]:
         """Which of many studies may share a case with this one, judged by their `span`.
@@ -143,9 +146,12 @@ def shared_cases(new: Study | Wanted, old: Study) -> tuple[Cases, Cases]:
     for path, values in common:
         our_codes = _coded(ours.study, path, values, our_cases, our_codes)
         their_codes = _coded(old, path, values, their_cases, their_codes)
-        if max(our_codes.max(initial=0), their_codes.max(initial=0)) > _LARGEST_CODE // 10**7:
-            both = np.unique(np.concatenate([our_codes, their_codes]), return_inverse=True)[1].reshape(-1)
-            our_codes, their_codes = both[: our_cases.size], both[our_cases.size :]
+        our_codes, their_codes = _shortened(our_codes, their_codes)
+    for path in _derived(ours.study, old):
+        our_values, their_values = _column(ours.study, path, our_cases), _column(old, path, their_cases)
+        our_places, their_places = _numbered(our_values, their_values)
+        count = 1 + max(our_places.max(initial=0), their_places.max(initial=0))
+        our_codes, their_codes = _shortened(our_codes * count + our_places, their_codes * count + their_places)
     _, at_ours, at_theirs = np.intersect1d(our_codes, their_codes, return_indices=True)
     order = np.argsort(at_ours)
     return our_cases[at_ours[order]], their_cases[at_theirs[order]]
@@ -162,6 +168,9 @@ def span(study: Study) -> Values:
     spans = {path: (value, value) for path, value in study.base.items()}
     for axis in study.axes:
         spans.update(dict.fromkeys(axis.paths, (float(axis.array.min()), float(axis.array.max()))))
+    for path in study.derive:
+        values = distinct_values(study, path)
+        spans[path] = (float(values[0]), float(values[-1]))
     return np.array([spans[path] for path in sorted(spans)], dtype=np.float64).reshape(-1, 2).T
 
 
@@ -170,16 +179,44 @@ def _paths(study: Study) -> list[str]:
 
 
 def _axis_pairs(new: Study, old: Study) -> list[str]:
-    """One path for each pair of an axis (or the base) of one study and of the other; tied paths are compared once."""
+    """One path for each pair of an axis (or the base) of one study and of the other; tied paths are compared once.
+
+    Without those that either study derives.
+    """
     found: dict[tuple[int | None, int | None, object], str] = {}
     ours, theirs = _axes_of(new), _axes_of(old)
     for path in dict.fromkeys((*new.base, *new.axis_paths)):
+        if path in new.derive or path in old.derive:
+            continue
         axes = (ours.get(path), theirs.get(path))
         # Parameters constant in both studies are compared individually, as are those that vary in one study only and
         # have another value here.
         constant = (axes[0] is None and new.base[path], axes[1] is None and old.base[path])
         found.setdefault((*axes, constant if None in axes else None), path)
     return list(found.values())
+
+
+def _derived(new: Study, old: Study) -> list[str]:
+    """The paths whose derived values are compared; equal formulas have equal values where all others are equal."""
+    return [] if new.derive == old.derive else sorted({*new.derive, *old.derive})
+
+
+def _column(study: Study, path: str, cases: Cases) -> Values:
+    """The values of any parameter in the given cases."""
+    return study.columns(cases)[path] if path in study.column_paths else np.full(cases.size, study.base[path])
+
+
+def _numbered(ours: Values | Cases, theirs: Values | Cases) -> tuple[Cases, Cases]:
+    """Numbers for the distinct values of two arrays: equal values have equal numbers."""
+    both = np.unique(np.concatenate([ours, theirs]), return_inverse=True)[1].reshape(-1).astype(np.int64)
+    return both[: ours.size], both[ours.size :]
+
+
+def _shortened(ours: Cases, theirs: Cases) -> tuple[Cases, Cases]:
+    """The codes, replaced by short ones where a further factor could overflow."""
+    if max(ours.max(initial=0), theirs.max(initial=0)) > _LARGEST_CODE // (3 * 10**7):
+        return _numbered(ours, theirs)
+    return ours, theirs
 
 
 def _axes_of(study: Study) -> dict[str, int]:

@@ -7,13 +7,14 @@ import hashlib
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_COLUMNS
+from sprag.worker.models.formulas import evaluate
 
 Combine = Literal["grid", "zip"]
 
@@ -105,6 +106,9 @@ class Study:
     plan : dict or None
         How a study that chooses its own cases does so, as plain JSON data (`sprag.worker.planning`); immutable. Its
         axes are zipped and have the cases of the rounds so far.
+    derive : dict
+        Path -> formula of other parameters in SI numbers (`sprag.worker.models.formulas`), sorted by path; immutable.
+        No axis varies such a path, and its value in `base` is that of the formula there.
     combine : "grid" or "zip"
         Grid: every combination, the first axis varies slowest. Zip: the axes side by side, all of one length.
 
@@ -122,6 +126,7 @@ class Study:
     combine: Combine = "grid"
     structure: dict[str, Any] | None = None
     plan: dict[str, Any] | None = None
+    derive: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.combine not in get_args(Combine):
@@ -131,6 +136,8 @@ class Study:
         paths = [path for axis in self.axes for path in axis.paths]
         if len(set(paths)) != len(paths):
             raise ValueError("a path is on two axes")
+        if not self.derive.keys() <= self.base.keys() - set(paths):
+            raise ValueError("a derived path is on an axis, or not in the base")
         if self.combine == "zip" and len({len(axis) for axis in self.axes}) > 1:
             raise ValueError("axes that are zipped must have equal lengths")
         most = MAX_AXES if self.combine == "grid" else MAX_COLUMNS
@@ -151,8 +158,13 @@ class Study:
 
     @property
     def axis_paths(self) -> tuple[str, ...]:
-        """Every path that varies, in the order of the axes."""
+        """Every path on an axis, in the order of the axes."""
         return tuple(path for axis in self.axes for path in axis.paths)
+
+    @property
+    def column_paths(self) -> tuple[str, ...]:
+        """Every path that `columns` gives: those on axes, then the derived ones."""
+        return (*self.axis_paths, *self.derive)
 
     def axis_of(self, path: str) -> int | None:
         """Position of the axis that varies ``path``; None when it does not vary."""
@@ -189,7 +201,7 @@ class Study:
         return tuple(reversed(found))
 
     def columns(self, cases: Sequence[int] | range | NDArray[np.integer[Any]]) -> dict[str, NDArray[np.float64]]:
-        """Values of every varying path for the given cases: path -> array of shape (m,), SI.
+        """Values of the `column_paths` in the given cases: path -> array of shape (m,), SI.
 
         Constant parameters are not included; the caller merges the columns over `base`. Raises IndexError as `indices`
         does.
@@ -198,10 +210,10 @@ class Study:
         for axis, index in zip(self.axes, self.indices(cases), strict=True):
             column = axis.array[index]
             found.update(dict.fromkeys(axis.paths, column))
-        return found
+        return found | evaluate(self.derive, self.base, found, len(cases)) if self.derive else found
 
     def case_parameters(self, case: int) -> dict[str, float]:
-        """Values (SI) of every varying path in one case, tied paths each; IndexError when there is no such case."""
+        """Values (SI) of the `column_paths` in one case; IndexError when there is no such case."""
         return {path: float(column[0]) for path, column in self.columns([case]).items()}
 
     def case_number(self, indices: Sequence[int]) -> int:
@@ -218,7 +230,8 @@ class Study:
     def cases_at(self, fixed: Mapping[str, float]) -> NDArray[np.int64]:
         """Numbers of the cases in which every path in ``fixed`` has the given value (SI, within `SAME_VALUE`).
 
-        A path that does not vary matches when its base value does. Only the axes of a zip are scanned.
+        A path that does not vary matches when its base value does. Only the axes of a zip are scanned, and the cases
+        that match otherwise for a derived path.
 
         Returns
         -------
@@ -230,6 +243,11 @@ class Study:
             When a path is neither on an axis nor in the base.
         """
         nothing: NDArray[np.int64] = np.empty(0, dtype=np.int64)
+        derived = {path: value for path, value in fixed.items() if path in self.derive}
+        if derived:
+            cases = self.cases_at({path: value for path, value in fixed.items() if path not in derived})
+            columns = self.columns(cases)
+            return cases[np.all([_same(columns[path], value) for path, value in derived.items()], axis=0)]
         positions: dict[int, int] = {}
         for path, value in fixed.items():
             at = self.axis_of(path)
@@ -256,7 +274,7 @@ class Study:
         return np.flatnonzero(match).astype(np.int64)
 
     def values_with(self, cases: range) -> Iterator[dict[str, float]]:
-        """The varying parameters of consecutive cases, one dictionary (path -> SI number) at a time."""
+        """The parameters of consecutive cases that `columns` gives, one dictionary (path -> SI number) at a time."""
         columns = {path: column.tolist() for path, column in self.columns(cases).items()}
         for row in range(len(cases)):
             yield {path: column[row] for path, column in columns.items()}
@@ -289,6 +307,7 @@ class Study:
             # Omitted where there is none, so that older studies and their hashes stay unchanged.
             **({} if self.structure is None else {"structure": self.structure}),
             **({} if self.plan is None else {"plan": self.plan}),
+            **({"derive": dict(self.derive)} if self.derive else {}),
         }
 
     def to_text(self) -> str:
@@ -313,6 +332,7 @@ class Study:
             combine=cast("Combine", data["combine"]),
             structure=data.get("structure"),
             plan=data.get("plan"),
+            derive=dict(data.get("derive", {})),
         )
 
     def physics_hash(self, engine_version: str) -> str:
@@ -328,6 +348,10 @@ class Study:
             allow_nan=False,
         )
         return hashlib.sha256(text.encode("ascii")).hexdigest()
+
+
+def _same(column: NDArray[np.float64], value: float) -> NDArray[np.bool_]:
+    return np.asarray(np.isclose(column, value, rtol=SAME_VALUE, atol=0.0))
 
 
 def _packed(values: NDArray[np.float64]) -> list[float] | str:

@@ -1,4 +1,4 @@
-"""Formulas of the shaft's angle, read by a parser of our own, never by Python's.
+"""Formulas of the shaft's angle, or of parameters, read by a parser of our own, never by Python's.
 
 Grammar, loosest first (``^`` and ``**`` are the same and bind to the right)::
 
@@ -8,6 +8,8 @@ Grammar, loosest first (``^`` and ``**`` are the same and bind to the right)::
     sign       := {"+" | "-"} power
     power      := atom ["^" sign]
     atom       := number | name | name "(" comparison {"," comparison} ")" | "(" comparison ")"
+
+A name is an identifier, or several with points between them such as ``pendulums.0.mass``.
 
 A formula is evaluated together with its derivative with respect to its first variable.
 """
@@ -33,7 +35,8 @@ MAX_DEPTH = 40
 CONSTANTS: Mapping[str, float] = {"pi": float(np.pi), "deg": float(np.pi) / 180.0}
 
 _TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)|(?P<name>[A-Za-z_][A-Za-z_0-9]*)"
+    r"\s*(?:(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
+    r"|(?P<name>[A-Za-z_][A-Za-z_0-9]*(?:\.[A-Za-z_0-9]+)*)"
     r"|(?P<sign>\*\*|<=|>=|[-+*/^(),<>]))"
 )
 

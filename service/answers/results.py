@@ -13,7 +13,7 @@ class Case(TypedDict):
     """One case: a row of results."""
 
     case: int
-    parameters: Annotated[dict[str, float], Doc("values of the axes, SI, every tied path")]
+    parameters: Annotated[dict[str, float], Doc("values of the axes, every tied path, and of derived parameters, SI")]
     ending: Annotated[str, Doc("ok, or why not; pending when it has not been run yet")]
     flags: list[str]
     results: Annotated[

@@ -118,6 +118,7 @@ class StudyDetail(_Study):
     progress: FullProgress
     combine: Annotated[str, Doc("grid: every combination, the first axis slowest; zip: the axes side by side")]
     axes: list[AxisInfo]
+    derive: Annotated[dict[str, str], Doc("derived parameters: path and formula, in SI numbers")]
     physics_hash: Annotated[str, Doc("SHA-256 of everything that determines the results: equal for equal studies")]
     regimes: Annotated[dict[str, int], Doc("number of cases of each regime; empty where cases have none")]
     flags: Annotated[dict[str, int], Doc("number of cases that have each flag; only flags that some case has")]
@@ -174,6 +175,7 @@ class Preview(TypedDict):
     shape: Annotated[list[int], Doc("number of values of each axis; of a zip, the common number")]
     combine: str
     axes: list[AxisInfo]
+    derive: Annotated[dict[str, str], Doc("derived parameters: path and formula, in SI numbers")]
     results: Annotated[int, Doc("number of results of each case")]
     reusable: Annotated[int, Doc("cases that need not be run, because other studies of the database have them")]
     estimated_seconds: Annotated[float, Doc("rough time of `most_cases` on the processes of this service, s")]

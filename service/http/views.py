@@ -68,6 +68,7 @@ def detail(record: StudyRecord, progress: Progress, study: Study, spec: dict[str
         "progress": progress_json(progress),
         "combine": study.combine,
         "axes": axes_json(study),
+        "derive": dict(study.derive),
         "physics_hash": record.physics_hash,
         "regimes": kinds.regimes,
         "flags": kinds.flags,

@@ -66,6 +66,7 @@ def preview_json(
         "shape": list(study.shape),
         "combine": study.combine,
         "axes": axes_json(study),
+        "derive": dict(study.derive),
         "results": len(models.study_results(study)),
         "reusable": reusable,
         "estimated_seconds": seconds,

@@ -63,7 +63,7 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
 
 def _held(study: Study, line: Line) -> tuple[str, ...]:
     """The fixed axes, then the constant parameters of the operating point."""
-    point, varying = models.presentation_of(study).operating_point, study.axis_paths
+    point, varying = models.presentation_of(study).operating_point, study.column_paths
     always = [path for path in point if path in study.base and path not in varying]
     fixed = [*line.at.items(), *((path, study.base[path]) for path in always)]
     return tuple(held_text(study, path, value) for path, value in fixed)

@@ -76,6 +76,9 @@ def require_axis(study: Study, parameter: str, path: str) -> int:
     position = study.axis_of(path)
     if position is not None:
         return position
+    if path in study.derive:
+        message = "not an axis: it is derived from other parameters"
+        raise refused(parameter, "not-an-axis", message, path, allowed=listed(study.axis_paths) or "no axis at all")
     fixed = path in study.base
     message = (
         f"not an axis: it is {quantity_text(study.base[path], unit_of(study, path))} in every case"
@@ -106,7 +109,7 @@ def locate_axes(study: Study, at: Sequence[tuple[str, str]]) -> Fixed:
     fixed: Fixed = {}
     for path, text in at:
         position = study.axis_of(path)
-        if position is None and path not in study.base:
+        if position is None and (path in study.derive or path not in study.base):
             require_axis(study, "at", path)
         unit = unit_of(study, path)
         value = _value(path, text, unit)

@@ -12,6 +12,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.spec.axes.design import read_design
+from sprag.service.spec.derive import check_derived, layout, read_machine
 from sprag.service.spec.fields import read_object
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.plan.outline import Outline, chooses, first_round, read_outline
@@ -33,7 +34,7 @@ VERSION: Final = 1
 #: Name of a study that gives none.
 UNNAMED: Final = "untitled"
 
-FIELDS: Final = ("sprag", "model", "name", "base", "run", "axes", "combine", "exclude", "refine", "goal")
+FIELDS: Final = ("sprag", "model", "name", "base", "derive", "run", "axes", "combine", "exclude", "refine", "goal")
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ def parse_spec(data: object) -> ParsedSpec:
     if model is None:
         raise report.error()
     part = part_of(model)
-    machine = part.read_base(report, found.get("base"))
+    machine = read_machine(report, part, found)
     outline: Outline | None = None
     combine: Combine = "zip"
     if chooses(found):
@@ -90,10 +91,12 @@ def parse_spec(data: object) -> ParsedSpec:
         axes = None if outline is None else outline.axes
     else:
         axes, combine = read_design(report, found, machine)
-    run = part.read_run(report, found.get("run", {}), machine, axes)
+    if machine.derive and axes is not None and not report.found:
+        check_derived(report, found["derive"], machine, layout(machine, axes, combine), ranges=outline is not None)
+    run = part.read_run(report, found.get("run", {}), machine, axes, combine)
     part.check(report, machine, axes or (), combine)
     report.raise_if_any()
-    study = Study(model, name, _in_order(machine), run, structure=machine.structure)
+    study = Study(model, name, _in_order(machine), run, structure=machine.structure, derive=machine.derive)
     given = replace(study, axes=axes or (), combine=combine)
     study = given if outline is None else first_round(report, study, outline)
     part.warn(report, study)

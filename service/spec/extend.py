@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.faults import Fault
 from sprag.service.spec.axes.axes import axis_values
+from sprag.service.spec.derive import read_machine
 from sprag.service.spec.document import ParsedSpec, parse_spec
 from sprag.service.spec.fields import read_object
 from sprag.service.spec.machine.registry import part_of
@@ -86,7 +87,7 @@ def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> di
     if study.combine != "grid":
         report.fault("/axes", "conflict", "the axes of this study go together, case by case", allowed="`cases` instead")
         raise report.error()
-    machine = part_of(study.model).read_base(Report(), spec.get("base"))
+    machine = read_machine(Report(), part_of(study.model), spec)
     for index, item in enumerate(items):
         _add(report, join("/axes", index), item, study, own, machine)
     report.raise_if_any()

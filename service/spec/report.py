@@ -51,6 +51,11 @@ class Report:
             shown = _as_written(value, _at(self._source, pointer))
             self.faults.append(Fault(pointer, code, message, shorten(shown), allowed, unit))
 
+    def adopt(self, other: Report) -> None:
+        """Record the faults of another report, without its warnings."""
+        self.found += other.found
+        self.faults += other.faults[: max(MAX_PROBLEMS - len(self.faults), 0)]
+
     @property
     def full(self) -> bool:
         """Whether the limit of faults is reached, so that further checks are useless."""

@@ -192,6 +192,32 @@ def to_float(number: Fraction) -> float:
     return value
 
 
+def plain_signs(text: str) -> str:
+    """``text`` with the signs of a typesetter (·, ×, −) replaced by those of a keyboard, character by character."""
+    return text.translate(_SIGNS)
+
+
+def measure(text: str) -> tuple[Fraction, dict[str, int]]:
+    """Factor of a unit such as "N/mm" to SI, and its powers of gram, meter, second and radian.
+
+    Raises
+    ------
+    QuantityError
+        When it cannot be read or is unknown.
+    """
+    factor, powers = _measure(text)
+    return factor / Fraction(1000) ** powers.get("gram", 0), powers
+
+
+def is_unit(name: str) -> bool:
+    """Whether a single name, such as "mm", is that of a unit."""
+    try:
+        _named(name)
+    except QuantityError:
+        return False
+    return True
+
+
 def load() -> None:
     """Load pint now, which takes half a second; otherwise the first quantity with a unit loads it."""
     _registry()

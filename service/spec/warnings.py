@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sprag.service.spec.axes.axes import varied_values
 from sprag.service.spec.report import Report
+from sprag.worker.derived import distinct_values, involved
 from sprag.worker.models import machine_shaft
 from sprag.worker.study import Axis, Study
 
@@ -117,7 +118,7 @@ def _turned_step(report: Report, study: Study, index: int, *, wraps: bool) -> No
     paths = [f"operation.steps.{index}.{end}" for end in ("from", "to")]
     first, last, weight = _columns(study, paths)
     turned = np.asarray(first > last)
-    varied = [path for path in paths if path in study.axis_paths]
+    varied = [path for path in paths if path in study.column_paths]
     if not varied or not turned.any() or (wraps and turned.all()):
         return
     what = (
@@ -146,7 +147,7 @@ def _chosen_angle(report: Report, study: Study) -> None:
 
 
 def _values(study: Study, path: str) -> NDArray[np.float64]:
-    return varied_values(path, study.axes, study.base)
+    return distinct_values(study, path) if path in study.derive else varied_values(path, study.axes, study.base)
 
 
 def _plausible(report: Report, study: Study, path: str, known: dict[str, tuple[float, str, str]] = _PLAUSIBLE) -> None:
@@ -162,7 +163,9 @@ def _plausible(report: Report, study: Study, path: str, known: dict[str, tuple[f
 
 
 def _pointer(study: Study, path: str) -> str:
-    """Where the spec gives the values of ``path``: its axis (shown with the path) or the base."""
+    """Where the spec gives the values of ``path``: its axis or its formula (shown with the path), or the base."""
+    if path in study.derive:
+        return f"/derive ({path})"
     for position, axis in enumerate(study.axes):
         if path in axis.paths:
             return f"/axes/{position} ({path})"
@@ -229,14 +232,13 @@ def _columns(study: Study, paths: Sequence[str]) -> list[NDArray[np.float64]]:
 
     The last array holds the number of cases that share a combination; 0 when only the ends of the axes were combined.
     """
-    axes = tuple(axis for axis in study.axes if set(axis.paths) & set(paths))
-    involved = replace(study, axes=axes)
-    cases_each = study.cases // involved.cases
-    if involved.cases > _MOST_COMBINATIONS:
+    part = involved(study, paths)
+    cases_each = study.cases // part.cases
+    if part.cases > _MOST_COMBINATIONS:
         cases_each = 0
         if study.combine == "grid":
-            ends = tuple(Axis(axis.paths, np.unique([axis.array.min(), axis.array.max()])) for axis in axes)
-            involved = replace(study, axes=ends)
-    varied = involved.columns(range(involved.cases))
+            ends = tuple(Axis(axis.paths, np.unique([axis.array.min(), axis.array.max()])) for axis in part.axes)
+            part = replace(part, axes=ends)
+    varied = part.columns(range(part.cases))
     columns = [np.asarray(varied.get(path, study.base[path]), dtype=np.float64) for path in paths]
     return [*columns, np.asarray(float(cases_each))]

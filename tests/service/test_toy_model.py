@@ -238,3 +238,32 @@ def test_its_cases_are_reused(finished: tuple[Service, str]) -> None:
     service, _ = finished
     preview = service.http.post("/api/v1/studies:preview", json=SPEC | {"name": "again"}).json()
     assert (preview["cases"], preview["reusable"]) == (12, 12)
+
+
+#: The mass follows from the spring; its values are those of some cases of `SPEC`.
+DERIVED: dict[str, Any] = SPEC | {
+    "name": "a derived toy",
+    "base": {"body": {"spring_rate": 200}, "damping": 0.1},
+    "derive": {"body.mass": "body.spring_rate / 200 N/m * 1 kg"},
+    "axes": [{"path": "body.spring_rate", "linspace": [100, 400, 4]}, {"path": "damping", "values": [0.1, 0.2]}],
+}
+
+
+def test_derived_parameters_are_computed_and_their_rows_reused(finished: tuple[Service, str]) -> None:
+    service, _ = finished
+    preview = service.http.post("/api/v1/studies:preview", json=DERIVED).json()
+    # Masses of 0.5, 1 and 2 kg were run with these springs and a damping of 0.1.
+    assert (preview["cases"], preview["reusable"]) == (8, 3)
+    assert preview["derive"] == {"body.mass": "body.spring_rate / 200.0 * 1.0"}
+    study_id = service.submit(DERIVED)
+    store = service.store
+    Dispatcher(store, InlineExecutor(), SystemClock()).run(lambda: store.get_study(study_id).state.terminal)
+    rates, dampings = np.repeat([100.0, 200.0, 300.0, 400.0], 2), np.tile([0.1, 0.2], 4)
+    by_hand = displacement({"body.spring_rate": rates, "body.mass": rates / 200.0, "damping": dampings}, END)
+    np.testing.assert_array_equal(store.case_rows(study_id).values[:, 1], by_hand)
+    motion = service.get(f"/studies/{study_id}/cases/7/trajectory", points=2)
+    assert motion["values"]["displacement"][-1] == by_hand[7]
+    # The other way: cases that were derived are those of a study that gives the same numbers.
+    points = "body.spring_rate,body.mass,damping\n300,1.5,0.2\n300,1.6,0.2\n"
+    plain = SPEC | {"axes": [{"points": points}]}
+    assert service.http.post("/api/v1/studies:preview", json=plain).json()["reusable"] == 1

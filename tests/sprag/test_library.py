@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -53,6 +54,37 @@ def test_the_page_runs(title: str, tmp_path: Path) -> None:
     done = python(str(script))
     assert done.returncode == 0, done.stderr
     assert "rad/s" in done.stdout
+
+
+def test_the_example_of_derived_parameters_has_the_numbers_of_the_guide() -> None:
+    page = (
+        (ROOT / "docs" / "guide.md")
+        .read_text(encoding="utf-8")
+        .split("\n### Derived parameters\n")[1]
+        .split("\n## ")[0]
+    )
+    (fields,) = re.findall(r"```json\n(.*?)```", page, re.DOTALL)
+    spec = json.loads((ROOT / "examples" / "one_pendulum.json").read_text(encoding="utf-8"))
+    del spec["base"]["pendulums"][0]["inertia"]
+    spec |= json.loads(f"{{{fields}}}")
+    table = sprag.run(spec, processes=0)
+    head, _, *rows = [
+        [cell.strip() for cell in line.strip("|").split("|")] for line in page.split("\n") if line.startswith("|")
+    ]
+    names = [cell.split("`")[1] for cell in head]
+    assert len(rows) == len(table)
+    for name, told in zip(names, np.array(rows, dtype=np.float64).T, strict=True):
+        np.testing.assert_allclose(table[name], told, rtol=1e-3, err_msg=name)
+    np.testing.assert_allclose(
+        table["pendulums.0.inertia"], 1.1 * table["pendulums.0.mass"] * 0.03**2 + 2e-4, rtol=1e-15
+    )
+    assert table.attrs["units"]["pendulums.0.inertia"] == "kg*m^2"
+    # The same machines, given number by number.
+    base, axes = spec["base"]["pendulums"][0], spec["axes"]
+    base["inertia"] = 1e-3
+    axes.append({"path": "pendulums.0.inertia", "values": table["pendulums.0.inertia"].tolist()})
+    plain = sprag.run({**spec, "derive": {}, "axes": axes, "combine": "zip"}, processes=0)
+    pd.testing.assert_frame_equal(plain[table.columns], table)
 
 
 def test_a_study_run_here_has_rows_and_units() -> None:

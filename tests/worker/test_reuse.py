@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sprag.worker import models
+from sprag.worker.models.formulas import evaluate
 from sprag.worker.reuse import Wanted, kin_hash, shared_cases, span, taken
 from sprag.worker.study import Axis, Study
 from tests.worker.fakes import BASE, RUN
@@ -19,7 +20,7 @@ NUMBERS = (0.1, 2e-3, 3e-3, 25.0, 30.0)
 
 @st.composite
 def studies(draw: st.DrawFn) -> Study:
-    """A small grid or zip over some of four paths, some of them tied; its values often meet the base's."""
+    """A small grid or zip over some of four paths, some of them tied, one perhaps derived; values often meet."""
     combine = draw(st.sampled_from(["grid", "zip"]))
     paths = draw(st.permutations(PATHS))
     cuts = sorted(draw(st.sets(st.integers(1, 4), max_size=3)))
@@ -30,8 +31,16 @@ def studies(draw: st.DrawFn) -> Study:
         values = draw(st.lists(st.sampled_from(NUMBERS), min_size=length, max_size=length, unique=combine == "grid"))
         axes.append(Axis(group, tuple(values)))
     study = Study("vibration-drive", "", dict(BASE), dict(RUN), tuple(axes), combine)  # type: ignore[arg-type]
+    left = [path for path in PATHS if path not in study.axis_paths]
+    if left and draw(st.booleans()):
+        derive = {left[0]: draw(st.sampled_from([other for other in PATHS if other != left[0]]))}
+        if draw(st.booleans()):
+            derive = {path: f"0 * {other} + 25" for path, other in derive.items()}
+        at_base = {path: float(column[0]) for path, column in evaluate(derive, BASE, {}, 1).items()}
+        study = replace(study, base=BASE | at_base, derive=derive)
     # A zip that repeats a case is refused by the spec.
-    rows = set(map(tuple, np.stack([*study.columns(range(study.cases)).values()], 1).tolist())) if axes else {()}
+    columns = replace(study, derive={}).columns(range(study.cases))
+    rows = set(map(tuple, np.stack([*columns.values()], 1).tolist())) if axes else {()}
     return study if len(rows) == study.cases else replace(study, axes=(), combine="grid")
 
 
@@ -62,7 +71,12 @@ def test_no_study_is_ruled_out_that_has_a_case(new: Study, others: list[Study]) 
         ours = {tuple(sorted(parameters(new, case).items())) for case in range(new.cases)}
         shares = any(tuple(sorted(parameters(other, case).items())) in ours for case in range(other.cases))
         assert possible or not shares
-        if other.cases == 1 and new.combine == "grid" and all(len(axis.paths) == 1 for axis in new.axes):
+        if (
+            not (new.derive or other.derive)
+            and other.cases == 1
+            and new.combine == "grid"
+            and all(len(axis.paths) == 1 for axis in new.axes)
+        ):
             assert possible == shares
         found, _ = shared_cases(wanted, other)
         assert bool(found.size) == shares
@@ -102,6 +116,24 @@ def test_many_zipped_columns_do_not_overflow() -> None:
     ours, theirs = shared_cases(shuffled, study)
     np.testing.assert_array_equal(ours, np.arange(5000))
     np.testing.assert_array_equal(theirs, order)
+
+
+def test_it_is_values_that_are_shared_and_not_formulas() -> None:
+    formula = {"shaft.load": "excitation.frequency / 100"}
+    frequencies = Axis(("excitation.frequency",), np.linspace(10.0, 20.0, 11))
+    base = BASE | {"shaft.load": BASE["excitation.frequency"] / 100}
+    derived = Study("vibration-drive", "", base, dict(RUN), (frequencies,), derive=formula)
+    loads = Axis(("shaft.load",), [0.1, 0.15, 0.3])
+    grid = Study("vibration-drive", "", dict(BASE), dict(RUN), (frequencies, loads))
+    assert kin_hash(grid, "1") == kin_hash(derived, "1")
+    ours, theirs = shared_cases(derived, grid)
+    assert (ours.tolist(), theirs.tolist()) == ([0, 5], [0, 16])
+    other = replace(derived, derive={"shaft.load": "excitation.frequency / 50"})
+    assert not shared_cases(derived, other)[0].size
+    assert shared_cases(other, derived)[0].size == 0
+    scaled = replace(derived, derive={"shaft.load": "0.02 * excitation.frequency / 2"})
+    equal = scaled.columns(range(11))["shaft.load"] == derived.columns(range(11))["shaft.load"]
+    np.testing.assert_array_equal(shared_cases(derived, scaled)[0], np.flatnonzero(equal))
 
 
 def test_kin_depends_on_run_engine_and_parameters_but_not_on_values() -> None:

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sprag.worker.derived import distinct_values, involved
 from sprag.worker.limits import MAX_AXES, MAX_CASES
 from sprag.worker.study import Axis, Study
 
@@ -213,3 +214,36 @@ def test_a_million_cases_cost_no_rows() -> None:
     assert of.cases == MAX_CASES
     assert of.case_parameters(of.cases - 1) == {"a": 999.0, "b": 999.0, "c": 9.0}
     assert of.cases_at({"a": 3.0, "c": 1.0})[:2].tolist() == [30001, 30011]
+
+
+def test_derived_values_follow_from_those_of_the_case() -> None:
+    made = study(
+        Axis(("a",), (1.0, 2.0, 3.0)), Axis(("b",), (5.0, 6.0)), base={**BASE, "c": 5.0},
+        derive={"c": "d + a^2", "d": "2*b"},
+    )  # fmt: skip
+    a, b = np.repeat([1.0, 2.0, 3.0], 2), np.tile([5.0, 6.0], 3)
+    columns = made.columns(range(6))
+    assert made.column_paths == ("a", "b", "c", "d")
+    np.testing.assert_array_equal(columns["c"], 2.0 * b + a**2)
+    np.testing.assert_array_equal(columns["d"], 2.0 * b)
+    assert made.case_parameters(4) == {"a": 3.0, "b": 5.0, "c": 19.0, "d": 10.0}
+    assert made.cases_at({"d": 12.0}).tolist() == [1, 3, 5]
+    assert made.cases_at({"d": 12.0, "a": 2.0}).tolist() == [3]
+    assert made.cases_at({"d": 11.0}).tolist() == []
+    assert Study.from_json(json.loads(json.dumps(made.to_json()))) == made == Study.from_text(made.to_text())
+    assert distinct_values(made, "c").tolist() == [11.0, 13.0, 14.0, 16.0, 19.0, 21.0]
+    assert distinct_values(made, "d").tolist() == [10.0, 12.0]
+    assert involved(made, ["d"]).axis_paths == ("b",)
+
+
+def test_a_formula_is_part_of_the_hash_and_none_leaves_it_as_it_was() -> None:
+    plain = study(Axis(("a",), (1.0, 2.0)))
+    hashes = {made.physics_hash("1") for made in (plain, study(*plain.axes, derive={"b": "2*a"}))}
+    assert len(hashes) == 2
+    assert "derive" not in plain.to_json()
+
+
+@pytest.mark.parametrize("derive", [{"a": "2*b"}, {"x": "2*b"}])
+def test_a_path_on_an_axis_or_none_at_all_is_not_derived(derive: dict[str, str]) -> None:
+    with pytest.raises(ValueError, match="derived path"):
+        study(Axis(("a",), (1.0, 2.0)), derive=derive)

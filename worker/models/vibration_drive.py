@@ -46,6 +46,8 @@ FLAG_SENTENCES: dict[str, str] = {
     WINDUP_OUT_OF_DATA: "A clutch was wound up beyond the measured data, where its law was extrapolated linearly.",
     **REGIME_FLAGS,
 }
+#: Most cases whose frequency is evaluated for an estimate.
+_SPREAD = 1_000
 #: Suffix of the variants of settled studies, after the number of pendulums.
 _SETTLED_VARIANT = "-settled"
 
@@ -129,7 +131,10 @@ def _mean_periods(study: Study) -> float:
 
 
 def _frequencies(study: Study) -> NDArray[np.float64]:
-    """Excitation frequencies of the study, Hz."""
+    """Excitation frequencies of the study, Hz; where they are derived, those of cases evenly spread over it."""
+    if "excitation.frequency" in study.derive:
+        cases = np.linspace(0, study.cases - 1, min(study.cases, _SPREAD), dtype=np.int64)
+        return study.columns(cases)["excitation.frequency"]
     for axis in study.axes:
         if "excitation.frequency" in axis.paths:
             return axis.array

@@ -63,6 +63,13 @@ def _motion(row: CaseRow) -> str:
     return sentence
 
 
+def _parameters(study: Study, case: int) -> list[tuple[str, float, str, str]]:
+    """Name, value, unit and (of a derived one) formula of each parameter that a case has for itself."""
+    values = study.case_parameters(case)
+    paths = [*(axis.paths[0] for axis in study.axes), *study.derive]
+    return [(axis_name(study, path), values[path], unit_of(study, path), study.derive.get(path, "")) for path in paths]
+
+
 @router.get("/studies/{study_id:study}/cases/{case:case}")
 def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = "") -> Response:
     """One case."""
@@ -89,14 +96,7 @@ def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = 
         sentence="The case has not been run yet." if row is None else models.ENDING_SENTENCES.get(row.ending, ""),
         motion="" if row is None else _motion(row),
         flags=[(flag, models.flags_of(study.model).get(flag, "")) for flag in (() if row is None else row.flags)],
-        parameters=[
-            (
-                axis_name(study, axis.paths[0]),
-                study.case_parameters(case)[axis.paths[0]],
-                unit_of(study, axis.paths[0]),
-            )
-            for axis in study.axes
-        ],
+        parameters=_parameters(study, case),
         infos=infos,
         shown=models.presentation_of(study),
         main=[info for info in infos if info.name in main_results(study, infos)],

@@ -88,7 +88,7 @@ def cases_page(
         rows=[(row, study.case_parameters(row.case)) for row in found.rows],
         found=found,
         faults=faults,
-        paths=[axis.paths[0] for axis in study.axes],
+        paths=[*(axis.paths[0] for axis in study.axes), *study.derive],
         shown=[info for name in names if (info := result_of(infos, name))],
         results=infos,
         fixed=fixed_choices(study, (), at),
@@ -153,7 +153,7 @@ def _ordered(context: Context, study_id: str, study: Study, wanted: _Wanted) -> 
         finished &= np.isin(cases, context.store.cases_of_kind(study_id, wanted.regime or None, wanted.flag or None))
     if by_result:
         keys = columns.values[name]
-    elif study.axis_of(name) is not None:
+    elif name in study.column_paths:
         keys = study.columns(cases)[name]
     elif name in ("", "case"):
         keys = cases.astype(np.float64)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import pyarrow as pa
 
-from sprag.service.results.exports.inputs import description_of
+from sprag.service.results.exports.inputs import column_description
 from sprag.service.results.exports.source import machine
 from sprag.service.spec.catalogue import unit_of
 
@@ -49,7 +49,7 @@ class _Pieces(io.RawIOBase):
 
 
 def schema(source: Source) -> pa.Schema:
-    """Columns ``case``, axis paths, ``ending``, ``flags``, results; unit and meaning as metadata of each field.
+    """Columns ``case``, axis and derived paths, ``ending``, ``flags``, results; each with its unit and meaning.
 
     The schema's metadata contain the study itself, as JSON of `machine` under ``sprag``.
     """
@@ -60,9 +60,9 @@ def schema(source: Source) -> pa.Schema:
             path,
             pa.float64(),
             nullable=False,
-            metadata={"unit": unit_of(study, path), "description": description_of(study, path)},
+            metadata={"unit": unit_of(study, path), "description": column_description(study, path)},
         )
-        for path in study.axis_paths
+        for path in study.column_paths
     ]
     fields += [
         pa.field("ending", pa.string(), nullable=False),
@@ -83,7 +83,7 @@ def batch(source: Source, block: RowBlock, made: pa.Schema) -> pa.RecordBatch:
     """The cases of a block as a batch of `schema`; NaN becomes null."""
     columns = source.study.columns(block.cases)
     flags = [text.split(",") if text else [] for text in block.flags]
-    arrays = [pa.array(block.cases), *(pa.array(columns[path]) for path in source.study.axis_paths)]
+    arrays = [pa.array(block.cases), *(pa.array(columns[path]) for path in source.study.column_paths)]
     arrays += [pa.array(block.endings, pa.string()), pa.array(flags, made.field("flags").type)]
     for index, info in enumerate(source.infos):
         column = np.ascontiguousarray(block.values[:, index])
@@ -118,7 +118,7 @@ def parquet_pieces(source: Source) -> Iterator[bytes]:
 def _repeating(source: Source) -> list[str]:
     """Columns with many repeated values; results hardly ever repeat, and trying costs time."""
     repeating = [info.name for info in source.infos if info.kind != "real"]
-    return [*source.study.axis_paths, "ending", *repeating]
+    return [*source.study.column_paths, "ending", *repeating]
 
 
 def arrow_pieces(source: Source) -> Iterator[bytes]:

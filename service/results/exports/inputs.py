@@ -16,14 +16,15 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
 #: Origin of the value of an input; "" where the user's spec is unknown.
-Origin = Literal["given", "default", "fitted", "axes", ""]
+Origin = Literal["given", "default", "fitted", "axes", "derived", ""]
 
 
 @dataclass(frozen=True, slots=True)
 class Input:
     """One parameter of the machine or setting of its run, for a table of inputs.
 
-    ``value`` is a number in SI, the text of a choice, or None where the axes change it.
+    ``value`` is a number in SI, the text of a choice, the formula (in SI numbers) of a derived parameter, or None where
+    the axes change it.
     """
 
     path: str
@@ -44,8 +45,14 @@ def description_of(study: Study, path: str) -> str:
     return "" if entry is None else entry.help
 
 
+def column_description(study: Study, path: str) -> str:
+    """The same for a column of values, with the formula of a derived parameter."""
+    told, formula = description_of(study, path), study.derive.get(path)
+    return told if formula is None else f"{told}; derived: {formula}".removeprefix("; ")
+
+
 def inputs(study: Study, spec: Mapping[str, Any]) -> tuple[Input, ...]:
-    """Every parameter of the machine: varied ones, which have no single value, the base's numbers, and the choices.
+    """Every parameter of the machine: varied ones, which have no single value, derived ones, numbers, and choices.
 
     ``spec`` is the user's own, which shows what was given.
     """
@@ -53,12 +60,12 @@ def inputs(study: Study, spec: Mapping[str, Any]) -> tuple[Input, ...]:
     numbers = [
         Input(
             path,
-            None if path in varying else study.base[path],
+            None if path in varying else study.derive.get(path, study.base.get(path)),
             unit_of(study, path),
             description_of(study, path),
-            "axes" if path in varying else _origin(spec, path),
+            "axes" if path in varying else "derived" if path in study.derive else _origin(spec, path),
         )
-        for path in dict.fromkeys((*varying, *study.base))
+        for path in dict.fromkeys((*varying, *study.derive, *study.base))
     ]
     chosen = [
         Input(choice.path, choice.text, "", choice.meaning, _origin(spec, choice.path))

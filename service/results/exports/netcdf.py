@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.results.exports.inputs import description_of
+from sprag.service.results.exports.inputs import column_description, description_of
 from sprag.service.results.exports.source import machine
 from sprag.service.results.exports.spool import spooled
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, flags_mask
+from sprag.worker.derived import blocks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -67,7 +68,7 @@ class _Grid:
     ----------
     dims : names of the dimensions: the first path of each axis of a grid; ``case`` where axes are zipped
     shape : their lengths
-    labels : coordinates that are not dimensions: the case number in a grid, further paths of tied axes
+    labels : coordinates that are not dimensions: the case number in a grid, further paths of tied axes, derived paths
     """
 
     def __init__(self, study: Study) -> None:
@@ -77,7 +78,7 @@ class _Grid:
         self.shape = study.shape or ((1,) if self._together else ())
         self._orders = [slice(None)] if self._together else [_order(axis) for axis in study.axes]
         paths = study.axis_paths if self._together else [path for axis in study.axes for path in axis.paths[1:]]
-        self.labels = [*paths] if self._together else [_CASE, *paths]
+        self.labels = [*([] if self._together else [_CASE]), *paths, *study.derive]
 
     def place(self, column: NDArray[Any]) -> NDArray[Any]:
         """A column in the order of cases as an array over the dimensions."""
@@ -94,7 +95,7 @@ class _Grid:
         return xr.Variable(self.dims, self.place(column), attributes, encoding)
 
     def coordinates(self) -> dict[str, Any]:
-        """Values of every axis path along its dimension, and the number of every case."""
+        """Values of every axis path along its dimension, those of derived paths, and the number of every case."""
         import xarray as xr
 
         study = self._study
@@ -105,10 +106,19 @@ class _Grid:
             for path in axis.paths:
                 attributes = {"units": unit_of(study, path), "long_name": description_of(study, path) or path}
                 found[path] = xr.Variable(self.dims[dimension], axis.array[order], attributes, unfilled)
+        for path, column in self._derived().items():
+            found[path] = self.variable(
+                column, {"units": unit_of(study, path), "long_name": column_description(study, path) or path}
+            )
         numbers = self.variable(
             np.arange(study.cases, dtype=np.int64), {"units": "1", "long_name": "number of the case"}
         )
         return {**found, _CASE: numbers}
+
+    def _derived(self) -> dict[str, NDArray[np.float64]]:
+        """The derived parameters of every case."""
+        parts = [self._study.columns(cases) for cases in blocks(self._study)] if self._study.derive else []
+        return {path: np.concatenate([part[path] for part in parts]) for path in self._study.derive}
 
 
 def _order(axis: Axis) -> Any:

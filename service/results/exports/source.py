@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 #: Parts of a spec that describe the machine and its run; the rows themselves contain the axes.
-_GIVEN: Final = ("base", "run")
+_GIVEN: Final = ("base", "derive", "run")
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +44,14 @@ def stored(store: Store, record: StudyRecord, study: Study) -> Source:
 def machine(source: Source) -> dict[str, Any]:
     """The machine and its run for programs, plain JSON data.
 
-    ``base`` and ``run`` in SI numbers, ``choices`` (non-numeric fields), ``defaults`` (paths that were left out), and
-    ``given``, base and run as the user wrote them.
+    ``base`` and ``run`` in SI numbers, ``derive`` (formulas of derived parameters in SI numbers), ``choices``
+    (non-numeric fields), ``defaults`` (paths that were left out), and ``given``, base, formulas and run as the user
+    wrote them.
     """
     study, spec = source.study, source.spec
     return {
         "base": study.base,
+        "derive": study.derive,
         "choices": choices(study, spec),
         "run": study.run,
         "combine": study.combine,
@@ -59,7 +61,7 @@ def machine(source: Source) -> dict[str, Any]:
 
 
 def given(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """The machine and its run as the user wrote them, with their units: plain JSON data."""
+    """The machine, its formulas and its run as the user wrote them, with their units: plain JSON data."""
     return {name: spec[name] for name in _GIVEN if spec.get(name)}
 
 

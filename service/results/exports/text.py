@@ -22,7 +22,7 @@ _FORMULA_STARTS: Final = ("=", "+", "-", "@", "\t", "\r")
 
 
 def row_json(row: CaseRow, parameters: dict[str, float]) -> Case:
-    """One case as JSON data; ``parameters`` are its axis parameters, SI."""
+    """One case as JSON data; ``parameters`` are those on axes and derived ones, SI."""
     return {
         "case": row.case,
         "parameters": parameters,
@@ -73,9 +73,9 @@ def json_lines_pieces(source: Source) -> Iterator[bytes]:
 
 
 def csv_pieces(source: Source) -> Iterator[bytes]:
-    """Header ``case, axis paths, ending, flags, result names``; empty cells for missing values."""
+    """Header ``case, axis paths, derived paths, ending, flags, result names``; empty cells for missing values."""
     study = source.study
-    paths = study.axis_paths
+    paths = study.column_paths
     yield _csv_lines([["case", *paths, "ending", "flags", *(info.name for info in source.infos)]])
     for block in source.blocks:
         columns = study.columns(block.cases)

@@ -52,8 +52,8 @@ def _write(source: Source, folder: Path, sheet_rows: int = SHEET_ROWS) -> Path:
 
 def _cases(book: Any, source: Source, title: Any, unit: Any, sheet_rows: int) -> None:
     study = source.study
-    names = ["case", *study.axis_paths, "ending", "flags", *(info.name for info in source.infos)]
-    units = ["", *(unit_of(study, path) for path in study.axis_paths), "", "", *(i.unit for i in source.infos)]
+    names = ["case", *study.column_paths, "ending", "flags", *(info.name for info in source.infos)]
+    units = ["", *(unit_of(study, path) for path in study.column_paths), "", "", *(i.unit for i in source.infos)]
     number, sheet, row = 0, None, sheet_rows
     for block in source.blocks:
         for cells in _rows(source, block):
@@ -79,7 +79,7 @@ def _sheet(book: Any, number: int, names: list[str], units: list[str], title: An
 
 def _rows(source: Source, block: RowBlock) -> Iterator[list[Any]]:
     columns = source.study.columns(block.cases)
-    parameters = [columns[path].tolist() for path in source.study.axis_paths]
+    parameters = [columns[path].tolist() for path in source.study.column_paths]
     values = block.values.tolist()
     named = [index for index, info in enumerate(source.infos) if info.kind == "category"]
     for index, case in enumerate(block.cases.tolist()):

@@ -96,7 +96,7 @@ def _lines(report: Report) -> Iterator[str]:
 
 def _mark(item: Input) -> str:
     """The mark of an input that the user did not give."""
-    return f" ({item.origin})" if item.origin in ("default", "fitted") else ""
+    return f" ({item.origin})" if item.origin in ("default", "fitted", "derived") else ""
 
 
 def _section(title: str, lines: Sequence[str]) -> Iterator[str]:

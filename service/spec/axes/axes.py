@@ -96,6 +96,11 @@ def read_paths(report: Report, pointer: str, data: object, machine: Machine) -> 
             report.fault(
                 where, "wrong-type", "must be a path, as text", path, allowed="a path such as 'excitation.frequency'"
             )
+        elif path in machine.derive:
+            report.fault(
+                where, "conflict", "is derived from other parameters, so it cannot vary by itself", path,
+                allowed="a path without a formula in `derive`",
+            )  # fmt: skip
         elif path in machine.parameters:
             found.append(machine.parameters[path])
         elif report.full:

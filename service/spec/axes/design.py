@@ -33,6 +33,7 @@ from sprag.service.spec.described import Listed, choice
 from sprag.service.spec.fields import read_object
 from sprag.service.spec.report import Report, join, quantity_text
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_COLUMNS
+from sprag.worker.models.formulas import evaluate
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -68,7 +69,9 @@ def read_design(report: Report, found: Mapping[str, Any], machine: Machine) -> t
     if columns is None or report.faults:
         return None, "zip"
     if conditions:
-        columns = chosen(columns, kept(conditions, columns, machine.values, _length(columns)))
+        count = _length(columns)
+        every = columns | evaluate(machine.derive, machine.values, columns, count)
+        columns = chosen(columns, kept(conditions, every, machine.values, count))
         return _as_axes(report, columns, machine, excluded=True), "zip"
     return _as_axes(report, columns, machine, block.lines), "zip"
 

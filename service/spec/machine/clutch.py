@@ -167,8 +167,12 @@ def _shown(value: object) -> object:
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
-def check_laws(report: Report, clutches: Iterable[Clutch], axes: Sequence[Axis], combine: Combine) -> None:
+def check_laws(
+    report: Report, clutches: Iterable[Clutch], axes: Sequence[Axis], combine: Combine, place: str = ""
+) -> None:
     """Record every clutch whose law is negative in its range, or zero everywhere, in some case of the study.
+
+    ``place`` is the JSON Pointer of what varies the laws, by default that of the first axis that does.
 
     The torque rises with each coefficient, and a wider range only adds windups. So the worst law of a grid is the one
     with the smallest coefficients and the widest range, and only that one is checked.
@@ -185,7 +189,7 @@ def check_laws(report: Report, clutches: Iterable[Clutch], axes: Sequence[Axis],
         if not varied:
             _check_law(report, clutch, clutch.values, "")
             continue
-        pointer = f"/axes/{min(position for position, _ in varied.values())}"
+        pointer = place or f"/axes/{min(position for position, _ in varied.values())}"
         worst = {
             path: float(axis.array.max() if path.endswith("windup_limit") else axis.array.min())
             for path, (_, axis) in varied.items()

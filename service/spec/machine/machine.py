@@ -26,11 +26,13 @@ class Machine:
     values : flat path -> SI number; incomplete when faults were recorded
     parameters : flat path -> parameter, for every number that an axis can vary
     structure : its non-numeric part as stored in a study; None where the model has none or it could not be read
+    derive : flat path -> formula in SI numbers, for every number that is derived from others
     """
 
     values: dict[str, float] = field(default_factory=dict)
     parameters: dict[str, Parameter] = field(default_factory=dict)
     structure: dict[str, Any] | None = None
+    derive: dict[str, str] = field(default_factory=dict)
 
     @property
     def fits(self) -> dict[str, ClutchFit]:

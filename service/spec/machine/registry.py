@@ -10,17 +10,19 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from sprag.service.spec.axes.axes import varied_values
+from sprag.service.spec.derive import case_table, layout
 from sprag.service.spec.machine.choices import Choice, drive_choices, shaft_choices
 from sprag.service.spec.machine.clutch import check_laws
 from sprag.service.spec.machine.drive import Drive, read_drive
 from sprag.service.spec.machine.machine import read_plain
-from sprag.service.spec.machine.shaft import read_shaft
+from sprag.service.spec.machine.shaft import check_shaft, read_shaft
 from sprag.service.spec.run import read_run, refuse_run
 from sprag.service.spec.schema.drive import drive_schema, run_schema
 from sprag.service.spec.schema.quantity import object_schema, plain_schema
 from sprag.service.spec.schema.shaft import shaft_schema
 from sprag.service.spec.warnings import warn_machine_shaft, warn_vibration_drive
 from sprag.worker import models
+from sprag.worker.derived import distinct_values
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -56,8 +58,10 @@ class SpecPart:
     Attributes
     ----------
     read_base : reads `base`
+    check_base : checks a machine as a whole that could be read without faults
     base_schema, run_schema : their JSON Schemas
-    read_run : reads `run` as stored in a study, for a machine with its axes (None where they could not be read)
+    read_run : reads `run` as stored in a study, for a machine with its axes (None where they could not be read) and
+        their combination
     check : checks what depends on both machine and axes
     warn : warns of what is allowed but implausible
     choices : the non-numeric fields of a study's machine; also takes the user's spec
@@ -65,20 +69,30 @@ class SpecPart:
 
     read_base: Callable[[Report, object], Machine]
     base_schema: Callable[[], Schema]
-    read_run: Callable[[Report, object, Machine, Axes | None], dict[str, Any]] = _no_run
+    check_base: Callable[[Report, Machine], None] = _nothing
+    read_run: Callable[[Report, object, Machine, Axes | None, Combine], dict[str, Any]] = _no_run
     run_schema: Callable[[], Schema] = _no_run_schema
     check: Callable[[Report, Machine, Axes, Combine], None] = _nothing
     warn: Callable[[Report, Study], None] = _nothing
     choices: Callable[[Study, Mapping[str, Any]], Iterable[Choice]] = _no_choices
 
 
-def _drive_run(report: Report, data: object, machine: Machine, axes: Axes | None) -> dict[str, Any]:
-    return read_run(report, data, varied_values("excitation.frequency", axes, machine.values))
+def _drive_run(report: Report, data: object, machine: Machine, axes: Axes | None, combine: Combine) -> dict[str, Any]:
+    path = "excitation.frequency"
+    if path in machine.derive and axes is not None and not report.faults:
+        return read_run(report, data, distinct_values(layout(machine, axes, combine), path))
+    return read_run(report, data, varied_values(path, axes, machine.values))
 
 
 def _drive_check(report: Report, machine: Machine, axes: Axes, combine: Combine) -> None:
     assert isinstance(machine, Drive)
-    check_laws(report, machine.clutches, axes, combine)
+    for clutch in machine.clutches:
+        if report.faults or not any(path.startswith(clutch.prefix) for path in machine.derive):
+            check_laws(report, [clutch], axes, combine)
+        else:
+            study = layout(machine, axes, combine)
+            paths = [path for path in study.column_paths if path.startswith(clutch.prefix)]
+            check_laws(report, [clutch], case_table(study, paths), "zip", "/derive")
 
 
 def _shaft_run(report: Report, data: object, *_: object) -> dict[str, Any]:
@@ -103,6 +117,7 @@ _PARTS = {
     models.MACHINE_SHAFT: SpecPart(
         read_base=read_shaft,
         base_schema=shaft_schema,
+        check_base=check_shaft,
         read_run=_shaft_run,
         run_schema=_shaft_run_schema,
         warn=warn_machine_shaft,

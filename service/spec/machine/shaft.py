@@ -1,6 +1,6 @@
 """The machine shaft of a spec (`base`): its structure, every number by its flat path, and the paths that axes can vary.
 
-The machine as a whole is checked (`shaft_check`) once its parts could be read.
+The machine as a whole is checked (`check_shaft`) once its parts could be read.
 """
 
 from __future__ import annotations
@@ -75,7 +75,6 @@ def read_shaft(report: Report, data: object) -> ShaftMachine:
     found = read_object(report, "/base", data, FIELDS)
     if found is None:
         return machine
-    before = report.found
     structure = _read_structure(report, found, machine.places)
     if structure is None:
         return machine
@@ -83,9 +82,14 @@ def read_shaft(report: Report, data: object) -> ShaftMachine:
     machine.parameters = machine_shaft.parameters_of(structure)
     _unused(report, found, structure)
     read_numbers(report, found, machine)
-    if report.found == before:
-        check_machine(report, structure, machine.values, machine.places)
     return machine
+
+
+def check_shaft(report: Report, machine: Machine) -> None:
+    """Check the machine as a whole, all of whose parts could be read; faults are recorded in ``report``."""
+    assert isinstance(machine, ShaftMachine)
+    if machine.structure is not None:
+        check_machine(report, machine.structure, machine.values, machine.places)
 
 
 def _read_structure(report: Report, found: Mapping[str, Any], places: dict[str, str]) -> dict[str, Any] | None:

@@ -94,7 +94,9 @@ def read_points(
         point: dict[str, float] = {}
         for path, value in item.items():
             place = join(where, path)
-            if path not in machine.parameters:
+            if path in machine.derive:
+                report.fault(place, "conflict", "is derived from other parameters", path, allowed="a path of `base`")
+            elif path not in machine.parameters:
                 known = did_you_mean(path, machine.parameters)
                 report.fault(place, "invalid-path", f"names no parameter{known}", path, allowed="a path of `base`")
             elif path in varied:

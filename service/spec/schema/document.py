@@ -7,11 +7,12 @@ the run, sizes of grids, clutch laws) are checked by `sprag.service.spec.documen
 from __future__ import annotations
 
 from sprag.service.spec.axes.design import COMBINE
+from sprag.service.spec.derive import derive_schema
 from sprag.service.spec.document import UNNAMED, VERSION
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.schema.axes import axes_schema, exclude_schema, path_schema
 from sprag.service.spec.schema.plan import goal_schema, refine_schema
-from sprag.service.spec.schema.quantity import Schema, object_schema
+from sprag.service.spec.schema.quantity import Schema, object_schema, without_numbers
 from sprag.worker import models
 from sprag.worker.limits import MAX_NAME_LENGTH
 
@@ -36,17 +37,25 @@ def spec_schema() -> Schema:
             "exclude": exclude_schema(),
             "refine": refine_schema(),
             "goal": goal_schema(path_schema()),
+            "derive": derive_schema(),
         },
         required=("sprag", "model", "base"),
         description="a study: a machine, a run, and what varies",
     )
     # Base and run depend on the model.
-    return {**schema, "allOf": [_of_model(model) for model in models.model_names()]}
+    branches = [_of_model(model, derived=derived) for model in models.model_names() for derived in (False, True)]
+    return {**schema, "allOf": branches}
 
 
-def _of_model(model: str) -> Schema:
+def _of_model(model: str, *, derived: bool) -> Schema:
+    """What holds for the specs of a model, with or without derived parameters."""
     part = part_of(model)
+    base = part.base_schema()
     return {
-        "if": {"properties": {"model": {"const": model}}, "required": ["model"]},
-        "then": {"properties": {"base": part.base_schema(), "run": part.run_schema()}},
+        "if": {
+            "properties": {"model": {"const": model}},
+            "required": ["model", *(["derive"] if derived else [])],
+            **({} if derived else {"not": {"required": ["derive"]}}),
+        },
+        "then": {"properties": {"base": without_numbers(base) if derived else base, "run": part.run_schema()}},
     }

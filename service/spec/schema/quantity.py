@@ -42,6 +42,26 @@ def required_of(parameters: Mapping[str, Parameter]) -> list[str]:
     return [name for name, parameter in parameters.items() if parameter.default is None]
 
 
+def without_numbers(schema: Schema) -> Schema:
+    """The schema of an object any number of which may be missing, and null in a list, because it is derived."""
+    found = {name: _without(part) for name, part in schema.items()}
+    fields = schema.get("properties", {})
+    if "required" in schema:
+        found["required"] = [name for name in schema["required"] if "x-unit" not in fields.get(name, {})]
+    ways = schema.get("oneOf", [])
+    if any("x-unit" in fields.get(name, {}) for way in ways for name in way.get("required", ())):
+        del found["oneOf"]
+    if schema.get("items") == QUANTITY:
+        found["items"] = {"type": [*QUANTITY["type"], "null"]}
+    return found
+
+
+def _without(part: Any) -> Any:
+    if isinstance(part, Mapping):
+        return without_numbers(dict(part))
+    return [_without(item) for item in part] if isinstance(part, list) else part
+
+
 def plain_schema(catalogue: tuple[Parameter, ...], prefix: str = "") -> Schema:
     """Schema of the object of all parameters below ``prefix``, nested as their paths are."""
     below = [entry for entry in catalogue if entry.path.startswith(prefix)]

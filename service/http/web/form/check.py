@@ -14,6 +14,7 @@ from sprag.service.jobs.preview import preview_json
 from sprag.service.results.fits import fit_json
 from sprag.service.results.wording import unit_text
 from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
+from sprag.service.spec.derive import with_values
 from sprag.service.spec.document import ParsedSpec, SpecError, load_spec, parse_spec
 from sprag.service.spec.machine.clutch import read_clutch
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
@@ -178,11 +179,16 @@ def clutch_at(spec: Mapping[str, Any], pointer: str) -> dict[str, Any]:
     return found
 
 
+def _with_derived(spec: Mapping[str, Any], study: Study) -> dict[str, Any]:
+    """The spec with the values of derived parameters in its base."""
+    return {**spec, "base": with_values(spec["base"], {path: study.base[path] for path in study.derive})}
+
+
 def _fit(found: Checked, pointer: str, values: Mapping[str, str]) -> None:
     clutch = clutch_at(found.spec, pointer)
     if not clutch.get("data") or "accuracy" not in clutch or pendulums_of(values) < 1:
         return
-    known = backlashes(found.spec, pointer)
+    known = backlashes(found.spec if found.parsed is None else _with_derived(found.spec, found.parsed.study), pointer)
     read = read_clutch(Report(), pointer, clutch, pointer.removeprefix("/base/").replace("/", ".") + ".", known)
     if read is not None and read.fit is not None:
         found.fits[pointer] = (fit_json(read.fit), fit_chart(read.fit, clutch, known[0] if known else 0.0))
@@ -200,8 +206,9 @@ def fits_of(spec: dict[str, Any]) -> dict[str, tuple[ClutchFitReport, FitChart]]
     """Report and picture of each clutch law that the spec gives as measured data, by their JSON Pointers."""
     # The fit is not stored, because it follows from the spec exactly.
     found = {}
-    alone = {key: value for key, value in spec.items() if key in ("sprag", "model", "name", "base", "run")}
-    for pointer, fit in parse_spec(alone).fits.items():
-        known = backlashes(spec, pointer)
+    alone = {key: value for key, value in spec.items() if key in ("sprag", "model", "name", "base", "derive", "run")}
+    parsed = parse_spec(alone)
+    for pointer, fit in parsed.fits.items():
+        known = backlashes(_with_derived(spec, parsed.study), pointer)
         found[pointer] = (fit_json(fit), fit_chart(fit, clutch_at(spec, pointer), known[0] if known else 0.0))
     return found

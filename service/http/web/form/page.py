@@ -21,6 +21,7 @@ from sprag.service.http.web.form import study_check
 from sprag.service.http.web.form.check import Checked
 from sprag.service.http.web.form.fields import FORM_MODEL, degree_field, path_choices, pendulum, run_fields, sections
 from sprag.service.http.web.form.spec import (
+    FORMULA,
     Values,
     axes_of,
     clutch_pointers,
@@ -146,6 +147,7 @@ def reshape(values: Values, wanted: str) -> None:
         count = pendulums_of(values)
         if count < MAX_PENDULUMS:
             _copy(values, f"/base/pendulums/{count - 1}/", f"/base/pendulums/{count}/")
+            _adapt_formulas(values, count)
         values["pendulums"] = str(min(count + 1, MAX_PENDULUMS))
     elif action == "drop-pendulum":
         count = pendulums_of(values)
@@ -179,6 +181,13 @@ def _copy(values: Values, source: str, target: str) -> None:
     values |= {
         target + name.removeprefix(source): text for name, text in list(values.items()) if name.startswith(source)
     }
+
+
+def _adapt_formulas(values: Values, index: int) -> None:
+    """Let the formulas of a copied pendulum use its own parameters."""
+    for name, text in list(values.items()):
+        if name.startswith(f"/base/pendulums/{index}/") and FORMULA in text:
+            values[name] = text.replace(f"pendulums.{index - 1}.", f"pendulums.{index}.")
 
 
 def _drop(values: Values, prefix: str) -> None:

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from sprag.service.faults import Fault
 from sprag.service.http.web.form.fields import FORM_MODEL, pendulum, sections
+from sprag.service.spec.derive import formulas_of, with_values
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
 from sprag.service.spec.units import QuantityError, parse_quantity
@@ -30,7 +31,9 @@ WAYS: Final = {
 }
 #: The form's choice for a run of a given time, which a spec expresses by its duration or window.
 TIMED: Final = "time"
-_FIELDS: Final = frozenset({"sprag", "model", "name", "base", "run", "axes", "combine"})
+_FIELDS: Final = frozenset({"sprag", "model", "name", "base", "run", "axes", "combine", "derive"})
+#: Beginning of a field with the formula of a derived parameter.
+FORMULA: Final = "="
 
 
 def pendulums_of(values: Mapping[str, str]) -> int:
@@ -75,11 +78,33 @@ def spec_of(values: Mapping[str, str]) -> tuple[dict[str, Any], Faults]:
     spec: dict[str, Any] = {"sprag": 1, "model": FORM_MODEL, **_given(values, "/name", "name"), "base": base}
     if "name" in spec:
         spec["name"] = values["/name"].strip()
+    derive = _formulas(base)
+    if derive:
+        spec["derive"] = derive
     spec["run"] = _run(values)
     axes = [_axis(values, index) for index in range(axes_of(values))]
     spec["axes"] = [axis for axis in axes if axis is not None]
     spec["combine"] = values.get("/combine", "grid")
     return spec, faults
+
+
+def _formulas(base: dict[str, Any]) -> dict[str, str]:
+    """Take the formulas out of ``base``: they are texts that begin with an equals sign."""
+    found: dict[str, str] = {}
+
+    def take(place: Any, prefix: str) -> None:
+        for key, value in list(place.items() if isinstance(place, dict) else enumerate(place)):
+            if isinstance(value, dict | list):
+                take(value, f"{prefix}{key}.")
+            elif isinstance(value, str) and value.startswith(FORMULA):
+                found[f"{prefix}{key}"] = value.removeprefix(FORMULA).strip()
+                if isinstance(place, dict):
+                    del place[key]
+                else:
+                    place[key] = None
+
+    take(base, "")
+    return found
 
 
 def plain(text: str) -> Any:
@@ -171,6 +196,8 @@ def _axis(values: Mapping[str, str], index: int) -> dict[str, Any] | None:
 
 def field_of(pointer: str, values: Mapping[str, str]) -> str:
     """The field beside which a fault at ``pointer`` of the spec is shown; "" for the whole form."""
+    if pointer.startswith("/derive/"):
+        pointer = "/base/" + pointer.removeprefix("/derive/").replace(".", "/")
     match = re.fullmatch(r"/axes/(\d+)(?:/(.*))?", pointer)
     if match:
         # Axes that are not filled in are not in the spec.
@@ -201,7 +228,8 @@ def values_of(spec: Mapping[str, Any]) -> Values:
     if not all(isinstance(axis, Mapping) and _plain_axis(axis) for axis in spec.get("axes", ())):
         raise ValueError("the form has no fields for all of these axes")
     values: Values = {"/name": str(spec.get("name", "")), "/combine": str(spec.get("combine", "grid"))}
-    base: Mapping[str, Any] = spec["base"]
+    formulas = {path: f"{FORMULA} {text}" for path, text in formulas_of(spec).items()}
+    base: Mapping[str, Any] = with_values(spec["base"], formulas)
     for key, content in base.items():
         if key == "clutch":
             values |= _clutch_values("/base/clutch", content)

@@ -16,7 +16,7 @@ from sprag.service.faults import Fault
 from sprag.service.http.web.figures.answers import motion_figures
 from sprag.service.http.web.figures.thinning import thin
 from sprag.service.http.web.form.check import check_form, check_text, message
-from sprag.service.http.web.form.page import EMPTY_FORM, share_clutches
+from sprag.service.http.web.form.page import EMPTY_FORM, reshape, share_clutches
 from sprag.service.http.web.form.spec import field_of, plain, spec_of, values_of, with_clutch_defaults
 from sprag.service.http.web.templates import duration, fragment, time_left
 from sprag.service.presets import preset_names, preset_text
@@ -25,6 +25,7 @@ from sprag.service.spec.document import format_of, load_spec, parse_spec
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
 from sprag.worker.study import Study
+from tests.service.spec_sample import changed
 
 EXAMPLES = Path(__file__).resolve().parents[4] / "examples"
 
@@ -47,6 +48,45 @@ def test_a_cloned_study_is_the_same_study(spec: dict[str, Any]) -> None:
     assert faults == {}
     assert physics(parse_spec(again).study) == physics(parse_spec(spec).study)
     assert again["name"] == spec["name"]
+
+
+FORMULAS = {
+    "pendulums.*.inertia": "1.1 * pendulums.*.mass * pendulums.*.arm^2 + 2e-4 kg*m^2",
+    "clutch.coefficients.1": "200 N*m/rad + 0 N*m/rad * max(shaft.inertia / 1 kg*m^2,1)",
+}
+
+
+def derived_spec() -> dict[str, Any]:
+    spec: dict[str, Any] = json.loads(json.dumps(changed({"/derive": FORMULAS, "/base/clutch/coefficients/1": None})))
+    del spec["base"]["pendulums"][0]["inertia"]
+    return spec
+
+
+def test_a_formula_is_written_into_the_field_of_its_parameter() -> None:
+    spec = derived_spec()
+    values = values_of(spec)
+    assert values["/base/pendulums/0/inertia"].startswith("= 1.1 * pendulums.0.mass")
+    assert values["/base/clutch/coefficients"].split("; ")[1].startswith("= 200 N*m/rad")
+    again, faults = spec_of(values)
+    assert faults == {}
+    assert parse_spec(again).study == parse_spec(spec).study
+    assert parse_spec(again).study.derive.keys() == {"pendulums.0.inertia", "clutch.coefficients.1"}
+
+
+def test_a_wrong_formula_is_told_beside_its_field() -> None:
+    values = values_of(derived_spec()) | {"/base/pendulums/0/inertia": "= 2 * pendulums.0.mass"}
+    checked = check_form(values, Chunking())
+    assert checked.faults.keys() == {"/base/pendulums/0/inertia"}
+    assert "kg*m^2" in checked.faults["/base/pendulums/0/inertia"][0]
+    values |= {"/base/pendulums/0/inertia": "= 2e-3 kg*m^2", "/base/clutch/coefficients": "0; = 1 kg; 0; 20000"}
+    assert check_form(values, Chunking()).faults.keys() == {"/base/clutch/coefficients"}
+
+
+def test_a_copied_pendulum_follows_from_its_own_parameters() -> None:
+    values = values_of(derived_spec())
+    reshape(values, "add-pendulum")
+    assert "pendulums.1.mass * pendulums.1.arm^2" in values["/base/pendulums/1/inertia"]
+    assert "pendulums.0.mass * pendulums.0.arm^2" in values["/base/pendulums/0/inertia"]
 
 
 @pytest.mark.parametrize(

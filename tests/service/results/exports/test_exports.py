@@ -73,7 +73,12 @@ class Filled:
 
 @pytest.fixture
 def filled(service: Service, spec: dict[str, Any]) -> Filled:
-    """A grid of three loads, a tied pair of amplitudes and two frequencies, rows that cover every size of double."""
+    """A grid of three loads, a tied pair of amplitudes and two frequencies, rows that cover every size of double.
+
+    The shaft's inertia is derived from the load.
+    """
+    del spec["base"]["shaft"]["inertia"]
+    spec["derive"] = {"shaft.inertia": "2e-3 kg*m^2 * (1 + shaft.load / 1 N*m)"}
     spec["axes"] = [
         {"path": "shaft.load", "values": LOADS},
         {"path": ["excitation.amplitude_x", "excitation.amplitude_y"], "values": ["1 mm", "3 mm"]},
@@ -110,6 +115,8 @@ def test_parquet_and_arrow_tell_units_and_the_study(filled: Filled) -> None:
         about = json.loads(table.schema.metadata[b"sprag"])
         assert about["study"] == filled.id
         assert about["base"]["pendulums.0.mass"] == 0.5
+        assert about["derive"] == {"shaft.inertia": "0.002 * (1 + shaft.load / 1.0)"}
+        assert b"derived: 0.002" in table.schema.field("shaft.inertia").metadata[b"description"]
     # What could not be computed is null, and nothing else is.
     assert arrow["shaft.speed.mean"].null_count == sum(ending != "ok" for ending in filled.rows.endings)
     assert arrow["flags"].to_pylist() == [flags.split(",") if flags else [] for flags in filled.rows.flags]
@@ -126,6 +133,9 @@ def test_openpyxl_reads_typed_cells_units_and_inputs(filled: Filled) -> None:
     assert table["shaft.speed.mean"][4] is None
     assert filled.rows.endings[4] != "ok"
     inputs = {row[0]: row[1:3] for row in book["inputs"].iter_rows(values_only=True)}
+    assert inputs["shaft.inertia"] == ("0.002 * (1 + shaft.load / 1.0)", "kg*m^2")
+    assert {row[0]: row[4] for row in book["inputs"].iter_rows(values_only=True)}["shaft.inertia"] == "derived"
+    assert inputs["derive.shaft.inertia"][0] == "2e-3 kg*m^2 * (1 + shaft.load / 1 N*m)"
     assert inputs["pendulums.0.mass"] == (0.5, "kg")
     assert inputs["shaft.load"] == ("varies", "N*m")
     assert inputs["study"][0] == filled.id
@@ -156,6 +166,9 @@ def test_xarray_opens_a_labelled_grid(filled: Filled, tmp_path: Path) -> None:
             speed.sel({"excitation.frequency": 16.1}).values, filled.column("shaft.speed.mean")[6]
         )
         assert grid["excitation.amplitude_y"].dims == ("excitation.amplitude_x",)
+        inertia = grid.coords["shaft.inertia"]
+        np.testing.assert_array_equal(inertia.values[:, 1, 0], 2e-3 * (1 + np.array(LOADS)))
+        assert (inertia.attrs["units"], inertia.dims) == ("kg*m^2", grid["case"].dims)
         assert decoded(grid["ending"]) == filled.rows.endings
         assert grid["flags"].values.reshape(-1).tolist() == [int(bool(text)) for text in filled.rows.flags]
         assert grid["case"].dims == grid["ending"].dims

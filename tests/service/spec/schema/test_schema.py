@@ -73,6 +73,9 @@ def test_it_accepts_the_examples(validator: Any, examples: Path) -> None:
         {"/axes/2/values": []},
         {"/axes/2/values": ...},
         {"/axes/1/path": []},
+        {"/derive": {"shaft.inertia": 3}},
+        {"/derive": []},
+        {"/base/clutch/coefficients": [0, None]},
     ],
 )
 def test_it_refuses_what_the_reader_refuses(validator: Any, changes: dict[str, Any]) -> None:
@@ -95,6 +98,16 @@ def test_it_refuses_what_the_reader_refuses(validator: Any, changes: dict[str, A
         {"/axes/0": {"path": "gravity", "range": [0, 10, 1]}},
         {"/axes/0": {"path": "gravity", "geomspace": [1, 10, 3]}},
         {"/name": ..., "/axes": ..., "/run": ..., "/combine": ...},
+        {
+            "/base/pendulums/0/inertia": ...,
+            "/base/shaft/inertia": ...,
+            "/base/clutch/coefficients": [0, None],
+            "/derive": {
+                "pendulums.*.inertia": "1 kg*m^2",
+                "shaft.inertia": "1 kg*m^2",
+                "clutch.coefficients.1": "200 N*m/rad",
+            },
+        },
     ],
 )
 def test_it_accepts_what_the_reader_accepts(validator: Any, changes: dict[str, Any]) -> None:

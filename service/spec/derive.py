@@ -1,0 +1,298 @@
+"""The derived parameters of a spec (`derive`): parameters that are formulas of others, in every case of a study.
+
+The base is read twice: first with any number in the place of each derived parameter, which gives the parameters of the
+machine; then with the values of the formulas.
+"""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from sprag.service.spec.axes.sample import unit_sample
+from sprag.service.spec.axes.values import in_range
+from sprag.service.spec.catalogue import model_parameter
+from sprag.service.spec.formulas import Formula, FormulaError, UnknownNameError, read_formula
+from sprag.service.spec.report import Report, join, quantity_text
+from sprag.worker.derived import blocks, involved
+from sprag.worker.limits import MAX_DERIVED
+from sprag.worker.models.formulas import MAX_LENGTH, CircularError, evaluate, evaluation_order
+from sprag.worker.study import Axis, Combine, Study
+
+if TYPE_CHECKING:
+    from sprag.service.spec.machine.machine import Machine
+    from sprag.service.spec.machine.registry import SpecPart
+    from sprag.worker.models import Parameter
+
+HELP: Final = (
+    "parameters that follow from others in every case, by path: formulas of other parameters, of numbers with their "
+    "units and of functions; `*` stands for every pendulum or step"
+)
+EXAMPLE: Final = {"pendulums.*.inertia": "1.1 * pendulums.*.mass * pendulums.*.arm^2 + 2e-4 kg*m^2"}
+_CONSTANT: Final = "constants."
+_MISSING: Final = object()
+#: Points of the ranges of a study that chooses its own cases at which a formula is tried: corners, and as many others.
+_CORNERS: Final = 4096
+
+
+def derive_schema() -> dict[str, Any]:
+    """JSON Schema of `derive`."""
+    return {
+        "type": "object",
+        "maxProperties": MAX_DERIVED,
+        "additionalProperties": {"type": "string", "minLength": 1, "maxLength": MAX_LENGTH},
+        "default": {},
+        "description": HELP,
+        "examples": [EXAMPLE],
+    }
+
+
+def read_machine(report: Report, part: SpecPart, found: Mapping[str, Any]) -> Machine:
+    """Read `base` and `derive` of a spec; faults are recorded in ``report``."""
+    base, before = found.get("base"), report.found
+    given = _read_given(report, found.get("derive", {}), base)
+    if not given:
+        machine = part.read_base(report, base)
+    else:
+        machine = _read_derived(report, part, str(found["model"]), base, given)
+    if report.found == before:
+        part.check_base(report, machine)
+    return machine
+
+
+def pointer_of(derive: Mapping[str, Any], path: str) -> str:
+    """JSON Pointer of the formula of a derived path in the spec's own `derive`."""
+    starred = (key for key in derive if "*" in key and _matches(key, path))
+    return join("/derive", path if path in derive else next(starred, path))
+
+
+def _matches(key: str, path: str) -> bool:
+    parts = list(zip(key.split("."), path.split("."), strict=False))
+    return key.count(".") == path.count(".") and all(mine in ("*", own) for mine, own in parts)
+
+
+def _read_given(report: Report, data: object, base: object) -> dict[str, tuple[str, str]]:
+    """Path -> (pointer, text) of every formula, those with ``*`` once for each item of their list."""
+    allowed = f"an object of at most {MAX_DERIVED} paths with their formulas"
+    if not isinstance(data, Mapping):
+        report.fault("/derive", "wrong-type", "must be an object", data, allowed=allowed)
+        return {}
+    found: dict[str, tuple[str, str]] = {}
+    for key, text in data.items():
+        pointer = join("/derive", key)
+        if not isinstance(text, str):
+            example = next(iter(EXAMPLE.values()))
+            report.fault(pointer, "wrong-type", "must be a formula, as text", text, allowed=f"such as '{example}'")
+            continue
+        for path, own in _expanded(report, pointer, key, text, base):
+            if path in found:
+                report.fault(pointer, "repeated", f"derives {path} a second time", text, allowed="one formula for each")
+            elif _at(base, path) is not _MISSING:
+                report.fault(
+                    pointer, "conflict", f"{path} is derived and cannot be given in `base` too", _at(base, path),
+                    allowed="either a formula in `derive`, or a number in `base`",
+                )  # fmt: skip
+            else:
+                found[path] = pointer, own
+            if len(found) > MAX_DERIVED:
+                report.fault("/derive", "too-many", "derives too many parameters", allowed=allowed)
+                return {}
+    return found
+
+
+def _expanded(report: Report, pointer: str, key: str, text: str, base: object) -> Iterator[tuple[str, str]]:
+    """The paths and formulas of one entry."""
+    if "*" not in key.split("."):
+        yield key, text
+        return
+    prefix = key.partition(".*")[0]
+    items = _at(base, prefix)
+    if not isinstance(items, list) or key.split(".").count("*") > 1:
+        allowed = "`*` once, for the number of a pendulum or a step, as in 'pendulums.*.inertia'"
+        report.fault(pointer, "invalid-path", f"`base` has no list at {prefix}", key, allowed=allowed)
+        return
+    for index in range(min(len(items), MAX_DERIVED + 1)):
+        yield key.replace("*", str(index)), text.replace(f"{prefix}.*.", f"{prefix}.{index}.")
+
+
+def _at(base: object, path: str) -> Any:
+    """What `base` gives at a path; ``_MISSING`` where it gives nothing, or null."""
+    place: Any = base
+    for key in path.split("."):
+        if isinstance(place, Mapping) and key in place:
+            place = place[key]
+        elif isinstance(place, list) and key.isdecimal() and len(key) < 9 and int(key) < len(place):
+            place = place[int(key)]
+        else:
+            return _MISSING
+    return _MISSING if place is None else place
+
+
+def formulas_of(spec: Mapping[str, Any]) -> dict[str, str]:
+    """The formulas of a valid spec as the user wrote them, by path."""
+    given = _read_given(Report(), spec.get("derive", {}), spec.get("base"))
+    return {path: text for path, (_, text) in given.items()}
+
+
+def with_values(base: object, values: Mapping[str, float | str]) -> Any:
+    """``base`` with these values at their paths, as far as it has a place for them."""
+    filled = copy.deepcopy(base)
+    for path, value in values.items():
+        first, _, rest = path.partition(".")
+        if rest and isinstance(filled, dict):
+            filled.setdefault(first, {})
+        above, _, key = path.rpartition(".")
+        place = _at(filled, above) if above else filled
+        if isinstance(place, dict):
+            place[key] = value
+        elif isinstance(place, list) and key.isdecimal() and len(key) < 9 and int(key) <= len(place):
+            place[int(key) : int(key) + 1] = [value]
+    return filled
+
+
+def _read_derived(
+    report: Report, part: SpecPart, model: str, base: object, given: Mapping[str, tuple[str, str]]
+) -> Machine:
+    """Read a machine with derived parameters."""
+    before = report.found
+    entries = {path: model_parameter(model, _catalogue_path(path)) for path in given}
+    numbers = {path: _any_number(entry) for path, entry in entries.items() if entry is not None}
+    filled = with_values(base, numbers)
+    first = Report(filled)
+    machine = part.read_base(first, filled)
+    report.adopt(first)
+    unknown = [path for path in given if path not in machine.parameters and not machine.assumed(path)]
+    for path in unknown:
+        report.fault(given[path][0], "invalid-path", machine.why_not(path), path, allowed="the path of a number")
+    # Values of the first reading are those of `base`, except for the derived paths.
+    formulas = _read_formulas(report, machine, {path: given[path] for path in given if path in machine.parameters})
+    machine.derive = {path: formulas[path].text for path in sorted(formulas)}
+    if report.found > before or not _is_ordered(report, formulas, given):
+        return machine
+    columns = evaluate(machine.derive, machine.values, {}, 1)
+    values = {path: float(column[0]) for path, column in columns.items()}
+    for path, value in values.items():
+        entry = machine.parameters[path]
+        if not entry.accepts(value):
+            report.fault(
+                given[path][0], "out-of-range", f"gives {path} a value out of range with the numbers of `base`",
+                quantity_text(value, entry.unit), allowed=entry.range_text(), unit=entry.unit,
+            )  # fmt: skip
+    if report.found > before:
+        return machine
+    derive = machine.derive
+    machine = part.read_base(report, with_values(base, values))
+    machine.derive = derive
+    return machine
+
+
+def _catalogue_path(path: str) -> str:
+    """The path under which the catalogue of a model has a parameter; constants have any name."""
+    return f"{_CONSTANT}NAME" if path.startswith(_CONSTANT) else path
+
+
+def _any_number(entry: Parameter) -> float:
+    """Some number in the range of a parameter."""
+    usual = (entry.default, 1.0, entry.low, entry.high, 0.5 * (entry.low + entry.high), entry.low + 1e-3)
+    return next(value for value in usual if value is not None and math.isfinite(value) and entry.accepts(value))
+
+
+def _read_formulas(report: Report, machine: Machine, given: Mapping[str, tuple[str, str]]) -> dict[str, Formula]:
+    units = {path: entry.unit for path, entry in machine.parameters.items()}
+    found: dict[str, Formula] = {}
+    for path, (pointer, text) in given.items():
+        try:
+            formula = read_formula(text, units, units[path])
+        except UnknownNameError as error:
+            why = machine.why_not(error.name)
+            report.fault(pointer, "invalid-path", f"{error}: {why}", text, allowed="paths of numbers, and functions")
+            continue
+        except FormulaError as error:
+            entry = machine.parameters[path]
+            report.fault(pointer, error.code, str(error), text, allowed=entry.range_text(), unit=entry.unit)
+            continue
+        for name in sorted(formula.uses - machine.values.keys() - given.keys()):
+            if not report.found:
+                report.fault(pointer, "required", f"uses {name}, which has no value in `base`", text)
+        found[path] = formula
+    return found
+
+
+def _is_ordered(report: Report, formulas: Mapping[str, Formula], given: Mapping[str, tuple[str, str]]) -> bool:
+    try:
+        evaluation_order({path: formula.uses for path, formula in formulas.items()})
+    except CircularError as error:
+        pointer = given[error.paths[0]][0]
+        report.fault(pointer, "circular", f"needs its own value: {error}", allowed="formulas without a circle")
+        return False
+    return True
+
+
+def layout(machine: Machine, axes: tuple[Axis, ...], combine: Combine) -> Study:
+    """The cases of a machine that could be read, with neither model nor run."""
+    return Study("", "", machine.values, {}, axes, combine, derive=machine.derive)
+
+
+def check_derived(report: Report, derive: object, machine: Machine, study: Study, *, ranges: bool = False) -> None:
+    """Record every derived parameter whose value is out of range in some case of ``study``.
+
+    Each combination of the values on which it depends is checked. With ``ranges``, for a study that chooses its own
+    cases, the axes hold the ends of what it may choose; then each combination of the ends is checked, at most
+    `_CORNERS` of them, and as many points in between.
+
+    Parameters
+    ----------
+    derive : that of the spec
+    """
+    for path in study.derive:
+        part, entry = involved(study, [path]), machine.parameters[path]
+        if ranges:
+            part = _over_ranges(part)
+        wrong, first = 0, -1
+        for cases in blocks(part):
+            refused = ~in_range(part.columns(cases)[path], entry)
+            if first < 0 and refused.any():
+                first = cases[int(refused.argmax())]
+            wrong += int(refused.sum())
+        if not wrong:
+            continue
+        values = part.case_parameters(first)
+        units = {name: machine.parameters[name].unit for name in part.axis_paths}
+        where = [f"{name} = {quantity_text(values[name], unit)}" for name, unit in units.items()]
+        each = 1 if ranges else study.cases // part.cases
+        cases_text = f"{wrong * each:,} of {part.cases * each:,} " + ("points tried" if ranges else "cases")
+        report.fault(
+            pointer_of(derive if isinstance(derive, Mapping) else {}, path), "out-of-range",
+            f"gives {path} a value out of range in {cases_text}, first with " + (", ".join(where[:4]) or "the base"),
+            quantity_text(values[path], entry.unit), allowed=entry.range_text(), unit=entry.unit,
+        )  # fmt: skip
+
+
+def _over_ranges(study: Study) -> Study:
+    """Points between the least and the largest values of the axes of ``study``: corners, then a sample."""
+    count = len(study.axes)
+    if not count:
+        return study
+    random = unit_sample("sobol", _CORNERS, 0, count)
+    corners = np.array(list(itertools.product((0.0, 1.0), repeat=count))) if 2**count <= _CORNERS else random.round()
+    points = np.concatenate([corners, random])
+    axes = []
+    for axis, share in zip(study.axes, points.T, strict=True):
+        low, high = axis.array.min(), axis.array.max()
+        axes.append(Axis(axis.paths, low * (1.0 - share) + high * share))
+    return replace(study, axes=tuple(axes), combine="zip")
+
+
+def case_table(study: Study, paths: list[str]) -> tuple[Axis, ...]:
+    """Every combination of the values of ``paths``, which vary, as zipped axes."""
+    part = involved(study, paths)
+    tables = [part.columns(cases) for cases in blocks(part)]
+    return tuple(
+        Axis((path,), np.concatenate([table[path] for table in tables])) for path in paths if path in part.column_paths
+    )

@@ -1,0 +1,278 @@
+"""Formulas of derived parameters: quantities with units are converted to SI, and units are checked by dimension.
+
+A number takes all units that follow it, so ``1 / 5 N/mm`` is one over 5 N/mm. Angles are checked as in practice, where
+the radian is often left out, with one exception: a frequency (Hz) is never taken for an angular speed (rad/s).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Final
+
+from sprag.service.faults import Code
+from sprag.service.spec.units import QuantityError, is_unit, measure, plain_signs, to_float
+from sprag.worker.models.formulas import MAX_LENGTH, RESERVED, Expression, ExpressionError, Node
+
+#: Powers of gram, meter, second and radian; None for the number 0, which has any unit.
+Powers = dict[str, Fraction] | None
+
+_PIECE: Final = re.compile(
+    r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?)"
+    r"|(?P<name>[A-Za-z_][A-Za-z_0-9]*(?:\.[A-Za-z_0-9]+)*)"
+)
+_UNIT: Final = re.compile(
+    r"\s*(?P<name>[A-Za-zµ°][A-Za-zµ°_0]*)(?![A-Za-z_0-9.(])"
+    r"(?:\s*(?:\*\*|\^)\s*[+-]?[0-9]{1,2}(?![0-9.])|[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+)?"
+)
+_BETWEEN_UNITS: Final = re.compile(r"\s*[*/](?!\*)|(?=\s)")
+_PLAIN: Final[dict[str, Fraction]] = {}
+_ANGLE: Final = {"radian": Fraction(1)}
+#: Functions of a plain number (or an angle) with a plain number or an angle.
+_TO_PLAIN: Final = frozenset({"sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "floor"})
+_TO_ANGLE: Final = frozenset({"asin", "acos", "atan"})
+_COMPARISONS: Final = frozenset({"<", "<=", ">", ">="})
+_HZ_HINT: Final = "one revolution is 2 pi rad: write '1 rev * frequency', or 'speed / 1 rev'"
+
+
+class FormulaError(ValueError):
+    """A formula that cannot be used. ``str()`` is a sentence without the formula; ``code`` is stable."""
+
+    def __init__(self, code: Code, message: str) -> None:
+        super().__init__(message)
+        self.code: Code = code
+
+
+class UnknownNameError(FormulaError):
+    """A formula that uses ``name``, which is not a parameter."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__("invalid-path", f"uses '{name[:60]}'")
+        self.name = name
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """A formula as stored in a study.
+
+    Attributes
+    ----------
+    text : str
+        The formula in SI numbers.
+    uses : frozenset of str
+        The parameters in it.
+    """
+
+    text: str
+    uses: frozenset[str]
+
+
+def read_formula(text: str, units: dict[str, str], unit: str) -> Formula:
+    """Read the formula of a parameter.
+
+    Parameters
+    ----------
+    text : as the user wrote it
+    units : path -> SI unit, of every parameter that it may use
+    unit : SI unit that its value must have
+
+    Raises
+    ------
+    FormulaError
+        When it cannot be read, uses something else, or its value is of another dimension.
+    """
+    if len(text) > MAX_LENGTH:
+        raise FormulaError("too-long", f"is longer than {MAX_LENGTH} characters")
+    scan = _Scan(plain_signs(text), units.keys())
+    try:
+        expression = Expression(scan.converted, units)
+    except ExpressionError as error:
+        raise FormulaError("invalid-formula", scan.told(error)) from None
+    found = _Dimensions(scan, units).of(expression.root)
+    wanted = _powers(unit)
+    if not _alike(found, wanted):
+        raise FormulaError("wrong-unit", f"gives {_text(found)}, expected {unit}{_hint(found, wanted)}")
+    return Formula(scan.converted, expression.used)
+
+
+class _Scan:
+    """A formula with its quantities converted to SI numbers.
+
+    Attributes
+    ----------
+    converted : the formula in SI numbers
+    quantities : position in ``converted`` -> powers of the unit of the number there
+    """
+
+    def __init__(self, text: str, known: Collection[str]) -> None:
+        self.quantities: dict[int, Powers] = {}
+        self._places: list[tuple[int, int]] = [(0, 0)]
+        self._known = known
+        parts: list[str] = []
+        length = position = 0
+        while position < len(text):
+            match = _PIECE.match(text, position)
+            part, end = (text[position], position + 1) if match is None else (match[0], match.end())
+            if match is not None and match["number"]:
+                last = self._last_unit(text, end)
+                if last > end:
+                    part, self.quantities[length] = self._converted(match[0], text[end:last])
+                    end = last
+            elif match is not None:
+                self._check_name(match[0])
+                if match[0] == "deg":
+                    self.quantities[length] = _ANGLE
+            parts.append(part)
+            length, position = length + len(part), end
+            self._places.append((length, position))
+        self.converted = "".join(parts)
+
+    def told(self, error: ExpressionError) -> str:
+        """The message of a fault in the converted formula, with the position in the original one."""
+        if error.position is None:
+            return str(error)
+        here, there = max(place for place in self._places if place[0] <= error.position)
+        sentence = str(error).removesuffix(f" (at character {error.position + 1})")
+        return f"{sentence} (at character {there + error.position - here + 1})"
+
+    def _last_unit(self, text: str, position: int) -> int:
+        """The end of the units that follow a number; its own end where there are none."""
+        unit = _UNIT.match(text, position)
+        while unit is not None:
+            position = unit.end()
+            between = _BETWEEN_UNITS.match(text, position)
+            unit = None if between is None else _UNIT.match(text, between.end())
+            if unit is not None and (unit["name"] in self._known or not is_unit(unit["name"])):
+                unit = None
+        return position
+
+    @staticmethod
+    def _converted(number: str, unit: str) -> tuple[str, Powers]:
+        try:
+            factor, powers = measure(unit.strip())
+            value = to_float(Fraction(number) * factor)
+        except QuantityError as error:
+            raise FormulaError(error.code, f"'{number}{unit}' {error}") from None
+        return repr(value), {name: Fraction(power) for name, power in powers.items()}
+
+    def _check_name(self, name: str) -> None:
+        if name not in self._known and name not in RESERVED:
+            raise UnknownNameError(name)
+
+
+class _Dimensions:
+    """The units of the parts of a formula."""
+
+    def __init__(self, scan: _Scan, units: dict[str, str]) -> None:
+        self._quantities, self._units = scan.quantities, units
+
+    def of(self, node: Node) -> Powers:
+        """The unit of the value of a node; FormulaError where units do not go together."""
+        kind = node.kind
+        if kind == "number":
+            return self._quantities.get(node.position, None if node.number == 0.0 else _PLAIN)
+        if kind.startswith("name "):
+            return _powers(self._units[kind[5:]])
+        if kind == "^":
+            return self._power(node)
+        parts = [self.of(part) for part in node.parts]
+        if kind in {"*", "/"}:
+            sign = 1 if kind == "*" else -1
+            if None in parts:
+                return None
+            left, right = (part or _PLAIN for part in parts)
+            return {name: left.get(name, Fraction()) + sign * right.get(name, Fraction()) for name in {*left, *right}}
+        if kind in {"negative", "abs"}:
+            return parts[0]
+        if kind in {"sign", "step"}:
+            return _PLAIN
+        if kind == "sqrt":
+            return None if parts[0] is None else {name: power / 2 for name, power in parts[0].items()}
+        if kind in _TO_PLAIN | _TO_ANGLE:
+            self._require_plain(kind, parts[0])
+            return _ANGLE if kind in _TO_ANGLE else _PLAIN
+        if kind == "if":
+            return self._same(kind, parts[1:])
+        unit = self._same(kind, parts)
+        return _PLAIN if kind in _COMPARISONS else _ANGLE if kind == "atan2" else unit
+
+    def _power(self, node: Node) -> Powers:
+        base, exponent = node.parts
+        self._require_plain("^", self.of(exponent))
+        unit = self.of(base)
+        if unit is None or not any(unit.values()):
+            return unit
+        number = _constant(exponent)
+        if number is None:
+            if not any(power for name, power in unit.items() if name != "radian"):
+                return _PLAIN
+            raise FormulaError("wrong-unit", f"raises {_text(unit)} to a power that is not a plain number")
+        return {name: power * number for name, power in unit.items()}
+
+    @staticmethod
+    def _require_plain(kind: str, unit: Powers) -> None:
+        if not _alike(unit, _PLAIN):
+            what = "the exponent" if kind == "^" else kind
+            raise FormulaError("wrong-unit", f"{what} takes a plain number or an angle, not {_text(unit)}")
+
+    @staticmethod
+    def _same(kind: str, units: list[Powers]) -> Powers:
+        given = [unit for unit in units if unit is not None]
+        for unit in given[1:]:
+            if not _alike(unit, given[0]):
+                what = {"+": "adds", "-": "subtracts"}.get(kind, f"'{kind}' compares")
+                raise FormulaError("wrong-unit", f"{what} {_text(given[0])} and {_text(unit)}{_hint(unit, given[0])}")
+        return given[0] if given else None
+
+
+def _powers(unit: str) -> dict[str, Fraction]:
+    return {name: Fraction(power) for name, power in measure(unit)[1].items()}
+
+
+def _constant(node: Node) -> Fraction | None:
+    """The value of an exponent that consists of numbers; None where it does not."""
+    if node.kind == "number":
+        return Fraction(repr(node.number))
+    parts = [_constant(part) for part in node.parts]
+    if node.kind == "negative" and parts[0] is not None:
+        return -parts[0]
+    if node.kind == "/" and parts[0] is not None and parts[1]:
+        return parts[0] / parts[1]
+    return None
+
+
+def _without_angle(unit: dict[str, Fraction]) -> dict[str, Fraction]:
+    return {name: power for name, power in unit.items() if power and name != "radian"}
+
+
+def _alike(one: Powers, other: Powers) -> bool:
+    """Whether two units are those of the same quantity; the radian counts only where speed and frequency differ."""
+    if one is None or other is None:
+        return True
+    if _without_angle(one) != _without_angle(other):
+        return False
+    return not _per_second(one) or one.get("radian", 0) == other.get("radian", 0)
+
+
+def _per_second(unit: dict[str, Fraction]) -> bool:
+    return _without_angle(unit) == {"second": Fraction(-1)}
+
+
+def _hint(one: Powers, other: Powers) -> str:
+    alike = one is not None and other is not None and _per_second(one) and _per_second(other)
+    return f"; {_HZ_HINT}" if alike else ""
+
+
+def _text(unit: Powers) -> str:
+    """A unit for a message, such as "kg*m^2/s"."""
+    names = {"gram": "kg", "meter": "m", "second": "s", "radian": "rad"}
+    present = [(names[name], (unit or {}).get(name, Fraction())) for name in names]
+
+    def powers(sign: int) -> list[str]:
+        found = [(name, sign * power) for name, power in present if sign * power > 0]
+        return [name if power == 1 else f"{name}^{power}" for name, power in found]
+
+    above, below = "*".join(powers(1)), "/".join(["", *powers(-1)])
+    return f"{above or '1'}{below}" if above or below else "a plain number"

@@ -1,0 +1,116 @@
+"""Formulas of parameters: quantities in them, units by dimension, positions of faults."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sprag.service.spec.formulas import FormulaError, read_formula
+from sprag.worker.models.formulas import evaluate
+
+UNITS = {
+    "mass": "kg", "arm": "m", "speed": "rad/s", "frequency": "Hz", "angle": "rad", "load": "N*m", "ratio": "1",
+    "part.0.damping": "N*m*s/rad",
+}  # fmt: skip
+VALUES = {"mass": 2.0, "arm": 0.3, "speed": 5.0, "frequency": 4.0, "angle": 0.5, "load": 1.5, "ratio": 0.25}
+VALUES |= {"part.0.damping": 0.02}
+
+
+def value(text: str, unit: str) -> float:
+    formula = read_formula(text, {**UNITS, "x": unit}, unit)
+    return float(evaluate({"x": formula.text}, {**VALUES, "x": 0.0}, {}, 1)["x"][0])
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "expected"),
+    [
+        ("2 mm", "m", 0.002),
+        ("3 * 2 mm", "m", 0.006),
+        ("mass / 5 N/mm", "s^2", 2.0 / 5000.0),
+        ("mass / (5 N/mm)", "s^2", 2.0 / 5000.0),
+        ("1 N m + 2 Nm + 3 N·m", "N*m", 6.0),
+        ("5 kg * m", "kg*m", 5.0),
+        ("5 kg*arm", "kg*m", 1.5),
+        ("arm^2 * 1 kg", "kg*m^2", 0.09),
+        ("arm**2 * 1e3 g", "kg*m^2", 0.09),
+        ("2 mm²", "m^2", 2e-6),
+        ("4 s^-1 * arm", "m/s", 1.2),
+        ("part.0.damping * speed", "N*m", 0.1),
+        ("0.5 * mass * arm^2 * speed^2", "N*m", 0.5 * 2.0 * 0.09 * 25.0),
+        ("frequency * 1 rev", "rad/s", 8.0 * math.pi),
+        ("speed / 1 rev", "Hz", 5.0 / (2.0 * math.pi)),
+        ("1500 rpm / 1 rev", "Hz", 25.0),
+        ("4*pi^2*frequency^2*arm", "m/s^2", 4.0 * math.pi**2 * 16.0 * 0.3),
+        ("sqrt(load / mass)", "m/s", math.sqrt(0.75)),
+        ("(arm^2)^(1/2)", "m", 0.3),
+        ("mass * sin(30 deg) + mass * cos(2 * angle)", "kg", 2.0 * 0.5 + 2.0 * math.cos(1.0)),
+        ("30*deg", "rad", math.pi / 6.0),
+        ("atan2(arm, 1 m)", "rad", math.atan2(0.3, 1.0)),
+        ("if(mass > 1 kg, arm, 2*arm)", "m", 0.3),
+        ("max(0, arm - 1 m)", "m", 0.0),
+        ("min(arm, 10 cm)", "m", 0.1),
+        ("abs(-arm)", "m", 0.3),
+        ("mass * exp(ratio) * ratio^ratio", "kg", 2.0 * math.exp(0.25) * 0.25**0.25),
+        ("0", "kg", 0.0),
+        ("arm + 0 * mass", "m", 0.3),
+        ("arm + 0 m * ratio", "m", 0.3),
+        ("mod(arm, 20 cm)", "m", 0.1),
+    ],
+)
+def test_the_value_is_that_of_the_formula_by_hand(text: str, unit: str, expected: float) -> None:
+    assert value(text, unit) == pytest.approx(expected, rel=1e-14, abs=1e-300)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "message"),
+    [
+        ("mass + arm", "kg", "adds kg and m"),
+        ("arm + 0 kg", "m", "adds m and kg"),
+        ("mass - 1", "kg", "subtracts kg and a plain number"),
+        ("mass * arm", "kg", r"gives kg\*m, expected kg"),
+        ("frequency", "rad/s", "one revolution"),
+        ("speed", "Hz", "one revolution"),
+        ("speed + frequency", "rad/s", "one revolution"),
+        ("sin(arm)", "1", "sin takes a plain number"),
+        ("arm^mass", "m", "exponent"),
+        ("arm^ratio", "m", "to a power that is not a plain number"),
+        ("if(ratio, arm, mass)", "m", "compares m and kg"),
+        ("mass < arm", "1", "compares kg and m"),
+        ("max(arm, 1)", "m", "compares m and a plain number"),
+        ("sqrt(mass)", "kg", r"kg\^1/2"),
+        ("1 / frequency", "Hz", "gives s"),
+        ("2 parsec", "m", "unknown unit"),
+        ("1e999 m", "m", "too large"),
+    ],
+)
+def test_units_that_do_not_go_together_are_refused(text: str, unit: str, message: str) -> None:
+    with pytest.raises(FormulaError, match=message):
+        read_formula(text, UNITS, unit)
+
+
+def test_a_parameter_is_no_unit() -> None:
+    assert read_formula("5 kg * m", {"m": "kg"}, "kg^2").uses == {"m"}
+
+
+@pytest.mark.parametrize(
+    ("text", "character"),
+    [("2 mm + ", 8), ("2 mm + $", 8), ("1234 mm * 5 kg ) * 2", 16), ("mass arm", 6), ("sin 2", 5)],
+)
+def test_the_position_of_a_fault_is_that_in_the_text_as_given(text: str, character: int) -> None:
+    with pytest.raises(FormulaError, match=rf"\(at character {character}\)"):
+        read_formula(text, UNITS, "m")
+
+
+def test_a_column_has_the_bits_of_its_single_cases() -> None:
+    formula = read_formula("mass * arm^2 * exp(sin(angle)) * ratio^1.5 + 0.1 kg*m^2", UNITS, "kg*m^2").text
+    draw = np.random.default_rng(1)
+    columns = {name: draw.uniform(0.1, 2.0, 1001) for name in ("mass", "arm", "angle", "ratio")}
+    base = {**VALUES, "x": 0.0}
+    together = evaluate({"x": formula}, base, columns, 1001)["x"]
+    for case in range(0, 1001, 37):
+        one = {name: column[case : case + 1] for name, column in columns.items()}
+        assert evaluate({"x": formula}, base, one, 1)["x"][0] == together[case]
+        at = {name: float(column[case]) for name, column in columns.items()}
+        assert evaluate({"x": formula}, base | at, {}, 3)["x"].tolist() == [together[case]] * 3

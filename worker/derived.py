@@ -1,0 +1,45 @@
+"""What the derived parameters of a study depend on, and the values that they take."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sprag.worker.models.formulas import needed, sources
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from numpy.typing import NDArray
+
+    from sprag.worker.study import Study
+
+#: Cases that are evaluated at once.
+_AT_ONCE: Final = 1 << 16
+
+
+def involved(study: Study, paths: Iterable[str]) -> Study:
+    """The study with only the axes on which the values of ``paths`` depend, and only the formulas that they need.
+
+    Each combination of their values is one case of it.
+    """
+    paths = tuple(paths)
+    roots = sources(study.derive, study.base, paths)
+    axes = tuple(axis for axis in study.axes if not roots.isdisjoint(axis.paths))
+    return replace(study, axes=axes, derive=needed(study.derive, study.base, paths))
+
+
+def blocks(study: Study) -> Iterator[range]:
+    """All cases of a study, many at a time."""
+    return (range(first, min(first + _AT_ONCE, study.cases)) for first in range(0, study.cases, _AT_ONCE))
+
+
+def distinct_values(study: Study, path: str) -> NDArray[np.float64]:
+    """The distinct values (SI) of any parameter of a study, ascending."""
+    if path not in study.derive:
+        axis = study.axis_of(path)
+        return np.array([study.base[path]]) if axis is None else np.unique(study.axes[axis].array)
+    part = involved(study, [path])
+    return np.unique(np.concatenate([np.unique(part.columns(cases)[path]) for cases in blocks(part)]))
