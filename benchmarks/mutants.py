@@ -20,6 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 _FOLDERS = ("sprag", "engine", "worker", "service", "migrations", "tests", "benchmarks")
 _FAULTS = "tests/acceptance/test_faults.py::"
 _KILLS = "tests/acceptance/test_kills.py::"
+_ROUNDS = "tests/contract/test_rounds.py::"
 _CERTIFICATE = "tests/engine/test_certificate.py::"
 
 
@@ -70,6 +71,42 @@ MUTANTS = (
         '        connection.exec_driver_sql("COMMIT")\n        connection.exec_driver_sql("BEGIN IMMEDIATE")\n'
         "        endings = Counter(result.endings)",
         (f"{_FAULTS}test_a_power_cut_takes_nothing_that_was_acknowledged",),
+    ),
+    Mutant(
+        "a round and its chunks in two transactions",
+        "service/storage/rounds.py",
+        "            chunks = [Chunk(number, first + start, size) for start, size in sizes]",
+        '            connection.exec_driver_sql("COMMIT")\n            connection.exec_driver_sql("BEGIN")\n'
+        "            chunks = [Chunk(number, first + start, size) for start, size in sizes]",
+        (f"{_ROUNDS}test_a_round_that_breaks_off_changes_nothing",),
+    ),
+    Mutant(
+        "a round is appended twice",
+        "service/storage/rounds.py",
+        "    return row.done == row.cases and cases in {None, row.cases}",
+        "    return bool(row.done == row.cases)",
+        (f"{_ROUNDS}test_a_round_is_appended_once_and_only_while_the_study_is_going",),
+    ),
+    Mutant(
+        "a round is appended before its predecessor is complete",
+        "service/storage/rounds.py",
+        "    return row.done == row.cases and cases in {None, row.cases}",
+        "    return cases in {None, row.cases}",
+        (f"{_ROUNDS}test_a_round_is_appended_once_and_only_while_the_study_is_going",),
+    ),
+    Mutant(
+        "a held study gets its next round",
+        "service/storage/rounds.py",
+        "    if row is None or row.most_cases is None or not StudyState(row.state).going:",
+        "    if row is None or row.most_cases is None or StudyState(row.state).terminal:",
+        (f"{_ROUNDS}test_a_round_is_appended_once_and_only_while_the_study_is_going",),
+    ),
+    Mutant(
+        "a study ends between its rounds",
+        "service/storage/work.py",
+        "            goes_on = most_cases is not None and summary is None",
+        "            goes_on = False",
+        (f"{_ROUNDS}test_a_study_with_rounds_is_not_ended_between_them",),
     ),
     Mutant(
         "no quarantine",

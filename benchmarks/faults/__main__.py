@@ -17,6 +17,7 @@ from benchmarks.faults.disk import disk, file_limit
 from benchmarks.faults.kills import kills
 from benchmarks.faults.link import link
 from benchmarks.faults.powercut import powercut
+from benchmarks.faults.rounds import rounds
 from benchmarks.faults.stopped import stopped
 
 
@@ -25,7 +26,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.faults", description=__doc__)
     drills = parser.add_subparsers(required=True, metavar="NAME")
 
-    def drill(name: str, run: Callable[..., dict[str, Any]], help_text: str, **defaults: int | float) -> None:
+    def drill(name: str, run: Callable[..., dict[str, Any]], help_text: str, **defaults: int | float | str) -> None:
         command = drills.add_parser(name, help=help_text)
         for option, default in defaults.items():
             command.add_argument(f"--{option}", type=type(default), default=default)
@@ -40,6 +41,7 @@ def main() -> None:
         "link", link, "links between hosts are cut (as root: it makes network namespaces)", cases=2_000, periods=200.0
     )
     drill("powercut", powercut, "the power goes between any two system calls of a commit", studies=12, seed=1)
+    drill("rounds", rounds, "kill -9 in a study that chooses its own cases", count=50, seed=1, url="")
     drill("stopped", stopped, "dispatchers are stopped, replaced and woken", cases=4_000, rounds=10, seed=1)
     drill(
         "badcases", badcases, "cases that crash or never return",

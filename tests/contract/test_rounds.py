@@ -160,6 +160,40 @@ def test_a_round_is_appended_once_and_only_while_the_study_is_going(store: Store
     assert store.get_study(record.id).cases == 27
 
 
+class BrokenOffError(Exception):
+    """The process ends here."""
+
+
+def test_a_round_that_breaks_off_changes_nothing(store: Store) -> None:
+    record = create(store)
+    epoch = store.take_over("test")
+    run_chunks(store, epoch, record.number)
+    before, last, broken = whole(store, record), False, 0
+    study = store.study_of(record.number)
+    left = 0
+
+    def meet(_connection: object, _cursor: object, statement: str, *_: object) -> None:
+        nonlocal left
+        left -= statement.startswith(("INSERT", "UPDATE", "DELETE"))
+        if left == 0:
+            raise BrokenOffError
+
+    while not last:
+        left = broken + 1
+        sa.event.listen(sa.engine.Engine, "after_cursor_execute", meet)
+        try:
+            last = Rounds(store).advance(epoch, record.number, study) is not None
+        except BrokenOffError:
+            broken += 1
+        finally:
+            sa.event.remove(sa.engine.Engine, "after_cursor_execute", meet)
+        if not last:
+            assert whole(store, record) == before
+            assert store.open_chunks(record.number) == []
+    assert broken >= 4  # an earlier end of the rounds, the round, its chunks, the study
+    assert store.get_study(record.id).cases == 50
+
+
 def test_a_study_with_rounds_is_not_ended_between_them(store: Store) -> None:
     record = create(store)
     epoch = store.take_over("test")

@@ -1,0 +1,163 @@
+"""A study that chooses its own cases under kill -9: in its cases, in the planner, in the transaction between rounds.
+
+The process that runs the study kills itself before a drawn event: a statement or the end of a transaction, a call of
+the planner. The next process goes on, and is killed again. In the end the study has the same cases, rounds and rows as
+an undisturbed one, bit for bit.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import sqlalchemy as sa
+
+from benchmarks.faults.harness import ROOT, environment
+from sprag.service.presets import preset_text
+from sprag.service.spec.document import load_spec, parse_spec
+from sprag.service.storage import maintenance
+from sprag.service.storage.part import SystemClock
+from sprag.service.storage.session import Session
+from sprag.service.storage.store import Store
+from sprag.service.storage.tables import STUDIES, results_table
+from sprag.worker import planning
+from sprag.worker.chunking import Chunking
+from sprag.worker.dispatcher import Dispatcher
+from sprag.worker.executors.inline import InlineExecutor
+from sprag.worker.planning.rounds import Planner
+from sprag.worker.states import StudyState
+
+#: Events of the whole study, roughly: what is drawn lies within, or the process ends with the study.
+_EVENTS = 60
+#: Events in whose middle a process is killed.
+_PLANNER, _STATEMENT, _COMMIT = "planner", "statement", "commit"
+
+
+def rounds(folder: Path, *, count: int = 50, seed: int = 1, url: str = "") -> dict[str, Any]:
+    """Run a refined study under ``count`` kills and compare it with an undisturbed one; gives the figures."""
+    draw = random.Random(seed)
+    url = url or f"sqlite:///{folder / 'rounds.sqlite3'}"
+    session = Session(url)
+    maintenance.upgrade(session)
+    session.close()
+    killed: Counter[str] = Counter()
+    studies = 0
+    with Store.open(url, chunking=Chunking(cases=8)) as store:
+        undisturbed = _create(store)
+        _run(url, undisturbed, 0, killed)
+        while killed.total() < count:
+            disturbed = _create(store)
+            studies += 1
+            while store.get_study(disturbed).state is not StudyState.FINISHED:
+                # Once there were kills enough, the last study is left alone.
+                _run(url, disturbed, 0 if killed.total() >= count else draw.randint(1, _EVENTS), killed)
+            assert _whole(store, disturbed) == _whole(store, undisturbed)
+        record = store.get_study(undisturbed)
+    return {
+        "studies": studies,
+        "kills": dict(killed),
+        "cases of each": record.cases,
+        "rounds of each": len(_whole_rounds(url, undisturbed)),
+        "other, missing or doubled cases, rounds and rows": 0,
+    }
+
+
+def _create(store: Store) -> str:
+    spec: dict[str, Any] = json.loads(preset_text("one_pendulum")[1])
+    spec["axes"] = [
+        {"path": "excitation.frequency", "values": ["24 Hz", "26 Hz"]},
+        {"path": "shaft.load", "adaptive": [0.05, 0.6]},
+    ]
+    spec["refine"] = {"results": ["shaft.speed.mean", "efficiency"], "error": "2 %", "start": 5, "finest": "1/32"}
+    parsed = parse_spec(load_spec(json.dumps(spec), "json"))
+    return store.create_study(parsed.spec, parsed.study, fresh=True).id
+
+
+def _run(url: str, study: str, fatal: int, killed: Counter[str]) -> None:
+    """Run the study in a process of its own that ends before event number ``fatal``; 0: it ends with the study."""
+    told = subprocess.run(
+        [sys.executable, "-m", "benchmarks.faults.rounds", url, study, str(fatal)],
+        cwd=ROOT, env=environment(), stdout=subprocess.PIPE, text=True, check=False,
+    )  # fmt: skip
+    assert told.returncode == (-signal.SIGKILL if told.stdout else 0), told
+    if told.stdout:
+        killed[told.stdout.strip()] += 1
+
+
+def _whole(store: Store, study: str) -> tuple[Any, ...]:
+    """Everything of a study that may not depend on how it was run."""
+    with store.session.read() as connection:
+        columns = (STUDIES.c.number, STUDIES.c.study, STUDIES.c.model, STUDIES.c.variant)
+        number, text, model, variant = connection.execute(sa.select(*columns).where(STUDIES.c.id == study)).one()
+        c = results_table(model, variant).c
+        rows = connection.execute(
+            sa.select(*(column for column in c if column.name != "study"))
+            .where(c.study == number)
+            .order_by(c.case_number)
+        ).all()
+    rounds = [(found.round, found.cases, found.summary) for found in store.rounds(study)]
+    return text, [tuple(map(repr, row)) for row in rows], rounds
+
+
+def _whole_rounds(url: str, study: str) -> list[Any]:
+    with Store.open(url) as store:
+        return [found for found in store.rounds(study) if found.cases]
+
+
+class _Fate:
+    """Counts events and ends the process before one of them."""
+
+    def __init__(self, fatal: int) -> None:
+        self._left = fatal
+
+    def meet(self, event: str) -> None:
+        self._left -= 1
+        if self._left == 0:
+            print(event, flush=True)
+            os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _watched(make: Callable[..., Planner], fate: _Fate) -> Callable[..., Planner]:
+    """A planner whose every call is an event."""
+
+    def made(plan: Any) -> Planner:
+        planner = make(plan)
+        tell, ask = planner.tell, planner.ask
+        planner.tell = lambda rows: (fate.meet(_PLANNER), tell(rows), fate.meet(_PLANNER))  # type: ignore
+        planner.ask = lambda: (fate.meet(_PLANNER), ask())[1]  # type: ignore[method-assign]
+        return planner
+
+    return made
+
+
+def main(url: str, study: str, fatal: int) -> None:
+    """Run every study of the database here, until the event that ends the process."""
+    fate = _Fate(fatal)
+    with Store.open(url, chunking=Chunking(cases=8)) as store:
+        if fatal:
+            for kind, make in list(planning.PLANNERS.items()):
+                planning.PLANNERS[kind] = _watched(make, fate)
+            sa.event.listen(sa.engine.Engine, "commit", lambda *_: fate.meet(_COMMIT))
+            sa.event.listen(sa.engine.Engine, "before_cursor_execute", _writes(fate))
+        dispatcher = Dispatcher(store, InlineExecutor(), SystemClock(), owner="drill")
+        dispatcher.run(lambda: store.get_study(study).over)
+
+
+def _writes(fate: _Fate) -> Callable[..., None]:
+    def meet(_connection: object, _cursor: object, statement: str, *_: object) -> None:
+        if statement.startswith(("INSERT", "UPDATE", "DELETE")):
+            fate.meet(_STATEMENT)
+
+    return meet
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2], int(sys.argv[3]))
