@@ -193,21 +193,21 @@ def _read_constraints(report: Report, data: object, infos: Sequence[ResultInfo])
         value = read_value(report, join(where, kind), fields[kind], info)
         within = _read_within(report, where, fields, info, kind, value)
         if value is not None and within is not None:
-            found.append({"result": info.name, kind: value, **({"within": within} if kind == "is" else {})})
+            found.append({"result": info.name, kind: value, **({"within": within} if within else {})})
     return found
 
 
 def _read_within(
     report: Report, where: str, fields: Mapping[str, Any], info: ResultInfo, kind: str, value: float | None
 ) -> float | None:
-    """Half the width (SI) of an equality, given as a quantity or relative to its value; 0 for an inequality."""
+    """Half the width (SI) of an equality, a quantity or relative to its value; 0 for other kinds and other results."""
     if kind != "is" or info.kind != "real":
         if "within" in fields:
             report.fault(
                 join(where, "within"), "not-used", "has no meaning here", fields["within"],
                 allowed="only with `is` and a real number",
             )  # fmt: skip
-        return 0.0 if kind != "is" else 0.5
+        return 0.0
     if value is None:
         return None
     share = in_percent(fields["within"]) if "within" in fields else _DEFAULT_WITHIN

@@ -1,0 +1,114 @@
+"""The part of a spec that describes a goal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from sprag.service.spec.machine.registry import part_of
+from sprag.service.spec.plan.goal import read_goal, read_points, read_variables
+from sprag.service.spec.report import Report
+from sprag.worker import models
+from tests.service.spec_sample import SPEC, parsed
+
+GOAL: dict[str, Any] = {
+    "vary": [
+        {"path": "pendulums.0.spring_rate", "from": "15 N/mm", "to": "5 N/mm"},
+        {"path": "pendulums.0.arm", "values": ["20 mm", "25 mm", "30 mm"]},
+        {"path": ["excitation.amplitude_x", "excitation.amplitude_y"], "from": "1 mm", "to": "3 mm"},
+    ],
+    "best": [{"result": "efficiency", "max": True}, {"result": "shaft.irregularity"}],
+    "subject_to": [
+        {"result": "shaft.speed.mean", "is": "8 rad/s", "within": "2 %"},
+        {"result": "torque.max", "at_most": "5000 N*mm"},
+        {"result": "regime", "is": "periodic"},
+        {"result": "regime.order", "is": 1},
+    ],
+    "at": [{"shaft.load": "0.2 N*m"}, {"shaft.load": 0.3}],
+    "population": 20,
+}
+
+
+def read(changes: dict[str, Any]) -> tuple[dict[str, Any] | None, Report]:
+    """The plan of the goal with other fields, and the report."""
+    data = {name: value for name, value in {**GOAL, **changes}.items() if value is not ...}
+    report = Report({"goal": data})
+    machine = part_of("vibration-drive").read_base(report, SPEC["base"])
+    variables = read_variables(report, data.get("vary"), machine)
+    points = read_points(report, data.get("at", []), machine, variables)
+    if variables is None or points is None:
+        return None, report
+    infos = models.study_results(parsed({"/run": {}, "/axes": []}).study)
+    return read_goal(report, infos, data, variables, points), report
+
+
+def test_a_goal_is_read_in_si() -> None:
+    plan, report = read({})
+    assert not report.faults
+    assert plan == {
+        "kind": "goal",
+        "vary": [
+            {"paths": ["pendulums.0.spring_rate"], "low": 5000.0, "high": 15000.0},
+            {"paths": ["pendulums.0.arm"], "values": [0.02, 0.025, 0.03]},
+            {"paths": ["excitation.amplitude_x", "excitation.amplitude_y"], "low": 0.001, "high": 0.003},
+        ],
+        "best": [{"result": "efficiency", "max": True}, {"result": "shaft.irregularity", "max": False}],
+        "subject_to": [
+            {"result": "shaft.speed.mean", "is": 8.0, "within": 0.16},
+            {"result": "torque.max", "at_most": 5.0},
+            {"result": "regime", "is": 1.0},
+            {"result": "regime.order", "is": 1.0},
+        ],
+        "at": [{"shaft.load": 0.2}, {"shaft.load": 0.3}],
+        "over": "worst",
+        "population": 20,
+        "generations": 60,
+        "seed": 1,
+        "polish": True,
+    }
+
+
+@pytest.mark.parametrize(
+    ("changes", "pointer", "code"),
+    [
+        ({"vary": ...}, "/goal/vary", "required"),
+        ({"vary": [{"path": "shaft.load", "from": 0.1}]}, "/goal/vary/0/to", "wrong-type"),
+        ({"vary": [{"path": "shaft.load", "from": 0.1, "to": 0.1}]}, "/goal/vary/0", "invalid-range"),
+        ({"vary": [{"path": "shaft.load"}]}, "/goal/vary/0", "exactly-one"),
+        ({"vary": [{"path": "shaft.load", "from": 0.1, "to": 1, "values": [1]}]}, "/goal/vary/0", "exactly-one"),
+        ({"vary": [*GOAL["vary"], GOAL["vary"][0]]}, "/goal/vary/3/path", "repeated"),
+        ({"vary": [{"path": "shaft.lod", "from": 0.1, "to": 1}]}, "/goal/vary/0/path", "invalid-path"),
+        ({"best": [{"result": "efficency"}]}, "/goal/best/0/result", "unknown-name"),
+        ({"best": [{"result": "regime"}]}, "/goal/best/0/result", "not-numeric"),
+        ({"best": [{"result": "efficiency", "max": 1}]}, "/goal/best/0/max", "wrong-type"),
+        ({"best": GOAL["best"][:1] * 2}, "/goal/best/1/result", "repeated"),
+        ({"best": [], "subject_to": []}, "/goal", "empty"),
+        ({"subject_to": [{"result": "torque.max"}]}, "/goal/subject_to/0", "exactly-one"),
+        ({"subject_to": [{"result": "torque.max", "at_most": "5 m"}]}, "/goal/subject_to/0/at_most", "wrong-unit"),
+        ({"subject_to": [{"result": "regime", "at_most": 1}]}, "/goal/subject_to/0/at_most", "not-numeric"),
+        ({"subject_to": [{"result": "regime", "is": "round"}]}, "/goal/subject_to/0/is", "invalid-choice"),
+        (
+            {"subject_to": [{"result": "shaft.speed.mean", "is": 0.0}]},
+            "/goal/subject_to/0/within",
+            "out-of-range",
+        ),
+        (
+            {"subject_to": [{"result": "torque.max", "at_most": 1, "within": "1 %"}]},
+            "/goal/subject_to/0/within",
+            "not-used",
+        ),
+        ({"at": [{"shaft.load": 0.2}, {"shaft.inertia": 0.2}]}, "/goal/at/1", "conflict"),
+        ({"at": [{"shaft.load": 0.2}, {"shaft.load": "200 N*mm"}]}, "/goal/at/1", "repeated"),
+        ({"at": [{"pendulums.0.arm": 0.2}]}, "/goal/at/0/pendulums.0.arm", "repeated"),
+        ({"at": [{"shaft.lod": 0.2}]}, "/goal/at/0/shaft.lod", "invalid-path"),
+        ({"at": [0.2]}, "/goal/at/0", "wrong-type"),
+        ({"population": 3}, "/goal/population", "out-of-range"),
+        ({"population": 1000, "generations": 10_000}, "/goal/generations", "too-many"),
+        ({"over": "best"}, "/goal/over", "invalid-choice"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_place(changes: dict[str, Any], pointer: str, code: str) -> None:
+    plan, report = read(changes)
+    assert plan is None
+    assert [(fault.where, fault.code) for fault in report.faults] == [(pointer, code)]

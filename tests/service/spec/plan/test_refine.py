@@ -1,0 +1,116 @@
+"""The part of a spec that refines curves and maps."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sprag.service.jobs.preview import preview_json
+from sprag.service.spec.extend import parse_extended
+from sprag.service.spec.longer import longer_spec
+from sprag.service.spec.report import SpecError
+from sprag.worker.chunking import Chunking
+from sprag.worker.planning import most_cases, planner_of
+from sprag.worker.study import Study
+from tests.service.spec_sample import changed, parsed, problems
+
+AXES = [
+    {"path": "excitation.frequency", "values": ["20 Hz", "25 Hz"]},
+    {"path": "shaft.load", "adaptive": [0, "1600 N*mm"]},
+]
+REFINE = {"results": ["shaft.speed.mean", "torque.max"], "error": "1 %", "start": 5, "finest": "1/64"}
+
+
+def refined(changes: dict[str, Any]) -> dict[str, Any]:
+    """Changes of the sample that make it a refined study, and others."""
+    return {"/axes": copy.deepcopy(AXES), "/refine": copy.deepcopy(REFINE), "/combine": ..., **changes}
+
+
+def test_a_refined_study_has_its_plan_and_its_first_round() -> None:
+    study = parsed(refined({})).study
+    assert study.plan == {
+        "kind": "refine", "results": ["shaft.speed.mean", "torque.max"], "error": 0.01, "start": 5, "finest": 64,
+        "most": None, "adaptive": [{"paths": ["shaft.load"], "low": 0.0, "high": 1.6}],
+        "fixed": [{"paths": ["excitation.frequency"], "values": [20.0, 25.0]}], "regime": False, "half_widths": [],
+    }  # fmt: skip
+    assert (study.combine, study.cases, most_cases(study)) == ("zip", 10, 130)
+    assert study.axis_paths == ("excitation.frequency", "shaft.load")
+    for frequency in (20.0, 25.0):
+        loads = np.sort(study.points(range(10))[study.axes[0].array == frequency, 1])
+        np.testing.assert_array_equal(loads, np.linspace(0.0, 1.6, 5))
+    assert Study.from_text(study.to_text()) == study
+
+
+def test_settled_studies_are_refined_by_their_regimes() -> None:
+    study = parsed(refined({"/run": {}})).study
+    assert study.plan is not None
+    assert study.plan["regime"] is True
+    assert study.plan["half_widths"] == ["shaft.speed.mean"]
+    needed = set(planner_of(study.plan).results)
+    assert {"regime", "regime.order", "shaft.speed.mean.half_width"} <= needed
+
+
+def test_ends_may_be_given_in_any_order_and_unit_and_fields_have_defaults() -> None:
+    turned = [AXES[0], {"path": "shaft.load", "adaptive": ["1.6 N*m", "0 N*cm"]}]
+    study = parsed(refined({"/axes": turned, "/refine": {"results": ["efficiency"]}})).study
+    assert study.plan is not None
+    assert study.plan["adaptive"] == [{"paths": ["shaft.load"], "low": 0.0, "high": 1.6}]
+    assert (study.plan["error"], study.plan["start"], study.plan["finest"]) == (0.01, 17, 256)
+
+
+@pytest.mark.parametrize(
+    ("changes", "pointer", "code"),
+    [
+        ({"/refine/results": ...}, "/refine/results", "required"),
+        ({"/refine/results": []}, "/refine/results", "wrong-type"),
+        ({"/refine/results": ["shaft.sped.mean"]}, "/refine/results/0", "unknown-name"),
+        ({"/refine/results": ["torque.max", "torque.max"]}, "/refine/results/1", "repeated"),
+        ({"/refine/error": "30 %"}, "/refine/error", "out-of-range"),
+        ({"/refine/error": "small"}, "/refine/error", "not-a-number"),
+        ({"/refine/start": 6}, "/refine/start", "out-of-range"),
+        ({"/refine/start": 129}, "/refine/start", "out-of-range"),
+        ({"/refine/finest": "1/60"}, "/refine/finest", "out-of-range"),
+        ({"/refine/finest": "fine"}, "/refine/finest", "not-a-number"),
+        ({"/refine/most": 0}, "/refine/most", "out-of-range"),
+        ({"/refine/errors": 1}, "/refine/errors", "unknown-field"),
+        ({"/axes/1/adaptive": [0.1]}, "/axes/1/adaptive", "wrong-type"),
+        ({"/axes/1/adaptive": [0.1, "100 N*mm"]}, "/axes/1/adaptive", "invalid-range"),
+        ({"/axes/1/adaptive": [-1, 1]}, "/axes/1/adaptive/0", "out-of-range"),
+        ({"/axes/0/path": "shaft.load", "/axes/0/values": [0.1]}, "/axes/1/path", "repeated"),
+        ({"/axes/1": {"path": "shaft.load", "values": [0.1]}}, "/axes", "exactly-one"),
+        ({"/combine": "zip"}, "/combine", "conflict"),
+        ({"/exclude": []}, "/exclude", "conflict"),
+        ({"/goal": {}}, "/goal", "conflict"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_place(changes: dict[str, Any], pointer: str, code: str) -> None:
+    found = problems(refined({"/run": {}, **changes}))
+    assert {where: fault.code for where, fault in found.items()} == {pointer: code}
+    assert found[pointer].allowed or pointer == "/axes/1/path"
+
+
+def test_a_refinement_needs_what_it_is_about() -> None:
+    changes = refined({})
+    del changes["/refine"]
+    assert {where: fault.code for where, fault in problems(changes).items()} == {"/refine": "required"}
+
+
+def test_a_preview_gives_what_there_can_be_at_most() -> None:
+    made = preview_json(parsed(refined({})), Chunking())
+    given = preview_json(parsed({}), Chunking())
+    assert (made["cases"], made["most_cases"], made["most_rounds"]) == (10, 130, 5)
+    assert (given["cases"], given["most_cases"], given["most_rounds"]) == (192, 192, 1)
+    assert made["estimated_bytes"] > 10 * preview_json(parsed({"/axes": []}), Chunking())["estimated_bytes"]
+
+
+def test_a_refined_study_is_not_extended_and_its_unsettled_cases_run_longer_as_a_list() -> None:
+    found = parsed(refined({"/run": {}}))
+    with pytest.raises(SpecError) as refused:
+        parse_extended(found.spec, found.study, {"axes": [{"path": "shaft.load", "values": [2.0]}]})
+    assert [fault.code for fault in refused.value.faults] == ["conflict"]
+    longer = longer_spec(changed(refined({"/run": {}})), found.study, np.array([1, 3]))
+    assert "refine" not in longer
+    assert [len(axis["values"]) for axis in longer["axes"]] == [2, 2]
