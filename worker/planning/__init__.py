@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from sprag.worker.planning.goals.plan import GOAL, GoalPlan
+from sprag.worker.planning.goals.planner import GoalPlanner
 from sprag.worker.planning.refine import CurveRefiner
 from sprag.worker.planning.refine_plan import REFINE, RefinePlan
 
@@ -18,8 +20,12 @@ def _refiner(plan: Mapping[str, Any]) -> Planner:
     return CurveRefiner(RefinePlan.from_json(plan))
 
 
+def _searcher(plan: Mapping[str, Any]) -> Planner:
+    return GoalPlanner(GoalPlan.from_json(plan))
+
+
 #: The planners by the kind of their plan.
-PLANNERS: dict[str, Callable[[Mapping[str, Any]], Planner]] = {REFINE: _refiner}
+PLANNERS: dict[str, Callable[[Mapping[str, Any]], Planner]] = {REFINE: _refiner, GOAL: _searcher}
 
 
 def most_cases(study: Study) -> int:

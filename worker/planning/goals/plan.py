@@ -1,0 +1,239 @@
+"""The plan of a study that searches for designs: what varies, what is best, what must hold."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+#: Value of "kind" in the plan.
+GOAL: Final = "goal"
+#: Bounds of a plan: designs of one generation, generations, designs in all.
+POPULATION = (4, 10_000)
+GENERATIONS = (1, 10_000)
+MOST_DESIGNS = 1_000_000
+
+Kind = Literal["is", "at_least", "at_most"]
+_KINDS: tuple[Kind, ...] = ("is", "at_least", "at_most")
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """What a search varies: a range or a catalogue of values, SI. All of its parameters take the same value.
+
+    Attributes
+    ----------
+    paths : tuple of str
+    low, high : float
+        The range, or the least and the largest of the values.
+    values : tuple of float
+        The values of a catalogue, ascending; none for a range.
+    """
+
+    paths: tuple[str, ...]
+    low: float
+    high: float
+    values: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """A result that is to be as large (``max``) or as small as possible."""
+
+    result: str
+    max: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """What a result must be, at every operating point; SI, or the code of a category.
+
+    Attributes
+    ----------
+    result : str
+    kind : {"is", "at_least", "at_most"}
+    value : float
+    within : float
+        Half width of the band around ``value`` of an equality; 0 for a category or a count, which must be equal.
+    """
+
+    result: str
+    kind: Kind
+    value: float
+    within: float = 0.0
+
+    @property
+    def polished(self) -> bool:
+        """Whether it is an equality of real numbers, which can be met more closely than by its band."""
+        return self.kind == "is" and self.within > 0.0
+
+    @property
+    def scale(self) -> float:
+        """What violations of the limit are divided by: its value, or where that is 0 its band or 1."""
+        return abs(self.value) or self.within or 1.0
+
+
+@dataclass(frozen=True)
+class GoalPlan:
+    """A search for the best designs, in SI.
+
+    Attributes
+    ----------
+    vary : tuple of Variable
+    best : tuple of Goal
+        Without one, any design within the limits will do.
+    subject_to : tuple of Limit
+    at : tuple of dict of float
+        Operating points of each design: the same paths in each, at least one point, which may be empty.
+    over : {"worst", "mean"}
+        How a goal is taken over the operating points. A limit must hold at each of them.
+    population, generations, seed : int
+    polish : bool
+        Whether equalities are met to 1e-6 by further rounds after the last generation.
+
+    Raises
+    ------
+    ValueError
+        If a field is out of its range; the message names it.
+    """
+
+    vary: tuple[Variable, ...]
+    best: tuple[Goal, ...]
+    subject_to: tuple[Limit, ...] = ()
+    at: tuple[Mapping[str, float], ...] = ({},)
+    over: Literal["worst", "mean"] = "worst"
+    population: int = 100
+    generations: int = 60
+    seed: int = 1
+    polish: bool = True
+
+    def __post_init__(self) -> None:
+        _check_variables(self)
+        for i, limit in enumerate(self.subject_to):
+            _check(math.isfinite(limit.value), f"subject_to.{i}.{limit.kind}", limit.value, "a finite number")
+            within = f"subject_to.{i}.within"
+            _check(0.0 <= limit.within < math.inf, within, limit.within, "a finite number of at least 0")
+        _check(bool(self.best or self.subject_to), "best", [], "at least one goal, or a limit in subject_to")
+        _check(self.over in {"worst", "mean"}, "over", self.over, "worst or mean")
+        for name, value, (low, high) in (
+            ("population", self.population, POPULATION),
+            ("generations", self.generations, GENERATIONS),
+            ("seed", self.seed, (0, 2**63 - 1)),
+        ):
+            _check(low <= value <= high, name, value, f"an integer from {low:,} to {high:,}")
+        designs = self.population * self.generations
+        _check(designs <= MOST_DESIGNS, "population", designs, f"at most {MOST_DESIGNS:,} times generations")
+
+    @property
+    def at_paths(self) -> tuple[str, ...]:
+        """Paths of the operating points, in the order of the first of them."""
+        return tuple(self.at[0])
+
+    @property
+    def paths(self) -> tuple[tuple[str, ...], ...]:
+        """What each column of the points varies: the variables in their order, then the paths of ``at``."""
+        return (*(one.paths for one in self.vary), *((path,) for path in self.at_paths))
+
+    @property
+    def results(self) -> tuple[str, ...]:
+        """Names of the results of goals and limits, each once."""
+        names = [goal.result for goal in self.best] + [limit.result for limit in self.subject_to]
+        return tuple(dict.fromkeys(names))
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> GoalPlan:
+        """The plan as stored with its study.
+
+        Raises
+        ------
+        ValueError
+            As of the class, or if something is missing.
+        """
+        try:
+            return cls(
+                vary=tuple(_variable(one) for one in data["vary"]),
+                best=tuple(Goal(str(one["result"]), bool(one["max"])) for one in data.get("best", ())),
+                subject_to=tuple(_limit(i, one) for i, one in enumerate(data.get("subject_to", ()))),
+                at=tuple(_point(one) for one in data.get("at") or [{}]),
+                over=data.get("over", "worst"),
+                population=int(data["population"]),
+                generations=int(data["generations"]),
+                seed=int(data["seed"]),
+                polish=bool(data.get("polish", True)),
+            )
+        except KeyError as error:
+            raise ValueError(f"goal: {error.args[0]} is missing") from error
+
+    def to_json(self) -> dict[str, Any]:
+        """The plan as plain JSON data, from which ``from_json`` makes an equal one."""
+        vary = [
+            {"paths": list(one.paths), "values": list(one.values)}
+            if one.values
+            else {"paths": list(one.paths), "low": one.low, "high": one.high}
+            for one in self.vary
+        ]
+        limits = [
+            {"result": one.result, one.kind: one.value} | ({"within": one.within} if one.within else {})
+            for one in self.subject_to
+        ]
+        return {
+            "kind": GOAL,
+            "vary": vary,
+            "best": [{"result": one.result, "max": one.max} for one in self.best],
+            "subject_to": limits,
+            "at": [dict(one) for one in self.at],
+            "over": self.over,
+            "population": self.population,
+            "generations": self.generations,
+            "seed": self.seed,
+            "polish": self.polish,
+        }
+
+
+def _check(holds: bool, name: str, value: object, allowed: str) -> None:
+    if not holds:
+        raise ValueError(f"goal.{name} is {value}; allowed: {allowed}")
+
+
+def _check_variables(plan: GoalPlan) -> None:
+    _check(bool(plan.vary), "vary", [], "at least one variable")
+    for i, one in enumerate(plan.vary):
+        _check(bool(one.paths), f"vary.{i}.paths", [], "at least one path")
+        if one.values:
+            ascending = all(a < b for a, b in zip(one.values, one.values[1:], strict=False))
+            finite = all(math.isfinite(value) for value in one.values)
+            _check(ascending and finite, f"vary.{i}.values", list(one.values), "finite values, each once")
+        else:
+            finite = math.isfinite(one.low) and math.isfinite(one.high)
+            _check(finite and one.low < one.high, f"vary.{i}.high", one.high, f"a finite number above {one.low}")
+    _check(bool(plan.at), "at", [], "at least one operating point")
+    for i, point in enumerate(plan.at):
+        same = set(point) == set(plan.at[0])
+        _check(same, f"at.{i}", sorted(point), f"the parameters of the first point, {sorted(plan.at[0])}")
+        for path, value in point.items():
+            _check(math.isfinite(value), f"at.{i}.{path}", value, "a finite number")
+    seen: set[str] = set()
+    for paths in plan.paths:
+        for path in paths:
+            _check(path not in seen, "vary", path, "each parameter once, in vary or in at")
+            seen.add(path)
+
+
+def _variable(data: Mapping[str, Any]) -> Variable:
+    paths = tuple(str(path) for path in data["paths"])
+    if "values" in data:
+        values = tuple(sorted(float(value) for value in data["values"]))
+        _check(bool(values), "vary.values", [], "at least one value")
+        return Variable(paths, values[0], values[-1], values)
+    return Variable(paths, float(data["low"]), float(data["high"]))
+
+
+def _point(data: Mapping[str, Any]) -> dict[str, float]:
+    return {str(path): float(value) for path, value in data.items()}
+
+
+def _limit(i: int, data: Mapping[str, Any]) -> Limit:
+    kinds = [kind for kind in _KINDS if kind in data]
+    _check(len(kinds) == 1, f"subject_to.{i}", sorted(data), "one of is, at_least and at_most")
+    return Limit(str(data["result"]), kinds[0], float(data[kinds[0]]), float(data.get("within", 0.0)))

@@ -1,0 +1,86 @@
+"""What a search shows of itself while it runs, as plain JSON data."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sprag.worker.planning.goals.hypervolume import MOST_GOALS, hypervolume
+from sprag.worker.planning.goals.plan import GOAL
+from sprag.worker.planning.goals.polish import MET
+from sprag.worker.planning.goals.ranking import fronts
+from sprag.worker.planning.goals.scores import misses, signs
+
+if TYPE_CHECKING:
+    from sprag.worker.planning.goals.plan import GoalPlan
+    from sprag.worker.planning.goals.scores import Scores
+
+Floats = NDArray[np.float64]
+
+
+class Record:
+    """Counts, best values and hypervolume, and what the polish has reached.
+
+    The reference point of the hypervolume is the worst of each goal among the survivors of the first generation of
+    which at least a tenth, and at least two, are within the limits.
+    """
+
+    def __init__(self, plan: GoalPlan) -> None:
+        self._plan = plan
+        self._signs = signs(plan)
+        self._counts = {"feasible": 0, "infeasible": 0, "failed": 0}
+        self._generation = 0
+        self._best = np.full(len(plan.best), np.nan)
+        self._volume: float | None = None
+        self._reference: Floats | None = None
+        self._polish: dict[str, int] | None = None
+
+    def generation(self, new: Scores, survivors: Scores) -> None:
+        """Take a generation: the scores of its new designs, and of the best so far."""
+        self._count(new)
+        self._generation += 1
+        goals = survivors.goals[survivors.feasible]
+        if not len(goals):
+            return
+        self._best = goals.min(axis=0) * self._signs
+        if 2 <= len(self._signs) <= MOST_GOALS:
+            if self._reference is None and len(goals) >= max(2, self._plan.population // 10):
+                self._reference = goals.max(axis=0)
+            if self._reference is not None:
+                self._volume = hypervolume(goals[fronts(goals) == 0], self._reference)
+
+    def polished(self, new: Scores) -> None:
+        """Take the new designs of a round of the polish."""
+        self._count(new)
+        before = self._polish or {"designs": 0, "met": 0}
+        met = int(np.count_nonzero((misses(self._plan, new.outputs) <= MET) & new.feasible))
+        self._polish = {"designs": before["designs"] + len(new), "met": before["met"] + met}
+
+    def _count(self, scores: Scores) -> None:
+        feasible, failed = int(np.count_nonzero(scores.feasible)), int(np.count_nonzero(scores.failed))
+        self._counts["feasible"] += feasible
+        self._counts["failed"] += failed
+        self._counts["infeasible"] += len(scores) - feasible - failed
+
+    def summary(self, phase: str) -> dict[str, Any]:
+        """What is known now.
+
+        ``phase`` is "search", "polish" or "ended". ``best`` has the best value of each goal among the survivors within
+        the limits, and ``hypervolume`` what these dominate, up to ``reference`` (two or three goals). Goals have the
+        units and signs of the results, and None where there is none. ``polish`` counts its designs, and those that meet
+        the equalities to 1e-6.
+        """
+        reference = None if self._reference is None else (self._reference * self._signs).tolist()
+        return {
+            "kind": GOAL,
+            "phase": phase,
+            "generation": self._generation,
+            "generations": self._plan.generations,
+            **self._counts,
+            "best": [None if np.isnan(value) else value for value in self._best.tolist()],
+            "hypervolume": self._volume,
+            "reference": reference,
+            "polish": None if self._polish is None else self._polish.copy(),
+        }

@@ -1,0 +1,149 @@
+"""What a design is worth: its goals, and by how much it violates its limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sprag.worker.planning.goals.linear import weighted_sum
+
+if TYPE_CHECKING:
+    from sprag.worker.planning.goals.plan import GoalPlan, Limit
+    from sprag.worker.planning.rounds import Rows
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+#: Violation of a limit whose result is missing in a case that did not fail, as that of a category.
+_MISSING = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """Judged designs.
+
+    Attributes
+    ----------
+    goals : array, shape (designs, goals)
+        All to be minimised: a goal that is to be large has its sign changed. NaN where missing.
+    violation : array, shape (designs,)
+        0 where every limit holds; inf where a case has failed or, with every limit held, a goal is missing.
+    outputs : array, shape (designs, outputs)
+        What they were judged by, as of ``outputs_of``.
+    """
+
+    goals: Floats
+    violation: Floats
+    outputs: Floats
+
+    @property
+    def feasible(self) -> Flags:
+        """Which designs are within every limit, shape (designs,)."""
+        flags: Flags = self.violation == 0.0
+        return flags
+
+    @property
+    def failed(self) -> Flags:
+        """Which designs cannot be judged, shape (designs,)."""
+        return np.isinf(self.violation)
+
+    def __getitem__(self, which: NDArray[np.int64] | Flags | slice) -> Scores:
+        return Scores(self.goals[which], np.asarray(self.violation[which]), self.outputs[which])
+
+    def __len__(self) -> int:
+        return len(self.violation)
+
+
+def joined(first: Scores, second: Scores) -> Scores:
+    """The designs of both, in that order."""
+    return Scores(
+        np.concatenate([first.goals, second.goals]),
+        np.concatenate([first.violation, second.violation]),
+        np.concatenate([first.outputs, second.outputs]),
+    )
+
+
+def outputs_of(plan: GoalPlan, rows: Rows) -> Floats:
+    """What designs are judged by, shape (designs, limits x points + goals + 1).
+
+    The columns are the result of each limit at each operating point, the goals taken over the operating points, and
+    1 where a case has failed, otherwise 0. Values that are missing or not finite are NaN.
+    """
+    points = len(plan.at)
+    designs = len(rows.points) // points
+    by_name = {
+        name: np.where(np.isfinite(values), values, np.nan).reshape(designs, points)
+        for name, values in ((name, rows.values[name]) for name in plan.results)
+    }
+    goals = [_over_points(plan.over, by_name[goal.result], goal.max) for goal in plan.best]
+    failed = ~rows.ok.reshape(designs, points).all(axis=1)
+    columns = [by_name[limit.result] for limit in plan.subject_to]
+    columns += [one.reshape(designs, 1) for one in (*goals, failed.astype(np.float64))]
+    return np.hstack(columns)
+
+
+def _over_points(over: str, values: Floats, largest: bool) -> Floats:
+    if over == "worst":
+        worst: Floats = values.min(axis=1) if largest else values.max(axis=1)
+        return worst
+    mean: Floats = weighted_sum(np.ones(values.shape[1]), values.T) / values.shape[1]
+    return mean
+
+
+def signs(plan: GoalPlan) -> Floats:
+    """1 for each goal that is to be small, -1 for each that is to be large, shape (goals,)."""
+    return np.array([-1.0 if goal.max else 1.0 for goal in plan.best], dtype=np.float64)
+
+
+def judge(plan: GoalPlan, outputs: Floats, *, equality: float | None = None) -> Scores:
+    """Scores of designs with those outputs.
+
+    Parameters
+    ----------
+    plan : GoalPlan
+    outputs : array
+        As of ``outputs_of``.
+    equality : float, optional
+        Bands of equalities of real numbers, relative to their values, instead of those of the plan.
+    """
+    points = len(plan.at)
+    first = points * len(plan.subject_to)
+    goals = outputs[:, first:-1] * signs(plan) + 0.0
+    violation = np.zeros(len(outputs))
+    for i, limit in enumerate(plan.subject_to):
+        within = limit.within if equality is None or not limit.polished else equality * limit.scale
+        violation += _violation(limit, within, outputs[:, points * i : points * (i + 1)])
+    missing = np.isnan(goals).any(axis=1) & (violation == 0.0)
+    violation[missing | (outputs[:, -1] != 0.0)] = np.inf
+    return Scores(goals, violation, outputs)
+
+
+def _violation(limit: Limit, within: float, values: Floats) -> Floats:
+    """Violation of one limit at its worst operating point, shape (designs,)."""
+    if limit.kind == "is" and not limit.polished:
+        excess = (values != limit.value).astype(np.float64)
+    elif limit.kind == "is":
+        excess = (np.abs(values - limit.value) - within) / limit.scale
+    elif limit.kind == "at_most":
+        excess = (values - limit.value) / limit.scale
+    else:
+        excess = (limit.value - values) / limit.scale
+    worst: Floats = np.where(np.isnan(values), _MISSING, np.maximum(excess, 0.0)).max(axis=1)
+    return worst
+
+
+def misses(plan: GoalPlan, outputs: Floats) -> Floats:
+    """How far designs are off their equalities of real numbers, relative, at worst; NaN where one is missing.
+
+    Shape (designs,); 0 without such equalities.
+    """
+    points = len(plan.at)
+    miss = np.zeros(len(outputs))
+    for i, limit in enumerate(plan.subject_to):
+        if limit.polished:
+            values = outputs[:, points * i : points * (i + 1)]
+            miss = np.maximum(miss, (np.abs(values - limit.value) / limit.scale).max(axis=1))
+    return miss

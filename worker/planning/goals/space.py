@@ -1,0 +1,93 @@
+"""The space of designs: unit coordinates that searches work in, and the values and cases that they stand for."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from sprag.worker.planning.goals.plan import GoalPlan
+
+Floats = NDArray[np.float64]
+
+
+class Space:
+    """Designs as points of the unit cube, one coordinate for each variable.
+
+    A range is mapped linearly. The k values of a catalogue share the unit interval evenly: value j (from 0) has the
+    coordinates from j / k to (j + 1) / k.
+
+    Attributes
+    ----------
+    dimensions : int
+    counts : int64 array, shape (dimensions,)
+        Number of values of each catalogue, 0 for a range.
+    size : int, optional
+        Number of designs; None where there is a range.
+    """
+
+    def __init__(self, plan: GoalPlan) -> None:
+        self._vary = plan.vary
+        self._low = np.array([one.low for one in plan.vary])
+        self._high = np.array([one.high for one in plan.vary])
+        self._at = np.array([[point[path] for path in plan.at_paths] for point in plan.at])
+        self.dimensions = len(plan.vary)
+        self.counts = np.array([len(one.values) for one in plan.vary], dtype=np.int64)
+        self.size = math.prod(self.counts.tolist()) if self.counts.all() else None
+
+    def designs(self, coordinates: Floats) -> Floats:
+        """Values of the variables, SI, shape (designs, dimensions), at coordinates of that shape in [0, 1]."""
+        values: Floats = self._low + (self._high - self._low) * coordinates
+        values = np.minimum(np.maximum(values, self._low), self._high)
+        for i in np.flatnonzero(self.counts).tolist():
+            values[:, i] = np.array(self._vary[i].values)[self.places(coordinates, i)]
+        return values + 0.0  # not -0.0
+
+    def places(self, coordinates: Floats, variable: int) -> NDArray[np.int64]:
+        """Which values of a catalogue the coordinates stand for, shape (designs,)."""
+        count = int(self.counts[variable])
+        return np.clip(np.floor(coordinates[:, variable] * count).astype(np.int64), 0, count - 1)
+
+    def centred(self, coordinates: Floats) -> Floats:
+        """The same designs, with catalogue coordinates in the middle of their values' shares."""
+        middle = coordinates.copy()
+        for i in np.flatnonzero(self.counts).tolist():
+            middle[:, i] = (self.places(coordinates, i) + 0.5) / self.counts[i]
+        return middle
+
+    def cases(self, designs: Floats) -> Floats:
+        """The cases of designs: those of a design stand together, one for each operating point."""
+        points = len(self._at)
+        rows = np.repeat(designs, points, axis=0)
+        return np.hstack([rows, np.tile(self._at.reshape(points, -1), (len(designs), 1))])
+
+    def coordinates(self, cases: Floats) -> tuple[Floats, Floats]:
+        """The designs of whole sets of cases, and coordinates of them, both of shape (designs, dimensions).
+
+        Raises
+        ------
+        ValueError
+            If they are not cases of this plan.
+        """
+        designs = cases[:: len(self._at), : self.dimensions]
+        if not np.array_equal(self.cases(designs), cases):
+            raise ValueError("the cases do not have the operating points of this search")
+        coordinates = (designs - self._low) / np.where(self._high > self._low, self._high - self._low, 1.0)
+        for i in np.flatnonzero(self.counts).tolist():
+            values = np.array(self._vary[i].values)
+            place = np.minimum(np.searchsorted(values, designs[:, i]), len(values) - 1)
+            coordinates[:, i] = np.where(values[place] == designs[:, i], (place + 0.5) / len(values), np.nan)
+        inside = (coordinates >= 0.0) & (coordinates <= 1.0)
+        if not inside.all():
+            i = int(np.flatnonzero(~inside.all(axis=0))[0])
+            value = designs[~inside[:, i], i][0]
+            raise ValueError(f"{self._vary[i].paths[0]}: {value} is not a value of this search")
+        return designs, coordinates
+
+
+def keys(designs: Floats) -> list[bytes]:
+    """What tells designs apart, one for each row."""
+    return [row.tobytes() for row in np.ascontiguousarray(designs)]
