@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import sqlalchemy as sa
@@ -18,10 +18,11 @@ from sprag.service.storage.records import CaseColumns, CaseRow, Kinds, RowBlock
 from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
 from sprag.worker import models
 from sprag.worker.models import WorkerEnding, regime_info
+from sprag.worker.ports import Chunk
 from sprag.worker.states import ChunkState, StudyState
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -34,6 +35,7 @@ CASES_AT_ONCE = 5_000
 BLOCK_ROWS = 2_000
 #: Studies whose counts of regimes and flags are kept.
 _MOST_COUNTED = 256
+_NO_CASES: Final = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +49,26 @@ class _Rows:
     cancelled: bool
 
 
+#: A finished chunk: its range of places, and when it finished.
+_Done = tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class _Counted:
+    """The kinds of a study at a revision; of one that still runs, also their numbers and the chunks with these rows."""
+
+    revision: int
+    kinds: Kinds
+    rows: Counter[tuple[str, int | None]] = field(default_factory=Counter)
+    chunks: frozenset[_Done] = frozenset()
+
+
 class Cases(Orders):
     """Rows of finished cases, and the cases that a cancelled study never ran, which have no rows in the database."""
 
     def __init__(self, session: Session, clock: Clock) -> None:
         super().__init__(session, clock)
-        self._counted: LRUCache[tuple[str, int], Kinds] = LRUCache(_MOST_COUNTED)
+        self._counted: LRUCache[str, _Counted] = LRUCache(_MOST_COUNTED)
         self._counting = Lock()
 
     def _rows(self, connection: sa.Connection, study_id: str) -> _Rows:
@@ -100,17 +116,45 @@ class Cases(Orders):
         """How many finished cases have which regime and which flag; raises StudyNotFound.
 
         Counting reads every row of the study, so that the counts of a revision, with which its rows change, are kept.
+        Until the study is over, only the rows of chunks that finished since are counted; afterwards a retry may replace
+        rows.
         """
         with self.session.read() as connection:
-            revision = self._row(connection, study_id, STUDIES.c.revision).revision
+            c = STUDIES.c
+            row = self._row(connection, study_id, c.revision, c.state)
             with self._counting:
-                kept = self._counted.get((study_id, revision))
-            if kept is not None:
-                return kept
-            kinds = _count_kinds(connection, self._rows(connection, study_id))
+                kept = self._counted.get(study_id)
+            if kept is not None and kept.revision == row.revision:
+                return kept.kinds
+            rows = self._rows(connection, study_id)
+            done = self._done(connection, rows.number)
+            if kept is not None and kept.chunks and kept.chunks <= done:
+                counts = kept.rows + self._count_new(connection, rows, done - kept.chunks)
+            else:
+                counts = _count(connection, rows)
+        counted = _Counted(row.revision, _kinds(rows, counts))
+        if not StudyState(row.state).terminal:
+            counted = replace(counted, rows=counts, chunks=done)
         with self._counting:
-            self._counted[study_id, revision] = kinds
-        return kinds
+            self._counted[study_id] = counted
+        return counted.kinds
+
+    def _count_new(
+        self, connection: sa.Connection, rows: _Rows, chunks: Iterable[_Done]
+    ) -> Counter[tuple[str, int | None]]:
+        """Numbers of the rows of these chunks by flags and regime."""
+        cases = [self._cases(Chunk(rows.number, first, count), connection) for first, count, _ in chunks]
+        counts: Counter[tuple[str, int | None]] = Counter()
+        for condition in conditions(rows.table.c.case_number, np.sort(np.concatenate([_NO_CASES, *cases]))):
+            counts += _count(connection, rows, condition)
+        return counts
+
+    @staticmethod
+    def _done(connection: sa.Connection, number: int) -> frozenset[_Done]:
+        c = CHUNKS.c
+        query = sa.select(c["first"], c["count"], c.finished_at)
+        found = connection.execute(query.where(c.study == number, c.state == ChunkState.DONE)).all()
+        return frozenset((first, count, finished_at) for first, count, finished_at in found)
 
     def cases_of_kind(self, study_id: str, regime: str | None = None, flag: str | None = None) -> NDArray[np.int64]:
         """Numbers of the cases of a regime or with a flag, ascending; raises StudyNotFound."""
@@ -118,7 +162,7 @@ class Cases(Orders):
             rows = self._rows(connection, study_id)
             kind = _of_kind(rows, regime, flag)
             if kind is None:
-                return np.empty(0, dtype=np.int64)
+                return _NO_CASES
             c = rows.table.c
             query = sa.select(c.case_number).where(c.study == rows.number, *kind)
             found = connection.execute(query.order_by(c.case_number)).scalars()
@@ -220,15 +264,25 @@ def _read(
     return connection.execute(query.order_by(c.case_number).limit(limit)).all()
 
 
-def _count_kinds(connection: sa.Connection, rows: _Rows) -> Kinds:
+def _count(
+    connection: sa.Connection, rows: _Rows, *conditions: sa.ColumnElement[bool]
+) -> Counter[tuple[str, int | None]]:
+    """Numbers of the study's rows by joined flags and code of the regime (None: the study has none)."""
     info, c = regime_info(rows.infos), rows.table.c
     keys = [c.flags] if info is None else [c.flags, c[info.column]]
-    found = connection.execute(sa.select(sa.func.count(), *keys).where(c.study == rows.number).group_by(*keys)).all()
+    query = sa.select(sa.func.count(), *keys).where(c.study == rows.number, *conditions)
+    found = connection.execute(query.group_by(*keys)).all()
+    return Counter({(flags, code[0] if code else None): cases for cases, flags, *code in found})
+
+
+def _kinds(rows: _Rows, counts: Counter[tuple[str, int | None]]) -> Kinds:
+    info = regime_info(rows.infos)
     regimes, flags = Counter[str](), Counter[str]()
-    for cases, joined, *code in found:
-        flags.update(dict.fromkeys(filter(None, joined.split(",")), cases))
-        if info is not None and code[0] is not None:
-            regimes[info.categories[code[0]]] += cases
+    for (joined, code), cases in counts.items():
+        for flag in filter(None, joined.split(",")):
+            flags[flag] += cases
+        if info is not None and code is not None:
+            regimes[info.categories[code]] += cases
     order = {} if info is None else {name: place for place, name in enumerate(info.categories)}
     return Kinds(_by_frequency(regimes, order), _by_frequency(flags, {}))
 

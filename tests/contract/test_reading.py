@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from datetime import UTC, datetime
+from typing import Any
+
 import numpy as np
 import pytest
 
+from sprag.service.storage import cases as cases_of_store
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
-from tests.contract.filling import create, finish
+from tests.contract.filling import SPEC, create, finish
 from tests.worker import fakes
 
 
@@ -109,3 +114,45 @@ def test_progress_counts_and_tells_the_time_left(store: Store, clock: fakes.Hand
     clock.seconds += 1000.0
     store.resume_study(record.id)
     assert store.progress(record.id).seconds_left == progress.seconds_left
+
+
+@pytest.mark.parametrize("finish_by", [None, datetime(2126, 1, 1, tzinfo=UTC)], ids=["by number", "coarse to fine"])
+def test_kinds_of_a_running_study_are_counted_once_for_each_row(
+    store: Store, monkeypatch: pytest.MonkeyPatch, finish_by: datetime | None
+) -> None:
+    read: list[int] = []
+
+    def counting(*arguments: Any) -> Counter[tuple[str, int | None]]:
+        counts = count(*arguments)
+        read.append(sum(counts.values()))
+        return counts
+
+    count = cases_of_store._count
+    monkeypatch.setattr(cases_of_store, "_count", counting)
+    record = store.create_study(SPEC, fakes.study(25, "a study"), finish_by=finish_by)
+    epoch = store.take_over("test")
+    for number, chunk in enumerate(store.open_chunks(record.number)):
+        result = fakes.result(chunk.first, chunk.count)
+        result.flags[:] = ["windup_out_of_data"] * (number + 1) + [""] * (chunk.count - number - 1)
+        store.claim(epoch, [chunk])
+        store.commit(epoch, chunk, result)
+        if number != 1:  # two chunks between two counts
+            assert store.kinds(record.id).flags == {"windup_out_of_data": [1, None, 6][number]}
+    store.settle(epoch, record.number)
+    assert store.kinds(record.id).flags == {"windup_out_of_data": 6}
+    assert read == [10, 15]
+
+
+def test_kinds_are_counted_anew_after_a_retry(store: Store) -> None:
+    record = create(store)
+    epoch = finish(store, record, "chatter")
+    assert store.kinds(record.id).flags == {}
+    store.retry_study(record.id)
+    for chunk in store.open_chunks(record.number):
+        result = fakes.result(chunk.first, chunk.count)
+        result.flags[:] = ["windup_out_of_data"] * chunk.count
+        store.claim(epoch, [chunk])
+        store.commit(epoch, chunk, result)
+        assert store.kinds(record.id).flags == {"windup_out_of_data": chunk.last + 1}
+    store.settle(epoch, record.number)
+    assert store.kinds(record.id).flags == {"windup_out_of_data": 25}
