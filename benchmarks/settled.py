@@ -1,6 +1,6 @@
 """Settled motions: how many are found, what they cost, and how they compare with runs of 20,000 periods.
 
-    python -m benchmarks.settled [--long PERIODS] [--drives COUNT]
+    python -m benchmarks.settled [--long PERIODS] [--drives COUNT] [--costs-only]
 
 Costs are ratios to the same cases run for 60 periods, in processor time of the same process.
 """
@@ -11,6 +11,7 @@ import argparse
 import math
 import time
 from collections import Counter
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,20 +20,28 @@ from numpy.typing import NDArray
 from benchmarks.workloads import CASES, W1, W2
 from sprag.engine.run import Run, SettledRun
 from sprag.engine.vibration_drive import orbits
-from sprag.engine.vibration_drive.cases import case_matrix, coefficient_count, pendulum_count, with_lengths
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import kernel, lane_count, order_for
-from sprag.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag.engine.vibration_drive.cases import case_matrix, pendulum_count, with_lengths
+from sprag.engine.vibration_drive.characteristics import characteristics, combined
+from sprag.engine.vibration_drive.integration import Integration, integrate
+from sprag.engine.vibration_drive.kernel import kernel_of
+from sprag.engine.vibration_drive.regimes import Regime, means, settled_infos
+from sprag.engine.vibration_drive.results import result_infos
 from sprag.engine.vibration_drive.settle import SettledBatch, settle
 from sprag.engine.vibration_drive.simulate import simulate
-from sprag.engine.vibration_drive.strobes import TURN
+from sprag.engine.vibration_drive.strobes import SHAFT_SPEED
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _FOUND = (Regime.PERIODIC, Regime.HELD)
 _MAX_ORDER = SettledRun().max_period
-_REPEATS = 5
+_REPEATS = 7
+#: Periods of a part of a long run, and the highest order that is looked for after it.
+_PIECE, _HIGHEST = 200, 64
+#: Tolerance and periods of the runs that follow the long ones of periodic cases.
+_FINE, _FINE_PERIODS = 1e-12, 2_000
+#: Results that depend on how the motion was come to, or are zero up to rounding.
+NOT_COMPARED = {"run.events", "run.steps", "runup.time", "balance.energy", "balance.momentum", "power.stored.mean"}
 
 
 def random_drives(count: int, pendulums: int, seed: int) -> dict[str, Floats | float]:
@@ -69,59 +78,164 @@ def random_drives(count: int, pendulums: int, seed: int) -> dict[str, Floats | f
     return columns
 
 
-def long_run(columns: dict[str, Any], cases: int, periods: int) -> tuple[Ints, Floats]:
-    """Least order (0: none up to 64) and mean speed of the shaft after a run of that many periods."""
-    run = Run()
-    module = kernel(pendulum_count(columns), coefficient_count(columns), order_for(run.tolerance), lane_count())
-    matrix = case_matrix(columns, run, cases)
-    starts = None
-    piece, kept = 200, 130
-    for _ in range(periods // piece):
-        lengths = with_lengths(matrix, np.zeros(cases), np.full(cases, float(piece)), windowed=False)
-        strobes = integrate(module, lengths, run, starts=starts, strobes=piece).strobes
-        starts = np.ascontiguousarray(strobes[:, -1])
-    last = np.ascontiguousarray(strobes[:, -kept:])
-    units = np.empty((cases, last.shape[2]))
-    orbits.find_units(last, np.arange(cases), kept, 40, matrix[:, 0].copy(), False, units)
-    orders, speeds = np.zeros(cases, dtype=np.int64), np.full(cases, np.nan)
-    for case in range(cases):
-        for order in range(1, 65):
-            apart = np.empty(order)
-            now, before = last[case, kept - order :], last[case, kept - 2 * order : kept - order]
-            orbits.distances(now.copy(), before.copy(), np.repeat(units[case : case + 1], order, axis=0), apart)
-            if apart.max() < 1e-9:
-                orders[case] = order
-                turn = last[case, -1, TURN] - last[case, -1 - order, TURN]
-                speeds[case] = turn / (order * matrix[case, 1])
-                break
-    return orders, speeds
-
-
 def _column(batch: SettledBatch, pendulums: int, name: str) -> Floats:
     values: Floats = batch.values[:, [info.name for info in settled_infos(pendulums)].index(name)]
     return values
 
 
-def compare(name: str, columns: dict[str, Any], cases: int, periods: int) -> None:
-    """Print how the settled motions of cases compare with long runs."""
+@dataclass(frozen=True)
+class Long:
+    """Cases after a long run.
+
+    ``orders`` (shape (cases,)): the least order, 0 where there is none up to 64; ``values`` (shape (cases, results)):
+    results over that many periods more, and where there is no order means over a second run of the same length;
+    ``speeds`` (shape (cases,)): the shaft's speed at the last strobe.
+    """
+
+    orders: Ints
+    values: Floats
+    speeds: Floats
+
+
+def long_run(columns: dict[str, Any], cases: int, periods: int) -> Long:
+    """Orders and results after a run of that many periods from rest.
+
+    Periodic cases then run on with smaller steps, because results after so many steps of the usual tolerance are off by
+    up to 1e-8 themselves.
+    """
+    n = pendulum_count(columns)
+    matrix = case_matrix(columns, Run(), cases)
+    usual, fine = (_Runner(columns, matrix, Run(tolerance=tolerance)) for tolerance in (Run().tolerance, _FINE))
+    every = np.arange(cases)
+    last = usual.go(every, _PIECE, None)
+    for _ in range(periods // _PIECE - 1):
+        last = usual.go(every, _PIECE, last.strobes[:, -1].copy())
+    orders, starts = _orders(last.strobes, matrix), last.strobes[:, -1].copy()
+    values = np.full((cases, len(result_infos(n))), np.nan)
+    repeats, never = np.flatnonzero(orders), np.flatnonzero(orders == 0)
+    now = starts[repeats]
+    for _ in range(_FINE_PERIODS // _PIECE):
+        now = fine.go(repeats, _PIECE, now).strobes[:, -1].copy()
+    values[repeats] = fine.results(repeats, orders[repeats], fine.go(repeats, orders[repeats], now, windowed=True).sums)
+    if len(never):
+        now, total = starts[never], None
+        for _ in range(periods // _PIECE):
+            done = usual.go(never, _PIECE, now, windowed=True)
+            now, total = done.strobes[:, -1].copy(), done.sums if total is None else usual.together(total, done.sums)
+        assert total is not None
+        values[never] = usual.results(never, periods, total)
+    return Long(orders, values, starts[:, SHAFT_SPEED])
+
+
+class _Runner:
+    """Runs cases on from their strobes."""
+
+    def __init__(self, columns: dict[str, Any], matrix: Floats, run: Run) -> None:
+        self.run, self.matrix = run, matrix
+        self.kernel = kernel_of(columns, run.tolerance)
+
+    def _lengths(self, cases: Ints, periods: Ints | int, *, windowed: bool) -> Floats:
+        ends = np.broadcast_to(np.asarray(periods, dtype=np.float64), (len(cases),))
+        return with_lengths(self.matrix[cases], np.zeros(len(cases)), ends, windowed=windowed)
+
+    def go(self, cases: Ints, periods: Ints | int, starts: Floats | None, *, windowed: bool = False) -> Integration:
+        lengths = self._lengths(cases, periods, windowed=windowed)
+        return integrate(self.kernel, lengths, self.run, starts=starts, strobes=_PIECE)
+
+    def together(self, first: Floats, second: Floats) -> Floats:
+        return combined(self.kernel.LAYOUT, [first, second])
+
+    def results(self, cases: Ints, periods: Ints | int, sums: Floats) -> Floats:
+        return characteristics(self.kernel.LAYOUT, self._lengths(cases, periods, windowed=True), sums)
+
+
+def _orders(strobes: Floats, matrix: Floats) -> Ints:
+    """Least order of each case up to 64, by comparing the last strobes; 0: none."""
+    cases, kept = len(strobes), 2 * _HIGHEST + 2
+    last = np.ascontiguousarray(strobes[:, -kept:])
+    units = np.empty((cases, last.shape[2]))
+    orbits.find_units(last, np.arange(cases), kept, 40, matrix[:, 0].copy(), False, units)
+    found = np.zeros(cases, dtype=np.int64)
+    for case in range(cases):
+        for order in range(1, _HIGHEST + 1):
+            apart = np.empty(order)
+            now, before = last[case, kept - order :], last[case, kept - 2 * order : kept - order]
+            orbits.distances(now.copy(), before.copy(), np.repeat(units[case : case + 1], order, axis=0), apart)
+            if apart.max() < 1e-9:
+                found[case] = order
+                break
+    return found
+
+
+def deviations(values: Floats, expected: Floats, pendulums: int) -> tuple[Floats, list[str]]:
+    """Deviation of every result that belongs to the motion, in shares of 1e-9, and the names of these results.
+
+    Shape (cases, results). A value deviates relatively, but by 1e-12 at least; one that both lack does not deviate.
+    """
+    infos = result_infos(pendulums)
+    chosen = [place for place, info in enumerate(infos) if info.name not in NOT_COMPARED]
+    ours, theirs = values[:, chosen], expected[:, chosen]
+    off = np.abs(ours - theirs) / np.maximum(1e-9 * np.abs(theirs), 1e-12)
+    off[np.isnan(ours) & np.isnan(theirs)] = 0.0
+    return np.where(np.isnan(off), np.inf, off), [infos[place].name for place in chosen]
+
+
+def compare(name: str, columns: dict[str, Any], cases: int, periods: int) -> Floats:
+    """Print how the settled motions of cases compare with long runs.
+
+    Returns whether the interval of each mean of irregular cases has the long mean, shape (cases, means); NaN where
+    there is no interval.
+    """
     n = pendulum_count(columns)
     batch = settle(columns, SettledRun(), cases=cases)
-    orders, speeds = long_run(columns, cases, periods)
-    periodic = (orders > 0) & (orders <= _MAX_ORDER)
+    long = long_run(columns, cases, periods)
+    periodic = (long.orders > 0) & (long.orders <= _MAX_ORDER)
     found = np.isin(batch.regimes, _FOUND)
     both = periodic & found
-    scale = np.maximum(np.abs(speeds), 1e-9)
-    off = np.where(both, np.abs(_column(batch, n, "shaft.speed.mean") - speeds) / scale, 0.0)
-    same = _column(batch, n, "regime.order") == orders
+    off, names = deviations(batch.values, long.values, n)
+    off = off[both]
+    same = _column(batch, n, "regime.order") == long.orders
     regimes = Counter(Regime(int(code)).name.lower() for code in batch.regimes)
     print(f"{name}: {dict(regimes)}")
     print(
         f"  periodic up to order {_MAX_ORDER} after {periods} periods: {periodic.sum()}; of these found "
-        f"{both.sum()} ({both.sum() / periodic.sum():.1%}), with another order {(both & ~same).sum()}, "
-        f"speed off by more than 1e-9: {(off > 1e-9).sum()} (largest {off.max():.1e})"
+        f"{both.sum()} ({both.sum() / periodic.sum():.1%}), with another order {(both & ~same).sum()}"
+    )
+    worst = np.unravel_index(np.argmax(off), off.shape)
+    print(
+        f"  cases with a result off by more than 1e-9: {(off > 1.0).any(axis=1).sum()} "
+        f"(most {off[worst] * 1e-9:.1e}: {names[worst[1]]})"
     )
     print(f"  told as periodic, but not so after the long run: {(found & ~periodic).sum()}")
     print(f"  periods computed: periodic {batch.spent[periodic].mean():.0f}, all {batch.spent.mean():.0f}")
+    inside = _intervals(batch, long, n)
+    hold, cases_with = np.nanmean(inside[:, 0]) if len(inside) else math.nan, len(inside)
+    print(f"  irregular: {cases_with}; intervals of the mean speed that have the long mean: {hold:.1%}", flush=True)
+    return inside
+
+
+def _intervals(batch: SettledBatch, long: Long, pendulums: int) -> Floats:
+    """Whether intervals of irregular cases without an order have the long mean: of the speed, then of all means."""
+    chosen = (batch.regimes == Regime.IRREGULAR) & (long.orders == 0)
+    names = [info.name for info in settled_infos(pendulums)]
+    places = list(means(pendulums))
+    first = names.index("shaft.speed.mean")
+    places = [first, *(place for place in places if place != first)]
+    widths = batch.values[chosen][:, [names.index(f"{names[place]}.half_width") for place in places]]
+    off = np.abs(batch.values[chosen][:, places] - long.values[chosen][:, places])
+    # A share that is 0 or 1 all along has no interval.
+    return np.where(widths > 0.0, off <= widths, np.nan)
+
+
+def compare_unloaded(count: int, periods: int) -> None:
+    """Print how the speeds from rest of drives without a load compare with those after long runs."""
+    columns = random_drives(count, 1, seed=4) | {"shaft.load": 0.0}
+    batch = settle(columns, SettledRun(), cases=count)
+    speeds, told = long_run(columns, count, periods).speeds, _column(batch, 1, "shaft.speed.from_rest")
+    off = np.abs(told - speeds) / np.maximum(speeds, 1e-3)
+    regimes = Counter(Regime(int(code)).name.lower() for code in batch.regimes)
+    print(f"{count} random drives without a load: {dict(regimes)}")
+    print(f"  speed from rest off by more than 1e-9: {(off > 1e-9).sum()} (largest {off.max():.1e})", flush=True)
 
 
 def cost(name: str, columns: dict[str, Any]) -> None:
@@ -140,15 +254,27 @@ def cost(name: str, columns: dict[str, Any]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--long", type=int, default=20_000, metavar="PERIODS")
-    parser.add_argument("--drives", type=int, default=150, metavar="COUNT")
+    parser.add_argument("--drives", type=int, default=300, metavar="COUNT", help="with one, two, three pendulums each")
+    parser.add_argument("--costs-only", action="store_true")
     chosen = parser.parse_args()
+    held = []
     for workload in (W1, W2):
         columns = workload.columns(np.arange(CASES))
         cost(workload.name, columns)
-        compare(workload.name, columns, CASES, chosen.long)
-    for pendulums in (1, 2):
+        if not chosen.costs_only:
+            held.append(compare(workload.name, columns, CASES, chosen.long))
+    for pendulums in () if chosen.costs_only else (1, 2, 3):
         columns = random_drives(chosen.drives, pendulums, seed=pendulums)
-        compare(f"{chosen.drives} random drives, {pendulums} pendulum(s)", columns, chosen.drives, chosen.long)
+        name = f"{chosen.drives} random drives, {pendulums} pendulum{'s' * (pendulums > 1)}"
+        held.append(compare(name, columns, chosen.drives, chosen.long))
+    if held:
+        compare_unloaded(chosen.drives, chosen.long)
+        cases, speeds = sum(map(len, held)), np.concatenate([inside[:, 0] for inside in held])
+        each = np.concatenate([inside[~np.isnan(inside)] for inside in held])
+        print(
+            f"all {cases} irregular cases: intervals that have the long mean: {np.nanmean(speeds):.1%} of the speed's,"
+        )
+        print(f"  {each.mean():.1%} of the {len(each)} of all means")
 
 
 if __name__ == "__main__":

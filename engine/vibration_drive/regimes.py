@@ -73,7 +73,7 @@ _OWN = (
     ResultInfo("regime.order", "1", "excitation periods after which the motion repeats itself", "count"),
     ResultInfo("regime.multiplier", "1", "factor by which disturbances of the orbit shrink in one turn of it"),
     ResultInfo("regime.settled_after", "1", "excitation periods from the start until the motion is settled"),
-    ResultInfo("regime.residual", "1", "scaled distance by which the orbit misses itself"),
+    ResultInfo("regime.residual", "1", "scaled distance by which the orbit misses itself, at most"),
     ResultInfo("regime.exponent", "1", "growth of disturbances of an irregular motion per period (Lyapunov exponent)"),
     ResultInfo("shaft.speed.from_rest", "rad/s", "without a load: speed that the shaft reaches from its own start"),
 )

@@ -201,7 +201,9 @@ class Search:
             if np.any(accepted):
                 least = np.empty(len(cases), dtype=np.int64)
                 orbits.find_least(points, done.strobes[first[:-1]], orders, units, _SAME, least)
-                certified.append(Orbits(cases, points, orders, multiplier, residual, least).take(accepted))
+                # The last step brings the orbit closer still, unless it is mere rounding.
+                better = np.where((size < RESIDUAL)[:, None], moved, points)
+                certified.append(Orbits(cases, better, orders, multiplier, residual, least).take(accepted))
             fails = converged | (told[:, newton.AGREES] == 0.0) | ~(size < 1.0) | ~(away < AWAY)
             fails |= (residual < _TELLING) & (multiplier >= STABLE)
             self._failed(cases[fails & ~accepted])
