@@ -120,6 +120,7 @@ def intervals(samples: Samples) -> Intervals:
     both = samples.irregular[curve, low] & samples.irregular[curve, low + width]
     scatter = both[:, None] & (errors > error)
     jumps = _through_zones(curve, low, width, both, jumps | scatter)
+    jumps = _without_gaps(curve * 2 * (plan.finest + most) + low, width, jumps, most)
     worth = np.where(width > plan.finest // (plan.start - 1), 2.0 * width, np.minimum(worst, 1.0))
     return Intervals(curve, low, width, resolved, errors, jumps, _reasons(samples, curve, low, width, both), worth)
 
@@ -186,9 +187,9 @@ def _jumps(
     turn = np.where(neighbours, np.diff(slope, axis=0), np.nan)
     before, after = np.vstack([gap, turn]) * width[:, None], np.vstack([turn, gap]) * width[:, None]
     # At an end of the curve only the other side tells.
-    before, after = np.where(np.isnan(before), -after, before), np.where(np.isnan(after), -before, after)
+    before, after = np.where(np.isnan(before), after, before), np.where(np.isnan(after), before, after)
     least = np.minimum(np.abs(before), np.abs(after))
-    bends = 0.5 * least
+    bends = 0.25 * least
     missing = ~np.isfinite(start) | ~np.isfinite(end)
     wide = np.maximum(samples.widths[curve, low], samples.widths[curve, low + width]) > error * ranges[curve]
     jump = np.where(before * after < 0.0, least, bends) > error
@@ -196,19 +197,16 @@ def _jumps(
     change = codes[curve, low] != codes[curve, low + width]
     jump |= change[:, None] & (np.abs(rise) > error)
     jump &= ~passed[:, None]
-    jump = _along_slopes(jump, (np.abs(rise) > 2.0 * error) & ~passed[:, None], neighbours)
+    jump = _with_slopes(jump, (np.abs(rise) > 2.0 * error) & ~passed[:, None], neighbours)
     return jump | missing | wide, bends
 
 
-def _along_slopes(jump: Bools, steep: Bools, neighbours: Bools) -> Bools:
-    """Jumps with the steep intervals next to them."""
-    while True:
-        wider = jump.copy()
-        wider[1:] |= jump[:-1] & steep[1:] & neighbours
-        wider[:-1] |= jump[1:] & steep[:-1] & neighbours
-        if (wider == jump).all():
-            return jump
-        jump = wider
+def _with_slopes(jump: Bools, steep: Bools, neighbours: Bools) -> Bools:
+    """Jumps with the steep intervals right beside them: a jump's foot may reach into the next interval."""
+    wider = jump.copy()
+    wider[1:] |= jump[:-1] & steep[1:] & neighbours
+    wider[:-1] |= jump[1:] & steep[:-1] & neighbours
+    return wider
 
 
 def _through_zones(curve: Ints, low: Ints, width: Ints, irregular: Bools, jump: Bools) -> Bools:
@@ -220,6 +218,15 @@ def _through_zones(curve: Ints, low: Ints, width: Ints, irregular: Bools, jump: 
     starts = np.concatenate([[0], np.flatnonzero(~same) + 1])
     anywhere = np.logical_or.reduceat(jump, starts, axis=0)[zone]
     return np.where(irregular[:, None], anywhere, jump)
+
+
+def _without_gaps(start: Ints, width: Ints, jump: Bools, narrow: int) -> Bools:
+    """Jumps, and what lies between two of them that are at most ``narrow`` apart: no test reaches in between."""
+    far = np.iinfo(np.int64).max // 4
+    ends = np.where(jump, (start + width)[:, None], -far)
+    begins = np.where(jump, start[:, None], far)
+    before, after = np.maximum.accumulate(ends), np.minimum.accumulate(begins[::-1])[::-1]
+    return np.asarray(after - before <= narrow)
 
 
 def _reasons(samples: Samples, curve: Ints, low: Ints, width: Ints, irregular: Bools) -> Ints:

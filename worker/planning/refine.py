@@ -7,7 +7,7 @@ say everything that there is to know, so that `describe` gives the same curves f
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     Bools = NDArray[np.bool_]
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
+
+#: Numbers of the reasons that are named by the first of them where they are neighbours.
+_CHANGES: Final = tuple(REASONS.index(why) for why in (Why.REGIME, Why.ORDER, Why.STEEP))
 
 
 @dataclass(frozen=True)
@@ -222,15 +225,17 @@ def _largest_of(errors: Floats, points: int) -> float | None:
 
 
 def _merged(plan: RefinePlan, low: Ints, width: Ints, why: Ints, jumps: Bools) -> list[Jump]:
-    """Jumps of one curve; neighbouring intervals of one reason are one."""
+    """Jumps of one curve; neighbouring intervals are one, except where the reasons are of different kinds."""
     told = np.flatnonzero(jumps.any(axis=1))
     if not len(told):
         return []
-    new = (np.diff(told, prepend=told[0] - 2) > 1) | (np.diff(why[told], prepend=-1) != 0)
+    kind = np.where(np.isin(why[told], _CHANGES), _CHANGES[0], why[told])
+    new = (np.diff(told, prepend=told[0] - 2) > 1) | (np.diff(kind, prepend=-1) != 0)
     first, last = told[new], told[np.append(new[1:], True)]
     axis = plan.adaptive[0]
     lows, highs = axis.at(low[first], plan.finest), axis.at(low[last] + width[last], plan.finest)
-    concerned = np.logical_or.reduceat(jumps[told], np.flatnonzero(new), axis=0).tolist()
+    starts = np.flatnonzero(new)
+    concerned = np.logical_or.reduceat(jumps[told], starts, axis=0).tolist()
     names = [tuple(name for name, one in zip(plan.results, row, strict=True) if one) for row in concerned]
-    reasons = (REASONS[number] for number in why[first].tolist())
+    reasons = (REASONS[number] for number in np.minimum.reduceat(why[told], starts).tolist())
     return [Jump(*part) for part in zip(lows.tolist(), highs.tolist(), reasons, names, strict=True)]

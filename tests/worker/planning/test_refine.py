@@ -128,6 +128,24 @@ def test_a_jump_is_halved_to_the_finest_interval_and_not_joined() -> None:
         assert errors_outside(curve, name, function).max() <= plan.error
 
 
+def test_what_lies_between_two_jumps_is_told_where_no_test_reaches_it() -> None:
+    near, far = 0.8 - 1.5 * 1.6 / 256, 0.8 + 1.5 * 1.6 / 256
+
+    def function(points: Floats) -> dict[str, Floats]:
+        x = points[:, -1]
+        return {"a": x + np.where((x > near) & (x < far), 0.6, 0.0)}
+
+    curve = curve_of(PLAN, function)
+    (jump,) = curve.jumps
+    assert (jump.low, jump.high) == pytest.approx((0.8 - 2 * 1.6 / 256, 0.8 + 2 * 1.6 / 256))
+
+
+def test_a_steep_end_of_a_smooth_curve_is_no_jump() -> None:
+    curve = curve_of(PLAN, lambda points: {"a": 1.0 / (0.05 + points[:, -1])})
+    assert not curve.jumps
+    assert errors_outside(curve, "a", lambda points: {"a": 1.0 / (0.05 + points[:, -1])}).max() <= PLAN.error
+
+
 def test_a_kink_is_refined_without_being_a_jump() -> None:
     def function(points: Floats) -> dict[str, Floats]:
         return {"a": np.maximum(points[:, -1] - 0.91, 0.0) - 0.3 * points[:, -1]}
