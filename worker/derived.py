@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.worker.models.formulas import needed, sources
+from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -34,6 +35,17 @@ def involved(study: Study, paths: Iterable[str]) -> Study:
 def blocks(study: Study) -> Iterator[range]:
     """All cases of a study, many at a time."""
     return (range(first, min(first + _AT_ONCE, study.cases)) for first in range(0, study.cases, _AT_ONCE))
+
+
+def refused_value(study: Study, cases: range) -> str:
+    """A sentence about the first derived value of these cases that its parameter does not allow; "" if none."""
+    values = study.columns(cases) if study.derive else {}
+    for path in study.derive:
+        entry = parameter_of(study, path)
+        for case, value in zip(cases, values[path].tolist(), strict=True):
+            if entry is not None and not entry.accepts(value):
+                return f"case {case} would derive {path} = {value:.6g}, allowed is {entry.range_text()}"
+    return ""
 
 
 def distinct_values(study: Study, path: str) -> NDArray[np.float64]:

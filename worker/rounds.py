@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from cachetools import LRUCache
 
+from sprag.worker.derived import refused_value
 from sprag.worker.planning import planner_of
 
 if TYPE_CHECKING:
@@ -59,6 +60,8 @@ class Rounds:
             self._store.settle(epoch, number, step.summary)
             return None
         grown = study.with_points(step.points)
+        if refused := refused_value(grown, range(study.cases, grown.cases)):
+            raise PlanError(f"the next round cannot be run: {refused}")
         chunks = self._store.append_round(epoch, number, grown, study.cases, step.summary)
         return None if chunks is None else Appended(grown, chunks)
 

@@ -123,6 +123,8 @@ def preview(
     ]
     if rows:
         show_table("Axes", columns, rows)
+    if made["derive"]:
+        show_table("Derived parameters", (("parameter", False), ("formula, SI", False)), [*made["derive"].items()])
     say(*(f"warning: {warning}" for warning in made["warnings"]))
 
 

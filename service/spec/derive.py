@@ -17,12 +17,12 @@ import numpy as np
 
 from sprag.service.spec.axes.sample import unit_sample
 from sprag.service.spec.axes.values import in_range
-from sprag.service.spec.catalogue import model_parameter
 from sprag.service.spec.formulas import Formula, FormulaError, UnknownNameError, read_formula
 from sprag.service.spec.report import Report, join, quantity_text
 from sprag.worker.derived import blocks, involved
 from sprag.worker.limits import MAX_DERIVED
 from sprag.worker.models.formulas import MAX_LENGTH, CircularError, evaluate, evaluation_order
+from sprag.worker.models.parameters import model_parameter
 from sprag.worker.study import Axis, Combine, Study
 
 if TYPE_CHECKING:
@@ -87,8 +87,8 @@ def _read_given(report: Report, data: object, base: object) -> dict[str, tuple[s
     for key, text in data.items():
         pointer = join("/derive", key)
         if not isinstance(text, str):
-            example = next(iter(EXAMPLE.values()))
-            report.fault(pointer, "wrong-type", "must be a formula, as text", text, allowed=f"such as '{example}'")
+            allowed = f"such as '{next(iter(EXAMPLE.values()))}'; in TOML the path is in quotation marks"
+            report.fault(pointer, "wrong-type", "must be a formula, as text", text, allowed=allowed)
             continue
         for path, own in _expanded(report, pointer, key, text, base):
             if path in found:
@@ -145,7 +145,7 @@ def with_values(base: object, values: Mapping[str, float | str]) -> Any:
     filled = copy.deepcopy(base)
     for path, value in values.items():
         first, _, rest = path.partition(".")
-        if rest and isinstance(filled, dict):
+        if rest and "." not in rest and isinstance(filled, dict):
             filled.setdefault(first, {})
         above, _, key = path.rpartition(".")
         place = _at(filled, above) if above else filled
@@ -164,7 +164,7 @@ def _read_derived(
     entries = {path: model_parameter(model, _catalogue_path(path)) for path in given}
     numbers = {path: _any_number(entry) for path, entry in entries.items() if entry is not None}
     filled = with_values(base, numbers)
-    first = Report(filled)
+    first = Report({"base": filled})
     machine = part.read_base(first, filled)
     report.adopt(first)
     unknown = [path for path in given if path not in machine.parameters and not machine.assumed(path)]

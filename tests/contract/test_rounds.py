@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import timedelta
 from typing import Any
 
@@ -293,6 +294,15 @@ def test_a_round_that_cannot_be_planned_says_why(store: Store) -> None:
     epoch = store.take_over("test")
     run_chunks(store, epoch, record.number)
     with pytest.raises(PlanError, match="cannot be planned: ValueError: there is no such round"):
+        Rounds(store).advance(epoch, record.number, store.study_of(record.number))
+    assert store.get_study(record.id).cases == 25
+
+
+def test_a_derived_value_out_of_range_in_a_later_round_is_not_run(store: Store) -> None:
+    record = create(store, replace(toy.study(), derive={"shaft.inertia": "0.5 - shaft.load"}))
+    epoch = store.take_over("test")
+    run_chunks(store, epoch, record.number)
+    with pytest.raises(PlanError, match=r"case \d+ would derive shaft.inertia = -.*allowed is > 0"):
         Rounds(store).advance(epoch, record.number, store.study_of(record.number))
     assert store.get_study(record.id).cases == 25
 

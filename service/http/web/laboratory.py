@@ -25,12 +25,12 @@ from sprag.service.http.work import Attended
 from sprag.service.presets import preset_names
 from sprag.service.results.pictures.curves import draw_motion
 from sprag.service.results.wording import number, words
-from sprag.service.spec.catalogue import parameter_of
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.numbers import parse_number
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity
 from sprag.worker import models
+from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -31,10 +31,11 @@ from sprag.service.results.exports.inputs import run_inputs
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.regimes import DOUBTFUL, ORDER, counted
 from sprag.service.results.selection import SelectionError
-from sprag.service.spec.catalogue import parameter_of, unit_of
+from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.numbers import parse_number
 from sprag.service.storage.records import Kinds
 from sprag.worker import models
+from sprag.worker.models.parameters import parameter_of
 from sprag.worker.states import TRANSITIONS, StudyEvent, StudyState
 
 if TYPE_CHECKING:

@@ -9,8 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from sprag.service.spec.catalogue import parameter_of, unit_of
+from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.machine.registry import part_of
+from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
     from sprag.worker.study import Study

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from sprag.service.spec.catalogue import general_path
 from sprag.service.spec.described import choice
 from sprag.service.spec.fields import read_object
 from sprag.service.spec.machine.machine import Machine, read_numbers
@@ -27,6 +26,7 @@ from sprag.service.spec.machine.shaft_parts import (
 from sprag.service.spec.report import Report, did_you_mean
 from sprag.worker import models
 from sprag.worker.models import machine_shaft
+from sprag.worker.models.parameters import general_path
 
 FIELDS: Final = (
     "cycle", "mean_speed", "mean_speed_is", "drive", "mechanism", "operation", "balance", "phi_c", "constants",

@@ -185,6 +185,18 @@ def test_a_path_that_cannot_be_derived_is_refused(changes: dict[str, Any], point
     assert found[pointer].code == code
 
 
+def test_faults_of_the_base_are_told_as_they_are_without_formulas() -> None:
+    own = {"/base/pendulums/0/inertia": ..., "/derive": {INERTIA: FORMULA, "shaft.inertia": "1 kg*m^2"}}
+    found = problems({**own, "/base/shaft": ..., "/base/pendulums/0/mass": "-1 g"})
+    assert {pointer: fault.code for pointer, fault in found.items()} == {"/base/pendulums/0/mass": "out-of-range"}
+    assert found["/base/pendulums/0/mass"].value == "-1 g"
+    found = problems({**own, "/base/shaft": ..., "/base/pendulums": ...})
+    assert (found["/base/pendulums"].code, found.keys() & {"/base/shaft", "/derive/shaft.inertia"}) == (
+        "required",
+        set(),
+    )
+
+
 def test_a_circle_is_told() -> None:
     derive = {"shaft.inertia": "2 * pendulums.0.inertia", INERTIA: "shaft.inertia / 2 + 1 kg*m^2"}
     spec = changed({"/base/pendulums/0/inertia": ..., "/base/shaft/inertia": ..., "/derive": derive})
