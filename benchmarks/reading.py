@@ -26,8 +26,8 @@ from pathlib import Path
 import httpx
 import numpy as np
 
+from sprag.service.formats import FORMATS
 from sprag.service.presets import preset_text
-from sprag.service.results.exports import FORMATS
 from sprag.service.spec.document import load_spec, parse_spec
 from sprag.service.storage.store import Store
 from sprag.worker import models

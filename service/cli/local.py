@@ -34,8 +34,8 @@ from sprag.worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from sprag.service.formats import Format
     from sprag.service.jobs.local import LocalRun
-    from sprag.service.results.exports import Format
     from sprag.service.results.report import ReportFormat
     from sprag.service.settings import Settings
     from sprag.service.spec.document import ParsedSpec

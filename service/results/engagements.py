@@ -13,7 +13,7 @@ from sprag.service.results.exports import table_csv
 from sprag.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.results.exports import Format
+    from sprag.service.formats import Format
     from sprag.worker.models import Engagements
     from sprag.worker.study import Study
 

@@ -11,7 +11,7 @@ from sprag.service.results.trajectories import timed_values, trajectory_csv
 from sprag.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.results.exports import Format
+    from sprag.service.formats import Format
     from sprag.worker.models import Portrait
     from sprag.worker.study import Study
 

@@ -14,7 +14,7 @@ from sprag.worker import models
 if TYPE_CHECKING:
     from sprag.service.answers.results import AngleTable, TimedValues, ValueAxis
     from sprag.service.answers.results import Trajectory as TrajectoryData
-    from sprag.service.results.exports import Format
+    from sprag.service.formats import Format
     from sprag.worker.models import Extent, Trajectory
     from sprag.worker.study import Study
 

@@ -80,20 +80,7 @@ _TOKEN: Final = re.compile(
 _SUPERSCRIPT: Final = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+")
 _LONGEST_UNIT: Final = 40
 _SUPERSCRIPTS: Final = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
-_SIGNS: Final = str.maketrans(
-    {
-        "\u2212": "-",
-        "\u2013": "-",
-        "·": "*",
-        "⋅": "*",
-        "×": "*",
-        "\u2219": "*",
-        "μ": "µ",
-        "\u00a0": " ",
-        "\u202f": " ",
-        "\u2009": " ",
-    }
-)
+_SIGNS: Final = str.maketrans("\u2212\u2013·⋅×\u2219μ\u00a0\u202f\u2009", "--****µ   ")
 
 
 class QuantityError(ValueError):

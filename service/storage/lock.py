@@ -8,14 +8,10 @@ import select
 import signal
 import socket
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import Final, Protocol
 
 from sprag.service.storage.private_files import create_private
 from sprag.worker.pool.process_table import start_time
-
-if TYPE_CHECKING:
-    pass
-
 
 #: Seconds to wait for a killed process to exit.
 _KILL_SECONDS: Final = 10.0

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sprag.engine import Ending
 from sprag.engine.catalogue import Parameter, ResultInfo
 from sprag.engine.outcome import Trajectory
-from sprag.service.results.exports import MEDIA_TYPES
+from sprag.service.formats import MEDIA_TYPES
 from sprag.service.settings import Settings
 from sprag.service.spec.document import SpecError, parse_spec
 from sprag.service.spec.extend import parse_extended

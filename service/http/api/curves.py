@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 from fastapi import APIRouter, Depends, Query
 from starlette.responses import Response
 
+from sprag.service import formats
 from sprag.service.answers import results as m
 from sprag.service.faults import parameter_error
 from sprag.service.http.api.document import files, format_query, problems
@@ -32,7 +33,7 @@ _WRITERS: Final = {
     "map": (answers.map_json, answers.map_csv, answers.map_picture),
 }
 #: JSON is what is sent to who asks for nothing.
-_ROW_FORMATS: Final[dict[exports.Format, str]] = {"json": JSON, **exports.MEDIA_TYPES}
+_ROW_FORMATS: Final[dict[formats.Format, str]] = {"json": JSON, **formats.MEDIA_TYPES}
 _PROBLEMS = ("invalid-parameter", "invalid-selection", "study-not-found", "not-acceptable", *CHECK_PROBLEMS)
 
 _REPORT_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; sandbox allow-modals"
@@ -121,7 +122,7 @@ async def _drawn(
     "/results",
     response_class=Response,
     responses={
-        **files("All finished cases, in the requested format.", exports.MEDIA_TYPES.values()),
+        **files("All finished cases, in the requested format.", formats.MEDIA_TYPES.values()),
         **problems("invalid-parameter", "study-not-found", "not-acceptable"),
         **documented_304(),
     },
@@ -129,15 +130,15 @@ async def _drawn(
 async def get_results(
     work: Attended,
     study_id: StudyId,
-    form: Annotated[str | None, format_query(exports.FORMATS, "csv")] = None,
+    form: Annotated[str | None, format_query(formats.FORMATS, "csv")] = None,
 ) -> Response:
     """Every finished case with all its results, in order of the cases: as a table, a labelled grid, or JSON."""
     chosen = choose_format(work.request, form, _ROW_FORMATS)
 
     def make(record: StudyRecord) -> Response:
         source = exports.stored(work.context.store, record, work.context.store.study(study_id))
-        name = f"{study_id}.{exports.SUFFIXES[chosen][0]}"
-        return streamed(exports.export(source, chosen), exports.MEDIA_TYPES[chosen], name)
+        name = f"{study_id}.{formats.SUFFIXES[chosen][0]}"
+        return streamed(exports.export(source, chosen), formats.MEDIA_TYPES[chosen], name)
 
     return await conditional(work, study_id, chosen, make)
 

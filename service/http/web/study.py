@@ -13,6 +13,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import QueryParams
 from starlette.responses import RedirectResponse, Response
 
+from sprag.service import formats
 from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.problems import ApiError
@@ -23,7 +24,6 @@ from sprag.service.http.work import Attended
 from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import timestamp
-from sprag.service.results import exports
 from sprag.service.results.curve_cases import select
 from sprag.service.results.defaults import caption, drawn_numbers
 from sprag.service.results.exports.inputs import inputs as every_input
@@ -72,7 +72,7 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
         "verbs": {verb: VERBS[verb] for verb in _verbs(StudyState(shown["state"]), record.ok < record.done)},
         "tabs": [*tabs, ("/cases", "Cases")],
         "endings": models.ENDING_SENTENCES,
-        "formats": list(exports.MEDIA_TYPES),
+        "formats": list(formats.MEDIA_TYPES),
         "now": timestamp(datetime.now(UTC)),
     }
 

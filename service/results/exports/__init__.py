@@ -7,58 +7,28 @@ Numbers read back as the same doubles; values that could not be computed are emp
 from __future__ import annotations
 
 from collections.abc import Iterator
+from importlib import import_module
+from typing import Final, cast
 
-from sprag.service.formats import FORMATS, MEDIA_TYPES, SUFFIXES, Format, format_of
+from sprag.service.formats import Format
 from sprag.service.results.exports.source import Source, stored
-from sprag.service.results.exports.text import (
-    csv_pieces,
-    escape,
-    json_lines_pieces,
-    json_pieces,
-    row_json,
-    rows_json,
-    table_csv,
-)
+from sprag.service.results.exports.text import csv_pieces, escape, json_pieces, row_json, rows_json, table_csv
 
-__all__ = [
-    "FORMATS",
-    "MEDIA_TYPES",
-    "SUFFIXES",
-    "Format",
-    "Source",
-    "csv_pieces",
-    "escape",
-    "export",
-    "format_of",
-    "json_lines_pieces",
-    "json_pieces",
-    "row_json",
-    "rows_json",
-    "stored",
-    "table_csv",
-]
+__all__ = ["Source", "csv_pieces", "escape", "export", "json_pieces", "row_json", "rows_json", "stored", "table_csv"]
+
+#: Module and function that write each format; only the libraries of the requested one are loaded.
+_WRITERS: Final[dict[Format, tuple[str, str]]] = {
+    "csv": ("text", "csv_pieces"),
+    "json": ("text", "json_pieces"),
+    "jsonl": ("text", "json_lines_pieces"),
+    "parquet": ("arrow", "parquet_pieces"),
+    "arrow": ("arrow", "arrow_pieces"),
+    "xlsx": ("xlsx", "xlsx_pieces"),
+    "netcdf": ("netcdf", "netcdf_pieces"),
+}
 
 
 def export(source: Source, form: Format) -> Iterator[bytes]:
-    """The file in pieces of about one block of rows. Only the libraries of the requested format are loaded."""
-    if form == "csv":
-        return csv_pieces(source)
-    if form == "json":
-        return json_pieces(source)
-    if form == "jsonl":
-        return json_lines_pieces(source)
-    if form == "parquet":
-        from sprag.service.results.exports.arrow import parquet_pieces
-
-        return parquet_pieces(source)
-    if form == "arrow":
-        from sprag.service.results.exports.arrow import arrow_pieces
-
-        return arrow_pieces(source)
-    if form == "xlsx":
-        from sprag.service.results.exports.xlsx import xlsx_pieces
-
-        return xlsx_pieces(source)
-    from sprag.service.results.exports.netcdf import netcdf_pieces
-
-    return netcdf_pieces(source)
+    """The file in pieces of about one block of rows."""
+    module, write = _WRITERS[form]
+    return cast("Iterator[bytes]", getattr(import_module(f"{__name__}.{module}"), write)(source))

@@ -18,8 +18,9 @@ import pyarrow.parquet as pq
 import pytest
 import xarray as xr
 
+from sprag.service.formats import FORMATS, MEDIA_TYPES, SUFFIXES, Format, format_of
 from sprag.service.results import exports
-from sprag.service.results.exports import MEDIA_TYPES, SUFFIXES, Source, format_of, xlsx
+from sprag.service.results.exports import Source, xlsx
 from sprag.service.storage.records import RowBlock
 from sprag.worker import models
 from sprag.worker.study import Study
@@ -279,7 +280,7 @@ def test_axes_that_go_together_are_labels_of_the_cases(service: Service, spec: d
         assert grid["excitation.frequency"].dims == ("case",)
 
 
-@pytest.mark.parametrize("form", exports.FORMATS)
+@pytest.mark.parametrize("form", FORMATS)
 def test_a_study_without_rows_is_an_empty_table(service: Service, form: str) -> None:
     study_id = service.submit()
     response = service.http.get(f"{API}/studies/{study_id}/results", params={"format": form})
@@ -297,8 +298,8 @@ def test_a_study_without_rows_is_an_empty_table(service: Service, form: str) -> 
     assert found == 0
 
 
-@pytest.mark.parametrize("form", exports.FORMATS)
-def test_the_format_is_chosen_by_accept_too(filled: Filled, form: exports.Format) -> None:
+@pytest.mark.parametrize("form", FORMATS)
+def test_the_format_is_chosen_by_accept_too(filled: Filled, form: Format) -> None:
     accept = {"Accept": MEDIA_TYPES[form].partition(";")[0]}
     response = filled.service.http.get(f"{API}/studies/{filled.id}/results", headers=accept)
     assert response.headers["content-type"] == MEDIA_TYPES[form]
