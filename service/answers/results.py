@@ -90,8 +90,19 @@ class ResultMeaning(TypedDict):
     description: str
 
 
+class Jump(TypedDict):
+    """A part of a refined curve that is not interpolated."""
+
+    low: Annotated[float, Doc("its ends, values of x, SI")]
+    high: float
+    why: Annotated[str, Doc("failed, irregular, regime, order, no_value or steep")]
+    results: Annotated[
+        list[str], Doc("the results that are not interpolated there, of those whose error was asked for")
+    ]
+
+
 class Curve(TypedDict):
-    """One curve; all its lists are aligned."""
+    """One curve; its lists of points are aligned."""
 
     by: dict[str, float]
     at: dict[str, float]
@@ -105,6 +116,19 @@ class Curve(TypedDict):
             list[int | None], Doc("excitation periods after which the motion of each case repeats; null: it does not")
         ]
     ]
+    error: NotRequired[
+        Annotated[
+            dict[str, float | None],
+            Doc(
+                "of a refined curve: estimated largest error of straight lines between its points outside `jumps`, "
+                "relative to the range, for each result that was asked for; null: not known yet"
+            ),
+        ]
+    ]
+    jumps: NotRequired[Annotated[list[Jump], Doc("of a refined curve: where it is not interpolated")]]
+    passed: NotRequired[
+        Annotated[bool, Doc("of a refined curve: whether no more points are needed for the error that was asked for")]
+    ]
 
 
 class CurvesData(TypedDict):
@@ -114,6 +138,7 @@ class CurvesData(TypedDict):
     units: Annotated[dict[str, str], Doc("SI unit of every parameter in x, by and at")]
     results: dict[str, ResultMeaning]
     curves: list[Curve]
+    error_asked: NotRequired[Annotated[float, Doc("of refined curves: the error that was asked for")]]
 
 
 class Curves(CurvesData):

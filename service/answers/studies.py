@@ -107,9 +107,9 @@ class AxisInfo(TypedDict):
 
     paths: Annotated[list[str], Doc("the parameters that vary together")]
     unit: str
-    values: Annotated[int, Doc("number of values")]
-    first: Annotated[float, Doc("the first value, SI")]
-    last: Annotated[float, Doc("the last value, SI")]
+    values: Annotated[int, Doc("number of values; of a study that chooses its own cases, of different ones so far")]
+    first: Annotated[float, Doc("the first value, SI; of a study that chooses its own cases, the least")]
+    last: Annotated[float, Doc("the last value, SI; of a study that chooses its own cases, the largest")]
 
 
 class StudyDetail(_Study):

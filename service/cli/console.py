@@ -175,9 +175,12 @@ def progress_text(
     seconds_left: tuple[float, float] | None,
     finish_by: str | None = None,
     in_time: str | None = None,
+    rounds: str | None = None,
 ) -> str:
-    """Text beside a progress bar: state, cases per second, time left, and whether the deadline will be met."""
+    """Text beside a progress bar: state, round, cases per second, time left, and whether the deadline will be met."""
     parts = [str(state)]
+    if rounds is not None:
+        parts.append(rounds)
     if rate:
         parts.append(f"{rate:.3g} cases/s")
     if seconds_left is not None:

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from sprag.service.results.report import ReportFormat
     from sprag.service.settings import Settings
     from sprag.service.spec.document import ParsedSpec
+    from sprag.service.storage.records import Progress
     from sprag.worker.models import Trajectory
     from sprag.worker.study import Study
 
@@ -249,6 +250,7 @@ def run(
 ) -> None:
     """Run a study here, without a service: rows or a report to standard output or FILE, progress on standard error."""
     from sprag.service.jobs.local import pool_size, run_here
+    from sprag.service.results.rounds import sentence
     from sprag.service.results.unaffected import Unaffected
 
     finish = _finish(finish_by)
@@ -270,20 +272,21 @@ def run(
             warnings=parsed.warnings,
             fresh=fresh,
             finish_by=finish,
-            on_progress=lambda now: update(
-                now.done, now.total, progress_text(now.state, now.rate, now.seconds_left, finish_by, now.in_time)
-            ),
+            on_progress=lambda now: update(now.done, now.total, _remark(now, finish_by)),
         ) as done,
     ):
         for piece in _rows(done, table_format(form, file, as_json)):
             write(piece)
         record, unaffecting = done.record, Unaffected().of(done.store, done.record)
-        endings = done.store.progress(record.id).endings
+        progress = done.store.progress(record.id)
+        endings = progress.endings
     kept = f", kept as {record.id}" if db is not None else ""
     known = f", {record.reused} of them reused" if record.reused else ""
     say(*(f"warning: {text}" for text in unaffecting))
     seconds = time.monotonic() - start
     say(f"{record.done} of {record.cases} cases done{known}, {record.ok} ok, {seconds:.1f} s{kept}")
+    if progress.rounds is not None:
+        say(sentence(progress.rounds))
     say(*ending_lines(endings))
     if as_json and to_file(file):
         numbers = {"cases": record.cases, "done": record.done, "ok": record.ok, "reused": record.reused}
@@ -293,6 +296,13 @@ def run(
         say(str(record.reason))
     if record.ok != record.cases:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
+
+
+def _remark(now: Progress, finish_by: str | None) -> str:
+    from sprag.service.results.rounds import sentence
+
+    rounds = None if now.rounds is None else sentence(now.rounds)
+    return progress_text(now.state, now.rate, now.seconds_left, finish_by, now.in_time, rounds)
 
 
 @contextmanager

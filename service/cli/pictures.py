@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -61,8 +61,14 @@ def _answer(
 
 def curve(
     study_id: StudyId,
-    x: Annotated[str, typer.Option("--x", metavar="PATH", help="Axis along the curve, such as shaft.load.")],
-    y: Annotated[list[str], typer.Option("--y", metavar="RESULT", help="Result to draw; may be repeated.")],
+    x: Annotated[
+        str | None,
+        typer.Option("--x", metavar="PATH", help="Axis along the curve; default: that of the page."),
+    ] = None,
+    y: Annotated[
+        list[str] | None,
+        typer.Option("--y", metavar="RESULT", help="Result to draw; may be repeated; default: those of the page."),
+    ] = None,
     by: Annotated[
         list[str] | None, typer.Option("--by", metavar="PATH", help="Axis with one curve for each value.")
     ] = None,
@@ -73,7 +79,8 @@ def curve(
     as_json: JsonFlag = False,
 ) -> None:
     """Show results against an axis as a table, and write them as a picture."""
-    query = [("x", x), *(("y", name) for name in y), *(("by", path) for path in by or ())]
+    query = [*([] if x is None else [("x", x)]), *(("y", name) for name in y or ())]
+    query += [("by", path) for path in by or ()]
     query += [("at", item) for item in at or ()]
     with connection(server, token) as client:
         _answer(client, study_id, "curves", query, file, show_curves, as_json)
@@ -140,7 +147,7 @@ def _show_effects(result: dict[str, Any]) -> None:
 
 
 def show_curves(found: dict[str, Any]) -> None:
-    """One table for each curve: the axis, then every result against it."""
+    """One table for each curve: the axis, then every result against it; of a refined curve its error and jumps."""
     x = found["x"]
     columns = [(_heading(x["path"], x["unit"]), True)]
     columns += [(_heading(name, result["unit"]), True) for name, result in found["results"].items()]
@@ -151,6 +158,18 @@ def show_curves(found: dict[str, Any]) -> None:
         regimes = [drawn["regime"]] if settled else []
         rows = zip(drawn["x"], *drawn["y"].values(), *regimes, drawn["endings"], strict=True)
         show_table(title, columns, [(*row[:-1], "" if row[-1] == OK else row[-1]) for row in rows])
+        if "error" in drawn:
+            say(*_refined(drawn, found["error_asked"], x["unit"]))
+
+
+def _refined(drawn: dict[str, Any], asked: float, unit: str) -> Iterator[str]:
+    """What is told of a refined curve."""
+    for name, error in drawn["error"].items():
+        told = "not known yet" if error is None else f"{100.0 * error:.2g} % of the range"
+        yield f"error of {name}: {told}, {100.0 * asked:.2g} % asked"
+    for jump in drawn["jumps"]:
+        ends = f"{cell_text(jump['low'])} to {cell_text(jump['high'])}" + ("" if unit == "1" else f" {unit}")
+        yield f"jump at {ends} ({jump['why'].replace('_', ' ')}): {', '.join(jump['results'])} not interpolated"
 
 
 def _held(values: Mapping[str, float], units: Mapping[str, str]) -> str:

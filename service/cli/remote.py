@@ -186,7 +186,14 @@ def _remark(study: dict[str, Any]) -> str:
     progress = study["progress"]
     left = progress["seconds_left"]
     interval = None if left is None else (left["low"], left["high"])
-    return progress_text(study["state"], progress["rate"], interval, study["finish_by"], progress["in_time"])
+    rounds = _rounds(study)
+    return progress_text(study["state"], progress["rate"], interval, study["finish_by"], progress["in_time"], rounds)
+
+
+def _rounds(study: dict[str, Any]) -> str | None:
+    """The rounds of a study that chooses its own cases, in words; None of another, or of a service without rounds."""
+    rounds = study["progress"].get("rounds")
+    return None if rounds is None else str(rounds["sentence"])
 
 
 def _exit_as(study: dict[str, Any]) -> None:
@@ -208,6 +215,7 @@ def show_study(study: dict[str, Any], as_json: bool) -> None:
         f"{study['name'] or study['model']}: {study['state']}, {progress['done']} of {progress['total']} cases done, "
         f"{progress['ok']} ok"
         + (f" ({endings})" if endings else "")
+        + (f"; {_rounds(study)}" if _rounds(study) else "")
         + (f"; {study['reused']} taken from other studies" if study.get("reused") else "")
         + (f"; to be finished by {study['finish_by']}" if _is_due(study) else "")
     )

@@ -209,8 +209,8 @@ class AsyncStudy:
 
     async def curves(
         self,
-        x: str,
-        y: str | Sequence[str],
+        x: str | None = None,
+        y: str | Sequence[str] = (),
         *,
         by: str | Sequence[str] = (),
         at: Mapping[str, Value] | None = None,
@@ -269,8 +269,8 @@ class AsyncStudy:
     async def picture(
         self,
         file: str | PathLike[str],
-        x: str,
-        y: str | Sequence[str],
+        x: str | None = None,
+        y: str | Sequence[str] = (),
         *,
         by: str | Sequence[str] = (),
         at: Mapping[str, Value] | None = None,

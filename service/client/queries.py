@@ -49,10 +49,14 @@ def spec_of(spec: Spec | str | PathLike[str]) -> Spec:
 
 
 def curve_query(
-    x: str, y: str | Sequence[str], by: str | Sequence[str], at: Mapping[str, Value] | None
+    x: str | None, y: str | Sequence[str], by: str | Sequence[str], at: Mapping[str, Value] | None
 ) -> list[tuple[str, str]]:
     """Query of curves: ``at`` maps paths to values, SI numbers or texts with a unit."""
-    query = [("x", x), *(("y", name) for name in _listed(y)), *(("by", path) for path in _listed(by))]
+    query = [
+        *([] if x is None else [("x", x)]),
+        *(("y", name) for name in _listed(y)),
+        *(("by", path) for path in _listed(by)),
+    ]
     return query + [("at", f"{path}={value}") for path, value in (at or {}).items()]
 
 

@@ -134,13 +134,16 @@ class Study:
 
     def curves(
         self,
-        x: str,
-        y: str | Sequence[str],
+        x: str | None = None,
+        y: str | Sequence[str] = (),
         *,
         by: str | Sequence[str] = (),
         at: Mapping[str, Value] | None = None,
     ) -> Curves:
-        """Results ``y`` against axis ``x``, a curve for each value of the axes ``by``, others held ``at`` values."""
+        """Results ``y`` against axis ``x``, a curve for each value of the axes ``by``, others held ``at`` values.
+
+        Without ``x`` or ``y``, the curves that the page of the study shows first.
+        """
         return Curves(cast("Any", self._client.plain.drawn(self.id, "curves", curve_query(x, y, by, at))))
 
     def map(self, x: str, y: str, z: str, *, at: Mapping[str, Value] | None = None) -> dict[str, Any]:
@@ -194,8 +197,8 @@ class Study:
     def picture(
         self,
         file: str | PathLike[str],
-        x: str,
-        y: str | Sequence[str],
+        x: str | None = None,
+        y: str | Sequence[str] = (),
         *,
         by: str | Sequence[str] = (),
         at: Mapping[str, Value] | None = None,

@@ -15,6 +15,7 @@ from sprag.service.results import exports
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.pictures.maps import draw_map as draw_map_picture
+from sprag.service.results.refined import not_joined
 from sprag.service.results.regimes import kind_columns
 from sprag.worker import models
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from sprag.service.jobs.checks import Library
-    from sprag.service.results.curves import CurveQuery, Curves, Map
+    from sprag.service.results.curves import Curve, CurveQuery, Curves, Map
 
 #: Numbers of curves or a map that are read and written in about ten milliseconds.
 FEW: Final = 20_000
@@ -41,7 +42,10 @@ def curves_json(library: Library, study_id: str, query: CurveQuery) -> bytes:
 
 
 def curves_csv(library: Library, study_id: str, query: CurveQuery) -> bytes:
-    """Every point of every curve as one row: fixed parameters, case, x, results, regime and its order, ending."""
+    """Every point of every curve as one row: fixed parameters, case, x, results, regime and its order, ending.
+
+    Of refined curves also the results that are not interpolated up to the next point.
+    """
     curves = curves_of(library, study_id, query)
     names = kind_columns(curves.selection.regime)
     columns: dict[str, list[Any]] = {}
@@ -54,11 +58,22 @@ def curves_csv(library: Library, study_id: str, query: CurveQuery) -> bytes:
             curves.selection.x: list(curve.line.x),
             **{info.name: numbers(curve.y[info.name], info.kind == "count") for info in curves.selection.results},
             **dict(kinds),
+            **_not_joined(curve, [info.name for info in curves.selection.results]),
             "ending": curve.endings,
         }
         for name, part in parts.items():
             columns.setdefault(name, []).extend(part)
     return exports.table_csv(list(columns), list(columns.values()))
+
+
+def _not_joined(curve: Curve, names: list[str]) -> dict[str, list[Any]]:
+    """A column of refined curves: the results that are not interpolated from the point of a row to the next one."""
+    if curve.refined is None:
+        return {}
+    texts = [""] * len(curve.endings)
+    for place, text in zip(curve.run().tolist(), not_joined(curve.refined, names), strict=True):
+        texts[place] = text
+    return {"not_joined": texts}
 
 
 def curves_picture(library: Library, study_id: str, query: CurveQuery, title: str, form: pictures.Picture) -> bytes:

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sprag.service.faults import ParameterFault
-from sprag.service.results.curves import Curve, CurveQuery, Curves, Fetch, Line, Map, Selection
+from sprag.service.results.curves import Curve, CurveQuery, Curves, Fetch, Line, Map, Selection, not_run
+from sprag.service.results.refined import families, plan_along, refined_curves
 from sprag.service.results.regimes import kind_columns, kinds_of
 from sprag.service.results.selection import (
     Fixed,
@@ -37,11 +38,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.worker.models import ResultInfo
+    from sprag.worker.planning.refine import Curve as Refined
     from sprag.worker.study import Study
 
 
 def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Selection:
-    """Select the cases of the curves of ``query``.
+    """Select the cases of the curves of ``query``; of refined curves, a fixed axis without a role is one of ``by``.
 
     Raises
     ------
@@ -51,14 +53,20 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
     results = numeric_results(infos, "y", query.y)
     x_axis = require_axis(study, "x", query.x)
     fixed = locate_axes(study, query.at)
+    plan = plan_along(study, query.x)
     by_axes = {path: require_axis(study, "by", path) for path in dict.fromkeys(query.by)}
+    # Every combination of the fixed axes is a curve of its own.
+    for path in () if plan is None else families(plan):
+        axis = require_axis(study, "by", path)
+        if axis not in {x_axis, *by_axes.values(), *fixed}:
+            by_axes[path] = axis
     _no_axis_twice({query.x: x_axis}, "by", by_axes, fixed)
     chooser = _zip_lines if study.combine == "zip" else _grid_lines
     x_values, lines = chooser(study, x_axis, by_axes, fixed, len(results))
     made = tuple(lines)
     units = {path: unit_of(study, path) for path in (query.x, *made[0].by, *made[0].at)}
     names = {path: axis_name(study, path) for path in (query.x, *made[0].by)}
-    return Selection(query.x, units, names, _held(study, made[0]), x_values, results, made, regime_info(infos))
+    return Selection(query.x, units, names, _held(study, made[0]), x_values, results, made, regime_info(infos), plan)
 
 
 def _held(study: Study, line: Line) -> tuple[str, ...]:
@@ -72,14 +80,21 @@ def _held(study: Study, line: Line) -> tuple[str, ...]:
 def draw(selection: Selection, fetch: Fetch) -> Curves:
     """Fetch the results of the selected cases in one query."""
     names = [info.name for info in selection.results]
-    columns = fetch(np.concatenate([line.cases for line in selection.lines]), _with_kinds(names, selection.regime))
+    needed = list(
+        dict.fromkeys([*_with_kinds(names, selection.regime), *(selection.plan.needed if selection.plan else ())])
+    )
+    columns = fetch(np.concatenate([line.cases for line in selection.lines]), needed)
     endings = [ending or PENDING for ending in columns.endings]
     regimes, orders = kinds_of(columns.values, selection.regime)
+    refined: list[Refined] | None = None
+    if selection.plan is not None:
+        refined = refined_curves(selection.plan, selection.lines, ~not_run(endings), columns)
     curves, start = [], 0
-    for line in selection.lines:
+    for place, line in enumerate(selection.lines):
         part = slice(start, start + line.cases.size)
         y = {name: columns.values[name][part] for name in names}
-        curves.append(Curve(line, y, endings[part], regimes and regimes[part], orders and orders[part]))
+        own = None if refined is None else refined[place]
+        curves.append(Curve(line, y, endings[part], regimes and regimes[part], orders and orders[part], own))
         start = part.stop
     return Curves(selection, tuple(curves))
 

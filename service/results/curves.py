@@ -13,12 +13,15 @@ from sprag.service.answers import filled
 from sprag.service.answers.results import Curve as CurveData
 from sprag.service.answers.results import CurvesData, MapData, MapResult, ResultMeaning
 from sprag.service.json_text import numbers
+from sprag.service.results.refined import jumps_of
 from sprag.worker.codes import PENDING
 from sprag.worker.models import WorkerEnding
 
 if TYPE_CHECKING:
     from sprag.service.storage.records import CaseColumns
     from sprag.worker.models import ResultInfo
+    from sprag.worker.planning.refine import Curve as Refined
+    from sprag.worker.planning.refine_plan import RefinePlan
 
 #: Results of cases, aligned with them: (case numbers, result names) -> columns.
 Fetch = Callable[[NDArray[np.int64], Sequence[str]], "CaseColumns"]
@@ -50,7 +53,7 @@ class Selection:
 
     For display: ``names`` of the drawn paths with those tied to them, and ``held``, the fixed ones with their values,
     including constant ones of the operating point. ``regime`` is the result that gives the kind of motion, where the
-    study has one.
+    study has one; ``plan`` is that of curves that were refined over x.
     """
 
     x: str
@@ -61,13 +64,15 @@ class Selection:
     results: tuple[ResultInfo, ...]
     lines: tuple[Line, ...]
     regime: ResultInfo | None = None
+    plan: RefinePlan | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Curve:
     """One curve: a line of cases with their results (NaN where there is none) and endings.
 
-    Of a settled study also with their regimes, and the excitation periods after which their motions repeat.
+    Of a settled study also with their regimes, and the excitation periods after which their motions repeat;
+    of a refined curve what its planner says of it.
     """
 
     line: Line
@@ -75,10 +80,11 @@ class Curve:
     endings: list[str]
     regimes: list[str | None] | None = None
     orders: list[int | None] | None = None
+    refined: Refined | None = None
 
     def run(self) -> NDArray[np.intp]:
         """Indices of the cases that were run, ascending, which a picture joins; of a coarser study, its own points."""
-        return np.flatnonzero(~_not_run(np.array(self.endings, dtype=object)))
+        return np.flatnonzero(~not_run(self.endings))
 
     def to_json(self, results: Sequence[ResultInfo]) -> CurveData:
         """The curve as JSON data."""
@@ -90,9 +96,13 @@ class Curve:
             "y": {info.name: numbers(self.y[info.name], info.kind == "count") for info in results},
             "endings": self.endings,
         }
-        if self.regimes is None or self.orders is None:
+        if self.regimes is not None and self.orders is not None:
+            data = {**data, "regime": self.regimes, "order": self.orders}
+        if self.refined is None:
             return data
-        return {**data, "regime": self.regimes, "order": self.orders}
+        errors = {info.name: self.refined.errors[info.name] for info in results if info.name in self.refined.errors}
+        jumps = jumps_of(self.refined, self.refined.errors)
+        return {**data, "error": errors, "jumps": jumps, "passed": self.refined.passed}
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,12 +115,13 @@ class Curves:
     def to_json(self) -> CurvesData:
         """The document described in docs/http.md: null for a missing number, with the ending that explains it."""
         chosen = self.selection
-        return {
+        data: CurvesData = {
             "x": {"path": chosen.x, "unit": chosen.units[chosen.x], "values": list(chosen.x_values)},
             "units": chosen.units,
             "results": {info.name: filled(ResultMeaning, info) for info in chosen.results},
             "curves": [curve.to_json(chosen.results) for curve in self.curves],
         }
+        return data if chosen.plan is None else {**data, "error_asked": chosen.plan.error}
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +169,7 @@ class Map:
 
         For a study that stopped between coarse and fine it is a coarser grid without holes.
         """
-        missing = _not_run(np.array(self.endings, dtype=object)).reshape(self.values.shape)
+        missing = not_run(self.endings).reshape(self.values.shape)
         rows, columns = _complete(missing)
         if not missing.any() or not (rows.size and columns.size):
             return self
@@ -189,6 +200,7 @@ def _complete(missing: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.
     return np.flatnonzero(rows), np.flatnonzero(columns)
 
 
-def _not_run(endings: NDArray[np.object_]) -> NDArray[np.bool_]:
+def not_run(endings: Sequence[str] | Sequence[Sequence[str]]) -> NDArray[np.bool_]:
     """Which cases have no ending of their own, either yet or ever; shape as ``endings``."""
-    return np.asarray((endings == PENDING) | (endings == WorkerEnding.CANCELLED.value), dtype=np.bool_)
+    own = np.array(endings, dtype=object)
+    return np.asarray((own == PENDING) | (own == WorkerEnding.CANCELLED.value), dtype=np.bool_)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.results.curves import CurveQuery
-from sprag.service.results.selection import axis_name, held_text
+from sprag.service.results.refined import curve_plan, families
+from sprag.service.results.selection import axis_name, held_text, refused
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 
@@ -26,8 +27,12 @@ _MOST_MAIN: Final = 10
 def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
     """What to draw for ``study``; None when nothing varies.
 
-    Axes that are not drawn are held at the base's value where they contain it, otherwise at their middle value.
+    Axes that are not drawn are held at the base's value where they contain it, otherwise at their middle value. Refined
+    curves are drawn with every result whose error was asked for, all of them.
     """
+    plan = curve_plan(study)
+    if plan is not None:
+        return CurveQuery(plan.adaptive[0].paths[0], plan.results, tuple(families(plan)))
     varying = [axis for axis in study.axes if len(axis) > 1]
     if not varying:
         return None
@@ -43,6 +48,34 @@ def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
     held = [axis for axis in others if by not in axis.paths]
     at = tuple((axis.paths[0], repr(usual_value(study, axis))) for axis in held)
     return CurveQuery(x, y if by is None else y[:1], () if by is None else (by,), at)
+
+
+def completed(
+    study: Study,
+    infos: Sequence[ResultInfo],
+    x: str | None,
+    y: tuple[str, ...],
+    by: tuple[str, ...],
+    at: tuple[tuple[str, str], ...],
+) -> CurveQuery:
+    """The curves of these choices; without ``x`` or ``y`` as they are drawn first.
+
+    Raises SelectionError where nothing varies that could be drawn.
+    """
+    if x and y:
+        return CurveQuery(x, y, by, at)
+    main = main_query(study, infos)
+    if main is None:
+        raise refused("x", "not-an-axis", "nothing varies in this study, so there are no curves")
+    if x:
+        return CurveQuery(x, main.y, by, at)
+    taken = {study.axis_of(path) for path in (*by, *(path for path, _ in at))}
+    return CurveQuery(
+        main.x,
+        y or main.y,
+        by or tuple(path for path in main.by if study.axis_of(path) not in taken),
+        (*at, *(pair for pair in main.at if study.axis_of(pair[0]) not in taken)),
+    )
 
 
 def main_results(study: Study, infos: Sequence[ResultInfo]) -> tuple[str, ...]:

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from sprag.service.spec.fields import placed
 from sprag.service.spec.report import did_you_mean
 from sprag.worker.models import ResultInfo
 from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from sprag.service.answers.studies import AxisInfo
-    from sprag.worker.study import Study
+    from sprag.worker.study import Axis, Study
 
 
 def unit_of(study: Study, path: str) -> str:
@@ -33,13 +37,19 @@ def unknown_result(infos: Iterable[ResultInfo], name: str) -> str:
 
 def axes_json(study: Study) -> list[AxisInfo]:
     """The axes of a study as JSON data, without the full lists of values."""
+    told = [(axis, values_told(study, axis)) for axis in study.axes]
     return [
         {
             "paths": list(axis.paths),
             "unit": unit_of(study, axis.paths[0]),
-            "values": len(axis),
-            "first": float(axis.array[0]),
-            "last": float(axis.array[-1]),
+            "values": values.size,
+            "first": float(values[0]),
+            "last": float(values[-1]),
         }
-        for axis in study.axes
+        for axis, values in told
     ]
+
+
+def values_told(study: Study, axis: Axis) -> NDArray[np.float64]:
+    """The values of an axis for people; of a study that chooses its cases each of its values once, ascending."""
+    return axis.array if study.plan is None else np.unique(axis.array)

@@ -20,10 +20,15 @@ from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
 from sprag.service.jobs import answers
 from sprag.service.results import exports, report
 from sprag.service.results.curves import CurveQuery
+from sprag.service.results.defaults import completed
 from sprag.service.results.report.content import report_of
+from sprag.worker import models
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from sprag.service.storage.records import StudyRecord
+    from sprag.worker.study import Study
 
 router = APIRouter(prefix="/studies/{study_id:study}", tags=["results"], dependencies=[Depends(strict_query)])
 
@@ -60,10 +65,16 @@ Fixed = Annotated[
 async def get_curves(
     work: Attended,
     study_id: StudyId,
-    x: XPath,
+    x: Annotated[
+        str | None,
+        Query(description="path of the axis along the curve; default: that of the page", examples=["shaft.load"]),
+    ] = None,
     y: Annotated[
-        list[str], Query(description="result to draw; may be repeated", examples=[["shaft.speed.mean"]], min_length=1)
-    ],
+        list[str] | None,
+        Query(
+            description="result to draw; may be repeated; default: those of the page", examples=[["shaft.speed.mean"]]
+        ),
+    ] = None,
     by: Annotated[
         list[str] | None,
         Query(
@@ -74,8 +85,16 @@ async def get_curves(
     at: Fixed = None,
     form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
-    """Results against one axis. An axis of several values that is neither x nor in `by` needs its value in `at`."""
-    return await _drawn(work, study_id, form, "curves", CurveQuery(x, tuple(y), tuple(by or ()), _pairs(at)))
+    """Results against one axis. An axis of several values that is neither x nor in `by` needs its value in `at`.
+
+    Without `x` or `y` they are the curves that the page of the study shows first. Refined curves tell their error and
+    their jumps.
+    """
+
+    def chosen(study: Study) -> CurveQuery:
+        return completed(study, models.study_results(study), x, tuple(y or ()), tuple(by or ()), _pairs(at))
+
+    return await _drawn(work, study_id, form, "curves", chosen)
 
 
 @router.get(
@@ -97,17 +116,22 @@ async def get_map(
     form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """One result over two axes."""
-    return await _drawn(work, study_id, form, "map", CurveQuery(x, (z,), (y,), _pairs(at)))
+    query = CurveQuery(x, (z,), (y,), _pairs(at))
+    return await _drawn(work, study_id, form, "map", lambda _study: query)
 
 
 async def _drawn(
-    work: Work, study_id: str, form: str | None, part: Literal["curves", "map"], query: CurveQuery
+    work: Work,
+    study_id: str,
+    form: str | None,
+    part: Literal["curves", "map"],
+    query: Callable[[Study], CurveQuery],
 ) -> Response:
     chosen = choose_format(work.request, form, DRAWN_FORMATS)
     as_json, as_table, as_picture = _WRITERS[part]
 
     def make(record: StudyRecord) -> Response | Drawing:
-        asked = (work.context.library, study_id, query)
+        asked = (work.context.library, study_id, query(work.context.store.study(study_id)))
         if chosen == "json":
             return placed(work.context, Drawing(as_json, asked, JSON))
         if chosen == "csv":

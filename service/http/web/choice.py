@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import main_query, main_results, usual_value
+from sprag.service.results.refined import curve_plan, families, plan_along
 from sprag.service.results.selection import refused
 
 if TYPE_CHECKING:
@@ -30,8 +31,8 @@ class MapQuery:
 def characteristic(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
     """The mechanical characteristic: speed, torque, power and efficiency along the study's main axis."""
     main = main_query(study, infos)
-    if main is None:
-        return None
+    if main is None or curve_plan(study) is not None:
+        return main  # refined curves are right for the results that were asked for
     return CurveQuery(main.x, main_results(study, infos), main.by, main.at)
 
 
@@ -65,7 +66,10 @@ def map_query(study: Study, infos: Sequence[ResultInfo], given: QueryParams) -> 
 
 
 def held(study: Study, given: Sequence[str], drawn: Sequence[str]) -> tuple[tuple[str, str], ...]:
-    """Pairs of path and value for the axes that are not drawn: as given, others (of a grid) at their usual value."""
+    """Pairs of path and value for the axes that are not drawn: as given, others at their usual value.
+
+    Axes of listed cases are only held as given, except the fixed ones of refined curves.
+    """
     pairs: dict[str, str] = {}
     for item in given:
         path, equals, value = item.partition("=")
@@ -74,11 +78,11 @@ def held(study: Study, given: Sequence[str], drawn: Sequence[str]) -> tuple[tupl
         if not equals or not value.strip():
             raise refused("at", "invalid-text", "must be path=value", item)
         pairs[path.strip()] = value.strip()
-    if study.combine == "grid":
-        for axis in study.axes:
-            open_axis = len(axis) > 1 and not any(path in axis.paths for path in (*drawn, *pairs))
-            if open_axis:
-                pairs[axis.paths[0]] = repr(usual_value(study, axis))
+    plan = plan_along(study, drawn[0])
+    fixed = families(plan) if plan is not None else study.axis_paths if study.combine == "grid" else ()
+    for axis in study.axes:
+        if len(axis) > 1 and axis.paths[0] in fixed and not any(path in axis.paths for path in (*drawn, *pairs)):
+            pairs[axis.paths[0]] = repr(usual_value(study, axis))
     return tuple(pairs.items())
 
 

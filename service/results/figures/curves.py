@@ -7,14 +7,18 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.results.figures.figure import Figure, Line, Marks, Panel, Quantity, line_colours
+from sprag.service.results.figures.figure import Band, Figure, Line, Marks, Panel, Quantity, line_colours
 from sprag.service.results.figures.orders import TITLE, order_map, strip_of
+from sprag.service.results.refined import jumps_of, sentence
+from sprag.service.results.refined import stretches as refined_stretches
 from sprag.service.results.regimes import DOUBTFUL, MARKED, regimes_of, stretches
 from sprag.service.results.wording import number, unit_text
 from sprag.worker.codes import PENDING
 from sprag.worker.models import WorkerEnding
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from sprag.service.results.curves import Curve, Curves, Map
     from sprag.worker.models import ResultInfo
 
@@ -52,7 +56,8 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1, *, by_u
         y = Quantity(infos[0].name if len(infos) == 1 else "", infos[0].unit)
         parts = tuple(_lines(lines, labels, infos, listed=index == 0))
         styles = tuple(info.name for info in infos) if len(infos) > 1 else ()
-        panels.append(Panel(y, parts, tuple(_marks(lines, infos, regimes)), styles))
+        bands = tuple(_bands(lines, infos)) if len(drawn) == 1 else ()
+        panels.append(Panel(y, parts, tuple(_marks(lines, infos, regimes)), styles, bands=bands))
     most = min(max(_MOST_POINTS // len(lines), _LEAST_POINTS), _LINE_POINTS)
     spans, looks = strip_of(drawn[0][1].curves) if len(drawn) == 1 else ({}, {})
     return Figure(
@@ -68,7 +73,22 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1, *, by_u
         looks,
         most=most,
         note=_nothing(drawn),
+        below=_told(drawn[0][1]) if len(drawn) == 1 else "",
     )
+
+
+def _told(curves: Curves) -> str:
+    """How right refined curves are."""
+    plan, refined = curves.selection.plan, [curve.refined for curve in curves.curves if curve.refined is not None]
+    return "" if plan is None else sentence(plan, refined, (info.name for info in curves.selection.results))
+
+
+def _bands(lines: Sequence[tuple[int, Curve]], infos: Sequence[ResultInfo]) -> Iterator[Band]:
+    """The jumps of refined curves."""
+    for index, ((_, curve), colour) in enumerate(zip(lines, line_colours(len(lines)), strict=True)):
+        if curve.refined is not None:
+            for jump in jumps_of(curve.refined, (info.name for info in infos)):
+                yield Band(jump["low"], jump["high"], colour, str(index))
 
 
 def _lines(
@@ -90,10 +110,19 @@ def _lines(
                 heading=labels[study] if values else "",
                 listed=listed and place == 0,
                 cases=curve.line.cases[run],
-                stretches=None if regimes is None else tuple(stretches(regimes, x.size)),
+                stretches=_stretches(curve, info, regimes, x.size),
                 # A line needs y as a function of x; the points of a zip may go back and forth.
                 joined=bool(np.all(np.diff(x) > 0.0)),
             )
+
+
+def _stretches(
+    curve: Curve, info: ResultInfo, regimes: Sequence[str | None] | None, points: int
+) -> tuple[NDArray[np.int64], ...] | None:
+    """The points that lines join; None for all of them."""
+    if curve.refined is not None and points:
+        return refined_stretches(curve.refined, info.name, stretches(regimes, points))
+    return None if regimes is None else tuple(stretches(regimes, points))
 
 
 def _marks(lines: Sequence[tuple[int, Curve]], infos: Sequence[ResultInfo], regimes: Sequence[str]) -> Iterator[Marks]:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 #: Colours that are distinguishable with any kind of colour vision (after Okabe and Ito), on light and dark backgrounds.
 PALETTE: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f6fc4", "#8c6d31")
+#: What bands are, for the legend.
+BANDS: Final = "jump, not interpolated"
 #: Look of a state for which its model defines none.
 OTHER_LOOK: Final = ("#999999", "+", "+++")
 
@@ -69,10 +71,21 @@ class Marks:
 
 
 @dataclass(frozen=True, slots=True)
+class Band:
+    """A part of the x axis, from ``low`` to ``high``, in which the lines of that ``key`` and ``colour`` are broken."""
+
+    low: float
+    high: float
+    colour: str
+    key: str
+
+
+@dataclass(frozen=True, slots=True)
 class Panel:
     """One plot. ``styles`` explains the dashes where they distinguish results.
 
     ``x`` is the quantity of its own x axis; without one, the panel has the x axis of the figure.
+    ``bands`` are the jumps of its curves.
     """
 
     y: Quantity
@@ -80,6 +93,7 @@ class Panel:
     marks: tuple[Marks, ...] = ()
     styles: tuple[str, ...] = ()
     x: Quantity | None = None
+    bands: tuple[Band, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +112,7 @@ class Figure:
     scale : the quantity of the numbers that colour points
     most : most points of a drawn line, where there are more than can be distinguished
     note : a sentence, where there is nothing to draw
+    below : a sentence below the panels
     """
 
     x: Quantity
@@ -115,6 +130,7 @@ class Figure:
     scale: str = ""
     most: int = 6_000
     note: str = ""
+    below: str = ""
 
     @property
     def apart(self) -> bool:
@@ -132,6 +148,11 @@ class Figure:
         occurring = {state: None for spans in self.spans.values() for state, _, _ in spans}
         known = [state for state in self.looks if state in occurring]
         return {state: self.looks.get(state, OTHER_LOOK) for state in dict.fromkeys([*known, *occurring])}
+
+    @property
+    def banded(self) -> bool:
+        """Whether any panel has bands."""
+        return any(panel.bands for panel in self.panels)
 
     @property
     def listed(self) -> list[Line]:

@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 from sprag.service.results.figures.curves import curves_figure
-from sprag.service.results.figures.figure import PALETTE, shortened
 from sprag.service.results.figures.motion import motion_figure
 from sprag.service.results.figures.portrait import portrait_figure
+from sprag.service.results.pictures.legends import COLUMNS, STYLES, explain, explain_regimes, explain_studies, handle
+from sprag.service.results.pictures.text import load_matplotlib, quantity_label, writable
 from sprag.service.results.regimes import MARKS
 from sprag.service.results.selection import refused
 from sprag.service.results.wording import words
-from sprag.worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from sprag.service.results.curves import Curves
     from sprag.service.results.figures.figure import Figure as Described
-    from sprag.service.results.figures.figure import Line, Marks, Panel, Quantity
+    from sprag.service.results.figures.figure import Line, Marks, Panel
     from sprag.worker.models import Portrait, Presentation, Trajectory
 
 Picture = Literal["svg", "png", "pdf"]
@@ -35,20 +33,8 @@ MEDIA_TYPES: Final[dict[Picture, str]] = {"svg": "image/svg+xml", "png": "image/
 #: Limits of one picture; more would take minutes to draw and be unreadable.
 MAX_PICTURE_CURVES: Final = 200
 MAX_PICTURE_POINTS: Final = 100_000
-#: Labels of a colour bar, which distinguishes more curves than a legend.
-_BAR_LABELS: Final = 24
-#: Style of the line, and marker where there is none.
-_STYLES: Final[tuple[tuple[Literal["-", "--", ":", "-."], str], ...]] = (
-    ("-", "o"),
-    ("--", "s"),
-    (":", "^"),
-    ("-.", "D"),
-)
 #: Columns of the legend of a strip of states.
 _MOST_STATES: Final = 8
-#: Columns of the legend of several studies, and the characters that fit in each.
-_COLUMNS: Final = 2
-_MOST_LABEL: Final = 52
 #: Characters on a line of a title.
 _TITLE_WIDTH: Final = 100
 _STYLE: Final[dict[Any, Any]] = {
@@ -107,7 +93,7 @@ def require_drawable(drawn: Sequence[Curves]) -> None:
 
 def draw_figure(figure: Described, title: str, picture: Picture) -> bytes:
     """Any described figure as a picture."""
-    legend = 0.24 * len(figure.listed) / _COLUMNS if figure.studies > 1 else 0.5 * len(figure.spans)
+    legend = 0.24 * len(figure.listed) / COLUMNS if figure.studies > 1 else 0.5 * len(figure.spans)
     size = (8.0 if figure.columns == 1 else 11.0, 1.2 + (2.1 if figure.motion else 3.6) * figure.rows + legend)
     return render(partial(paint_figure, drawn=figure, title=title), picture, size)
 
@@ -128,8 +114,9 @@ def paint_figure(figure: Figure, drawn: Described, title: str) -> None:
     for axes in plots[-drawn.columns :] if together else ():
         axes.set_xlabel(quantity_label(drawn.x))
     if not drawn.motion:
-        (_explain if drawn.studies == 1 else _explain_studies)(figure, plots, drawn)
-        explain_regimes(figure, drawn.regimes, "lower" if drawn.studies == 1 else "upper")
+        (explain if drawn.studies == 1 else explain_studies)(figure, plots, drawn)
+        edge: Literal["upper", "lower"] = "lower" if drawn.studies == 1 else "upper"
+        explain_regimes(figure, drawn.regimes, edge, jumps=drawn.banded, below=drawn.below)
     held = drawn.held if drawn.studies == 1 else ()
     head(figure, title, (drawn.heading, *held) if drawn.heading else held)
 
@@ -139,17 +126,6 @@ def check_size(what: str, count: int, most: int, parameter: str = "format") -> N
     if count > most:
         message = f"{count} {what} are too many for one picture; choose fewer, or take the numbers"
         raise refused(parameter, "too-many", message, allowed=f"<= {most} {what}")
-
-
-@cache
-def load_matplotlib() -> None:
-    """Load the parts of matplotlib that pictures need, once per process, so that the time counts for no picture."""
-    with uncounted():
-        import matplotlib.backends.backend_agg
-        import matplotlib.backends.backend_pdf
-        import matplotlib.backends.backend_svg
-        import matplotlib.figure
-        import matplotlib.font_manager  # noqa: F401
 
 
 @contextmanager
@@ -179,9 +155,12 @@ def _paint_panel(figure: Figure, axes: Axes, panel: Panel, drawn: Described) -> 
     from matplotlib.lines import Line2D
 
     shaded = None
+    for band in panel.bands:
+        # The edges show a jump that is narrower than a pixel.
+        axes.axvspan(band.low, band.high, facecolor=band.colour, edgecolor=band.colour, alpha=0.25, linewidth=0.6)
     for line in panel.lines:
         if line.shades is not None and line.x.size:
-            marker = _STYLES[line.style % len(_STYLES)][1]
+            marker = STYLES[line.style % len(STYLES)][1]
             shaded = axes.scatter(line.x, line.y, c=line.shades, cmap="viridis", s=12.0, marker=marker, zorder=2.1)
         elif line.shades is None:
             _paint_line(axes, line, thin=drawn.motion or drawn.apart)
@@ -193,13 +172,13 @@ def _paint_panel(figure: Figure, axes: Axes, panel: Panel, drawn: Described) -> 
         axes.set_xlabel(quantity_label(panel.x))
         named = [line for line in panel.lines if line.listed]
         if len(named) > 1:
-            axes.legend([_handle(line) for line in named], [line.name for line in named], fontsize=8)
+            axes.legend([handle(line) for line in named], [line.name for line in named], fontsize=8)
     if drawn.motion and len(panel.lines) > 1:
         axes.legend(fontsize=8, loc="upper right", framealpha=0.8)
     if panel.styles:
         handles = [
             Line2D([], [], color="0.3", linestyle=style, marker=marker, markersize=3.0, label=name)
-            for name, (style, marker) in zip(panel.styles, _STYLES * len(panel.styles), strict=False)
+            for name, (style, marker) in zip(panel.styles, STYLES * len(panel.styles), strict=False)
         ]
         # Above the plot, where it hides no point.
         axes.legend(
@@ -214,7 +193,7 @@ def _paint_panel(figure: Figure, axes: Axes, panel: Panel, drawn: Described) -> 
 
 
 def _paint_line(axes: Axes, line: Line, *, thin: bool) -> None:
-    style, marker = _STYLES[line.style % len(_STYLES)]
+    style, marker = STYLES[line.style % len(STYLES)]
     for stretch in line.stretches or (slice(None),):
         axes.plot(
             line.x[stretch],
@@ -271,82 +250,6 @@ def _paint_states(axes: Axes, drawn: Described) -> None:
     )
 
 
-def _handle(line: Line) -> Artist:
-    """The legend handle of a line."""
-    from matplotlib.lines import Line2D
-
-    style, marker = _STYLES[line.style % len(_STYLES)]
-    marker = "" if line.joined and line.cases is None else marker
-    return Line2D([], [], color=line.colour, linestyle=style, marker=marker, markersize=3.0)
-
-
-def _explain(figure: Figure, plots: list[Axes], drawn: Described) -> None:
-    """Explain the colours beside the plots: in a legend, or in a colour bar where there are many curves."""
-    if not drawn.family:
-        return
-    meaning = ",\n".join(quantity_label(quantity).replace(" = ", " =\n") for quantity in drawn.family)
-    lines = drawn.listed
-    texts = [line.name for line in lines]
-    if len(texts) <= len(PALETTE):
-        figure.legend(
-            [_handle(line) for line in lines], texts, title=meaning, loc="outside right upper",
-            fontsize=8, title_fontsize=8,
-        )  # fmt: skip
-        return
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import ListedColormap, Normalize
-
-    # One block of colour for each curve, with its label in the middle: values may be unevenly spaced or not be numbers.
-    blocks = ScalarMappable(Normalize(-0.5, len(texts) - 0.5), ListedColormap([line.colour for line in lines]))
-    bar = figure.colorbar(blocks, ax=plots, aspect=30 * len(plots))
-    labelled = range(0, len(texts), math.ceil(len(texts) / _BAR_LABELS))
-    bar.set_ticks(list(labelled), labels=[texts[number] for number in labelled])
-    bar.ax.tick_params(labelsize=8, length=0)
-    bar.set_label(meaning.replace(" =\n", " = "), fontsize=8)
-
-
-def _explain_studies(figure: Figure, _plots: list[Axes], drawn: Described) -> None:
-    """The legend of several studies: each name once, and below it the values that distinguish its curves."""
-    from matplotlib.patches import Patch
-
-    lines = [(line.heading, _handle(line), line.name) for line in drawn.listed]
-    columns = _COLUMNS
-    if drawn.family:
-        # A legend is filled column by column: blocks of equal length, equally many per column, keep the studies apart.
-        empty = Patch(visible=False)
-        studies = {name: [line for line in lines if line[0] == name] for name, _, _ in lines}
-        length = max(map(len, studies.values()))
-        blocks: list[tuple[str, Artist, str]] = []
-        for name, own in studies.items():
-            blocks += [(name, empty, name), *own, *[("", empty, "")] * (length - len(own))]
-        lines = blocks + [("", empty, "")] * ((length + 1) * (-len(studies) % _COLUMNS))
-    labels = [_fitting(text) for _, _, text in lines]
-    title = ", ".join(quantity_label(quantity) for quantity in drawn.family)
-    figure.legend(
-        [handle for _, handle, _ in lines], labels, title=title or None, loc="outside lower center",
-        fontsize=8, title_fontsize=8, ncols=columns,
-    )  # fmt: skip
-
-
-def explain_regimes(figure: Figure, regimes: Sequence[str], edge: Literal["upper", "lower"] = "lower") -> None:
-    """Explain the marks of points at an edge of the picture; nothing where all motions are periodic."""
-    from matplotlib.lines import Line2D
-
-    looks = [(name, MARKS[name]) for name in regimes]
-    if looks:
-        handles = [
-            Line2D([], [], color=look.colour, marker=look.marker, markersize=5.0, linestyle="none", label=name)
-            for name, look in looks
-        ]
-        figure.legend(
-            handles=handles,
-            loc="outside upper center" if edge == "upper" else "outside lower center",
-            ncols=len(handles),
-            fontsize=8,
-            frameon=False,
-        )
-
-
 def head(figure: Figure, title: str, held: tuple[str, ...]) -> None:
     """The title, and below it the held parameters with their values; lines break only between two of these."""
     lines = [_short(title)] if title else []
@@ -362,33 +265,7 @@ def head(figure: Figure, title: str, held: tuple[str, ...]) -> None:
         figure.suptitle("\n".join(lines), fontsize=10)
 
 
-def axis_label(name: str, unit: str, brackets: str = "()") -> str:
-    """The label of an axis: the name, and its unit in ``brackets`` where it has one."""
-    return f"{name} {brackets[:1]}{unit}{brackets[1:]}" if unit != "1" else name
-
-
-def quantity_label(quantity: Quantity) -> str:
-    """The same for a quantity; only the unit where it has no name."""
-    if quantity.name:
-        return axis_label(quantity.name, quantity.unit)
-    return "dimensionless" if quantity.unit == "1" else quantity.unit
-
-
-def _fitting(label: str) -> str:
-    """A name limited to the font's characters and the width of a legend's column."""
-    return shortened(writable(label), _MOST_LABEL)
-
-
 def _short(title: str) -> str:
     """``title`` limited to the font's characters and the width of a picture."""
     text = writable(title)
     return text if len(text) <= 80 else text[:79] + "…"
-
-
-def writable(text: str, family: str | None = None) -> str:
-    """``text`` with a square for every character that the font lacks; line breaks are kept."""
-    load_matplotlib()
-    from matplotlib.font_manager import FontProperties, findfont, get_font
-
-    glyphs = get_font(findfont(FontProperties(family=family))).get_charmap()
-    return "".join(c if c == "\n" or ord(c) in glyphs else "\N{WHITE SQUARE}" for c in text)

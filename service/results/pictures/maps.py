@@ -12,12 +12,12 @@ from sprag.service.results.pictures.curves import (
     MAX_PICTURE_POINTS,
     Picture,
     check_size,
-    explain_regimes,
     head,
     paint_marks,
-    quantity_label,
     render,
 )
+from sprag.service.results.pictures.legends import explain_regimes
+from sprag.service.results.pictures.text import quantity_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.results.pictures.curves import Picture, axis_label, check_size, head, render
+from sprag.service.results.pictures.curves import Picture, check_size, head, render
+from sprag.service.results.pictures.text import axis_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,7 +17,7 @@ from sprag.service.results.exports.source import given_texts
 from sprag.service.results.pictures.curves import require_drawable
 from sprag.service.results.regimes import counted
 from sprag.service.results.selection import SelectionError
-from sprag.service.spec.catalogue import unit_of
+from sprag.service.spec.catalogue import axes_json
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -107,10 +107,7 @@ def make_report(
         record.name or record.model,
         _facts(record, study) + ((("motions", counted(regimes)),) if regimes else ()),
         record.warnings,
-        tuple(
-            AxisRow(", ".join(a.paths), unit_of(study, a.paths[0]), len(a), a.values[0], a.values[-1])
-            for a in study.axes
-        ),
+        tuple(AxisRow(", ".join(a["paths"]), a["unit"], a["values"], a["first"], a["last"]) for a in axes_json(study)),
         run_inputs(study, spec),
         tuple((name, count, models.ENDING_SENTENCES.get(name, "")) for name, count in endings.items()),
         inputs(study, spec),
@@ -133,12 +130,18 @@ def _facts(record: StudyRecord, study: Study) -> tuple[tuple[str, str], ...]:
         ("model", record.model),
         ("state", f"{record.state.value}: {record.state.sentence}"),
         ("cases", f"{record.cases:,}, of which {record.done:,} are done and {record.ok:,} ended ok"),
-        ("axes", {"grid": "every combination", "zip": "side by side"}[study.combine] if study.axes else "none"),
+        ("axes", _combined(study)),
         ("submitted", f"{record.created_at:%Y-%m-%d %H:%M} UTC"),
         ("ended", "not yet" if ended is None else f"{ended:%Y-%m-%d %H:%M} UTC"),
         ("engine", record.engine_version),
         ("hash of the physics", record.physics_hash),
     )
+
+
+def _combined(study: Study) -> str:
+    if study.plan is not None:
+        return "cases chosen in rounds"
+    return {"grid": "every combination", "zip": "side by side"}[study.combine] if study.axes else "none"
 
 
 def ranges(infos: Sequence[ResultInfo], blocks: Iterable[RowBlock]) -> tuple[Range, ...]:

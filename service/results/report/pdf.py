@@ -8,7 +8,8 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
 from sprag.service.results.figures.curves import curves_figure
-from sprag.service.results.pictures.curves import load_matplotlib, paint_figure, painting, writable
+from sprag.service.results.pictures.curves import paint_figure, painting
+from sprag.service.results.pictures.text import load_matplotlib, writable
 from sprag.service.results.report.html import input_text, number_text
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 from sprag.service.http.web.figures.thinning import thin
 from sprag.service.json_text import numbers
 from sprag.service.results.figures.curves import doubtful_marks, map_quantities
-from sprag.service.results.figures.figure import PALETTE, shortened
+from sprag.service.results.figures.figure import BANDS, PALETTE, shortened
 from sprag.service.results.figures.orders import TITLE, OrderMap, order_map
 from sprag.service.results.regimes import MARKS
 from sprag.service.results.wording import unit_text, words
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.service.results.curves import Map
-    from sprag.service.results.figures.figure import Figure, Line, Marks, Panel, Quantity
+    from sprag.service.results.figures.figure import Band, Figure, Line, Marks, Panel, Quantity
 
 Data = dict[str, Any]
 
@@ -73,7 +73,7 @@ def plotly_figure(figure: Figure) -> Data:
         "height": inner + margin["t"] + margin["b"],
         "margin": margin,
         "hovermode": "x" if figure.motion else "closest",
-        "showlegend": named or bool(figure.regimes or strip),
+        "showlegend": named or bool(figure.regimes or strip or figure.banded),
         "legend": _legend(figure, beside=beside),
         _MOTIONS: {**_BELOW, "title": {"text": _motion_title(figure), "side": "top"}},
         "uirevision": "keep",
@@ -83,6 +83,7 @@ def plotly_figure(figure: Figure) -> Data:
         lines = wrap(figure.heading, _NARROW_HEADING) if figure.columns == 1 else [figure.heading]
         layout["title"] = {"text": "<br>".join(map(_escaped, lines)), "font": {"size": 14}, "x": 0, "xref": "paper"}
     traces: list[Data] = []
+    shapes: list[Data] = []
     first = figure.columns if strip else 0  # strips have the first axes, and their x axes are those of the panels above
     for index, panel in enumerate(figure.panels):
         suffix = _suffix(index + first)
@@ -101,6 +102,7 @@ def plotly_figure(figure: Figure) -> Data:
                 trace["marker"]["colorbar"] |= {"x": right, "y": (low + high) / 2.0, "len": high - low}
             traces.append(trace | {"showlegend": line.listed and named})
         traces += [_marks_trace(marks, panel.y, listed=index == 0) | axes for marks in panel.marks]
+        shapes += [_band(band) | {"xref": axes["xaxis"], "yref": f"{axes['yaxis']} domain"} for band in panel.bands]
     for column in range(first):
         suffix = _suffix(column)
         axes = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
@@ -116,15 +118,19 @@ def plotly_figure(figure: Figure) -> Data:
             "showgrid": False,
         }
         layout |= {"barmode": "overlay", "bargap": 0.25}
+    if shapes:
+        layout["shapes"] = shapes
+        traces.append(_band_entry())
     over_time = figure.motion and figure.x.unit == "s"
     cases = any(line.cases is not None for panel in figure.panels for line in panel.lines)
-    return {"data": traces, "layout": layout, **({"zoom": True} if over_time else {"cases": True} if cases else {})}
+    kind = {"zoom": True} if over_time else {"cases": True} if cases else {}
+    return {"data": traces, "layout": layout, **({"below": figure.below} if figure.below else {}), **kind}
 
 
 def _motion_title(figure: Figure) -> str:
     """What the legend of marks and strips is about."""
     if not figure.regimes:
-        return figure.states
+        return figure.states if figure.spans or not figure.banded else ""
     return f"Regime; {figure.states.lower()}" if figure.spans else "Regime"
 
 
@@ -206,9 +212,12 @@ def _line_trace(line: Line, panel: Panel, figure: Figure, headings: set[str]) ->
     if line.cases is None:
         return trace if line.joined else trace | _points(line, kept, panel, figure.scale)
     told = ", ".join(text for text in (heading, name) if text) or _escaped(words(panel.y.name))
+    size: int | list[int] = 6
+    if not marked and any(stretch.size == 1 for stretch in line.stretches or ()):
+        trace["mode"], size = "lines+markers", _lone(places)
     return trace | {
         "customdata": [None if place is None else int(line.cases[place]) for place in places],
-        "marker": {"color": line.colour, "symbol": SYMBOLS[int(line.key) % len(SYMBOLS)], "size": 6},
+        "marker": {"color": line.colour, "symbol": SYMBOLS[int(line.key) % len(SYMBOLS)], "size": size},
         "hovertemplate": _hover(panel.y, told),
     }
 
@@ -244,6 +253,12 @@ def _with_gaps(kept: NDArray[np.int64], stretches: tuple[NDArray[np.int64], ...]
     return drawn
 
 
+def _lone(places: list[int | None]) -> list[int]:
+    """Sizes of markers that show only the points between two gaps, of which no line is seen."""
+    around = [None, *places, None]
+    return [6 if before is None and after is None else 0 for before, after in zip(around, around[2:], strict=False)]
+
+
 def _marks_trace(marks: Marks, y: Quantity, *, listed: bool) -> Data:
     """The points of a regime; a regime without points appears in the legend only."""
     return {
@@ -259,6 +274,23 @@ def _marks_trace(marks: Marks, y: Quantity, *, listed: bool) -> Data:
         "marker": {"color": MARKS[marks.regime].colour, "symbol": MARKS[marks.regime].symbol, "size": 8},
         "hovertemplate": _hover(y, marks.regime),
     }
+
+
+def _band(band: Band) -> Data:
+    """A jump of a curve, behind the lines over the whole height of its panel."""
+    return {
+        "type": "rect", "x0": band.low, "x1": band.high, "y0": 0, "y1": 1, "layer": "below", "fillcolor": band.colour,
+        "opacity": 0.25, "line": {"color": band.colour, "width": 1}, "legendgroup": band.key,
+    }  # fmt: skip
+
+
+def _band_entry() -> Data:
+    """The entry of the legend for all jumps."""
+    return {
+        "type": "scatter", "mode": "markers", "name": BANDS, "legend": _MOTIONS, "x": [None], "y": [None],
+        "showlegend": True, "marker": {"color": "rgba(119, 119, 119, 0.4)", "symbol": "square", "size": 12},
+        "hoverinfo": "skip",
+    }  # fmt: skip
 
 
 def _states(figure: Figure, *, listed: bool) -> Iterator[Data]:

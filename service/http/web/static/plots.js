@@ -90,6 +90,11 @@ sprag.show = async (element, figure) => {
     element.dataset.drawn = String(Number(element.dataset.drawn || 0) + 1);
     return;
   }
+  const below = element.nextElementSibling;
+  if (below?.matches(".below")) {
+    below.textContent = figure.below ?? "";
+    below.hidden = !figure.below;
+  }
   const first = !sprag.figures.has(element);
   if (first) element.replaceChildren();
   sprag.figures.set(element, figure);

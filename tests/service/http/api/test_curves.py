@@ -129,8 +129,6 @@ def test_a_study_without_choice_needs_no_at(service: Service, spec: dict[str, An
             None,
         ),
         ("x=shaft.load&y=torque.max&at=excitation.frequency", "at", "invalid-text", None),
-        ("y=torque.max", "x", "required", None),
-        ("x=shaft.load", "y", "required", None),
         ("x=shaft.load&y=torque.max&bye=excitation.frequency", "bye", "unknown-field", None),
         ("x=shaft.load&x=shaft.load&y=torque.max", "x", "repeated", None),
         ("x=shaft.load&y=torque.max&format=docx", "format", "invalid-choice", "json, csv, svg, png, pdf"),

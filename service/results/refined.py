@@ -1,0 +1,134 @@
+"""Refined curves: which studies have them, and what their planner says of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sprag.worker import models
+from sprag.worker.planning.refine import Curve as Refined
+from sprag.worker.planning.refine import describe, largest
+from sprag.worker.planning.refine_plan import REFINE, RefinePlan
+from sprag.worker.planning.rounds import Rows
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sprag.service.answers.results import Jump
+    from sprag.service.results.curves import Line
+    from sprag.service.storage.records import CaseColumns
+    from sprag.worker.study import Study
+
+
+def curve_plan(study: Study) -> RefinePlan | None:
+    """The plan of a study that refines curves; None for any other, also one that refines maps."""
+    if study.plan is None or study.plan["kind"] != REFINE:
+        return None
+    plan = RefinePlan.from_json(study.plan)
+    return plan if len(plan.adaptive) == 1 else None
+
+
+def plan_along(study: Study, path: str) -> RefinePlan | None:
+    """The plan of a study that refines curves over ``path``; None for any other."""
+    plan = curve_plan(study)
+    return plan if plan is not None and path in plan.adaptive[0].paths else None
+
+
+def families(plan: RefinePlan) -> list[str]:
+    """The fixed axes that tell curves apart, each by its first path."""
+    return [axis.paths[0] for axis in plan.fixed if len(axis.values) > 1]
+
+
+def refined_curves(
+    plan: RefinePlan, lines: Sequence[Line], run: NDArray[np.bool_], columns: CaseColumns
+) -> list[Refined]:
+    """What the planner says of each line, which is one combination of the fixed axes.
+
+    ``columns`` has the results that the plan needs, for the cases of all lines in their order; ``run`` says which of
+    these cases have been run.
+    """
+    points = [_points(plan, line) for line in lines]
+    rows = Rows(
+        np.concatenate(points)[run],
+        (np.array(columns.endings, dtype=object) == models.OK)[run],
+        {name: columns.values[name][run] for name in plan.needed},
+    )
+    every = describe(plan, rows)
+    return [every[int(plan.places(own[:1])[0][0])] for own in points]
+
+
+def _points(plan: RefinePlan, line: Line) -> NDArray[np.float64]:
+    """The points of a line as the plan has them, shape (cases, columns)."""
+    given = {**line.by, **line.at}
+    fixed = [next((given[path] for path in axis.paths if path in given), axis.values[0]) for axis in plan.fixed]
+    return np.column_stack([np.tile(fixed, (len(line.x), 1)), line.x])
+
+
+def stretches(refined: Refined, name: str, regimes: Sequence[NDArray[np.int64]]) -> tuple[NDArray[np.int64], ...]:
+    """Indices of the points of a curve that straight lines join, each ascending.
+
+    For a result that was not asked for: the stretches ``regimes`` of like motion, broken at every jump.
+    """
+    joined = refined.joined.get(name)
+    if joined is not None:
+        return _split(joined)
+    joined = np.logical_and.reduce(list(refined.joined.values()))
+    whole = _split(joined)
+    number = np.concatenate([np.full(part.size, place) for place, part in enumerate(whole)])
+    found = []
+    for part in regimes:
+        found += np.split(part, np.flatnonzero(np.diff(number[part])) + 1)
+    return tuple(found)
+
+
+def _split(joined: NDArray[np.bool_]) -> tuple[NDArray[np.int64], ...]:
+    return tuple(np.split(np.arange(joined.size + 1, dtype=np.int64), np.flatnonzero(~joined) + 1))
+
+
+def jumps_of(refined: Refined, names: Iterable[str]) -> list[Jump]:
+    """The intervals in which lines of these results are broken; of one that was not asked for, all."""
+    wanted = set(names)
+    every = not wanted <= refined.joined.keys()
+    return [jump.to_json() for jump in refined.jumps if every or wanted & set(jump.results)]  # type: ignore[misc]
+
+
+def not_joined(refined: Refined, names: Sequence[str]) -> list[str]:
+    """For each point the results that are not interpolated to the next point, with a space between them."""
+    asked = [name for name in names if name in refined.joined]
+    texts = [
+        " ".join(name for name, one in zip(asked, row, strict=True) if not one)
+        for row in zip(*(refined.joined[name].tolist() for name in asked), strict=True)
+    ]
+    return [*(texts or [""] * (len(refined.x) - 1)), ""] if len(refined.x) else []
+
+
+def sentence(plan: RefinePlan, curves: Sequence[Refined], names: Iterable[str]) -> str:
+    """How right the curves of these results are, for people; "" where none of them was asked for."""
+    drawn = list(dict.fromkeys(names))
+    asked = [name for name in drawn if name in plan.results]
+    if not asked:
+        return ""
+    count = sum(_apart(jumps_of(curve, asked)) for curve in curves)
+    outside = f" outside {count} jump{'s' if count > 1 else ''}" if count else ""
+    error = largest(curve.errors[name] for curve in curves for name in asked if np.isfinite(curve.values[name]).any())
+    passed = all(curve.passed for curve in curves)
+    if error is None:
+        told = f"The error is not known yet; {_percent(plan.error)} of the range is asked."
+    elif passed and error <= plan.error:
+        told = f"Within {_percent(plan.error)} of the range, as asked,{outside} (estimate: {_percent(error)})."
+        told = told.replace(", (", " (")
+    else:
+        told = f"Not reached: {_percent(error)} of the range now{outside}, {_percent(plan.error)} asked."
+    others = [name for name in drawn if name not in asked]
+    return f"{told} No error was asked for {', '.join(others)}." if others else told
+
+
+def _apart(jumps: Sequence[Jump]) -> int:
+    """Number of jumps; neighbours of different reasons are one."""
+    return len({jump["low"] for jump in jumps} - {jump["high"] for jump in jumps})
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %"

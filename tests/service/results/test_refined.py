@@ -1,0 +1,207 @@
+"""Refined curves: drawn by default as they were asked for, with their error and their jumps, never across a jump."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.results.curve_cases import draw, select
+from sprag.service.results.curves import CurveQuery, Curves
+from sprag.service.results.defaults import completed, main_query
+from sprag.service.results.figures.curves import curves_figure
+from sprag.service.results.figures.figure import BANDS, Figure, Line
+from sprag.service.results.pictures.curves import paint_figure, painting
+from sprag.service.results.report.content import report_of
+from sprag.worker import models
+from sprag.worker.study import Study
+from tests.service.conftest import API, Service
+from tests.service.refined_study import EFFICIENCY, JUMP, SPEC, SPEED, TORQUE, fetched, fill, study_of
+
+WIDTH = 1.0 / 256.0
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    return study_of()
+
+
+def drawn(study: Study, done: int | None = None, **changes: Any) -> Curves:
+    """The curves that are shown first, or changed ones."""
+    infos = models.study_results(study)
+    query = main_query(study, infos)
+    assert query is not None
+    return draw(select(study, infos, replace(query, **changes)), fetched(study, done))
+
+
+def lines_of(figure: Figure, result: str) -> list[Line]:
+    return [line for panel in figure.panels for line in panel.lines if panel.y.name == result]
+
+
+def test_the_first_curves_are_those_that_were_asked_for(study: Study) -> None:
+    curves = drawn(study)
+    assert (curves.selection.x, [info.name for info in curves.selection.results]) == ("shaft.load", [SPEED, EFFICIENCY])
+    assert [curve.line.by for curve in curves.curves] == [{"excitation.frequency": f} for f in (20.0, 25.0)]
+    for curve in curves.curves:
+        assert np.all(np.diff(curve.line.x) > 0.0)
+        assert (curve.line.x[0], curve.line.x[-1]) == (0.0, 1.0)
+        assert len(curve.line.x) < 160
+
+
+def test_a_fixed_axis_without_a_role_tells_curves_apart(study: Study) -> None:
+    infos = models.study_results(study)
+    named = select(study, infos, CurveQuery("shaft.load", (SPEED,)))
+    assert [line.by for line in named.lines] == [{"excitation.frequency": f} for f in (20.0, 25.0)]
+    held = select(study, infos, CurveQuery("shaft.load", (SPEED,), at=(("excitation.frequency", "20 Hz"),)))
+    assert [(line.by, line.at) for line in held.lines] == [({}, {"excitation.frequency": 20.0})]
+
+
+def test_what_is_not_chosen_is_as_in_the_first_curves(study: Study) -> None:
+    infos = models.study_results(study)
+    assert completed(study, infos, None, (), (), ()) == main_query(study, infos)
+    only = completed(study, infos, None, (TORQUE,), (), (("excitation.frequency", "20 Hz"),))
+    assert (only.x, only.y, only.by) == ("shaft.load", (TORQUE,), ())
+
+
+def test_each_curve_tells_its_error_and_its_jumps(study: Study) -> None:
+    data = drawn(study, y=(SPEED, TORQUE)).to_json()
+    assert data["error_asked"] == 0.01
+    with_jump, smooth = data["curves"]
+    for curve in (with_jump, smooth):
+        assert curve["passed"]
+        assert set(curve["error"]) == {SPEED}
+        error = curve["error"][SPEED]
+        assert error is not None
+        assert 0.0 < error <= 0.01
+    (jump,) = with_jump["jumps"]
+    assert jump["low"] <= JUMP <= jump["high"] <= jump["low"] + 2.0 * WIDTH
+    assert (jump["why"], jump["results"]) == ("steep", [SPEED])
+    assert smooth["jumps"] == []
+
+
+def test_curves_that_were_not_refined_say_nothing_of_errors() -> None:
+    listed = replace(study_of(), plan=None)
+    curves = draw(select(listed, models.study_results(listed), CurveQuery("shaft.load", (SPEED,))), fetched(listed))
+    assert "error_asked" not in curves.to_json()
+    assert not {"error", "jumps", "passed"} & set(curves.to_json()["curves"][0])
+
+
+def test_both_painters_break_lines_where_a_jump_is_told(study: Study) -> None:
+    curves = drawn(study)
+    (jump,) = curves.to_json()["curves"][0]["jumps"]
+    figure = curves_figure([("", curves)])
+    broken, whole = lines_of(figure, SPEED)
+    assert broken.stretches is not None
+    assert [broken.x[part[[0, -1]]].tolist() for part in broken.stretches] == [[0.0, jump["low"]], [jump["high"], 1.0]]
+    for line in (whole, *lines_of(figure, EFFICIENCY)):
+        assert line.stretches is not None
+        assert len(line.stretches) == 1
+    trace = next(trace for trace in plotly_figure(figure)["data"] if trace["name"] == "20")
+    gap = trace["x"].index(None)
+    assert (trace["x"][gap - 1], trace["x"][gap + 1]) == (jump["low"], jump["high"])
+    painted = painted_lines(figure)
+    assert [jump["low"], jump["high"]] not in painted
+    assert sum(ends[1] == jump["low"] for ends in painted) == 1
+
+
+def test_a_point_between_two_jumps_is_seen_in_the_browser_too(study: Study) -> None:
+    curves = drawn(study, y=(SPEED,), by=(), at=(("excitation.frequency", "20"),))
+    (curve,) = curves.curves
+    assert curve.refined is not None
+    joined = curve.refined.joined[SPEED].copy()
+    joined[:2] = [False, False]
+    alone = replace(curve, refined=replace(curve.refined, joined={SPEED: joined}))
+    (trace, _) = plotly_figure(curves_figure([("", replace(curves, curves=(alone,)))]))["data"]
+    shown = [x for x, size in zip(trace["x"], trace["marker"]["size"], strict=True) if size]
+    assert shown == [curve.line.x[0], curve.line.x[1]]
+
+
+def painted_lines(figure: Figure) -> list[list[float]]:
+    """First and last x of every line that matplotlib draws."""
+    from matplotlib.figure import Figure as Canvas
+
+    with painting():
+        canvas = Canvas(figsize=(8.0, 8.0), layout="constrained")
+        paint_figure(canvas, figure, "")
+    lines = [line for axes in canvas.axes for line in axes.lines if line.get_linestyle() == "-"]
+    return [[float(x) for x in np.asarray(line.get_xdata())[[0, -1]]] for line in lines]
+
+
+def test_no_line_of_another_result_crosses_a_jump_either(study: Study) -> None:
+    figure = curves_figure([("", drawn(study, y=(TORQUE,)))])
+    broken, whole = lines_of(figure, TORQUE)
+    assert [len(line.stretches or ()) for line in (broken, whole)] == [2, 1]
+    assert len(figure.panels[0].bands) == 1
+    assert figure.below == ""
+
+
+def test_jumps_are_marked_in_the_panels_of_their_results(study: Study) -> None:
+    curves = drawn(study)
+    (jump,) = curves.to_json()["curves"][0]["jumps"]
+    figure = curves_figure([("", curves)])
+    speed, efficiency = figure.panels
+    assert [(band.low, band.high, band.colour) for band in speed.bands] == [
+        (jump["low"], jump["high"], speed.lines[0].colour)
+    ]
+    assert efficiency.bands == ()
+    shown = plotly_figure(figure)
+    (shape,) = shown["layout"]["shapes"]
+    assert (shape["x0"], shape["x1"], shape["yref"]) == (jump["low"], jump["high"], "y domain")
+    assert [trace["name"] for trace in shown["data"] if trace["name"] == BANDS] == [BANDS]
+
+
+def test_a_sentence_tells_how_right_the_curves_are(study: Study) -> None:
+    told = curves_figure([("", drawn(study))]).below
+    assert told.startswith("Within 1 % of the range, as asked, outside 1 jump (estimate: ")
+    assert plotly_figure(curves_figure([("", drawn(study))]))["below"] == told
+    smooth = drawn(study, y=(SPEED, TORQUE), by=(), at=(("excitation.frequency", "25"),))
+    told = curves_figure([("", smooth)]).below
+    assert told.startswith("Within 1 % of the range, as asked (estimate: ")
+    assert told.endswith(f" No error was asked for {TORQUE}.")
+
+
+def test_a_study_that_is_not_done_says_what_it_has_not_reached() -> None:
+    study = study_of(rounds=2)
+    told = curves_figure([("", drawn(study))]).below
+    assert told.startswith("Not reached: ")
+    assert told.endswith(", 1 % asked.")
+    nothing = drawn(study, done=0)
+    assert curves_figure([("", nothing)]).below == "The error is not known yet; 1 % of the range is asked."
+    assert [curve["error"] for curve in nothing.to_json()["curves"]] == [{SPEED: None, EFFICIENCY: None}] * 2
+    some = drawn(study, done=20)
+    assert all(curve.refined is not None and len(curve.refined.x) == curve.run().size for curve in some.curves)
+
+
+def test_the_answers_of_a_service(service: Service) -> None:
+    study_id = service.submit(SPEC)
+    fill(service, study_id)
+    curves = service.get(f"/studies/{study_id}/curves")
+    assert list(curves["results"]) == [SPEED, EFFICIENCY]
+    assert [len(curve["jumps"]) for curve in curves["curves"]] == [1, 0]
+    table = service.http.get(f"{API}/studies/{study_id}/curves", params={"format": "csv"}).text
+    rows = list(csv.DictReader(io.StringIO(table)))
+    (marked,) = [row for row in rows if row["not_joined"]]
+    jump = curves["curves"][0]["jumps"][0]
+    assert (float(marked["shaft.load"]), marked["not_joined"]) == (jump["low"], SPEED)
+    sentence = service.get(f"/studies/{study_id}")["progress"]["rounds"]["sentence"]
+    assert f"Cases are chosen in rounds: {sentence}." in service.http.get(f"/studies/{study_id}").text
+    axes = service.get(f"/studies/{study_id}")["axes"]
+    assert (axes[0]["values"], axes[0]["first"], axes[0]["last"]) == (2, 20.0, 25.0)
+    assert (axes[1]["first"], axes[1]["last"]) == (0.0, 1.0)
+    for address in ("curves", "figures/curves"):
+        assert service.http.get(f"/studies/{study_id}/{address}").status_code == 200
+    pictures = report_of(service.store, study_id).pictures
+    told = [[len(curve.refined.jumps) if curve.refined else None for curve in part.curves] for part in pictures]
+    assert told == [[1, 0]] * len(pictures)
+
+
+def test_a_study_in_which_nothing_varies_has_no_first_curves(service: Service) -> None:
+    spec = {name: value for name, value in SPEC.items() if name not in {"axes", "refine"}}
+    answer = service.http.get(f"{API}/studies/{service.submit(spec)}/curves")
+    assert answer.status_code == 422
+    assert "nothing varies" in answer.json()["errors"][0]["message"]
