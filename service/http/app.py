@@ -18,14 +18,13 @@ from starlette.types import ASGIApp
 from sprag.service.http import handlers
 from sprag.service.http.access import Access
 from sprag.service.http.api import (
+    case_tables,
     cases,
     catalogues,
     clutch_fits,
     curves,
-    engagements,
     events,
     health,
-    portraits,
     schedules,
     sensitivity,
     studies,
@@ -40,7 +39,6 @@ from sprag.service.http.shares import Shares
 from sprag.service.http.views import API_PREFIX
 from sprag.service.http.web import case, compare, laboratory, login, pages, results, study, table
 from sprag.service.http.web import engagements as engagement_pages
-from sprag.service.http.web import portrait as portrait_pages
 from sprag.service.http.web import schedules as schedule_pages
 from sprag.service.http.web.form import page as form
 from sprag.service.jobs import checks
@@ -201,8 +199,7 @@ def _routes() -> APIRouter:
         curves,
         sensitivity,
         cases,
-        engagements,
-        portraits,
+        case_tables,
         clutch_fits,
         schedules,
         catalogues,
@@ -218,7 +215,6 @@ def _routes() -> APIRouter:
         table,
         case,
         engagement_pages,
-        portrait_pages,
         compare,
         laboratory,
         schedule_pages,

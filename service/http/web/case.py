@@ -1,4 +1,4 @@
-"""The page of one case: its parameters, ending and results, and its motion over time."""
+"""The page of one case: its parameters, ending and results, its motion over time, its strobes and its orbit."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ from sprag.service.faults import FaultError
 from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
 from sprag.service.http.drawing import picture, unchanging
 from sprag.service.http.respond import json_response
-from sprag.service.http.web.figures.answers import SAMPLES, motion_figures
+from sprag.service.http.web.figures.answers import SAMPLES, motion_figures, strobes_figure
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.results import trajectories
 from sprag.service.results.defaults import main_results
 from sprag.service.results.pictures.curves import draw_motion
+from sprag.service.results.portraits import require_strobes
 from sprag.service.results.regimes import ORDER
 from sprag.service.results.selection import axis_name
 from sprag.service.results.wording import number
@@ -137,5 +138,18 @@ async def motion_picture(
         made = await work.run_case(models.run_trajectory, study, case, *span, SAMPLES // 3)
         title = f"{study.name}, case {case}"
         return await picture(draw_motion, "svg", made, models.presentation_of(study), title).response(work)
+
+    return await unchanging(work, study_id, make)
+
+
+@router.get("/studies/{study_id:study}/cases/{case:case}/strobes")
+async def strobes(
+    work: Attended, study_id: StudyId, case: CaseNumber, columns: Annotated[int, Query(ge=1, le=2)] = 2
+) -> Response:
+    """The figure of a case's strobes and its orbit: how it approaches its motion."""
+    study, _ = await work.case_of(study_id, case, require_strobes)
+
+    async def make() -> Response:
+        return json_response(await work.run_case(strobes_figure, study, case, columns))
 
     return await unchanging(work, study_id, make)
