@@ -18,6 +18,7 @@ from sprag.service.storage.store import Store
 from sprag.service.storage.tables import ROUNDS
 from sprag.worker import models
 from sprag.worker.dispatcher import Dispatcher
+from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.models import ChunkResult, ChunkTask
 from sprag.worker.ports import EpochLostError
 from sprag.worker.rounds import PlanError, Rounds
@@ -26,6 +27,13 @@ from sprag.worker.study import Study
 from tests.contract.filling import SPEC
 from tests.worker import fakes
 from tests.worker.planning import toy
+
+
+@pytest.fixture(params=["sqlite_url", "postgres_url"])
+def url(request: pytest.FixtureRequest) -> str:
+    """One driver of each kind of database: rounds ask nothing of a driver that other studies do not."""
+    url: str = request.getfixturevalue(request.param)
+    return url
 
 
 @pytest.fixture(autouse=True)
@@ -104,7 +112,7 @@ def test_a_study_in_memory_grows_with_its_rounds(store: Store) -> None:
     assert store.study(record.id).cases == 50
 
 
-@pytest.mark.parametrize("kills", [1, 2, 5, 11])
+@pytest.mark.parametrize("kills", [2, 7])
 def test_an_interrupted_study_ends_as_an_undisturbed_one(store: Store, kills: int) -> None:
     other = create(store, fresh=True)
     finish(store, other)
@@ -314,18 +322,15 @@ def spread(task: ChunkTask) -> ChunkResult:
     return ChunkResult(task.first, [models.OK] * task.count, [""] * task.count, values)
 
 
-def dispatch(store: Store, record: StudyRecord, steps: int) -> None:
-    executor = fakes.pool(2, run=spread)
-    dispatcher = Dispatcher(store, executor, SystemClock())
-    left = iter(range(steps))
-    dispatcher.run(lambda: store.get_study(record.id).state in {StudyState.FINISHED, StudyState.PAUSED}
-                   or next(left, None) is None)  # fmt: skip
+def dispatch(store: Store, record: StudyRecord) -> None:
+    ended = {StudyState.FINISHED, StudyState.PAUSED}
+    Dispatcher(store, InlineExecutor(spread), SystemClock()).run(lambda: store.get_study(record.id).state in ended)
 
 
 def test_the_dispatcher_runs_all_rounds_and_holds_what_cannot_be_planned(store: Store) -> None:
     record, broken = create(store), create(store, toy.study(broken_at=2), fresh=True)
-    dispatch(store, record, 10_000)
-    dispatch(store, broken, 10_000)
+    dispatch(store, record)
+    dispatch(store, broken)
     assert store.get_study(record.id).state is StudyState.FINISHED
     assert store.get_study(record.id).cases == 100
     held = store.get_study(broken.id)
