@@ -27,9 +27,15 @@ MIN_ERROR, MAX_ERROR = 1e-4, 0.2
 MIN_FINEST, MAX_FINEST = 16, 4096
 RESULTS: Final = Listed("results", 1, 16, "the results that must be right to the error")
 START: Final = Described(
-    "start", "", "values of each adaptive axis in the first round: a power of 2 and 1", "whole", 3, 257, 17
+    "start",
+    "Values at first",
+    "values of an adaptive axis in the first round: a power of 2 and 1",
+    "whole",
+    3,
+    257,
+    17,
 )
-MOST: Final = Described("most", "", "cases at most", "whole", 2, MAX_PLANNED_CASES)
+MOST: Final = Described("most", "Cases at most", "bound of the cases of all rounds", "whole", 2, MAX_PLANNED_CASES)
 OTHER: Final = named(START)
 _DEFAULT_ERROR: Final = 0.01
 DEFAULT_FINEST: Final = 256

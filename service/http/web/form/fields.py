@@ -7,12 +7,13 @@ field.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from sprag.service.results.wording import number, words
 from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN, Described
 from sprag.service.spec.fields import placed
+from sprag.service.spec.plan import refine
 from sprag.service.spec.units import example
 from sprag.worker import models
 from sprag.worker.models import Parameter
@@ -90,6 +91,25 @@ def run_fields() -> dict[str, Field]:
 def degree_field(pointer: str) -> Field:
     """The highest degree of the fit of a clutch at ``pointer``."""
     return _described(FIT["max_degree"], pointer)
+
+
+def refine_fields() -> dict[str, Field]:
+    """The fields of a refinement, by name."""
+
+    def text(name: str, label: str, meaning: str, limits: str, default: str, *, required: bool = False) -> Field:
+        shown = "shaft.speed.mean; efficiency" if required else ""
+        return Field(f"/refine/{name}", label, "", "", "", meaning, limits, required, default, shown)
+
+    error = f"{100.0 * refine.MIN_ERROR:g} % to {100.0 * refine.MAX_ERROR:g} %"
+    finest = f'"1/{refine.MIN_FINEST}" to "1/{refine.MAX_FINEST}"'
+    own = [
+        text("results", "Results", f"{refine.RESULTS.help}, parted by semicolons", "", "", required=True),
+        text("error", "Error", "of straight lines between the points, relative to the range of a result", error, "1 %"),
+        _described(refine.START, "/refine"),
+        text("finest", "Finest step", "no interval is divided further than to this part of the axis", finest, "1/256"),
+        replace(_described(refine.MOST, "/refine"), default="no bound"),
+    ]
+    return {field.name.rpartition("/")[2]: field for field in own}
 
 
 def _described(entry: Described, pointer: str) -> Field:

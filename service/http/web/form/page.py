@@ -19,9 +19,18 @@ from sprag.service.http.respond import json_response
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form import study_check
 from sprag.service.http.web.form.check import Checked
-from sprag.service.http.web.form.fields import FORM_MODEL, degree_field, path_choices, pendulum, run_fields, sections
+from sprag.service.http.web.form.fields import (
+    FORM_MODEL,
+    degree_field,
+    path_choices,
+    pendulum,
+    refine_fields,
+    run_fields,
+    sections,
+)
 from sprag.service.http.web.form.spec import (
     FORMULA,
+    REFINE_DEFAULTS,
     Values,
     axes_of,
     clutch_pointers,
@@ -49,6 +58,7 @@ EMPTY_FORM: Final[Values] = {
     **{f"/run/{name}": run_fields()[name].default for name in ("until", "at_most", "tolerance", "reset")},
     "/base/clutch/kind": "law",
     "/axes/0/way": "linspace",
+    **REFINE_DEFAULTS,
 }
 
 
@@ -219,6 +229,7 @@ def form_page(request: Request, values: Values, checked: Checked | None, status:
         presets=[preset for preset in map(preset_of, preset_names()) if text_mode or _fits_form(preset)],
         most_coefficients=models.MAX_COEFFICIENTS,
         run=run_fields(),
+        refine=refine_fields(),
         degree_field=degree_field,
     )
 

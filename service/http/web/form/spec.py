@@ -10,6 +10,7 @@ from sprag.service.faults import Fault
 from sprag.service.http.web.form.fields import FORM_MODEL, pendulum, sections
 from sprag.service.spec.derive import formulas_of, with_values
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
+from sprag.service.spec.plan import refine
 from sprag.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
 from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker.limits import MAX_AXES
@@ -28,10 +29,13 @@ WAYS: Final = {
     "linspace": ("from", "to", "count"),
     "geomspace": ("from", "to", "count"),
     "range": ("from", "to", "step"),
+    "adaptive": ("from", "to"),
 }
+#: What is asked of a refinement in a form that was not about one.
+REFINE_DEFAULTS: Final[Values] = {"/refine/results": "shaft.speed.mean; efficiency", "/refine/error": "1 %"}
 #: The form's choice for a run of a given time, which a spec expresses by its duration or window.
 TIMED: Final = "time"
-_FIELDS: Final = frozenset({"sprag", "model", "name", "base", "run", "axes", "combine", "derive"})
+_FIELDS: Final = frozenset({"sprag", "model", "name", "base", "run", "axes", "combine", "derive", "refine"})
 #: Beginning of a field with the formula of a derived parameter.
 FORMULA: Final = "="
 
@@ -85,7 +89,16 @@ def spec_of(values: Mapping[str, str]) -> tuple[dict[str, Any], Faults]:
     axes = [_axis(values, index) for index in range(axes_of(values))]
     spec["axes"] = [axis for axis in axes if axis is not None]
     spec["combine"] = values.get("/combine", "grid")
+    if any("adaptive" in axis for axis in spec["axes"]):
+        spec["refine"] = _refine(values)
     return spec, faults
+
+
+def _refine(values: Mapping[str, str]) -> dict[str, Any]:
+    """What a form with an adaptive axis asks for."""
+    found = _object(values, "/refine", [f"/refine/{name}" for name in refine.FIELDS if name != "results"])
+    names = [name.strip() for name in re.split(r"[;,\s]+", values.get("/refine/results", "")) if name.strip()]
+    return {**({"results": names} if names else {}), **found}
 
 
 def _formulas(base: dict[str, Any]) -> dict[str, str]:
@@ -198,6 +211,8 @@ def field_of(pointer: str, values: Mapping[str, str]) -> str:
     """The field beside which a fault at ``pointer`` of the spec is shown; "" for the whole form."""
     if pointer.startswith("/derive/"):
         pointer = "/base/" + pointer.removeprefix("/derive/").replace(".", "/")
+    if pointer == "/refine" or pointer.startswith("/refine/results"):
+        return "/refine/results"
     match = re.fullmatch(r"/axes/(\d+)(?:/(.*))?", pointer)
     if match:
         # Axes that are not filled in are not in the spec.
@@ -251,6 +266,9 @@ def values_of(spec: Mapping[str, Any]) -> Values:
             values |= {f"/run/window/{index}": _text(item) for index, item in enumerate(content)}
         else:
             values[f"/run/{key}"] = _text(content)
+    values |= REFINE_DEFAULTS
+    for key, content in spec.get("refine", {}).items():
+        values[f"/refine/{key}"] = "; ".join(content) if key == "results" else _text(content)
     values["axes"] = str(len(spec.get("axes", ())))
     for index, axis in enumerate(spec.get("axes", ())):
         values |= _axis_values(f"/axes/{index}", axis)

@@ -50,6 +50,56 @@ def test_a_cloned_study_is_the_same_study(spec: dict[str, Any]) -> None:
     assert again["name"] == spec["name"]
 
 
+REFINED = changed(
+    {
+        "/axes": [
+            {"path": "excitation.frequency", "values": [20, 25]},
+            {"path": "shaft.load", "adaptive": [0, "1.2 N*m"]},
+        ],
+        "/refine": {"results": ["shaft.speed.mean", "efficiency"], "error": "2 %", "finest": "1/64", "most": 300},
+    }
+)
+
+
+def test_a_refined_study_is_cloned_with_all_that_it_asks_for() -> None:
+    values = values_of(json.loads(json.dumps(REFINED)))
+    assert (values["/axes/1/way"], values["/axes/1/from"], values["/axes/1/to"]) == ("adaptive", "0", "1.2 N*m")
+    again, faults = spec_of(values)
+    assert faults == {}
+    assert again["refine"] == REFINED["refine"]
+    assert physics(parse_spec(again).study) == physics(parse_spec(REFINED).study)
+
+
+def test_an_axis_that_is_refined_asks_for_results_and_an_error() -> None:
+    values = values_of(changed({}))
+    assert "refine" not in spec_of(values)[0]
+    values |= {"/axes/2/way": "adaptive", "/axes/2/from": "0", "/axes/2/to": "1.2 N*m"}
+    checked = check_form(values, Chunking())
+    assert checked.faults == {}
+    assert checked.spec["refine"] == {"results": ["shaft.speed.mean", "efficiency"], "error": "1 %"}
+    assert checked.preview is not None
+    assert (checked.preview["cases"], checked.preview["most_cases"]) == (64 * 17, 64 * 257)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("/refine/results", "", "is required"),
+        ("/refine/results", "shaft.speed.mean; speed", "speed"),
+        ("/refine/error", "90 %", "out of range"),
+        ("/refine/start", "16", "power of 2"),
+        ("/refine/finest", "1/100", "power of 2"),
+        ("/refine/most", "1", "out of range"),
+        ("/axes/1/to", "", "must begin with a number"),
+        ("/axes/1/from", "0 mm", "not a unit of this field"),
+        ("/axes/1/from", "1.2 N*m", "begins where it ends"),
+    ],
+)
+def test_each_fault_of_a_refinement_stands_beside_its_field(name: str, text: str, message: str) -> None:
+    checked = check_form({**values_of(REFINED), name: text}, Chunking())
+    assert message in " ".join(checked.faults[name])
+
+
 FORMULAS = {
     "pendulums.*.inertia": "1.1 * pendulums.*.mass * pendulums.*.arm^2 + 2e-4 kg*m^2",
     "clutch.coefficients.1": "200 N*m/rad + 0 N*m/rad * max(shaft.inertia / 1 kg*m^2,1)",
