@@ -62,7 +62,7 @@ def test_columns_are_the_variables_then_the_operating_points() -> None:
     [
         ({"vary": []}, "goal.vary"),
         ({"vary": [{"paths": ["a"], "low": 2.0, "high": 2.0}]}, r"goal.vary.0.high is 2.0; allowed: .* above 2.0"),
-        ({"vary": [{"paths": ["a"], "values": [1.0, 1.0]}]}, "goal.vary.0.values"),
+        ({"vary": [{"paths": ["a"], "values": [1.0, float("inf")]}]}, "goal.vary.0.values"),
         ({"vary": [{"paths": [], "low": 0.0, "high": 1.0}]}, "goal.vary.0.paths"),
         ({"vary": [{"paths": ["shaft.load"], "low": 0.0, "high": 1.0}]}, "each parameter once"),
         ({"best": [], "subject_to": []}, "at least one goal"),

@@ -6,6 +6,7 @@ authors' program. Catalogue values are exchanged between parents and mutated to 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,16 +34,25 @@ _CROSSED = 0.9
 _ATTEMPTS = 20
 
 
+@dataclass(frozen=True)
+class _Survivors:
+    """Designs in the order of their ranks, then of their crowding distances; shapes (designs, ...)."""
+
+    coordinates: Floats
+    scores: Scores
+    rank: Ints
+    crowding: Floats
+
+
 class Nsga2:
     """The survivors so far, and how the next generation follows from them."""
 
     def __init__(self, space: Space, population: int, generations: int, seed: int) -> None:
         self._space, self._population, self._seed = space, population, seed
-        self._coordinates = np.empty((0, space.dimensions))
         self._tolerance = Tolerance(generations)
-        self._scores: Scores | None = None
-        self._rank = np.empty(0, dtype=np.int64)
-        self._crowding = np.empty(0)
+        #: The best by the limits as they are, and the parents of the next generation, by violations tolerated now.
+        self._best: _Survivors | None = None
+        self._parents: _Survivors | None = None
 
     def propose(self, generation: int, known: Container[bytes]) -> Floats:
         """Coordinates of new designs, shape (at most ``population``, dimensions)."""
@@ -63,11 +73,22 @@ class Nsga2:
 
     def take(self, coordinates: Floats, scores: Scores) -> None:
         """Choose survivors among the old ones and these designs."""
-        together = scores if self._scores is None else joined(self._scores, scores)
-        places = np.concatenate([self._coordinates, coordinates])
+        epsilon = self._tolerance.next(scores)
+        best = self._chosen(self._best, coordinates, scores, 0.0)
+        self._parents = self._chosen(self._parents, coordinates, scores, epsilon) if epsilon > 0.0 else best
+        self._best = best
+
+    def survivors(self) -> tuple[Floats, Scores]:
+        """The best designs so far, the first fronts first, those with far neighbours first within a front."""
+        assert self._best is not None
+        return self._best.coordinates, self._best.scores
+
+    def _chosen(self, old: _Survivors | None, coordinates: Floats, scores: Scores, epsilon: float) -> _Survivors:
+        if old is not None:
+            coordinates, scores = np.concatenate([old.coordinates, coordinates]), joined(old.scores, scores)
         # Without goals, designs are spread over the space of the variables.
-        apart = together.goals if together.goals.shape[1] else places
-        rank = ranks(tolerant(together, self._tolerance.next(scores)))
+        apart = scores.goals if scores.goals.shape[1] else coordinates
+        rank = ranks(tolerant(scores, epsilon))
         chosen: list[Ints] = []
         distances: list[Floats] = []
         room = min(self._population, len(rank))
@@ -79,34 +100,29 @@ class Nsga2:
             room -= len(kept)
             if room == 0:
                 break
-        best, distance = np.concatenate(chosen), np.concatenate(distances)
-        order = np.lexsort((-distance, rank[best]))
-        best = best[order]
-        self._coordinates, self._scores = places[best], together[best]
-        self._rank, self._crowding = rank[best], distance[order]
-
-    def survivors(self) -> tuple[Floats, Scores]:
-        """The best designs so far, the first fronts first, those with far neighbours first within a front."""
-        assert self._scores is not None
-        return self._coordinates, self._scores
+        places, distance = np.concatenate(chosen), np.concatenate(distances)
+        order = np.lexsort((-distance, rank[places]))
+        places = places[order]
+        return _Survivors(coordinates[places], scores[places], rank[places], distance[order])
 
     def _drawn(self, draws: Draws, count: int) -> Floats:
-        if self._scores is None:
+        if self._parents is None:
             return _latin(draws, count, self._space.dimensions)
         pairs = (count + 1) // 2
-        mothers, fathers = self._parents(draws, pairs), self._parents(draws, pairs)
+        mothers, fathers = _winners(draws, self._parents, pairs), _winners(draws, self._parents, pairs)
         children = _crossed(draws, mothers, fathers, self._space.counts)
         return _mutated(draws, children, self._space.counts)[:count]
 
-    def _parents(self, draws: Draws, count: int) -> Floats:
-        """Winners of tournaments of two, which are drawn so that each survivor takes part in as many as any other."""
-        size = len(self._rank)
-        rounds = -(-2 * count // size)
-        drawn = np.concatenate([draws.permutation(size) for _ in range(rounds)])[: 2 * count].reshape(count, 2)
-        one, other = drawn.T
-        better = self._rank[one] < self._rank[other]
-        better |= (self._rank[one] == self._rank[other]) & (self._crowding[one] >= self._crowding[other])
-        return self._coordinates[np.where(better, one, other)]
+
+def _winners(draws: Draws, parents: _Survivors, count: int) -> Floats:
+    """Winners of tournaments of two, which are drawn so that each parent takes part in as many as any other."""
+    size = len(parents.rank)
+    rounds = -(-2 * count // size)
+    drawn = np.concatenate([draws.permutation(size) for _ in range(rounds)])[: 2 * count].reshape(count, 2)
+    one, other = drawn.T
+    better = parents.rank[one] < parents.rank[other]
+    better |= (parents.rank[one] == parents.rank[other]) & (parents.crowding[one] >= parents.crowding[other])
+    return parents.coordinates[np.where(better, one, other)]
 
 
 def _latin(draws: Draws, count: int, dimensions: int) -> Floats:

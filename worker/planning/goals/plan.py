@@ -223,7 +223,7 @@ def _check_variables(plan: GoalPlan) -> None:
 def _variable(data: Mapping[str, Any]) -> Variable:
     paths = tuple(str(path) for path in data["paths"])
     if "values" in data:
-        values = tuple(sorted(float(value) for value in data["values"]))
+        values = tuple(sorted({float(value) for value in data["values"]}))
         _check(bool(values), "vary.values", [], "at least one value")
         return Variable(paths, values[0], values[-1], values)
     return Variable(paths, float(data["low"]), float(data["high"]))

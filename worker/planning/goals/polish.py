@@ -2,8 +2,8 @@
 
 Every design starts with central differences of its limits and goals (one round); each further round tries one step for
 each design, from which the derivatives are corrected by Broyden's rule. With the derivatives J of the equalities and of
-the inequalities that the step would violate, their residuals r and the derivatives G of the goals (per range of the
-goals), the step d solves
+the inequalities that the step would violate, their residuals r, and the gradients of the goals, each of length 1, as
+the rows of G, the step d solves
 
     (J'J + mu M) d = -J'r,    M = I + kappa G'G,
 
@@ -37,7 +37,7 @@ MET, _AIM = 1e-6, 1e-8
 MOST_STARTS, MOST_TRIALS = 20, 10
 #: Half the distance of central differences, and the longest step, in widths of the ranges.
 _APART, _LONGEST = 1e-4, 0.1
-_DAMPING, _HOLD = 1e-9, 100.0
+_DAMPING, _HOLD = 1e-8, 30.0
 
 
 @dataclass
@@ -75,11 +75,7 @@ class Polish:
         self._plan = plan
         self._free = np.flatnonzero(space.counts == 0)
         self._starts = [_Start(*one) for one in zip(places, outputs, strict=True)]
-        points = len(plan.at)
         self._residuals = _Residuals(plan)
-        goals = outputs[:, points * len(plan.subject_to) : -1]
-        spans = np.array([np.ptp(one[~np.isnan(one)]) if not np.isnan(one).all() else 0.0 for one in goals.T])
-        self._goal_scales = np.where(spans > 0.0, spans, np.inf)
         for start in self._starts:
             start.active = not self._met(start.outputs) and start.outputs[-1] == 0.0
         self._trials = -1
@@ -162,7 +158,8 @@ class Polish:
         equal, excess = self._residuals.of(start.outputs)
         equal_rows, excess_rows = self._residuals.derivatives(start.derivatives)
         first = len(self._plan.at) * len(self._plan.subject_to)
-        goals = start.derivatives[first:-1] / self._goal_scales[:, None]
+        goals = start.derivatives[first:-1]
+        goals = goals / np.array([norm(row) or 1.0 for row in goals]).reshape(-1, 1)
         held = excess > 0.0
         step = np.zeros(len(self._free))
         for _ in range(1 + len(excess)):
