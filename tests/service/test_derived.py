@@ -42,6 +42,7 @@ def test_a_derived_value_is_shown_as_such(filled: tuple[Service, str]) -> None:
         text = service.http.get(page).text
         assert f'{INERTIA} <small class="soft">(derived)</small>' in text
         assert STORED in text
+    assert '<td class="num">derived</td>' in service.http.get(own).text
     rows = service.http.get(f"{own}/cases", params={"sort": INERTIA}).text
     assert "inertia, derived" in rows
     # The first two cases have the larger mass, and therefore the larger inertia.
@@ -77,3 +78,14 @@ def test_it_is_extended_with_its_formula(filled: tuple[Service, str]) -> None:
     wider = service.store.study(answer.json()["id"])
     assert (wider.cases, wider.derive) == (6, {INERTIA: STORED})
     assert service.store.reusable(wider) == 4
+
+
+def test_it_is_scheduled(filled: tuple[Service, str]) -> None:
+    service, study_id = filled
+    given = {"name": "nightly", "cron": "0 2 * * *", "zone": "UTC", "spec": service.store.spec(study_id)}
+    kept = service.http.post("/api/v1/schedules", json=given)
+    assert kept.status_code == 201, kept.text
+    given["spec"]["derive"] = {INERTIA: "2 * pendulums.0.mass"}
+    refused = service.http.post("/api/v1/schedules", json=given)
+    assert refused.status_code == 422
+    assert [error["code"] for error in refused.json()["errors"]] == ["wrong-unit"]
