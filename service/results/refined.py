@@ -9,7 +9,7 @@ import numpy as np
 
 from sprag.worker import models
 from sprag.worker.planning.refine import Curve as Refined
-from sprag.worker.planning.refine import describe, largest
+from sprag.worker.planning.refine import describe
 from sprag.worker.planning.refine_plan import REFINE, RefinePlan
 from sprag.worker.planning.rounds import Rows
 
@@ -112,7 +112,8 @@ def sentence(plan: RefinePlan, curves: Sequence[Refined], names: Iterable[str]) 
         return ""
     count = sum(_apart(jumps_of(curve, asked)) for curve in curves)
     outside = f" outside {count} jump{'s' if count > 1 else ''}" if count else ""
-    error = largest(curve.errors[name] for curve in curves for name in asked if np.isfinite(curve.values[name]).any())
+    every = [curve.errors[name] for curve in curves for name in asked if np.isfinite(curve.values[name]).any()]
+    error = None if None in every or not every else max(error for error in every if error is not None)
     passed = all(curve.passed for curve in curves)
     if error is None:
         told = f"The error is not known yet; {_percent(plan.error)} of the range is asked."
