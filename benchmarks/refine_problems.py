@@ -135,6 +135,23 @@ def machine_shafts() -> list[Problem]:
     ]
 
 
+def maps() -> list[Problem]:
+    """Maps of drives and machine shafts."""
+    frequency = AdaptiveAxis(FREQUENCY, 100.0 / (2.0 * math.pi), 220.0 / (2.0 * math.pi))
+    load, amplitude = AdaptiveAxis(LOAD, 0.02, 0.5), AdaptiveAxis(AMPLITUDE, 0.001, 0.003)
+    pressure = AdaptiveAxis(("operation.gas.discharge_pressure",), 1.5e5, 12e5)
+    inertia, speed = AdaptiveAxis(("drive.inertia",), 5.0, 80.0), AdaptiveAxis(("mean_speed",), 3.0, 25.0)
+    one, means = _preset("one_pendulum", {AMPLITUDE: 0.002}), ("shaft.speed.mean", "efficiency")
+    return [
+        Problem("one_pendulum over frequency and load at 2 mm", one, (frequency, load), means),
+        Problem("one_pendulum over amplitude and load at 25 Hz", one, (amplitude, load), means),
+        Problem("one_pendulum over frequency and load at 2 mm, four results", one, (frequency, load)),
+        Problem("compressor over pressure and inertia", _preset("compressor", {}),
+                (pressure, replace(inertia, low=0.2, high=1.6)), SHAFT_RESULTS),
+        Problem("press over inertia and speed", _preset("press", {}), (inertia, speed), SHAFT_RESULTS),
+    ]  # fmt: skip
+
+
 def families() -> dict[str, Sequence[Problem]]:
     """All curves by the name of their family."""
     return {

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from sprag.worker.planning.goals.plan import GOAL, GoalPlan
 from sprag.worker.planning.goals.planner import GoalPlanner
-from sprag.worker.planning.refine import CurveRefiner
+from sprag.worker.planning.refine import refiner
 from sprag.worker.planning.refine_plan import REFINE, RefinePlan
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def _refiner(plan: Mapping[str, Any]) -> Planner:
-    return CurveRefiner(RefinePlan.from_json(plan))
+    return refiner(RefinePlan.from_json(plan))
 
 
 def _searcher(plan: Mapping[str, Any]) -> Planner:

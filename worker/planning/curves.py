@@ -118,7 +118,8 @@ def intervals(samples: Samples) -> Intervals:
     jumps, bends = _jumps(samples, ranges, curve, low, width, passed)
     errors = np.where(width[:, None] == 1, np.where(np.isnan(bends), raw, bends), raw)
     both = samples.irregular[curve, low] & samples.irregular[curve, low + width]
-    scatter = both[:, None] & (errors > error)
+    # What passed only because it scatters.
+    scatter = passed[:, None] & (errors > error)
     jumps = _through_zones(curve, low, width, both, jumps | scatter)
     jumps = _without_gaps(curve * 2 * (plan.finest + most) + low, width, jumps, most)
     worth = np.where(width > plan.finest // (plan.start - 1), 2.0 * width, np.minimum(worst, 1.0))

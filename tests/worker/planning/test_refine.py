@@ -10,7 +10,7 @@ import pytest
 
 from sprag.worker.models.settled import IRREGULAR
 from sprag.worker.planning.curves import Why
-from sprag.worker.planning.refine import CurveRefiner, describe
+from sprag.worker.planning.refine import CurveRefiner, describe, refiner
 from sprag.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan, half_widths_of
 from sprag.worker.planning.rounds import Rows, Step
 
@@ -39,7 +39,7 @@ def rows_of(plan: RefinePlan, points: Floats, function: Function) -> Rows:
 
 def refined(plan: RefinePlan, function: Function) -> tuple[list[Rows], Step]:
     """The rows of all rounds, and the last step."""
-    planner, rounds = CurveRefiner(plan), []
+    planner, rounds = refiner(plan), []
     while len((step := planner.ask()).points):
         rounds.append(rows_of(plan, step.points, function))
         planner.tell(rounds[-1])

@@ -1,0 +1,178 @@
+"""The planner of refined curves: halves intervals until straight lines between the points are right to the error.
+
+All curves of a study advance together: a round halves every interval that is not resolved yet. The rows of all rounds
+say everything that there is to know, so that `describe` gives the same curves from the rows of a finished study.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from sprag.worker.planning.curves import REASONS, Intervals, Why, intervals
+from sprag.worker.planning.refiner import Described, Refiner
+from sprag.worker.planning.samples import Samples
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sprag.worker.planning.refine_plan import RefinePlan
+    from sprag.worker.planning.refiner import Places
+    from sprag.worker.planning.rounds import Rows
+
+    Bools = NDArray[np.bool_]
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+
+#: Numbers of the reasons that are named by the first of them where they are neighbours.
+_CHANGES: Final = tuple(REASONS.index(why) for why in (Why.REGIME, Why.ORDER, Why.STEEP))
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A part of a curve that is not interpolated: it holds one jump or several, or the curve does not exist there.
+
+    Attributes
+    ----------
+    low, high : float
+        Its ends, SI.
+    why : Why
+    results : tuple of str
+        The results concerned.
+    """
+
+    low: float
+    high: float
+    why: Why
+    results: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """As plain JSON data."""
+        return {"low": self.low, "high": self.high, "why": self.why.value, "results": list(self.results)}
+
+
+@dataclass(frozen=True)
+class Curve(Described):
+    """A refined curve.
+
+    Attributes
+    ----------
+    fixed : dict of str to float
+        Values of the fixed axes by path.
+    x : float64 array, shape (points,)
+        The adaptive parameter, SI, ascending.
+    ok, values, errors, passed
+        As of `Described`; the interpolation is by straight lines.
+    joined : dict of str to bool array, each shape (points - 1,)
+        Whether a straight line from each point to the next shows the result.
+    jumps : tuple of Jump
+    """
+
+    fixed: dict[str, float]
+    x: Floats
+    ok: Bools
+    values: dict[str, Floats]
+    joined: dict[str, Bools]
+    errors: dict[str, float | None]
+    jumps: tuple[Jump, ...]
+    passed: bool
+
+    def to_json(self) -> dict[str, Any]:
+        return {
+            "fixed": self.fixed,
+            "points": len(self.x),
+            "failed": int((~self.ok).sum()),
+            "errors": self.errors,
+            "jumps": [jump.to_json() for jump in self.jumps],
+            "passed": self.passed,
+        }
+
+
+class CurveRefiner(Refiner):
+    """Planner of curves: one adaptive axis."""
+
+    dimensions = 1
+    rounds_per_halving = 1
+    noun = "curves"
+
+    def __init__(self, plan: RefinePlan) -> None:
+        super().__init__(plan)
+        #: The intervals of the rows so far; computed once.
+        self._own: Intervals | None = None
+
+    def changed(self) -> None:
+        self._own = None
+
+    def further(self) -> Places:
+        """The middle of every interval that is not resolved."""
+        own = self._intervals()
+        open_ = np.flatnonzero(~own.resolved)
+        chosen = open_[np.lexsort((own.low[open_], own.curve[open_], -own.worth[open_]))]
+        return own.curve[chosen], [own.low[chosen] + own.width[chosen] // 2]
+
+    def described(self) -> list[Curve]:
+        return _curves(self.samples, self._intervals())
+
+    def _intervals(self) -> Intervals:
+        if self._own is None:
+            self._own = intervals(self.samples)
+        return self._own
+
+
+def describe(plan: RefinePlan, rows: Rows) -> list[Curve]:
+    """The refined curves from all rows of a study, in any order; the last fixed axis varies fastest.
+
+    ValueError for a row that is not a point of the plan.
+    """
+    samples = Samples(plan)
+    samples.add(rows)
+    return _curves(samples, intervals(samples))
+
+
+def _curves(samples: Samples, own: Intervals) -> list[Curve]:
+    bounds = np.searchsorted(own.curve, np.arange(len(samples.known) + 1))
+    return [_curve(samples, own, index, slice(bounds[index], bounds[index + 1])) for index in range(len(bounds) - 1)]
+
+
+def _curve(samples: Samples, own: Intervals, index: int, part: slice) -> Curve:
+    plan = samples.plan
+    places = np.flatnonzero(samples.known[index])
+    values = samples.values[index, places]
+    present = np.isfinite(values).any(axis=0)
+    # A result that the whole curve lacks has no jumps beside those of the others.
+    jumps, errors = own.jumps[part] & (present | ~present.any()), own.errors[part]
+    return Curve(
+        fixed=plan.fixed_values(index),
+        x=plan.adaptive[0].at(places, plan.finest),
+        ok=samples.ok[index, places],
+        values={name: values[:, k] for k, name in enumerate(plan.results)},
+        joined={name: ~own.jumps[part][:, k] for k, name in enumerate(plan.results)},
+        errors={name: _largest_of(errors[~jumps[:, k], k], len(places)) for k, name in enumerate(plan.results)},
+        jumps=tuple(_merged(plan, own.low[part], own.width[part], own.why[part], jumps)),
+        passed=len(places) > 1 and bool(own.resolved[part].all()),
+    )
+
+
+def _largest_of(errors: Floats, points: int) -> float | None:
+    if points < 2 or np.isnan(errors).any():
+        return None
+    return float(errors.max(initial=0.0))
+
+
+def _merged(plan: RefinePlan, low: Ints, width: Ints, why: Ints, jumps: Bools) -> list[Jump]:
+    """Jumps of one curve; neighbouring intervals are one, except where the reasons are of different kinds."""
+    told = np.flatnonzero(jumps.any(axis=1))
+    if not len(told):
+        return []
+    kind = np.where(np.isin(why[told], _CHANGES), _CHANGES[0], why[told])
+    new = (np.diff(told, prepend=told[0] - 2) > 1) | (np.diff(kind, prepend=-1) != 0)
+    first, last = told[new], told[np.append(new[1:], True)]
+    axis = plan.adaptive[0]
+    lows, highs = axis.at(low[first], plan.finest), axis.at(low[last] + width[last], plan.finest)
+    starts = np.flatnonzero(new)
+    concerned = np.logical_or.reduceat(jumps[told], starts, axis=0).tolist()
+    names = [tuple(name for name, one in zip(plan.results, row, strict=True) if one) for row in concerned]
+    reasons = (REASONS[number] for number in np.minimum.reduceat(why[told], starts).tolist())
+    return [Jump(*part) for part in zip(lows.tolist(), highs.tolist(), reasons, names, strict=True)]

@@ -1,0 +1,142 @@
+"""What the planners of curves and of maps share: the first round, the rows, the bounds."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sprag.worker.order import levels
+from sprag.worker.planning.refine_plan import REFINE
+from sprag.worker.planning.rounds import Rows, Step
+from sprag.worker.planning.samples import Samples
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from sprag.worker.planning.refine_plan import RefinePlan
+
+    Ints = NDArray[np.int64]
+    #: Combination, and positions along each adaptive axis.
+    Places = tuple[Ints, list[Ints]]
+
+
+class Refiner(ABC):
+    """A planner of refinement (`sprag.worker.planning.rounds.Planner`).
+
+    Raises
+    ------
+    ValueError
+        Where the plan has another number of adaptive axes than ``dimensions``.
+    """
+
+    #: Number of adaptive axes.
+    dimensions: int
+    #: Rounds at most for each halving of the grids.
+    rounds_per_halving: int
+    #: What a combination of the fixed axes is, in summaries.
+    noun: str
+
+    def __init__(self, plan: RefinePlan) -> None:
+        if len(plan.adaptive) != self.dimensions:
+            raise ValueError(f"adaptive: {len(plan.adaptive)} axes are not allowed; {self.noun} have {self.dimensions}")
+        self.plan = plan
+        self.paths = plan.paths
+        self.results = plan.needed
+        self.most_cases = plan.most_cases
+        self.most_rounds = 1 + self.rounds_per_halving * ((plan.finest // (plan.start - 1)).bit_length() - 1)
+        self.samples = Samples(plan)
+        self.rounds = 0
+
+    def tell(self, rows: Rows) -> None:
+        """Take the rows of the next round; ValueError where they are not the points asked for."""
+        combinations, positions = self._places()
+        if not np.array_equal(rows.points, self.plan.points(combinations, positions)):
+            raise ValueError(f"round {self.rounds}: the rows are not those of the points asked for")
+        self.samples.put(combinations, positions, rows.ok, rows.values)
+        self.rounds += 1
+        self.changed()
+
+    def ask(self) -> Step:
+        """The next round, and what is known of every curve or map."""
+        return Step(self.plan.points(*self._places()), self._summary())
+
+    @abstractmethod
+    def changed(self) -> None:
+        """Forget what was derived from fewer rows."""
+
+    @abstractmethod
+    def further(self) -> Places:
+        """The places of a later round, the most valuable first, each once."""
+
+    @abstractmethod
+    def described(self) -> Sequence[Described]:
+        """Every curve or map so far."""
+
+    def _places(self) -> Places:
+        if not self.rounds:
+            return self._first()
+        left = self.most_cases - int(self.samples.known.sum()) if self.rounds < self.most_rounds else 0
+        combinations, positions = self.further()
+        return combinations[:left], [own[:left] for own in positions]
+
+    def _first(self) -> Places:
+        """The first round: the ends of all axes, their middles, and so on."""
+        plan = self.plan
+        at = np.indices((plan.combinations, *(plan.start for _ in plan.adaptive))).reshape(1 + self.dimensions, -1)
+        passes = levels(plan.start)[at[1:]].max(axis=0)
+        order = np.lexsort((*at[:0:-1], at[0], passes))[: self.most_cases]
+        combinations, *positions = at[:, order].astype(np.int64)
+        return combinations, [own * (plan.finest // (plan.start - 1)) for own in positions]
+
+    def _summary(self) -> dict[str, Any]:
+        every, known = self.described(), self.samples.known
+        return {
+            "kind": REFINE,
+            "asked": self.plan.error,
+            "error": largest(one.error for one in every if one.ok.any() or not len(one.ok)),
+            "cases": int(known.sum()),
+            "failed": int((known & ~self.samples.ok).sum()),
+            "rounds": self.rounds,
+            "passed": all(one.passed for one in every),
+            self.noun: [one.to_json() for one in every],
+        }
+
+
+class Described(ABC):
+    """A refined curve or map.
+
+    Attributes
+    ----------
+    ok : bool array, shape (points,)
+    values : dict of str to float64 array, each shape (points,)
+        The results; NaN where there is none.
+    errors : dict of str to float or None
+        Estimated largest error of the interpolation, relative to the range of the result, outside the jumps; None
+        where it is not known.
+    passed : bool
+        Whether everything is resolved: the error is at most that asked, outside the jumps.
+    """
+
+    ok: NDArray[np.bool_]
+    values: dict[str, NDArray[np.float64]]
+    errors: dict[str, float | None]
+    passed: bool
+
+    @property
+    def error(self) -> float | None:
+        """The largest of the errors of the results that there are; None where one is not known."""
+        return largest(self.errors[name] for name, values in self.values.items() if np.isfinite(values).any())
+
+    @abstractmethod
+    def to_json(self) -> dict[str, Any]:
+        """What is known of it, without its points, as plain JSON data."""
+
+
+def largest(errors: Iterable[float | None]) -> float | None:
+    """The largest error; None where one is not known, or there is none."""
+    every = list(errors)
+    return None if None in every else max((error for error in every if error is not None), default=None)
