@@ -106,8 +106,8 @@ def draw_map(
 def _show_map(found: dict[str, Any]) -> None:
     """A line for each value of y, a column for each of x."""
     held = _held(found["at"], found["units"])
-    title = _heading(found["z"]["name"], found["z"]["unit"]) + (f"; {held}" if held else "")
-    corner = f"{_heading(found['y']['path'], found['y']['unit'])} \\ {_heading(found['x']['path'], found['x']['unit'])}"
+    title = heading(found["z"]["name"], found["z"]["unit"]) + (f"; {held}" if held else "")
+    corner = f"{heading(found['y']['path'], found['y']['unit'])} \\ {heading(found['x']['path'], found['x']['unit'])}"
     columns = [(corner, True), *((cell_text(value), True) for value in found["x"]["values"])]
     rows = [(y, *row) for y, row in zip(found["y"]["values"], found["z"]["values"], strict=True)]
     show_table(title, columns, rows)
@@ -134,7 +134,7 @@ def _show_sensitivity(found: dict[str, Any]) -> None:
 
 def _show_effects(result: dict[str, Any]) -> None:
     way = "no shares" if result["method"] == "none" else f"method {result['method']}"
-    title = f"{_heading(result['result'], result['unit'])}: {result['cases']} cases, {way}"
+    title = f"{heading(result['result'], result['unit'])}: {result['cases']} cases, {way}"
     columns = [("axis", False), ("first order", True), ("+-", True), ("total", True), ("+-", True)]
     columns += [("least mean", True), ("largest mean", True)]
     rows = []
@@ -149,8 +149,8 @@ def _show_effects(result: dict[str, Any]) -> None:
 def show_curves(found: dict[str, Any]) -> None:
     """One table for each curve: the axis, then every result against it; of a refined curve its error and jumps."""
     x = found["x"]
-    columns = [(_heading(x["path"], x["unit"]), True)]
-    columns += [(_heading(name, result["unit"]), True) for name, result in found["results"].items()]
+    columns = [(heading(x["path"], x["unit"]), True)]
+    columns += [(heading(name, result["unit"]), True) for name, result in found["results"].items()]
     settled = all("regime" in drawn for drawn in found["curves"])
     columns += [("regime", False)] * settled + [("ending", False)]
     for drawn in found["curves"]:
@@ -178,5 +178,6 @@ def _held(values: Mapping[str, float], units: Mapping[str, str]) -> str:
     return ", ".join(f"{path} = {value}" + ("" if unit == "1" else f" {unit}") for path, value, unit in texts)
 
 
-def _heading(name: str, unit: str) -> str:
+def heading(name: str, unit: str) -> str:
+    """A column's heading: the name with its unit."""
     return name if unit == "1" else f"{name} [{unit}]"

@@ -22,6 +22,7 @@ from sprag.service.client.queries import (
     extension,
     finish_text,
     form_of,
+    front_query,
     longer_query,
     reporting,
     result_query,
@@ -53,6 +54,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from sprag.service.answers.goals import FrontReport
     from sprag.service.answers.results import Case
     from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
     from sprag.service.client.queries import Spec
@@ -225,6 +227,10 @@ class AsyncStudy:
     async def sensitivity(self, y: str | Sequence[str]) -> dict[str, Any]:
         """Main effects of every axis on results, and shares of their variance."""
         return await self._get("/sensitivity", result_query(y))
+
+    async def front(self, limit: int | None = None, *, exact: bool = False) -> FrontReport:
+        """The designs of a study with a goal, as `Study.front` gives them."""
+        return cast("FrontReport", await self._get("/front", front_query(limit, exact)))
 
     async def engagements(self, case: int) -> dict[str, Any]:
         """Every engagement of the clutches of one case, as `Study.engagements` gives them."""

@@ -20,6 +20,7 @@ from sprag.service.client.wire import (
     connection_options,
     document,
     engagements_path,
+    front_path,
     is_event,
     reason,
     refusal,
@@ -113,6 +114,14 @@ class ServiceClient:
     def drawn(self, study_id: str, part: Drawn, query: Query) -> dict[str, Any]:
         """Curves of results against one axis, a map of one result over two, or what results depend on."""
         return self._json("GET", f"{study_path(study_id)}/{part}", params=list(query))
+
+    def front(self, study_id: str, query: Query = ()) -> dict[str, Any]:
+        """The designs of a study with a goal."""
+        return self._json("GET", front_path(study_id), params=list(query))
+
+    def front_file(self, study_id: str, query: Query) -> Iterator[bytes]:
+        """The same as a file, by the query's ``format``."""
+        return self.download(front_path(study_id), query)
 
     def picture(self, study_id: str, part: Drawn, query: Query, form: str) -> Iterator[bytes]:
         """The same as a picture, "svg", "png" or "pdf"."""

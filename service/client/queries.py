@@ -77,6 +77,11 @@ def result_query(y: str | Sequence[str]) -> list[tuple[str, str]]:
     return [("y", name) for name in _listed(y)]
 
 
+def front_query(limit: int | None, exact: bool) -> list[tuple[str, str]]:
+    """Query of the designs of a study with a goal; None leaves the number of designs to the service."""
+    return [("exact", str(exact).lower()), *([] if limit is None else [("limit", str(limit))])]
+
+
 def extension(
     axes: Sequence[Mapping[str, Any]] | None, cases: Sequence[Mapping[str, Any]] | None, name: str | None
 ) -> dict[str, Any]:

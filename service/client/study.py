@@ -17,6 +17,7 @@ from sprag.service.client.queries import (
     extension,
     finish_text,
     form_of,
+    front_query,
     reporting,
     result_query,
     spec_of,
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from sprag.service.answers.goals import FrontReport
     from sprag.service.answers.results import Case
     from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
     from sprag.service.client.queries import Spec
@@ -154,6 +156,18 @@ class Study:
     def sensitivity(self, y: str | Sequence[str]) -> dict[str, Any]:
         """Main effects of every axis on results, and shares of their variance."""
         return self._client.plain.drawn(self.id, "sensitivity", result_query(y))
+
+    def front(self, limit: int | None = None, *, exact: bool = False) -> FrontReport:
+        """The designs of a study with a goal, the best first, and the history of the search.
+
+        Parameters
+        ----------
+        limit : int, optional
+            Most designs, by default 2,000.
+        exact : bool
+            Whether designs must meet equalities to 1e-6 to be feasible, instead of within their bands.
+        """
+        return cast("FrontReport", self._client.plain.front(self.id, front_query(limit, exact)))
 
     def engagements(self, case: int) -> dict[str, Any]:
         """Every engagement of the clutches of one case ("engagements"), and the means of its "periods"."""

@@ -91,6 +91,11 @@ def engagements_path(study_id: str, case: int) -> str:
     return f"{study_path(study_id)}/cases/{case:d}/engagements"
 
 
+def front_path(study_id: str) -> str:
+    """Address of the designs of a study with a goal."""
+    return f"{study_path(study_id)}/front"
+
+
 def strobes_path(study_id: str, case: int) -> str:
     """Address of the strobes of a case under the API."""
     return f"{study_path(study_id)}/cases/{case:d}/strobes"

@@ -1,4 +1,4 @@
-"""Curves and maps as bytes that are ready to be sent.
+"""Curves, maps and fronts as bytes that are ready to be sent.
 
 The service itself writes small answers; those with more than `FEW` numbers belong in a checking process, because
 reading and writing them takes seconds during which nobody else would be answered.
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sprag.service.json_text import numbers, to_bytes
 from sprag.service.results import exports
 from sprag.service.results.curve_cases import draw, draw_map, select
+from sprag.service.results.fronts import designs_of, front_csv, front_json
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.pictures.maps import draw_map as draw_map_picture
 from sprag.service.results.refined import not_joined
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
     from sprag.service.jobs.checks import Library
     from sprag.service.results.curves import Curve, CurveQuery, Curves, Map
+    from sprag.service.results.fronts import Designs
 
 #: Numbers of curves or a map that are read and written in about ten milliseconds.
 FEW: Final = 20_000
@@ -116,3 +118,21 @@ def map_csv(library: Library, study_id: str, query: CurveQuery) -> bytes:
 def map_picture(library: Library, study_id: str, query: CurveQuery, title: str, form: pictures.Picture) -> bytes:
     """The map as a picture."""
     return draw_map_picture(map_of(library, study_id, query), title, form)
+
+
+def front_of(library: Library, study_id: str, exact: bool) -> Designs:
+    """The designs of a study; raises StudyNotFound, and FaultError for a study without a goal."""
+    store = library.store
+    return designs_of(
+        store.study(study_id), store.rounds(study_id), partial(store.rows_for_cases, study_id), exact=exact
+    )
+
+
+def front_as_json(library: Library, study_id: str, exact: bool, limit: int) -> bytes:
+    """The designs as JSON text."""
+    return to_bytes(front_json(study_id, front_of(library, study_id, exact), limit))
+
+
+def front_as_csv(library: Library, study_id: str, exact: bool, limit: int) -> bytes:
+    """The designs as a table."""
+    return front_csv(front_of(library, study_id, exact), limit)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from sprag.worker.planning.goals.plan import GOAL
+
 if TYPE_CHECKING:
     from sprag.service.answers.studies import Round, Rounds
     from sprag.service.storage.records import RoundProgress, RoundRecord
@@ -33,7 +35,9 @@ def round_json(record: RoundRecord) -> Round:
 
 
 def sentence(rounds: RoundProgress) -> str:
-    """For people: "round 3 of at most 12, error now 2.1 %, asked 1 %"."""
+    """For people: "round 3 of at most 12, error now 2.1 %, asked 1 %", "generation 12 of 60, 240 feasible"."""
+    if rounds.latest.summary.get("kind") == GOAL:
+        return ", ".join(_search(rounds.latest.summary))
     told = [f"round {_number(rounds)} of at most {_most(rounds)}"]
     if not rounds.latest.cases:
         number = _number(rounds)
@@ -58,3 +62,16 @@ def _state(summary: dict[str, Any]) -> list[str]:
         return []
     now = "error not known yet" if error is None else f"error now {100.0 * error:.2g} %"
     return [now, f"asked {100.0 * asked:.2g} %"]
+
+
+def _search(summary: dict[str, Any]) -> list[str]:
+    """What a search for designs has reached: "generation 12 of 60", "240 feasible", "best 0.84"."""
+    generation, generations, feasible = summary["generation"], summary["generations"], summary["feasible"]
+    told = [f"generation {generation + 1} of {generations}"]
+    if summary["phase"] != "search":
+        ended = f"{generation} generation" if generation == 1 else f"{generation} generations"
+        told = [ended] if summary["phase"] == "ended" else [ended, "polish of equalities"]
+    best = [f"{value:.3g}" for value in summary["best"] if value is not None]
+    exact = (summary["polish"] or {}).get("met", 0)
+    told.append(f"{feasible:,} feasible" if feasible else "none feasible")
+    return [*told, *([f"{exact:,} exact"] * bool(exact)), *([f"best {' and '.join(best)}"] * bool(best))]

@@ -1,0 +1,92 @@
+"""Answers about studies with a goal: their designs, ranked, and how the search has come to them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NotRequired
+
+from typing_extensions import TypedDict
+
+from sprag.service.answers import Doc, Number
+
+
+class DesignVariable(TypedDict):
+    """What a search varies."""
+
+    name: Annotated[str, Doc("the first of `paths`")]
+    paths: Annotated[list[str], Doc("the parameters that take the value together")]
+    unit: str
+    low: Annotated[float, Doc("least value, SI")]
+    high: Annotated[float, Doc("largest value, SI")]
+    values: Annotated[list[float], Doc("the listed values, SI; empty for a range")]
+
+
+class DesignGoal(TypedDict):
+    """A result that is to be as small or as large as possible."""
+
+    result: str
+    unit: str
+    description: str
+    max: Annotated[bool, Doc("whether the largest value is the best")]
+
+
+#: A limit has one of is, at_least and at_most; "is" is no name for a field of a class.
+DesignLimit = TypedDict(
+    "DesignLimit",
+    {
+        "result": str,
+        "unit": str,
+        "is": NotRequired[Annotated[float | str, Doc("SI, or the name of a category")]],
+        "at_least": NotRequired[Annotated[float, Doc("SI")]],
+        "at_most": NotRequired[Annotated[float, Doc("SI")]],
+        "within": Annotated[float, Doc("half the width of the band around `is`, SI; 0 where it must be equal")],
+    },
+)
+DesignLimit.__doc__ = "What a design must fulfil at every operating point."
+
+
+class Design(TypedDict):
+    """One design: a value of every variable, run at every operating point."""
+
+    design: Annotated[int, Doc("its number, from 0, in order of the cases")]
+    cases: Annotated[list[int], Doc("its cases, one for each operating point")]
+    round: Annotated[int, Doc("number of the round that it belongs to, from 1")]
+    phase: Annotated[Literal["search", "polish"], Doc("whether a generation or the polish of equalities asked for it")]
+    variables: Annotated[dict[str, float], Doc("value of each variable by its name, SI")]
+    goals: Annotated[dict[str, Number], Doc("each goal over the operating points, SI; null where it is missing")]
+    results: Annotated[
+        dict[str, list[Number | str]], Doc("results of goals and limits at each operating point; null where missing")
+    ]
+    feasible: Annotated[bool, Doc("whether it is within every limit")]
+    failed: Annotated[bool, Doc("whether one of its cases has failed, or a goal is missing")]
+    violation: Annotated[Number, Doc("sum of the relative violations of limits; 0 if feasible, null if failed")]
+    miss: Annotated[Number, Doc("largest relative distance from the value of an equality; null where missing")]
+    exact: Annotated[bool, Doc("whether it is feasible with its equalities met to 1e-6; without equalities, feasible")]
+    rank: Annotated[int, Doc("0: no other design is better (the front), and so on; infeasible ones come last")]
+
+
+class Generation(TypedDict):
+    """What was known after a generation, or after a round of the polish."""
+
+    round: Annotated[int, Doc("rounds before")]
+    generation: Annotated[int, Doc("generations before")]
+    phase: Annotated[str, Doc("what came next: search, polish or ended")]
+    feasible: Annotated[int, Doc("designs within every limit")]
+    infeasible: int
+    failed: int
+    best: Annotated[list[float | None], Doc("best value of each goal within the limits, SI; null: none yet")]
+    hypervolume: Annotated[float | None, Doc("what the front dominates, up to a fixed point; null where not known")]
+
+
+class FrontReport(TypedDict):
+    """The designs of a study with a goal, the best rank first, within a rank in order of the first goal."""
+
+    study: str
+    variables: list[DesignVariable]
+    best: list[DesignGoal]
+    subject_to: list[DesignLimit]
+    at: Annotated[list[dict[str, float]], Doc("the operating points, SI; a single empty one for that of the base")]
+    over: Annotated[str, Doc("what counts of several operating points: worst or mean")]
+    generations: Annotated[int, Doc("generations at most")]
+    counts: Annotated[dict[str, int], Doc("all designs: known, pending, feasible, failed, exact, front (of rank 0)")]
+    designs: Annotated[list[Design], Doc("at most `limit` of the known ones")]
+    history: list[Generation]

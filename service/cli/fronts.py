@@ -1,0 +1,85 @@
+"""``sprag front``: the designs of a study with a goal."""
+
+from __future__ import annotations
+
+from itertools import chain
+from typing import Annotated, Any
+
+import typer
+
+from sprag.service.cli.console import say, show_table, write_json
+from sprag.service.cli.files import write_pieces
+from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
+from sprag.service.cli.pictures import file_format, heading
+from sprag.service.cli.remote import connection
+
+#: Designs of a file: every one.
+_EVERY = 1_000_000
+
+
+def front(
+    study_id: StudyId,
+    limit: Annotated[int, typer.Option("--limit", min=1, metavar="N", help="Most designs, the best first.")] = 20,
+    exact: Annotated[
+        bool, typer.Option("--exact", help="Designs must meet equalities to 1e-6 to be feasible.")
+    ] = False,
+    file: Annotated[
+        str | None, typer.Option("-o", "--output", metavar="FILE", help="File to write: .csv, with all designs.")
+    ] = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Show the best designs of a study with a goal: goals, variables, results of limits."""
+    form = None if file is None else file_format(file, ("csv",), "table")
+    with connection(server, token) as client:
+        query = [("exact", str(exact).lower())]
+        found = client.front(study_id, [*query, ("limit", str(limit))])
+        if file is not None and form is not None:
+            write_pieces(file, client.front_file(study_id, [*query, ("limit", str(_EVERY)), ("format", form)]))
+    if as_json:
+        write_json(found)
+    else:
+        _show(found)
+    if file is not None:
+        say(f"table: {file}")
+
+
+def _show(found: dict[str, Any]) -> None:
+    """A line for each design, the best first."""
+    counts = found["counts"]
+    told = [f"{counts['known']} designs", f"{counts['feasible']} feasible", f"{counts['front']} on the front"]
+    if counts["pending"]:
+        told.append(f"{counts['pending']} still to be run")
+    columns = [(name, True) for name in ("design", "case")]
+    columns += [(_lines(goal["result"], goal["unit"]), True) for goal in found["best"]]
+    columns += [(_lines(one["name"], one["unit"]), True) for one in found["variables"]]
+    limited, points = _limited(found), len(found["at"])
+    columns += [
+        (_lines(name if points == 1 else f"{name} at {number}", unit), True)
+        for name, unit in limited.items()
+        for number in range(1, points + 1)
+    ]
+    rows = [
+        (
+            design["design"],
+            design["cases"][0],
+            *design["goals"].values(),
+            *design["variables"].values(),
+            *chain.from_iterable(design["results"][name] for name in limited),
+            *(design[name] for name in ("feasible", "exact", "rank")),
+        )
+        for design in found["designs"]
+    ]
+    show_table(", ".join(told), [*columns, ("feasible", False), ("exact", False), ("rank", True)], rows)
+
+
+def _limited(found: dict[str, Any]) -> dict[str, str]:
+    """Names and units of the results of limits; without those that the columns of goals show."""
+    goals = {goal["result"] for goal in found["best"]} if len(found["at"]) == 1 else ()
+    return {limit["result"]: limit["unit"] for limit in found["subject_to"] if limit["result"] not in goals}
+
+
+def _lines(name: str, unit: str) -> str:
+    """The heading of a narrow column: a line for each part of the name, and one for the unit."""
+    return heading(name, unit).replace(".", ".\n").replace(" ", "\n")

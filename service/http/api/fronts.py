@@ -1,0 +1,59 @@
+"""GET /studies/{id}/front: the designs of a study with a goal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Final
+
+from fastapi import APIRouter, Depends, Query
+from starlette.responses import Response
+
+from sprag.service.answers import goals as m
+from sprag.service.http.api.document import files, format_query, problems
+from sprag.service.http.api.document import not_modified as documented_304
+from sprag.service.http.context import StudyId
+from sprag.service.http.drawing import TABLE_FORMATS, Drawing, attached, conditional
+from sprag.service.http.requests import strict_query
+from sprag.service.http.respond import choose_format
+from sprag.service.http.work import CHECK_PROBLEMS, Attended
+from sprag.service.jobs import answers
+from sprag.service.results.fronts import DESIGNS, MOST_DESIGNS, goal_of
+
+if TYPE_CHECKING:
+    from sprag.service.storage.records import StudyRecord
+
+router = APIRouter(prefix="/studies/{study_id:study}", tags=["results"], dependencies=[Depends(strict_query)])
+
+_WRITERS: Final = {"json": answers.front_as_json, "csv": answers.front_as_csv}
+
+
+@router.get(
+    "/front",
+    response_model=m.FrontReport,
+    responses={
+        **files("Designs, as JSON or a table.", TABLE_FORMATS.values()),
+        **problems("invalid-parameter", "invalid-selection", "study-not-found", "not-acceptable", *CHECK_PROBLEMS),
+        **documented_304(),
+    },
+)
+async def get_front(
+    work: Attended,
+    study_id: StudyId,
+    exact: Annotated[
+        bool, Query(description="designs must meet equalities of real numbers to 1e-6 to be feasible")
+    ] = False,
+    limit: Annotated[int, Query(ge=1, le=MOST_DESIGNS, description="most designs", examples=[100])] = DESIGNS,
+    form: Annotated[str | None, format_query(TABLE_FORMATS)] = None,
+) -> Response:
+    """The designs of a study with a goal, the best first: variables, goals, limits, ranks, and the search's history."""
+    chosen = choose_format(work.request, form, TABLE_FORMATS)
+
+    def make(_record: StudyRecord) -> Response | Drawing:
+        study = work.context.store.study(study_id)
+        goal_of(study)
+        headers = attached(f"{study_id}-front.csv") if chosen == "csv" else {}
+        drawing = Drawing(
+            _WRITERS[chosen], (work.context.library, study_id, exact, limit), TABLE_FORMATS[chosen], headers
+        )
+        return drawing if study.cases > answers.FEW // 10 else drawing.here()
+
+    return await conditional(work, study_id, chosen, make)

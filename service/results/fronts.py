@@ -1,0 +1,237 @@
+"""Designs of a study with a goal: ranked, with their numbers, and how the search has come to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import chain
+from typing import TYPE_CHECKING, Any, Final, cast
+
+import numpy as np
+
+from sprag.service.answers.goals import Design, DesignGoal, DesignLimit, DesignVariable, FrontReport, Generation
+from sprag.service.faults import Fault, FaultError
+from sprag.service.json_text import numbers
+from sprag.service.results import exports
+from sprag.service.spec.catalogue import unit_of
+from sprag.worker import models
+from sprag.worker.models import WorkerEnding
+from sprag.worker.planning.goals import GoalPlan, front
+from sprag.worker.planning.goals.plan import GOAL
+from sprag.worker.planning.goals.polish import MET
+from sprag.worker.planning.rounds import Rows
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from sprag.service.results.curves import Fetch
+    from sprag.service.storage.records import RoundRecord
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.planning.goals import Front, Limit
+    from sprag.worker.study import Study
+
+#: Designs that are answered unless more are asked for.
+DESIGNS: Final = 2000
+#: Designs that are answered at most.
+MOST_DESIGNS: Final = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Designs:
+    """The designs of a study whose cases all have their rows.
+
+    Attributes
+    ----------
+    numbers : int64 array, shape (designs,)
+        Of each design, ascending.
+    front : Front
+        Aligned with ``numbers``; its ``cases`` are those of the study.
+    exact : bool array, shape (designs,)
+        Feasible, and equalities of real numbers met to 1e-6.
+    values : dict of float64 arrays, each shape (designs, operating points)
+        Results of goals and limits, SI or the code of a category.
+    order : int64 array, shape (designs,)
+        Positions of the designs: the best rank first, within a rank the best first goal.
+    rounds : list of RoundRecord
+    round : int64 array, shape (designs,)
+        Which of ``rounds`` each design belongs to.
+    pending : int
+        Designs that are still to be run, or never were.
+    """
+
+    study: Study
+    plan: GoalPlan
+    infos: dict[str, ResultInfo]
+    numbers: NDArray[np.int64]
+    front: Front
+    exact: NDArray[np.bool_]
+    values: dict[str, NDArray[np.float64]]
+    order: NDArray[np.int64]
+    rounds: list[RoundRecord]
+    round: NDArray[np.int64]
+    pending: int
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Numbers of designs, as `FrontReport` gives them."""
+        flags = {"feasible": self.front.feasible, "failed": self.front.failed, "exact": self.exact}
+        first = self.front.feasible & (self.front.rank == 0)
+        counted = {name: int(np.count_nonzero(flag)) for name, flag in (flags | {"front": first}).items()}
+        return {"known": len(self.numbers), "pending": self.pending, **counted}
+
+
+def goal_of(study: Study) -> GoalPlan:
+    """The search of a study; FaultError for a study without a goal."""
+    if study.plan is None or study.plan.get("kind") != GOAL:
+        message = "the study has no goal, so that its cases are no designs"
+        raise FaultError(
+            "invalid-selection", message, [Fault(None, "conflict", message, allowed="a study whose spec has `goal`")]
+        )
+    return GoalPlan.from_json(study.plan)
+
+
+def designs_of(study: Study, rounds: list[RoundRecord], fetch: Fetch, *, exact: bool = False) -> Designs:
+    """All designs of ``study``, ranked.
+
+    Parameters
+    ----------
+    rounds : list of RoundRecord
+        As `Store.rounds` gives them.
+    fetch : callable
+        Gives rows by numbers of cases and names of results.
+    exact : bool
+        Whether designs must meet equalities to 1e-6 to be feasible, instead of within their bands.
+
+    Raises
+    ------
+    FaultError
+        For a study without a goal.
+    """
+    plan = goal_of(study)
+    points = len(plan.at)
+    whole = range(study.cases - study.cases % points)
+    columns = fetch(np.arange(whole.stop, dtype=np.int64), list(plan.results))
+    endings = np.array([ending or WorkerEnding.CANCELLED for ending in columns.endings], dtype=object)
+    known = (endings != WorkerEnding.CANCELLED).reshape(-1, points).all(axis=1)
+    kept = np.repeat(known, points)
+    values = {name: column[kept] for name, column in columns.values.items()}
+    rows = Rows(study.points(whole)[kept], endings[kept] == models.OK, values)
+    found = front(plan, rows, equality=MET if exact else None)
+    numbers_ = np.flatnonzero(known)
+    found.cases[:] = numbers_[:, None] * points + np.arange(points)
+    goal = found.goals[:, 0] * (-1.0 if plan.best[0].max else 1.0) if plan.best else found.violation
+    return Designs(
+        study=study,
+        plan=plan,
+        infos={info.name: info for info in models.study_results(study) if info.name in plan.results},
+        numbers=numbers_,
+        front=found,
+        exact=found.feasible & (found.miss <= MET),
+        values={name: column.reshape(-1, points) for name, column in values.items()},
+        order=np.lexsort((numbers_, goal, found.rank)),
+        rounds=rounds,
+        round=np.searchsorted([record.cases.start for record in rounds], found.cases[:, 0], side="right") - 1,
+        pending=int(np.count_nonzero(~known)),
+    )
+
+
+def front_json(study_id: str, found: Designs, limit: int = DESIGNS) -> FrontReport:
+    """The designs as an answer, at most ``limit`` of them."""
+    plan, infos = found.plan, found.infos
+    return {
+        "study": study_id,
+        "variables": _variables(found),
+        "best": [
+            DesignGoal(
+                result=goal.result,
+                unit=infos[goal.result].unit,
+                description=infos[goal.result].description,
+                max=goal.max,
+            )
+            for goal in plan.best
+        ],
+        "subject_to": [_limit(limit_, infos[limit_.result]) for limit_ in plan.subject_to],
+        "at": [dict(point) for point in plan.at],
+        "over": plan.over,
+        "generations": plan.generations,
+        "counts": found.counts,
+        "designs": [design_json(found, int(position)) for position in found.order[:limit]],
+        "history": history(found.rounds),
+    }
+
+
+def _variables(found: Designs) -> list[DesignVariable]:
+    return [
+        {
+            "name": one.paths[0],
+            "paths": list(one.paths),
+            "unit": unit_of(found.study, one.paths[0]),
+            "low": one.low,
+            "high": one.high,
+            "values": list(one.values),
+        }
+        for one in found.plan.vary
+    ]
+
+
+def _limit(limit: Limit, info: ResultInfo) -> DesignLimit:
+    value = info.cell(limit.value)
+    named: Any = {"result": info.name, "unit": info.unit, limit.kind: value, "within": limit.within}
+    return cast("DesignLimit", named)
+
+
+def design_json(found: Designs, position: int) -> Design:
+    """The design at a position."""
+    ranked, record = found.front, found.rounds[found.round[position]]
+    names = [one.paths[0] for one in found.plan.vary]
+    return {
+        "design": int(found.numbers[position]),
+        "cases": ranked.cases[position].tolist(),
+        "round": record.round + 1,
+        "phase": "polish" if record.summary.get("phase") == "polish" else "search",
+        "variables": dict(zip(names, ranked.variables[position].tolist(), strict=True)),
+        "goals": dict(
+            zip((goal.result for goal in found.plan.best), numbers(ranked.goals[position] + 0.0), strict=True)
+        ),
+        "results": {
+            name: [found.infos[name].cell(value) for value in column[position].tolist()]
+            for name, column in found.values.items()
+        },
+        "feasible": bool(ranked.feasible[position]),
+        "failed": bool(ranked.failed[position]),
+        "violation": _finite(ranked.violation[position]),
+        "miss": _finite(ranked.miss[position]),
+        "exact": bool(found.exact[position]),
+        "rank": int(ranked.rank[position]),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def history(rounds: Sequence[RoundRecord]) -> list[Generation]:
+    """What was known before each round from the second on, and at the end."""
+    names = ("generation", "phase", "feasible", "infeasible", "failed", "best", "hypervolume")
+    return [
+        cast("Generation", {"round": record.round, **{name: record.summary.get(name) for name in names}})
+        for record in rounds
+        if record.summary
+    ]
+
+
+def front_csv(found: Designs, limit: int = DESIGNS) -> bytes:
+    """A row for each design, at most ``limit``: SI numbers, those of several operating points by their number."""
+    plan, points = found.plan, range(1, len(found.plan.at) + 1)
+    told = ("round", "phase", "rank", "feasible", "failed", "exact", "violation", "miss")
+    header = ["design", "case", *told, *(one.paths[0] for one in plan.vary)]
+    header += [f"{plan.over}.{goal.result}" for goal in plan.best if len(points) > 1]
+    header += [name if len(points) == 1 else f"{name}.{number}" for name in found.values for number in points]
+    rows: list[list[Any]] = []
+    for position in found.order[:limit].tolist():
+        design = cast("dict[str, Any]", design_json(found, position))
+        row = [design["design"], design["cases"][0], *(design[name] for name in told), *design["variables"].values()]
+        row += design["goals"].values() if len(points) > 1 else ()
+        rows.append([*row, *chain.from_iterable(design["results"].values())])
+    return exports.table_csv(header, zip(*rows, strict=True) if rows else [[] for _ in header])

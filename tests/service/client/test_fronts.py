@@ -1,0 +1,69 @@
+"""The designs of a study with a goal, by both clients and by the command."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from anyio.from_thread import BlockingPortal
+
+from sprag.service.cli import fronts
+from sprag.service.client import AsyncClient, Client
+from sprag.service.client.plain import ServiceClient
+from tests.conftest import Finished
+from tests.service.conftest import PortalTransport, Service
+from tests.service.searching import search
+
+
+async def asynchronous(service: Service, study_id: str) -> Any:
+    """The exact front by the other client."""
+    async with AsyncClient("http://localhost", transport=httpx.ASGITransport(service.app)) as client:
+        return await (await client.study(study_id)).front(limit=3, exact=True)
+
+
+def test_both_clients_give_the_designs(service: Service, portal: BlockingPortal) -> None:
+    study_id = search(service)
+    with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
+        study = client.study(study_id)
+        assert study.front() == service.get(f"/studies/{study_id}/front")
+        exact = study.front(limit=3, exact=True)
+    assert len(exact["designs"]) == 3
+    assert exact["designs"][0]["exact"]
+    assert portal.call(partial(asynchronous, service, study_id)) == exact
+
+
+def test_the_command_shows_the_best_designs(
+    service: Service,
+    portal: BlockingPortal,
+    sprag: Callable[..., Finished],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    @contextmanager
+    def connection(*_: object) -> Iterator[ServiceClient]:
+        with ServiceClient("http://localhost", transport=PortalTransport(service.app, portal)) as client:
+            yield client
+
+    monkeypatch.setattr(fronts, "connection", connection)
+    study_id = search(service)
+    found = service.get(f"/studies/{study_id}/front")
+    shown = sprag("front", study_id, "--limit", 3, "-o", tmp_path / "front.csv")
+    assert shown.code == 0
+    counts, designs = found["counts"], found["designs"]
+    lines = shown.out.splitlines()
+    assert lines[0].startswith(f"{counts['known']} designs, {counts['feasible']} feasible")
+    assert {"excitation.", "amplitude_x", "[rad/s]"} <= set(shown.out.split())
+    rows = [line.split() for line in lines[1:] if line.split()[:1] and line.split()[0].isdecimal()]
+    assert [[int(row[0]), int(row[-1])] for row in rows] == [[item["design"], item["rank"]] for item in designs[:3]]
+    with (tmp_path / "front.csv").open(newline="") as file:
+        assert len(list(csv.DictReader(file))) == counts["known"]
+    told = json.loads(sprag("front", study_id, "--exact", "--json").out)
+    assert told == service.get(f"/studies/{study_id}/front", exact=True, limit=20)
+    assert sprag("front", study_id, "-o", tmp_path / "front.doc").code == 2
