@@ -156,6 +156,15 @@ class MapResult(TypedDict):
     values: Annotated[list[list[Number]], Doc("values[j][i] belongs to y.values[j] and x.values[i]")]
 
 
+class MapPoints(TypedDict):
+    """The cases of a refined map that have been run; all lists are aligned."""
+
+    x: list[float]
+    y: list[float]
+    z: list[Number]
+    cases: list[int]
+
+
 class MapData(TypedDict):
     """One result over two axes, without the study."""
 
@@ -164,14 +173,28 @@ class MapData(TypedDict):
     z: MapResult
     units: Annotated[dict[str, str], Doc("SI unit of every parameter in x, y and at")]
     at: dict[str, float]
-    cases: list[list[int]]
-    endings: list[list[str]]
+    cases: Annotated[list[list[int]], Doc("empty for a refined map, whose values are interpolated: see `points`")]
+    endings: Annotated[
+        list[list[str]], Doc("of a refined map: interpolated; jump, where it must not be interpolated; pending")
+    ]
     regime: NotRequired[Annotated[list[list[str | None]], Doc("regime of each case of a settled study; null: none")]]
     order: NotRequired[
         Annotated[
             list[list[int | None]],
             Doc("excitation periods after which the motion of each case repeats; null: it does not"),
         ]
+    ]
+    points: NotRequired[Annotated[MapPoints, Doc("of a refined map: its cases")]]
+    error_asked: NotRequired[Annotated[float, Doc("of a refined map: the error that was asked for")]]
+    error: NotRequired[
+        Annotated[
+            float | None,
+            Doc("of a refined map: estimated largest error outside jumps, relative to the range; null: not known yet"),
+        ]
+    ]
+    jumps_share: NotRequired[Annotated[float, Doc("of a refined map: share of its area that is not interpolated")]]
+    passed: NotRequired[
+        Annotated[bool, Doc("of a refined map: whether no more points are needed for the error that was asked for")]
     ]
 
 

@@ -104,7 +104,7 @@ def map_csv(library: Library, study_id: str, query: CurveQuery) -> bytes:
         **{path: [value] * points for path, value in drawn.at.items()},
         drawn.y: [y for y in drawn.y_values for _ in range(across)],
         drawn.x: [*drawn.x_values] * len(drawn.y_values),
-        "case": drawn.cases.reshape(-1).tolist(),
+        **({} if drawn.refined else {"case": drawn.cases.reshape(-1).tolist()}),
         drawn.result.name: numbers(drawn.values.reshape(-1), drawn.result.kind == "count"),
         **{
             name: list(chain.from_iterable(rows or ()))

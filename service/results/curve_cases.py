@@ -16,12 +16,13 @@ import numpy as np
 from sprag.service.faults import ParameterFault
 from sprag.service.results.curves import Curve, CurveQuery, Curves, Fetch, Line, Map, Selection, not_run
 from sprag.service.results.refined import families, plan_along, refined_curves
+from sprag.service.results.refined_maps import draw_refined_map, map_plan
 from sprag.service.results.regimes import kind_columns, kinds_of
 from sprag.service.results.selection import (
     Fixed,
     SelectionError,
     axis_name,
-    held_text,
+    held_texts,
     listed,
     locate_axes,
     numeric_results,
@@ -29,7 +30,6 @@ from sprag.service.results.selection import (
     require_axis,
 )
 from sprag.service.spec.catalogue import unit_of
-from sprag.worker import models
 from sprag.worker.codes import PENDING
 from sprag.worker.limits import MAX_CURVE_VALUES
 from sprag.worker.models import regime_info
@@ -66,15 +66,9 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
     made = tuple(lines)
     units = {path: unit_of(study, path) for path in (query.x, *made[0].by, *made[0].at)}
     names = {path: axis_name(study, path) for path in (query.x, *made[0].by)}
-    return Selection(query.x, units, names, _held(study, made[0]), x_values, results, made, regime_info(infos), plan)
-
-
-def _held(study: Study, line: Line) -> tuple[str, ...]:
-    """The fixed axes, then the constant parameters of the operating point."""
-    point, varying = models.presentation_of(study).operating_point, study.column_paths
-    always = [path for path in point if path in study.base and path not in varying]
-    fixed = [*line.at.items(), *((path, study.base[path]) for path in always)]
-    return tuple(held_text(study, path, value) for path, value in fixed)
+    return Selection(
+        query.x, units, names, held_texts(study, made[0].at), x_values, results, made, regime_info(infos), plan
+    )
 
 
 def draw(selection: Selection, fetch: Fetch) -> Curves:
@@ -107,7 +101,10 @@ def _with_kinds(names: list[str], regime: ResultInfo | None) -> list[str]:
 def draw_map(
     study: Study, infos: Sequence[ResultInfo], x: str, y: str, z: str, at: Sequence[tuple[str, str]], fetch: Fetch
 ) -> Map:
-    """One result over two axes of a grid; raises SelectionError as `select` does."""
+    """One result over two axes of a grid, or of a refined map; raises SelectionError as `select` does."""
+    plan = map_plan(study)
+    if plan is not None:
+        return draw_refined_map(study, infos, plan, (x, y, z), at, fetch)
     (result,) = numeric_results(infos, "z", (z,))
     if study.combine == "zip":
         raise refused("x", "not-a-grid", "a map needs a grid; the axes of this study go together (zip)")
@@ -128,7 +125,7 @@ def draw_map(
         y,
         (unit_of(study, x), unit_of(study, y)),
         (axis_name(study, x), axis_name(study, y)),
-        _held(study, rows[0]),
+        held_texts(study, rows[0].at),
         x_values,
         tuple(row.by[y] for row in rows),
         rows[0].at,

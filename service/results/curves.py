@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from sprag.service.answers import filled
 from sprag.service.answers.results import Curve as CurveData
-from sprag.service.answers.results import CurvesData, MapData, MapResult, ResultMeaning
+from sprag.service.answers.results import CurvesData, MapData, MapPoints, MapResult, ResultMeaning
 from sprag.service.json_text import numbers
 from sprag.service.results.refined import jumps_of
 from sprag.worker.codes import PENDING
 from sprag.worker.models import WorkerEnding
 
 if TYPE_CHECKING:
+    from sprag.service.results.refined_maps import RefinedMap
     from sprag.service.storage.records import CaseColumns
     from sprag.worker.models import ResultInfo
     from sprag.worker.planning.refine import Curve as Refined
@@ -128,7 +129,8 @@ class Curves:
 class Map:
     """One result over two axes; ``values``, ``endings`` and ``cases`` have the shape (y values, x values).
 
-    ``names`` and ``held`` are for display, as in `Selection`; ``units`` and ``names`` belong to x and y.
+    ``names`` and ``held`` are for display, as in `Selection`; ``units`` and ``names`` belong to x and y. A refined map
+    has the values in the middles of even squares, which are no cases.
     """
 
     x: str
@@ -146,9 +148,25 @@ class Map:
     endings: list[list[str]]
     regimes: list[list[str | None]] | None = None
     orders: list[list[int | None]] | None = None
+    refined: RefinedMap | None = None
 
     def to_json(self) -> MapData:
         """The map as JSON data; ``z.values[j][i]`` belongs to ``y.values[j]`` and ``x.values[i]``."""
+        if self.refined is not None:
+            return self._refined(self.refined)
+        return self._grid()
+
+    def _refined(self, known: RefinedMap) -> MapData:
+        points: MapPoints = {
+            "x": known.x.tolist(),
+            "y": known.y.tolist(),
+            "z": numbers(known.values),
+            "cases": known.cases.tolist(),
+        }
+        told = {"error_asked": known.asked, "error": known.error, "jumps_share": known.told, "passed": known.passed}
+        return {**self._grid(), "cases": [], "points": points, **told}  # type: ignore[typeddict-item]
+
+    def _grid(self) -> MapData:
         data: MapData = {
             "x": {"path": self.x, "unit": self.units[0], "values": list(self.x_values)},
             "y": {"path": self.y, "unit": self.units[1], "values": list(self.y_values)},

@@ -10,6 +10,7 @@ import numpy as np
 
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.refined import curve_plan, families
+from sprag.service.results.refined_maps import map_plan, squares
 from sprag.service.results.selection import axis_name, held_text, refused
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
@@ -94,8 +95,9 @@ def usual_value(study: Study, axis: Axis) -> float:
 
 def drawn_numbers(study: Study, query: CurveQuery) -> int:
     """How many numbers the curves of ``query`` have, at most."""
+    mapped = map_plan(study)
     if study.combine == "zip":
-        return study.cases * len(query.y)
+        return study.cases * len(query.y) + (0 if mapped is None else squares(mapped) ** 2)
     axes = [axis for path in (query.x, *query.by) for axis in study.axes if path in axis.paths]
     return math.prod(map(len, axes)) * len(query.y)
 

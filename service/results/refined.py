@@ -116,12 +116,12 @@ def sentence(plan: RefinePlan, curves: Sequence[Refined], names: Iterable[str]) 
     error = None if None in every or not every else max(error for error in every if error is not None)
     passed = all(curve.passed for curve in curves)
     if error is None:
-        told = f"The error is not known yet; {_percent(plan.error)} of the range is asked."
+        told = f"The error is not known yet; {percent(plan.error)} of the range is asked."
     elif passed and error <= plan.error:
-        told = f"Within {_percent(plan.error)} of the range, as asked,{outside} (estimate: {_percent(error)})."
+        told = f"Within {percent(plan.error)} of the range, as asked,{outside} (estimate: {percent(error)})."
         told = told.replace(", (", " (")
     else:
-        told = f"Not reached: {_percent(error)} of the range now{outside}, {_percent(plan.error)} asked."
+        told = f"Not reached: {percent(error)} of the range now{outside}, {percent(plan.error)} asked."
     others = [name for name in drawn if name not in asked]
     return f"{told} No error was asked for {', '.join(others)}." if others else told
 
@@ -131,5 +131,6 @@ def _apart(jumps: Sequence[Jump]) -> int:
     return len({jump["low"] for jump in jumps} - {jump["high"] for jump in jumps})
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
+    """A share for display."""
     return f"{100.0 * share:.2g} %"

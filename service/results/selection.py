@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +12,7 @@ from sprag.service.faults import Code, Fault, FaultError, ParameterFault, shown
 from sprag.service.spec.catalogue import result_of, unit_of, unknown_result
 from sprag.service.spec.report import did_you_mean, quantity_text
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
+from sprag.worker import models
 from sprag.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
@@ -99,6 +100,14 @@ def held_text(study: Study, path: str, value: float) -> str:
     """A parameter held at ``value`` (SI) for display: ``excitation.frequency = 25 Hz``."""
     unit = unit_of(study, path)
     return f"{axis_name(study, path)} = {value:.6g}" + ("" if unit == "1" else f" {unit}")
+
+
+def held_texts(study: Study, at: Mapping[str, float]) -> tuple[str, ...]:
+    """The fixed axes, then the constant parameters of the operating point."""
+    point, varying = models.presentation_of(study).operating_point, study.axis_paths
+    always = [path for path in point if path in study.base and path not in varying]
+    fixed = [*at.items(), *((path, study.base[path]) for path in always)]
+    return tuple(held_text(study, path, value) for path, value in fixed)
 
 
 def locate_axes(study: Study, at: Sequence[tuple[str, str]]) -> Fixed:

@@ -36,10 +36,33 @@ SPEC: dict[str, Any] = changed(
         "/refine": {"results": [SPEED, EFFICIENCY], "error": "1 %"},
     }
 )
+#: The same over load and frequency: a map for each of two masses.
+MAP: dict[str, Any] = changed(
+    {
+        "/name": "Refined map",
+        "/axes": [
+            {"path": "excitation.frequency", "adaptive": ["20 Hz", "30 Hz"]},
+            {"path": "pendulums.0.mass", "values": ["0.5 kg", "0.4 kg"]},
+            {"path": "shaft.load", "adaptive": [0, "1 N*m"]},
+        ],
+        "/combine": ...,
+        "/refine": {"results": [SPEED, EFFICIENCY], "error": "2 %", "start": 9, "finest": "1/32"},
+    }
+)
+
+
+def map_value(name: str, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A made-up result at points of mass (kg), frequency (Hz) and load (N*m)."""
+    mass, frequency, load = points.T
+    if name == SPEED:
+        return frequency - 10.0 * load**2 - np.where((mass == 0.4) & (load > JUMP), 8.0, 0.0)
+    return load * (2.0 - load)
 
 
 def value_of(name: str, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A made-up result at points of frequency (Hz) and load (N*m)."""
+    """A made-up result at points of frequency (Hz) and load (N*m), or as `map_value` for three columns."""
+    if points.shape[1] == 3:
+        return map_value(name, points)
     frequency, load = points[:, 0], points[:, 1]
     if name == SPEED:
         return 30.0 - 20.0 * load**2 - np.where((frequency == 20.0) & (load > JUMP), 8.0, 0.0)

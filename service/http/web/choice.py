@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import main_query, main_results, usual_value
 from sprag.service.results.refined import curve_plan, families, plan_along
+from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.selection import refused
 
 if TYPE_CHECKING:
@@ -53,6 +54,13 @@ def curve_query(study: Study, infos: Sequence[ResultInfo], given: QueryParams) -
 
 def map_query(study: Study, infos: Sequence[ResultInfo], given: QueryParams) -> MapQuery | None:
     """The map requested by a URL; None where fewer than two axes vary."""
+    plan = map_plan(study)
+    if plan is not None:
+        x, y = (axis.paths[0] for axis in plan.adaptive)
+        if given.get("x") == y or given.get("y") == x:
+            x, y = y, x
+        x, y, z = given.get("x") or x, given.get("y") or y, given.get("z") or plan.results[0]
+        return MapQuery(x, y, z, held(study, given.getlist("at"), (x, y)))
     varying = [axis for axis in study.axes if len(axis) > 1]
     main = main_query(study, infos)
     if main is None or study.combine != "grid" or len(varying) < 2:
@@ -78,7 +86,7 @@ def held(study: Study, given: Sequence[str], drawn: Sequence[str]) -> tuple[tupl
         if not equals or not value.strip():
             raise refused("at", "invalid-text", "must be path=value", item)
         pairs[path.strip()] = value.strip()
-    plan = plan_along(study, drawn[0])
+    plan = plan_along(study, drawn[0]) or map_plan(study)
     fixed = families(plan) if plan is not None else study.axis_paths if study.combine == "grid" else ()
     for axis in study.axes:
         if len(axis) > 1 and axis.paths[0] in fixed and not any(path in axis.paths for path in (*drawn, *pairs)):

@@ -20,12 +20,16 @@ from sprag.service.http.work import Attended
 from sprag.service.results.curve_cases import select
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.pictures import curves as pictures
+from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.selection import SelectionError
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from sprag.service.storage.records import StudyRecord
+    from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 
 router = APIRouter(include_in_schema=False)
@@ -107,12 +111,18 @@ def map_page(
         kinds=KINDS,
         faults=faults,
         axes=_axis_choices(study),
-        results=[info for info in infos if info.kind != "category"],
+        results=_mapped_results(study, infos),
         fixed=fixed_choices(study, (shown.x, shown.y), shown.at),
         figure=f"/studies/{study_id}/figures/map?{urlencode([*pairs, ('kind', kind)])}",
         files=f"{views.study_address(study_id)}/map?{urlencode(pairs)}",
         held=held,
     )
+
+
+def _mapped_results(study: Study, infos: Sequence[ResultInfo]) -> list[ResultInfo]:
+    """The results that a map can show: of a refined map those that it was refined for."""
+    plan = map_plan(study)
+    return [info for info in infos if info.kind != "category" and (plan is None or info.name in plan.results)]
 
 
 def _axis_choices(study: Study) -> list[dict[str, Any]]:

@@ -29,6 +29,7 @@ from sprag.service.results.defaults import caption, drawn_numbers
 from sprag.service.results.exports.inputs import inputs as every_input
 from sprag.service.results.exports.inputs import run_inputs
 from sprag.service.results.pictures import curves as pictures
+from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.regimes import DOUBTFUL, ORDER, counted
 from sprag.service.results.selection import SelectionError
 from sprag.service.spec.catalogue import unit_of
@@ -64,7 +65,8 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
     # Counting kinds takes time in proportion to the rows, so only the page that shows them does it.
     shown = views.detail(record, progress, study, context.store.spec(study_id), Kinds({}, {}))
     varies = any(len(axis) > 1 for axis in study.axes)
-    mapped = study.combine == "grid" and sum(len(axis) > 1 for axis in study.axes) > 1
+    grid = study.combine == "grid" and sum(len(axis) > 1 for axis in study.axes) > 1
+    mapped = grid or map_plan(study) is not None
     tabs = [("", "Overview"), *([("/curves", "Curves")] if varies else []), *([("/map", "Map")] if mapped else [])]
     return {
         "study": shown,
@@ -238,6 +240,6 @@ def _plain(text: str | None) -> float | None:
 def orders_address(study: Study, study_id: str) -> str | None:
     """URL of the map of the periods after which motions repeat; None where there is none."""
     query = map_query(study, models.study_results(study), QueryParams({"z": ORDER}))
-    if query is None or not models.is_settled(study.run):
+    if query is None or map_plan(study) is not None or not models.is_settled(study.run):
         return None
     return f"/studies/{study_id}/map?{urlencode(pairs_of(query))}"

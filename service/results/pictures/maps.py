@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 #: Points of a map that are marked each.
 _MARKED_POINTS: Final = 600
+#: Points of a refined map that are drawn each.
+_REFINED_POINTS: Final = 5_000
 
 
 def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
@@ -50,6 +52,8 @@ def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
         if drawn.values.size <= _MARKED_POINTS:
             points = np.meshgrid(drawn.x_values, drawn.y_values)
             axes.plot(*(part.reshape(-1) for part in points), ".", color="0.3", markersize=2.5, clip_on=False)
+        if drawn.refined is not None and drawn.refined.x.size <= _REFINED_POINTS:
+            axes.plot(drawn.refined.x, drawn.refined.y, ".", color="0.3", markersize=1.5, clip_on=False)
         for axis, values in ((axes.xaxis, drawn.x_values), (axes.yaxis, drawn.y_values)):
             if len(values) == 1:
                 axis.set_ticks(values)
@@ -57,9 +61,11 @@ def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
         axes.set_ylabel(quantity_label(y))
         doubtful = list(doubtful_marks(drawn))
         paint_marks(axes, doubtful, clipped=False)
-        explain_regimes(figure, [marks.regime for marks in doubtful])
+        below = "" if drawn.refined is None else drawn.refined.sentence
+        explain_regimes(figure, [marks.regime for marks in doubtful], below=below)
         missing = int(np.isnan(drawn.values if orders is None else orders.places).sum())
-        head(figure, title, (*drawn.held, f"grey: {missing} cases without a result") if missing else drawn.held)
+        grey = "grey: not interpolated" if drawn.refined else f"grey: {missing} cases without a result"
+        head(figure, title, (*drawn.held, grey) if missing else drawn.held)
 
     return render(paint, picture, (8.0, 6.0))
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sprag.service.http.web.figures.plotly import map_figure, plotly_figure
+from sprag.service.http.web.figures.maps import map_figure
+from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import CurveQuery, Curves
 from sprag.service.results.figures.curves import curves_figure

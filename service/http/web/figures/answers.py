@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.http.web.figures.plotly import Data, map_figure, plotly_figure
+from sprag.service.http.web.figures.maps import map_figure
+from sprag.service.http.web.figures.plotly import Data, plotly_figure
 from sprag.service.jobs.answers import curves_of, map_of
 from sprag.service.json_text import to_bytes
 from sprag.service.results.figures.curves import curves_figure

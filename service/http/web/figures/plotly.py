@@ -10,18 +10,13 @@ import numpy as np
 
 from sprag.service.http.web.figures.thinning import thin
 from sprag.service.json_text import numbers
-from sprag.service.results.figures.curves import doubtful_marks, map_quantities
 from sprag.service.results.figures.figure import BANDS, PALETTE, shortened
-from sprag.service.results.figures.orders import TITLE, OrderMap, order_map
 from sprag.service.results.regimes import MARKS
 from sprag.service.results.wording import unit_text, words
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
-    from sprag.service.results.curves import Map
     from sprag.service.results.figures.figure import Band, Figure, Line, Marks, Panel, Quantity
 
 Data = dict[str, Any]
@@ -45,8 +40,8 @@ _OWN_AXIS_GAP: Final = 85
 _STATES_HEIGHT: Final = 45
 _ORDERS_HEIGHT: Final = 26
 #: Name and place of the legend that tells of motions: below the panels, over the whole width.
-_MOTIONS: Final = "legend2"
-_BELOW: Final[Data] = {
+MOTIONS: Final = "legend2"
+BELOW: Final[Data] = {
     "orientation": "h", "x": 0, "xanchor": "left", "y": 0, "yref": "container", "yanchor": "bottom", "tracegroupgap": 0,
 }  # fmt: skip
 #: Share of the width between two panels side by side.
@@ -75,13 +70,13 @@ def plotly_figure(figure: Figure) -> Data:
         "hovermode": "x" if figure.motion else "closest",
         "showlegend": named or bool(figure.regimes or strip or figure.banded),
         "legend": _legend(figure, beside=beside),
-        _MOTIONS: {**_BELOW, "title": {"text": _motion_title(figure), "side": "top"}},
+        MOTIONS: {**BELOW, "title": {"text": _motion_title(figure), "side": "top"}},
         "uirevision": "keep",
     }
     if figure.heading:
         # A narrow picture has one column, and no room for a long line.
         lines = wrap(figure.heading, _NARROW_HEADING) if figure.columns == 1 else [figure.heading]
-        layout["title"] = {"text": "<br>".join(map(_escaped, lines)), "font": {"size": 14}, "x": 0, "xref": "paper"}
+        layout["title"] = {"text": "<br>".join(map(escaped, lines)), "font": {"size": 14}, "x": 0, "xref": "paper"}
     traces: list[Data] = []
     shapes: list[Data] = []
     first = figure.columns if strip else 0  # strips have the first axes, and their x axes are those of the panels above
@@ -101,7 +96,7 @@ def plotly_figure(figure: Figure) -> Data:
                 right = _across(figure, index)[1] + _BAR_GAP
                 trace["marker"]["colorbar"] |= {"x": right, "y": (low + high) / 2.0, "len": high - low}
             traces.append(trace | {"showlegend": line.listed and named})
-        traces += [_marks_trace(marks, panel.y, listed=index == 0) | axes for marks in panel.marks]
+        traces += [marks_trace(marks, panel.y, listed=index == 0) | axes for marks in panel.marks]
         shapes += [_band(band) | {"xref": axes["xaxis"], "yref": f"{axes['yaxis']} domain"} for band in panel.bands]
     for column in range(first):
         suffix = _suffix(column)
@@ -142,10 +137,10 @@ def _suffix(number: int) -> str:
 def axis_title(quantity: Quantity) -> str:
     """The title of an axis: words and unit."""
     shown = unit_text(quantity.unit)
-    return f"{_escaped(words(quantity.name))} ({shown})" if shown else _escaped(words(quantity.name))
+    return f"{escaped(words(quantity.name))} ({shown})" if shown else escaped(words(quantity.name))
 
 
-def _escaped(text: str) -> str:
+def escaped(text: str) -> str:
     """Escape text that plotly would interpret as markup."""
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
@@ -193,14 +188,14 @@ def _line_trace(line: Line, panel: Panel, figure: Figure, headings: set[str]) ->
     """A line; the first one of a heading shows the heading."""
     kept = thin(line.y, figure.most)
     places = _with_gaps(kept, line.stretches)
-    heading, name = (_escaped(shortened(text, _MOST_LABEL)) for text in (line.heading, line.name))
+    heading, name = (escaped(shortened(text, _MOST_LABEL)) for text in (line.heading, line.name))
     title = "" if heading in headings else heading
     headings.add(heading)
     marked = not line.joined or (line.cases is not None and kept.size <= _MARKED)
     trace: Data = {
         "type": "scatter",
         "mode": "+".join(["lines"] * line.joined + ["markers"] * marked),
-        "name": name or _escaped(words(panel.y.name)),
+        "name": name or escaped(words(panel.y.name)),
         "legendgroup": line.key,
         "legendgrouptitle": {"text": title},
         "showlegend": line.listed,
@@ -211,7 +206,7 @@ def _line_trace(line: Line, panel: Panel, figure: Figure, headings: set[str]) ->
     }
     if line.cases is None:
         return trace if line.joined else trace | _points(line, kept, panel, figure.scale)
-    told = ", ".join(text for text in (heading, name) if text) or _escaped(words(panel.y.name))
+    told = ", ".join(text for text in (heading, name) if text) or escaped(words(panel.y.name))
     size: int | list[int] = 6
     if not marked and any(stretch.size == 1 for stretch in line.stretches or ()):
         trace["mode"], size = "lines+markers", _lone(places)
@@ -225,7 +220,7 @@ def _line_trace(line: Line, panel: Panel, figure: Figure, headings: set[str]) ->
 def _points(line: Line, kept: NDArray[np.int64], panel: Panel, scale: str) -> Data:
     """Points that are no cases: open ones, or in the colours of numbers, with the scale of these."""
     x = unit_text(panel.x.unit if panel.x else "")
-    where = f"%{{x:.5g}} {x}, %{{y:.6g}} {unit_text(panel.y.unit)}<extra>{_escaped(line.name)}</extra>"
+    where = f"%{{x:.5g}} {x}, %{{y:.6g}} {unit_text(panel.y.unit)}<extra>{escaped(line.name)}</extra>"
     symbol = SYMBOLS[line.style % len(SYMBOLS)]
     if line.ring:
         marker: Data = {"symbol": f"{symbol}-open", "size": 12, "color": line.colour, "line": {"width": 2}}
@@ -259,13 +254,13 @@ def _lone(places: list[int | None]) -> list[int]:
     return [6 if before is None and after is None else 0 for before, after in zip(around, around[2:], strict=False)]
 
 
-def _marks_trace(marks: Marks, y: Quantity, *, listed: bool) -> Data:
+def marks_trace(marks: Marks, y: Quantity, *, listed: bool) -> Data:
     """The points of a regime; a regime without points appears in the legend only."""
     return {
         "type": "scatter",
         "mode": "markers",
         "name": marks.regime,
-        "legend": _MOTIONS,
+        "legend": MOTIONS,
         "legendgroup": f"regime {marks.regime}",
         "showlegend": listed,
         "x": marks.x.tolist() or [None],
@@ -287,7 +282,7 @@ def _band(band: Band) -> Data:
 def _band_entry() -> Data:
     """The entry of the legend for all jumps."""
     return {
-        "type": "scatter", "mode": "markers", "name": BANDS, "legend": _MOTIONS, "x": [None], "y": [None],
+        "type": "scatter", "mode": "markers", "name": BANDS, "legend": MOTIONS, "x": [None], "y": [None],
         "showlegend": True, "marker": {"color": "rgba(119, 119, 119, 0.4)", "symbol": "square", "size": 12},
         "hoverinfo": "skip",
     }  # fmt: skip
@@ -323,75 +318,4 @@ def _state_group(figure: Figure, state: str, *, first: bool) -> Data:
     """Which legend a state is in: beside a motion one block, otherwise the legend of motions."""
     if figure.motion:
         return {"legendgroup": "states", "legendgrouptitle": {"text": figure.states if first else ""}}
-    return {"legend": _MOTIONS, "legendgroup": f"state {state}"}
-
-
-def map_figure(drawn: Map, contour: bool) -> Data:
-    """A map as a figure: colours, or lines of equal value with their numbers; gaps where there is no result."""
-    drawn = drawn.run()
-    x, y, z = map_quantities(drawn)
-    orders = order_map(drawn)
-    contour = contour and orders is None
-    where = (
-        f"{_escaped(words(drawn.x))} %{{x:.5g}} {unit_text(x.unit)}<br>"
-        f"{_escaped(words(drawn.y))} %{{y:.5g}} {unit_text(y.unit)}"
-    )
-    trace: Data = {
-        "type": "contour" if contour else "heatmap",
-        "x": list(drawn.x_values),
-        "y": list(drawn.y_values),
-        "z": [numbers(row) for row in drawn.values],
-        "customdata": drawn.cases.tolist(),
-        "colorscale": "Viridis",
-        "colorbar": {"title": {"text": axis_title(z), "side": "right"}},
-        "hoverongaps": False,
-        "hovertemplate": f"{where}<br>%{{z:.5g}} {unit_text(z.unit)}<br>case %{{customdata}}<extra></extra>",
-    }
-    if contour:
-        trace |= {"contours": {"showlabels": True}, "line": {"width": 1}, "connectgaps": False}
-    if orders is not None:
-        trace |= _orders(orders) | {"hovertemplate": f"{where}<br>%{{text}}<br>case %{{customdata}}<extra></extra>"}
-    blocks = [] if orders is None else list(_blocks(orders))
-    doubtful = [_marks_trace(marks, y, listed=True) | {"cliponaxis": False} for marks in doubtful_marks(drawn)]
-    return {
-        "data": [trace, *doubtful, *blocks],
-        "layout": {
-            "height": 520,
-            "margin": {"t": 20, "r": 20, "b": 60, "l": 70},
-            "showlegend": bool(doubtful or blocks),
-            _MOTIONS: {**_BELOW, "title": {"text": TITLE if blocks else "Regime", "side": "top"}},
-            # A field ends where nothing further was computed.
-            "xaxis": {"title": {"text": axis_title(x)}, **_whole(drawn.x_values)},
-            "yaxis": {"title": {"text": axis_title(y)}, **_whole(drawn.y_values)},
-        },
-        "cases": True,
-    }
-
-
-def _orders(orders: OrderMap) -> Data:
-    """Blocks of colour in the place of a scale."""
-    count = max(len(orders.looks), 1)
-    edges = [place / count for place in range(count + 1)]
-    scale = [[edge, colour] for place, colour in enumerate(orders.colours) for edge in edges[place : place + 2]]
-    return {
-        "z": [numbers(row) for row in orders.places],
-        "text": [[name or "" for name in row] for row in orders.names],
-        "colorscale": scale or "Viridis",
-        "zmin": -0.5,
-        "zmax": count - 0.5,
-        "showscale": False,
-    }
-
-
-def _blocks(orders: OrderMap) -> Iterator[Data]:
-    """The entries of the legend of such a map."""
-    for name, (colour, _, _) in orders.looks.items():
-        yield {
-            "type": "scatter", "mode": "markers", "name": name, "legend": _MOTIONS, "x": [None], "y": [None],
-            "showlegend": True, "marker": {"color": colour, "symbol": "square", "size": 11}, "hoverinfo": "skip",
-        }  # fmt: skip
-
-
-def _whole(values: Sequence[float]) -> Data:
-    """An axis that shows all of the values, and no more."""
-    return {"range": [values[0], values[-1]]} if len(values) > 1 else {}
+    return {"legend": MOTIONS, "legendgroup": f"state {state}"}

@@ -10,7 +10,8 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from sprag.service.http.web.figures.plotly import map_figure, plotly_figure
+from sprag.service.http.web.figures.maps import map_figure
+from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import CurveQuery, Curves, Map
 from sprag.service.results.figures.curves import curves_figure

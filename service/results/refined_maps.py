@@ -1,0 +1,183 @@
+"""Refined maps: one result over the two adaptive axes, at the middles of the squares of an even grid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sprag.service.results.curves import Fetch, Map, not_run
+from sprag.service.results.refined import percent
+from sprag.service.results.selection import axis_name, held_texts, listed, locate_axes, numeric_results, refused
+from sprag.service.spec.catalogue import unit_of
+from sprag.worker import models
+from sprag.worker.codes import PENDING
+from sprag.worker.planning.refine import describe_maps
+from sprag.worker.planning.refine_plan import REFINE, RefinePlan
+from sprag.worker.planning.rounds import Rows
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.planning.refine import Map as Described
+    from sprag.worker.study import Study
+
+#: Squares along an axis, at most; more cannot be told apart in a picture.
+MOST_SQUARES: Final = 256
+#: What stands in the place of an ending where a square is interpolated, and where it must not be.
+INTERPOLATED, JUMP = "interpolated", "jump"
+
+
+@dataclass(frozen=True, slots=True)
+class RefinedMap:
+    """What is known of a refined map beside its squares.
+
+    Attributes
+    ----------
+    asked, error : float
+        The error that was asked for, and the estimated one outside jumps (None: not known yet), relative to the range.
+    told : float
+        Share of the map that is not interpolated.
+    passed : bool
+        Whether no more points are needed.
+    x, y, values : float64 arrays, shape (points,)
+        The cases that have been run.
+    cases : int64 array, shape (points,)
+    """
+
+    asked: float
+    error: float | None
+    told: float
+    passed: bool
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    values: NDArray[np.float64]
+    cases: NDArray[np.int64]
+
+    @property
+    def sentence(self) -> str:
+        """How right the map is, for people."""
+        outside = f" outside jumps ({percent(self.told)} of the map)" if self.told else ""
+        if self.error is None:
+            return f"The error is not known yet; {percent(self.asked)} of the range is asked."
+        if self.passed and self.error <= self.asked:
+            estimate = f"estimate: {percent(self.error)}"
+            return f"Within {percent(self.asked)} of the range, as asked{',' + outside if outside else ''}; {estimate}."
+        return f"Not reached: {percent(self.error)} of the range now{outside}, {percent(self.asked)} asked."
+
+
+def map_plan(study: Study) -> RefinePlan | None:
+    """The plan of a study that refines maps; None for any other."""
+    if study.plan is None or study.plan["kind"] != REFINE:
+        return None
+    plan = RefinePlan.from_json(study.plan)
+    return plan if len(plan.adaptive) == 2 else None
+
+
+def squares(plan: RefinePlan) -> int:
+    """Squares along each axis of a picture of a map."""
+    return min(plan.finest, MOST_SQUARES)
+
+
+def draw_refined_map(
+    study: Study,
+    infos: Sequence[ResultInfo],
+    plan: RefinePlan,
+    names: tuple[str, str, str],
+    at: Sequence[tuple[str, str]],
+    fetch: Fetch,
+) -> Map:
+    """The map of ``names`` (x, y, result); raises SelectionError."""
+    x, y, z = names
+    (result,) = numeric_results(infos, "z", (z,))
+    sides = _sides(plan, x, y)
+    if z not in plan.results:
+        raise refused("z", "invalid-choice", "the map was not refined for this result", z, allowed=listed(plan.results))
+    held = _fixed_values(study, plan, at)
+    own, points = _described(study, plan, held, z, fetch)
+    count = squares(plan)
+    ends = [plan.adaptive[side] for side in sides]
+    middles = [axis.low + (axis.high - axis.low) * (np.arange(count) + 0.5) / count for axis in ends]
+    places = np.meshgrid(*middles)  # shape (y, x)
+    values = own.at(z, *(places if sides == (0, 1) else places[::-1]))
+    empty = PENDING if not len(own.cells) else JUMP
+    endings = np.where(np.isnan(values), empty, INTERPOLATED).tolist()
+    columns = [points[:, len(plan.fixed) + side] for side in sides]
+    known = RefinedMap(
+        plan.error,
+        own.errors[z],
+        own.told[z],
+        own.passed,
+        columns[0],
+        columns[1],
+        points[:, -2],
+        points[:, -1].astype(int),
+    )
+    return Map(
+        x,
+        y,
+        (unit_of(study, x), unit_of(study, y)),
+        (axis_name(study, x), axis_name(study, y)),
+        held_texts(study, held),
+        tuple(middles[0].tolist()),
+        tuple(middles[1].tolist()),
+        held,
+        {path: unit_of(study, path) for path in held},
+        result,
+        np.full(values.shape, -1, dtype=np.int64),
+        values,
+        endings,
+        refined=known,
+    )
+
+
+def _fixed_values(study: Study, plan: RefinePlan, at: Sequence[tuple[str, str]]) -> dict[str, float]:
+    """The values of the fixed axes by their first paths; SelectionError where one is not clear."""
+    located = locate_axes(study, at)
+    for path, _ in located.values():
+        if any(path in own.paths for own in plan.adaptive):
+            raise refused("at", "repeated", "the axis is drawn", path)
+    given = {study.axes[axis].paths[0]: index for axis, (_, index) in located.items()}
+    held: dict[str, float] = {}
+    for own in plan.fixed:
+        path = own.paths[0]
+        if path not in given and len(own.values) > 1:
+            message = f"the axis {path} is left open: give its value as at={path}=VALUE"
+            raise refused("at", "not-fixed", message, allowed=listed(own.values), unit=unit_of(study, path))
+        axis = study.axis_of(path)
+        held[path] = own.values[0] if axis is None or path not in given else study.axes[axis].value(given[path])
+    return held
+
+
+def _sides(plan: RefinePlan, x: str, y: str) -> tuple[int, int]:
+    """Which adaptive axis is x, and which is y."""
+    found = []
+    for parameter, path in (("x", x), ("y", y)):
+        side = next((place for place, axis in enumerate(plan.adaptive) if path in axis.paths), None)
+        if side is None or side in found:
+            message = "a refined map is drawn over its two adaptive axes"
+            raise refused(
+                parameter, "not-an-axis", message, path, allowed=listed(axis.paths[0] for axis in plan.adaptive)
+            )
+        found.append(side)
+    return found[0], found[1]
+
+
+def _described(
+    study: Study, plan: RefinePlan, held: dict[str, float], z: str, fetch: Fetch
+) -> tuple[Described, NDArray[np.float64]]:
+    """What the planner says of the map, and its points: the plan's columns, the result, the case."""
+    every = study.points(range(study.cases))
+    cases = np.flatnonzero(np.all(every[:, : len(plan.fixed)] == list(held.values()), axis=1)).astype(np.int64)
+    columns = fetch(cases, plan.needed)
+    endings = [ending or PENDING for ending in columns.endings]
+    run = ~not_run(endings)
+    ok = np.array(endings, dtype=object) == models.OK
+    values = {name: columns.values[name][run] for name in plan.needed}
+    points = every[cases]
+    number = int(plan.places(points[:1])[0][0])
+    own = describe_maps(plan, Rows(points[run], ok[run], values))[number]
+    return own, np.column_stack([points[run], values[z], cases[run]])

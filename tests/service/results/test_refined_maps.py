@@ -1,0 +1,119 @@
+"""Refined maps: squares of an even grid that are interpolated, and left blank where a jump is told."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sprag.service.http.web.figures.maps import map_figure
+from sprag.service.results.curve_cases import draw_map
+from sprag.service.results.curves import Map
+from sprag.service.results.pictures.maps import draw_map as paint_map
+from sprag.service.results.selection import SelectionError
+from sprag.worker import models
+from sprag.worker.study import Study
+from tests.service.conftest import API, Service
+from tests.service.refined_study import EFFICIENCY, JUMP, MAP, SPEED, TORQUE, fetched, fill, map_value, study_of
+
+LOAD, FREQUENCY, MASS = "shaft.load", "excitation.frequency", "pendulums.0.mass"
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    return study_of(MAP)
+
+
+def drawn(study: Study, mass: float, done: int | None = None, x: str = LOAD, y: str = FREQUENCY, z: str = SPEED) -> Map:
+    infos = models.study_results(study)
+    return draw_map(study, infos, x, y, z, ((MASS, str(mass)),), fetched(study, done))
+
+
+def truth(found: Map, mass: float) -> Any:
+    load, frequency = np.meshgrid(found.x_values, found.y_values)
+    points = np.stack([np.full(load.size, mass), frequency.reshape(-1), load.reshape(-1)], axis=1)
+    return map_value(SPEED, points).reshape(load.shape)
+
+
+def test_a_smooth_map_is_right_to_the_error_everywhere(study: Study) -> None:
+    found = drawn(study, 0.5)
+    expected = truth(found, 0.5)
+    assert found.values.shape == (32, 32)
+    assert np.abs(found.values - expected).max() <= 0.02 * np.ptp(expected)
+    assert {ending for row in found.endings for ending in row} == {"interpolated"}
+    assert found.refined is not None
+    assert found.refined.passed
+    assert found.refined.sentence.startswith("Within 2 % of the range, as asked; estimate: ")
+    assert found.refined.x.size < 33 * 33 / 4
+
+
+def test_a_jump_is_blank_and_nothing_else(study: Study) -> None:
+    found = drawn(study, 0.4)
+    blank = np.isnan(found.values)
+    loads = np.array(found.x_values)[blank.any(axis=0)]
+    assert loads.size
+    assert np.abs(loads - JUMP).max() <= 1.5 / 32.0
+    expected = truth(found, 0.4)
+    assert np.abs(found.values - expected)[~blank].max() <= 0.02 * np.ptp(expected)
+    assert "outside jumps" in str(found.refined and found.refined.sentence)
+    turned = drawn(study, 0.4, x=FREQUENCY, y=LOAD)
+    np.testing.assert_array_equal(turned.values, found.values.T)
+
+
+def test_the_answer_has_the_cases_apart_from_the_squares(study: Study) -> None:
+    data = drawn(study, 0.4).to_json()
+    assert (data["error_asked"], data["passed"], data["cases"]) == (0.02, True, [])
+    assert 0.0 < data["jumps_share"] < 0.1
+    points = data["points"]
+    cases = study.points(range(study.cases))[points["cases"]]
+    np.testing.assert_array_equal(cases, np.stack([np.full(len(cases), 0.4), points["y"], points["x"]], axis=1))
+    np.testing.assert_array_equal(map_value(SPEED, cases), points["z"])
+
+
+def test_both_painters_show_it(study: Study) -> None:
+    found = drawn(study, 0.4)
+    assert paint_map(found, "", "svg").startswith(b"<?xml")
+    figure = map_figure(found, contour=False)
+    squares, points = figure["data"]
+    assert found.refined is not None
+    assert figure["below"] == found.refined.sentence
+    assert sum(value is None for row in squares["z"] for value in row) == np.isnan(found.values).sum()
+    assert len(points["x"]) == len(points["customdata"])
+
+
+def test_before_the_first_rows_nothing_is_known(study: Study) -> None:
+    found = drawn(study, 0.4, done=0)
+    assert np.isnan(found.values).all()
+    assert found.refined is not None
+    assert found.refined.sentence == "The error is not known yet; 2 % of the range is asked."
+
+
+@pytest.mark.parametrize(
+    ("query", "parameter", "told"),
+    [
+        ((LOAD, MASS, SPEED, ()), "y", "two adaptive axes"),
+        ((LOAD, LOAD, SPEED, ()), "y", "two adaptive axes"),
+        ((LOAD, FREQUENCY, TORQUE, ((MASS, "0.4"),)), "z", "not refined"),
+        ((LOAD, FREQUENCY, SPEED, ()), "at", "left open"),
+        ((LOAD, FREQUENCY, SPEED, ((MASS, "0.4"), (LOAD, "0"))), "at", "is drawn"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(study: Study, query: Any, parameter: str, told: str) -> None:
+    draw = partial(draw_map, study, models.study_results(study))
+    with pytest.raises(SelectionError, match=told) as refused:
+        draw(*query, fetched(study))
+    assert [fault.where for fault in refused.value.faults] == [parameter]
+
+
+def test_the_pages_and_files_of_a_service(service: Service) -> None:
+    study_id = service.submit(MAP)
+    fill(service, study_id)
+    page = service.http.get(f"/studies/{study_id}/map").text
+    assert f"/studies/{study_id}/figures/map?" in page
+    query = {"x": LOAD, "y": FREQUENCY, "z": EFFICIENCY, "at": f"{MASS}=0.4"}
+    assert service.http.get(f"/studies/{study_id}/figures/map", params=query).json()["below"].startswith("Within 2 %")
+    assert service.get(f"/studies/{study_id}/map", **query)["passed"]
+    table = service.http.get(f"{API}/studies/{study_id}/map", params={**query, "format": "csv"}).text
+    assert table.splitlines()[0] == f"{MASS},{FREQUENCY},{LOAD},{EFFICIENCY},ending"
