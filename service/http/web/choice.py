@@ -11,6 +11,7 @@ from sprag.service.results.defaults import main_query, main_results, usual_value
 from sprag.service.results.refined import curve_plan, families, plan_along
 from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.selection import refused
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from starlette.datastructures import QueryParams
@@ -57,6 +58,9 @@ def map_query(study: Study, infos: Sequence[ResultInfo], given: QueryParams) -> 
     plan = map_plan(study)
     if plan is not None:
         x, y = (axis.paths[0] for axis in plan.adaptive)
+        along = [path for path in models.presentation_of(study).along if path in study.axis_paths]
+        if along and along[0] in plan.adaptive[1].paths:
+            x, y = y, x
         if given.get("x") == y or given.get("y") == x:
             x, y = y, x
         x, y, z = given.get("x") or x, given.get("y") or y, given.get("z") or plan.results[0]

@@ -51,6 +51,19 @@ def edges(values: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([middle[:1], (middle[1:] + middle[:-1]) / 2.0, middle[-1:]])
 
 
+def map_edges(drawn: Map) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Borders of the cells of a map along x and y; squares of a refined map are whole."""
+    if drawn.refined is None:
+        return edges(drawn.x_values), edges(drawn.y_values)
+    return _even(np.array(drawn.x_values)), _even(np.array(drawn.y_values))
+
+
+def _even(middles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Borders of even squares with these middles."""
+    step = middles[1] - middles[0]
+    return np.concatenate([middles - step / 2.0, middles[-1:] + step / 2.0])
+
+
 def motion_name(regime: str | None, order: int | None) -> str | None:
     """``2 periods`` for a periodic motion, the name of its regime for another one; None for a case without."""
     if regime != "periodic" or order is None:

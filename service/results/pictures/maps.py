@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.results.figures.curves import doubtful_marks, map_quantities
-from sprag.service.results.figures.orders import TITLE, OrderMap, edges, order_map
+from sprag.service.results.figures.orders import TITLE, OrderMap, map_edges, order_map
 from sprag.service.results.pictures.curves import (
     MAX_PICTURE_POINTS,
     Picture,
@@ -41,7 +41,7 @@ def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
-        borders = edges(drawn.x_values), edges(drawn.y_values)
+        borders = map_edges(drawn)
         if orders is None:
             mesh = axes.pcolormesh(*borders, np.ma.masked_invalid(drawn.values), cmap="viridis")
             figure.colorbar(mesh, label=quantity_label(z))

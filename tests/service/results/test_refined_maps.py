@@ -11,6 +11,7 @@ import pytest
 from sprag.service.http.web.figures.maps import map_figure
 from sprag.service.results.curve_cases import draw_map
 from sprag.service.results.curves import Map
+from sprag.service.results.figures.orders import map_edges
 from sprag.service.results.pictures.maps import draw_map as paint_map
 from sprag.service.results.selection import SelectionError
 from sprag.worker import models
@@ -117,3 +118,12 @@ def test_the_pages_and_files_of_a_service(service: Service) -> None:
     assert service.get(f"/studies/{study_id}/map", **query)["passed"]
     table = service.http.get(f"{API}/studies/{study_id}/map", params={**query, "format": "csv"}).text
     assert table.splitlines()[0] == f"{MASS},{FREQUENCY},{LOAD},{EFFICIENCY},ending"
+
+
+def test_squares_fill_the_map_to_its_ends(study: Study) -> None:
+    found = drawn(study, 0.5)
+    for borders, ends in zip(map_edges(found), ((0.0, 1.0), (20.0, 30.0)), strict=True):
+        assert borders.size == 33
+        assert (borders[0], borders[-1]) == pytest.approx(ends)
+    layout = map_figure(found, contour=False)["layout"]
+    assert layout["xaxis"]["range"] == pytest.approx([0.0, 1.0])

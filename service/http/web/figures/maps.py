@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING
 from sprag.service.http.web.figures.plotly import BELOW, MOTIONS, Data, axis_title, escaped, marks_trace
 from sprag.service.json_text import numbers
 from sprag.service.results.figures.curves import doubtful_marks, map_quantities
-from sprag.service.results.figures.orders import TITLE, OrderMap, order_map
+from sprag.service.results.figures.orders import TITLE, OrderMap, map_edges, order_map
 from sprag.service.results.wording import unit_text, words
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from sprag.service.results.curves import Map
     from sprag.service.results.refined_maps import RefinedMap
@@ -44,6 +47,7 @@ def map_figure(drawn: Map, contour: bool) -> Data:
         trace |= {"contours": {"showlabels": True}, "line": {"width": 1}, "connectgaps": False}
     if orders is not None:
         trace |= _orders(orders) | {"hovertemplate": f"{where}<br>%{{text}}<br>case %{{customdata}}<extra></extra>"}
+    across, up = (drawn.x_values, drawn.y_values) if drawn.refined is None else map_edges(drawn)
     blocks = [] if orders is None else list(_blocks(orders))
     doubtful = [marks_trace(marks, y, listed=True) | {"cliponaxis": False} for marks in doubtful_marks(drawn)]
     return {
@@ -54,8 +58,8 @@ def map_figure(drawn: Map, contour: bool) -> Data:
             "showlegend": bool(doubtful or blocks),
             MOTIONS: {**BELOW, "title": {"text": TITLE if blocks else "Regime", "side": "top"}},
             # A field ends where nothing further was computed.
-            "xaxis": {"title": {"text": axis_title(x)}, **_whole(drawn.x_values)},
-            "yaxis": {"title": {"text": axis_title(y)}, **_whole(drawn.y_values)},
+            "xaxis": {"title": {"text": axis_title(x)}, **_whole(across)},
+            "yaxis": {"title": {"text": axis_title(y)}, **_whole(up)},
         },
         "cases": True,
         **({} if drawn.refined is None else {"below": drawn.refined.sentence}),
@@ -95,6 +99,6 @@ def _blocks(orders: OrderMap) -> Iterator[Data]:
         }  # fmt: skip
 
 
-def _whole(values: Sequence[float]) -> Data:
+def _whole(values: Sequence[float] | NDArray[np.float64]) -> Data:
     """An axis that shows all of the values, and no more."""
-    return {"range": [values[0], values[-1]]} if len(values) > 1 else {}
+    return {"range": [float(values[0]), float(values[-1])]} if len(values) > 1 else {}
