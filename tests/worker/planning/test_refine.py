@@ -197,6 +197,38 @@ def test_a_change_of_regime_is_told_only_where_a_result_jumps() -> None:
     assert np.diff(curve.x)[np.searchsorted(curve.x, 0.41) - 1] == pytest.approx(1.6 / 256)
 
 
+LEAF = 1.6 / 256
+
+
+def ramp(x: Floats, at: float, step: float) -> Floats:
+    """A step, and from there 25 finest intervals that rise by 3 % of the range each."""
+    slope = 0.03 / LEAF * np.clip(x - at, 0.0, 25.0 * LEAF)
+    return np.asarray(slope + np.where(x > at, step, 0.0) - 0.2 * (x > 1.5))
+
+
+def test_a_change_of_order_with_a_step_is_told_where_a_steep_part_follows() -> None:
+    at = 0.8 + 0.5 * LEAF
+
+    def function(points: Floats) -> dict[str, Floats]:
+        x = points[:, -1]
+        return settled(x, ramp(x, at, 0.02), x, **{"regime.order": np.where(x > at, 2.0, 1.0)})
+
+    curve = curve_of(SETTLED, function)
+    assert any(jump.low <= at <= jump.high and "mean" in jump.results for jump in curve.jumps)
+
+
+def test_the_steep_foot_of_a_jump_is_told_with_it() -> None:
+    at = 0.8 + 0.5 * LEAF
+    curve = curve_of(PLAN, lambda points: {"a": ramp(points[:, -1], at, 0.3)})
+    jump = next(jump for jump in curve.jumps if jump.low <= at <= jump.high)
+    assert (jump.low, jump.high) == pytest.approx((0.8, 0.8 + 2.0 * LEAF))
+
+
+def test_a_jump_of_a_few_errors_is_told() -> None:
+    curve = curve_of(PLAN, lambda points: {"a": np.sin(points[:, -1]) + np.where(points[:, -1] > 0.8013, 0.035, 0.0)})
+    assert any(jump.low <= 0.8013 <= jump.high for jump in curve.jumps)
+
+
 def noise(x: Floats) -> Floats:
     """Numbers between -1 and 1 that differ at any two points."""
     return np.asarray(np.sin(1e6 * x))
@@ -230,6 +262,28 @@ def test_irregular_motion_is_told_as_a_zone_and_not_refined_to_the_finest() -> N
 def test_a_mean_that_is_not_known_to_the_error_is_told() -> None:
     curve = curve_of(replace(SETTLED, error=0.002), irregular_zone)
     assert any(set(jump.results) == {"mean", "max"} for jump in curve.jumps if jump.why is Why.IRREGULAR)
+
+
+def test_a_zone_of_irregular_motion_is_told_where_a_result_scatters_in_a_part_of_it() -> None:
+    def function(points: Floats) -> dict[str, Floats]:
+        x = points[:, -1]
+        own = irregular_zone(points)
+        return own | {"max": 2.0 - x + np.where((x > 0.65) & (x < 0.75), 0.15 * noise(x), 0.0)}
+
+    curve = curve_of(SETTLED, function)
+    (zone,) = curve.jumps
+    assert (zone.why, zone.results) == (Why.IRREGULAR, ("max",))
+    assert (zone.low, zone.high) == pytest.approx((0.5, 0.9), abs=1.6 / 128)
+
+
+def test_a_mean_with_a_wide_interval_is_told_however_smooth_it_is() -> None:
+    def function(points: Floats) -> dict[str, Floats]:
+        x = points[:, -1]
+        own = settled(x, x, x**2)
+        return own | {"regime": np.full(len(x), IRREGULAR), "mean.half_width": np.full(len(x), 0.02)}
+
+    curve = curve_of(SETTLED, function)
+    assert [(jump.low, jump.high, jump.results) for jump in curve.jumps] == [(0.0, 1.6, ("mean",))]
 
 
 def test_scatter_takes_all_points_of_the_finest_grid_and_no_more() -> None:
