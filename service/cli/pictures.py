@@ -100,17 +100,33 @@ def draw_map(
     """Show one result over two axes as a table, and write it as a picture."""
     query = [("x", x), ("y", y), ("z", z), *(("at", item) for item in at or ())]
     with connection(server, token) as client:
-        _answer(client, study_id, "map", query, file, _show_map, as_json)
+        _answer(client, study_id, "map", query, file, show_map, as_json)
 
 
-def _show_map(found: dict[str, Any]) -> None:
-    """A line for each value of y, a column for each of x."""
+def show_map(found: dict[str, Any]) -> None:
+    """A line for each value of y, a column for each of x; of a refined map a line for each case."""
     held = _held(found["at"], found["units"])
     title = heading(found["z"]["name"], found["z"]["unit"]) + (f"; {held}" if held else "")
+    if "points" in found:
+        _show_points(found, title)
+        return
     corner = f"{heading(found['y']['path'], found['y']['unit'])} \\ {heading(found['x']['path'], found['x']['unit'])}"
     columns = [(corner, True), *((cell_text(value), True) for value in found["x"]["values"])]
     rows = [(y, *row) for y, row in zip(found["y"]["values"], found["z"]["values"], strict=True)]
     show_table(title, columns, rows)
+
+
+def _show_points(found: dict[str, Any], title: str) -> None:
+    """The cases of a refined map, and how right it is."""
+    points, axes = found["points"], (found["x"], found["y"])
+    columns = [*((heading(axis["path"], axis["unit"]), True) for axis in axes)]
+    columns += [(heading(found["z"]["name"], found["z"]["unit"]), True), ("case", True)]
+    show_table(title, columns, list(zip(points["x"], points["y"], points["z"], points["cases"], strict=True)))
+    error = "not known yet" if found["error"] is None else f"{100.0 * found['error']:.2g} % of the range"
+    say(
+        f"error: {error}, {100.0 * found['error_asked']:.2g} % asked; "
+        f"{100.0 * found['jumps_share']:.2g} % of the map is not interpolated"
+    )
 
 
 def sensitivity(

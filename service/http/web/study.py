@@ -97,19 +97,13 @@ def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[Clutch
     frame = study_frame(context, study_id)
     query = _with_rows(context, study, study_id, characteristic(study, models.study_results(study)))
     first = context.store.case_row(study_id, 0) if query is None else None
-    too_many = query is not None and drawn_numbers(study, query) > pictures.MAX_PICTURE_POINTS
-    address = views.study_address(study_id)
-    pairs = [] if query is None else pairs_of(query)
     kinds = context.store.kinds(study_id)
     return page(
         "study.html",
         **frame,
         tab="",
         shown=models.presentation_of(study),
-        caption=None if query is None else caption(study, query),
-        figure=None if query is None else f"/studies/{study_id}/figures/curves?{urlencode([*pairs, ('columns', '2')])}",
-        picture=None if query is None or too_many else f"{address}/curves?{urlencode([*pairs, ('format', 'svg')])}",
-        curves=f"/studies/{study_id}/curves?{urlencode(pairs)}",
+        **_main_figure(study, study_id, query),
         orders=orders_address(study, study_id),
         only_row=None if first is None else first.results.items(),
         units={info.name: info.unit for info in models.study_results(study)},
@@ -124,6 +118,29 @@ def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[Clutch
         flag_meanings=models.flags_of(study.model),
         to_run_longer=(*DOUBTFUL, models.NOT_SETTLED),
     )
+
+
+def _main_figure(study: Study, study_id: str, query: CurveQuery | None) -> dict[str, Any]:
+    """The addresses of the figure on the page, of its picture and of the page where others are chosen; its caption."""
+    if query is None:
+        return {"figure": None, "picture": None, "others": None, "kind": "", "caption": None}
+    mapped = map_query(study, models.study_results(study), QueryParams()) if map_plan(study) is not None else None
+    if mapped is not None:
+        kind, pairs, more = "map", pairs_of(mapped), ("kind", "heatmap")
+        told = f"{mapped.z} over {mapped.x} and {mapped.y}"
+        drawable = True
+    else:
+        kind, pairs, more = "curves", pairs_of(query), ("columns", "2")
+        told = caption(study, query)
+        drawable = drawn_numbers(study, query) <= pictures.MAX_PICTURE_POINTS
+    picture = f"{views.study_address(study_id)}/{kind}?{urlencode([*pairs, ('format', 'svg')])}"
+    return {
+        "figure": f"/studies/{study_id}/figures/{kind}?{urlencode([*pairs, more])}",
+        "picture": picture if drawable else None,
+        "others": f"/studies/{study_id}/{kind}?{urlencode(pairs)}",
+        "kind": kind,
+        "caption": told,
+    }
 
 
 def _with_rows(context: Context, study: Study, study_id: str, query: CurveQuery | None) -> CurveQuery | None:

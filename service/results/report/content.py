@@ -15,7 +15,9 @@ from sprag.service.results.defaults import main_query
 from sprag.service.results.exports.inputs import Input, inputs, run_inputs
 from sprag.service.results.exports.source import given_texts
 from sprag.service.results.pictures.curves import require_drawable
+from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.regimes import counted
+from sprag.service.results.rounds import sentence
 from sprag.service.results.selection import SelectionError
 from sprag.service.spec.catalogue import axes_json
 from sprag.worker import models
@@ -77,7 +79,7 @@ class Report:
 def report_of(store: Store, study_id: str) -> Report:
     """The report of a stored study; raises StudyNotFound."""
     record, progress = store.look(study_id)
-    return make_report(
+    report = make_report(
         record,
         store.study(study_id),
         progress.endings,
@@ -86,6 +88,9 @@ def report_of(store: Store, study_id: str) -> Report:
         store.spec(study_id),
         store.kinds(study_id).regimes,
     )
+    if progress.rounds is None:
+        return report
+    return replace(report, facts=(*report.facts, ("rounds", sentence(progress.rounds))))
 
 
 def make_report(
@@ -180,6 +185,8 @@ def _pictures(study: Study, infos: tuple[ResultInfo, ...], fetch: Fetch) -> tupl
     query = main_query(study, infos)
     if query is None:
         return (), "Nothing varies in this study, so there is no curve."
+    if map_plan(study) is not None:
+        return (), "The results are a refined map: its picture and its numbers are files of their own."
     groups = list(_groups(infos, models.presentation_of(study).checks))
     chosen = [info for group in groups for info in group]
     try:

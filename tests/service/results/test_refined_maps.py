@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sprag.service.cli.pictures import show_map
 from sprag.service.http.web.figures.maps import map_figure
 from sprag.service.results.curve_cases import draw_map
 from sprag.service.results.curves import Map
 from sprag.service.results.figures.orders import map_edges
 from sprag.service.results.pictures.maps import draw_map as paint_map
+from sprag.service.results.report.content import report_of
 from sprag.service.results.selection import SelectionError
 from sprag.worker import models
 from sprag.worker.study import Study
@@ -108,14 +110,24 @@ def test_what_cannot_be_drawn_is_refused(study: Study, query: Any, parameter: st
     assert [fault.where for fault in refused.value.faults] == [parameter]
 
 
-def test_the_pages_and_files_of_a_service(service: Service) -> None:
+def test_the_pages_and_files_of_a_service(service: Service, capsys: pytest.CaptureFixture[str]) -> None:
     study_id = service.submit(MAP)
     fill(service, study_id)
-    page = service.http.get(f"/studies/{study_id}/map").text
-    assert f"/studies/{study_id}/figures/map?" in page
+    for address in ("", "/map"):
+        page = service.http.get(f"/studies/{study_id}{address}").text
+        assert f"/studies/{study_id}/figures/map?x=shaft.load&amp;y=excitation.frequency" in page
+    report = report_of(service.store, study_id)
+    assert "refined map" in report.note
+    assert dict(report.facts)["rounds"] == service.get(f"/studies/{study_id}")["progress"]["rounds"]["sentence"]
     query = {"x": LOAD, "y": FREQUENCY, "z": EFFICIENCY, "at": f"{MASS}=0.4"}
     assert service.http.get(f"/studies/{study_id}/figures/map", params=query).json()["below"].startswith("Within 2 %")
-    assert service.get(f"/studies/{study_id}/map", **query)["passed"]
+    found = service.get(f"/studies/{study_id}/map", **query)
+    assert found["passed"]
+    show_map(found)
+    shown = capsys.readouterr()
+    numbers = [line.split()[-1] for line in shown.out.splitlines() if line.strip()]
+    assert [number for number in numbers if number.isdigit()] == [str(case) for case in found["points"]["cases"]]
+    assert "2 % asked" in shown.err
     table = service.http.get(f"{API}/studies/{study_id}/map", params={**query, "format": "csv"}).text
     assert table.splitlines()[0] == f"{MASS},{FREQUENCY},{LOAD},{EFFICIENCY},ending"
 
