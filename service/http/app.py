@@ -38,7 +38,7 @@ from sprag.service.http.guard import Guard
 from sprag.service.http.metrics import Metrics
 from sprag.service.http.shares import Shares
 from sprag.service.http.views import API_PREFIX
-from sprag.service.http.web import case, compare, laboratory, login, pages, results, study, table
+from sprag.service.http.web import case, compare, front, laboratory, login, pages, results, study, table
 from sprag.service.http.web import engagements as engagement_pages
 from sprag.service.http.web import schedules as schedule_pages
 from sprag.service.http.web.form import page as form
@@ -213,6 +213,7 @@ def _routes() -> APIRouter:
         pages,
         form,
         study,
+        front,
         results,
         table,
         case,

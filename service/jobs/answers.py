@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sprag.service.json_text import numbers, to_bytes
 from sprag.service.results import exports
 from sprag.service.results.curve_cases import draw, draw_map, select
+from sprag.service.results.figures.front import front_figure, history_figure
 from sprag.service.results.fronts import designs_of, front_csv, front_json
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.pictures.maps import draw_map as draw_map_picture
@@ -136,3 +137,22 @@ def front_as_json(library: Library, study_id: str, exact: bool, limit: int) -> b
 def front_as_csv(library: Library, study_id: str, exact: bool, limit: int) -> bytes:
     """The designs as a table."""
     return front_csv(front_of(library, study_id, exact), limit)
+
+
+def front_picture(
+    library: Library,
+    study_id: str,
+    exact: bool,
+    axes: tuple[str | None, str | None],
+    title: str,
+    form: pictures.Picture,
+) -> bytes:
+    """The designs over two quantities as a picture."""
+    found = front_of(library, study_id, exact)
+    pictures.check_size("designs", len(found.numbers), pictures.MAX_PICTURE_POINTS)
+    return pictures.draw_figure(front_figure(found, *axes), title, form)
+
+
+def search_picture(library: Library, study_id: str, title: str, form: pictures.Picture) -> bytes:
+    """How a search has come to its designs as a picture."""
+    return pictures.draw_figure(history_figure(front_of(library, study_id, exact=False)), title, form)

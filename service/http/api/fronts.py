@@ -11,7 +11,7 @@ from sprag.service.answers import goals as m
 from sprag.service.http.api.document import files, format_query, problems
 from sprag.service.http.api.document import not_modified as documented_304
 from sprag.service.http.context import StudyId
-from sprag.service.http.drawing import TABLE_FORMATS, Drawing, attached, conditional
+from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture
 from sprag.service.http.requests import strict_query
 from sprag.service.http.respond import choose_format
 from sprag.service.http.work import CHECK_PROBLEMS, Attended
@@ -30,7 +30,7 @@ _WRITERS: Final = {"json": answers.front_as_json, "csv": answers.front_as_csv}
     "/front",
     response_model=m.FrontReport,
     responses={
-        **files("Designs, as JSON or a table.", TABLE_FORMATS.values()),
+        **files("Designs, as JSON, a table or a picture.", DRAWN_FORMATS.values()),
         **problems("invalid-parameter", "invalid-selection", "study-not-found", "not-acceptable", *CHECK_PROBLEMS),
         **documented_304(),
     },
@@ -42,18 +42,21 @@ async def get_front(
         bool, Query(description="designs must meet equalities of real numbers to 1e-6 to be feasible")
     ] = False,
     limit: Annotated[int, Query(ge=1, le=MOST_DESIGNS, description="most designs", examples=[100])] = DESIGNS,
-    form: Annotated[str | None, format_query(TABLE_FORMATS)] = None,
+    x: Annotated[str | None, Query(description="of a picture: goal, variable or limited result to the right")] = None,
+    y: Annotated[str | None, Query(description="of a picture: the same upwards; by default two goals")] = None,
+    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """The designs of a study with a goal, the best first: variables, goals, limits, ranks, and the search's history."""
-    chosen = choose_format(work.request, form, TABLE_FORMATS)
+    chosen = choose_format(work.request, form, DRAWN_FORMATS)
 
-    def make(_record: StudyRecord) -> Response | Drawing:
+    def make(record: StudyRecord) -> Response | Drawing:
         study = work.context.store.study(study_id)
         goal_of(study)
-        headers = attached(f"{study_id}-front.csv") if chosen == "csv" else {}
-        drawing = Drawing(
-            _WRITERS[chosen], (work.context.library, study_id, exact, limit), TABLE_FORMATS[chosen], headers
-        )
-        return drawing if study.cases > answers.FEW // 10 else drawing.here()
+        shown = (work.context.library, study_id, exact)
+        if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - narrows the type
+            headers = attached(f"{study_id}-front.csv") if chosen == "csv" else {}
+            drawing = Drawing(_WRITERS[chosen], (*shown, limit), DRAWN_FORMATS[chosen], headers)
+            return drawing if study.cases > answers.FEW // 10 else drawing.here()
+        return picture(answers.front_picture, chosen, *shown, (x, y), record.name or record.model)
 
     return await conditional(work, study_id, chosen, make)

@@ -37,6 +37,7 @@ from sprag.service.spec.numbers import parse_number
 from sprag.service.storage.records import Kinds
 from sprag.worker import models
 from sprag.worker.models.parameters import parameter_of
+from sprag.worker.planning.goals.plan import GOAL
 from sprag.worker.states import TRANSITIONS, StudyEvent, StudyState
 
 if TYPE_CHECKING:
@@ -67,7 +68,13 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
     varies = any(len(axis) > 1 for axis in study.axes)
     grid = study.combine == "grid" and sum(len(axis) > 1 for axis in study.axes) > 1
     mapped = grid or map_plan(study) is not None
-    tabs = [("", "Overview"), *([("/curves", "Curves")] if varies else []), *([("/map", "Map")] if mapped else [])]
+    goal = study.plan is not None and study.plan["kind"] == GOAL
+    tabs = [
+        ("", "Overview"),
+        *([("/front", "Designs")] if goal else []),
+        *([("/curves", "Curves")] if varies else []),
+        *([("/map", "Map")] if mapped else []),
+    ]
     return {
         "study": shown,
         "live": not StudyState(shown["state"]).terminal,

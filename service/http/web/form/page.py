@@ -13,7 +13,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.faults import FaultError
-from sprag.service.http.context import Context, Ctx
+from sprag.service.http.context import Context, Ctx, study_with
 from sprag.service.http.problems import ApiError, api_error
 from sprag.service.http.respond import json_response
 from sprag.service.http.views import preset_of
@@ -44,6 +44,7 @@ from sprag.service.http.web.templates import fragment, page, spec_text
 from sprag.service.http.work import Attended, Work
 from sprag.service.jobs.submission import Submission, take_in
 from sprag.service.presets import preset_names
+from sprag.service.spec.design import design_spec
 from sprag.worker import models
 from sprag.worker.limits import MAX_AXES
 from sprag.worker.models import MAX_PENDULUMS
@@ -69,10 +70,14 @@ async def new_study(
     request: Request,
     preset: Annotated[str | None, Query(max_length=80)] = None,
     clone: Annotated[str | None, Query(max_length=80)] = None,
+    case: Annotated[int | None, Query(ge=0)] = None,
+    along: Annotated[str | None, Query(max_length=200)] = None,
     mode: Annotated[str, Query(max_length=10)] = "form",
 ) -> Response:
-    """The form, empty or filled in from an example or from another study."""
-    spec = await run_in_threadpool(_start, context, preset, clone)
+    """The form, empty or filled in from an example or from another study, or one case of it, alone or along a
+    parameter.
+    """
+    spec = await run_in_threadpool(_start, context, preset, clone, case, along)
     if spec is None:
         values = {"/text": "", "format": "json"} if mode == "text" else with_clutch_defaults(dict(EMPTY_FORM))
         return form_page(request, values, None)
@@ -82,13 +87,19 @@ async def new_study(
         mode = "text"
     if mode == "text":
         values = {"/text": spec_text(spec), "format": "json"}
-    if clone is not None and "/name" in values:
+    if clone is not None and case is None and "/name" in values:
         values["/name"] = f"{values['/name']} (copy)"
     checked = await look_over(context, work, values)
     return await run_in_threadpool(form_page, request, values, checked)
 
 
-def _start(context: Context, preset: str | None, clone: str | None) -> dict[str, Any] | None:
+def _start(
+    context: Context, preset: str | None, clone: str | None, case: int | None = None, along: str | None = None
+) -> dict[str, Any] | None:
+    if clone is not None and case is not None:
+        study = study_with(context, clone, case)
+        known = along is None or (along in study.base and along not in study.derive)
+        return design_spec(context.store.spec(clone), study, case, along if known else None)
     if clone is not None:
         return context.store.spec(clone)
     if preset is None:

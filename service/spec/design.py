@@ -1,0 +1,47 @@
+"""A study of a single design of a search: its values in the base, alone or over a range of one parameter."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from sprag.service.spec.catalogue import unit_of
+from sprag.service.spec.derive import with_values
+from sprag.worker.limits import MAX_NAME_LENGTH
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sprag.worker.study import Study
+
+#: Values over which a design is run, and how far beyond its own value.
+_VALUES: Final = 41
+_BEYOND: Final = 2.0
+
+
+def design_spec(spec: Mapping[str, Any], study: Study, case: int, along: str | None = None) -> dict[str, Any]:
+    """The spec of a study of one case.
+
+    Parameters
+    ----------
+    spec : the study's own spec
+    study : the same in SI numbers
+    case : number of the case; IndexError when there is none
+    along : path of a parameter that the study varies from 0 to twice its value; by default nothing varies
+    """
+    values = {path: value for path, value in study.case_parameters(case).items() if path not in study.derive}
+    kept = {key: value for key, value in spec.items() if key not in {"axes", "combine", "exclude", "refine", "goal"}}
+    name, suffix = spec.get("name", ""), f", design of case {case}"
+    made = {
+        **kept,
+        "name": name[: MAX_NAME_LENGTH - len(suffix)] + suffix,
+        "base": with_values(spec["base"], {path: _text(study, path, value) for path, value in values.items()}),
+    }
+    if along is not None:
+        most = _BEYOND * values.get(along, study.base[along])
+        made["axes"] = [{"path": along, "linspace": [0, _text(study, along, most), _VALUES]}]
+    return made
+
+
+def _text(study: Study, path: str, value: float) -> float | str:
+    unit = unit_of(study, path)
+    return value if unit == "1" else f"{value!r} {unit}"
