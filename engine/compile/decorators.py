@@ -87,5 +87,6 @@ def _unmanaged(typing_context: Any, array: Any) -> Any:  # noqa: ARG001
 
 
 #: ``unmanaged(array)`` is the same array without its reference count, for compiled code whose caller keeps it alive.
-#: numba counts references at many calls, atomically; without that W1 went from 3850 to 5000 cases a second.
+#: numba counts references at many calls, atomically; without that the workload of one pendulum
+#: (`benchmarks/workloads.py`) went from 3850 to 5000 cases a second.
 unmanaged = cast(Callable[[Any], Any], _unmanaged)

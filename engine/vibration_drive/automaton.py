@@ -54,7 +54,7 @@ class Transition:
     to ``target``.
 
     ``reset`` describes what is set at the crossing. ``literal_only`` rows hold under ``reset = "literal"`` alone
-    (docs/theory.md)): there an engaged clutch restarts when w rises through 0. Since w is positive when it engages, the
+    (docs/theory.md): there an engaged clutch restarts when w rises through 0. Since w is positive when it engages, the
     row that leads back to the same state notes the fall of w through 0 that has to come first; it changes nothing and
     counts as no event.
     """

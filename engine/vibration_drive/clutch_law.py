@@ -1,4 +1,4 @@
-"""The clutch's torque over its windup as a given law: check, torque, stiffness, stored energy (docs/theory.md)).
+"""The clutch's torque over its windup as a given law: check, torque, stiffness, stored energy (docs/theory.md).
 
 A law is the list ``c_1 .. c_p`` of T(u) = sum c_k u^(k-1), valid up to ``windup_limit`` (rad); beyond it goes on
 straight with its end slope (state BEYOND). Below zero windup no torque is transmitted.

@@ -30,7 +30,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter("shaft.initial_speed", "phi_e'(0)", "rad/s", 0.0, 1e6, False, 0.0, "shaft speed at t = 0"),
 )
 
-#: Coefficients of the clutch polynomial (docs/theory.md)); ``K`` counts from 0, so K = 0 is c_1. Unit N*m/rad^K.
+#: Coefficients of the clutch polynomial (docs/theory.md); ``K`` counts from 0, so K = 0 is c_1. Unit N*m/rad^K.
 CLUTCH_COEFFICIENT = Parameter(
     "clutch.coefficients.K", "c_(K+1)", "N*m/rad^K", -1e30, 1e30, False, None, "clutch polynomial"
 )

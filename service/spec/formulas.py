@@ -166,7 +166,7 @@ class _Dimensions:
     """The units of the parts of a formula."""
 
     def __init__(self, scan: _Scan, units: dict[str, str]) -> None:
-        self._quantities, self._units = scan.quantities, units
+        self._quantities, self._unit_of = scan.quantities, units
 
     def of(self, node: Node) -> Powers:
         """The unit of the value of a node; FormulaError where units do not go together."""
@@ -174,7 +174,7 @@ class _Dimensions:
         if kind == "number":
             return self._quantities.get(node.position, None if node.number == 0.0 else _PLAIN)
         if kind.startswith("name "):
-            return _powers(self._units[kind[5:]])
+            return _powers(self._unit_of[kind[5:]])
         if kind == "^":
             return self._power(node)
         parts = [self.of(part) for part in node.parts]

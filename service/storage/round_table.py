@@ -45,9 +45,11 @@ def latest_round(connection: sa.Connection, number: int) -> RoundRecord:
 
 
 def _query(number: int) -> sa.Select[Any]:
-    return sa.select(ROUNDS).where(ROUNDS.c.study == number)
+    c = ROUNDS.c
+    columns = (c.round, c.first, c["count"].label("cases"), c.summary, c.planned_at)  # a row has a method `count`
+    return sa.select(*columns).where(c.study == number)
 
 
 def _record(row: sa.Row[Any]) -> RoundRecord:
-    first, count = row.first, row._mapping["count"]
-    return RoundRecord(row.round, range(first, first + count), json.loads(row.summary), moment(row.planned_at))
+    cases = range(row.first, row.first + row.cases)
+    return RoundRecord(row.round, cases, json.loads(row.summary), moment(row.planned_at))

@@ -49,6 +49,7 @@ def imported(module: str) -> subprocess.CompletedProcess[str]:
     "module",
     [
         "sprag.service.client",
+        "sprag.service.cli.app",
         *(f"sprag.service.client.{name}" for name in ("aio", "frames", "plain", "queries", "study")),
     ],
 )
@@ -58,7 +59,7 @@ def test_the_client_is_imported_without_the_rest(module: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("module", "missing"), [("sprag.service.stale_files", "fcntl"), ("sprag.service.http.app", "fastapi")]
+    ("module", "missing"), [("sprag.worker.executors.dask_tasks", "fcntl"), ("sprag.service.http.app", "fastapi")]
 )
 def test_the_modules_are_really_refused(module: str, missing: str) -> None:
     done = imported(module)
