@@ -68,10 +68,9 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
     varies = any(len(axis) > 1 for axis in study.axes)
     grid = study.combine == "grid" and sum(len(axis) > 1 for axis in study.axes) > 1
     mapped = grid or map_plan(study) is not None
-    goal = study.plan is not None and study.plan["kind"] == GOAL
     tabs = [
         ("", "Overview"),
-        *([("/front", "Designs")] if goal else []),
+        *([("/front", "Designs")] if _has_goal(study) else []),
         *([("/curves", "Curves")] if varies else []),
         *([("/map", "Map")] if mapped else []),
     ]
@@ -127,10 +126,28 @@ def _study_page(context: Context, study_id: str, fits: Mapping[str, tuple[Clutch
     )
 
 
+def _has_goal(study: Study) -> bool:
+    return study.plan is not None and study.plan["kind"] == GOAL
+
+
+def _drawable(points: int) -> bool:
+    """Whether a picture can show so many points."""
+    return points <= pictures.MAX_PICTURE_POINTS
+
+
 def _main_figure(study: Study, study_id: str, query: CurveQuery | None) -> dict[str, Any]:
     """The addresses of the figure on the page, of its picture and of the page where others are chosen; its caption."""
+    if _has_goal(study):
+        return {
+            "heading": "Designs",
+            "figure": f"/studies/{study_id}/figures/front",
+            "picture": f"{views.study_address(study_id)}/front?format=svg" if _drawable(study.cases) else None,
+            "others": f"/studies/{study_id}/front",
+            "kind": "Designs",
+            "caption": "Every design of the search; grey ones are outside the limits",
+        }
     if query is None:
-        return {"figure": None, "picture": None, "others": None, "kind": "", "caption": None}
+        return {"heading": "", "figure": None, "picture": None, "others": None, "kind": "", "caption": None}
     mapped = map_query(study, models.study_results(study), QueryParams()) if map_plan(study) is not None else None
     if mapped is not None:
         kind, pairs, more = "map", pairs_of(mapped), ("kind", "heatmap")
@@ -139,13 +156,14 @@ def _main_figure(study: Study, study_id: str, query: CurveQuery | None) -> dict[
     else:
         kind, pairs, more = "curves", pairs_of(query), ("columns", "2")
         told = caption(study, query)
-        drawable = drawn_numbers(study, query) <= pictures.MAX_PICTURE_POINTS
+        drawable = _drawable(drawn_numbers(study, query))
     picture = f"{views.study_address(study_id)}/{kind}?{urlencode([*pairs, ('format', 'svg')])}"
     return {
+        "heading": models.presentation_of(study).heading,
         "figure": f"/studies/{study_id}/figures/{kind}?{urlencode([*pairs, more])}",
         "picture": picture if drawable else None,
         "others": f"/studies/{study_id}/{kind}?{urlencode(pairs)}",
-        "kind": kind,
+        "kind": kind.capitalize(),
         "caption": told,
     }
 

@@ -14,7 +14,9 @@ from tests.service.searching import search
 
 def test_the_page_shows_the_best_designs_with_their_links(service: Service) -> None:
     study_id = search(service)
-    assert f'href="/studies/{study_id}/front"' in service.http.get(f"/studies/{study_id}").text
+    overview = service.http.get(f"/studies/{study_id}").text
+    assert f'data-figure="/studies/{study_id}/figures/front"' in overview
+    assert f'href="/studies/{study_id}/front"' in overview
     answer = service.http.get(f"/studies/{study_id}/front")
     assert answer.status_code == 200
     found = service.get(f"/studies/{study_id}/front")
