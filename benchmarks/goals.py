@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from benchmarks.peers.searches import Found, Problem, cmaes_evaluations, optuna_nsga2, pymoo_nsga2
 from benchmarks.workloads import W1
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.run import SettledRun
 from sprag.engine.vibration_drive.regimes import settled_infos
 from sprag.engine.vibration_drive.settle import settle
@@ -139,7 +139,7 @@ class Drive:
         batch = settle(columns, SettledRun(), cases=len(designs))
         self.seconds += time.process_time() - begin
         values = {name: batch.values[:, place] for name, place in self._places.items()}
-        return batch.endings == ENDING_CODES.index(Ending.OK), values
+        return batch.endings == ENDINGS.index(Ending.OK), values
 
     def evaluate(self, designs: Floats) -> tuple[Floats, Floats]:
         """The same as goals to be minimised and violations, for peers."""

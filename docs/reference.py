@@ -100,7 +100,9 @@ def limits() -> Iterator[Row]:
     yield "time in which a client takes something of an answer", f"{limit.WRITE_SECONDS:g} s"
 
 
-DRIVE, SHAFT = models.VIBRATION_DRIVE, models.MACHINE_SHAFT
+DRIVE = models.VIBRATION_DRIVE
+WORDS = {name: name.replace("-", " ") for name in models.model_names()}
+PARAMETER_HEADS = "path | unit | allowed | default | "
 TIMED = {info.name.replace("pendulums.0.", "pendulums.N.") for info in models.result_infos(DRIVE, "1")}
 #: Results that cases of a given time have not.
 SETTLED_ONLY = {info.name for info in models.result_catalogue(DRIVE)} - TIMED
@@ -108,10 +110,8 @@ SETTLED_ONLY = {info.name for info in models.result_catalogue(DRIVE)} - TIMED
 TABLES: dict[str, tuple[str, Iterable[Row]]] = {
     "commands": ("command | ", commands()),
     "settings": ("variable | default | ", settings()),
-    "parameters of the vibration drive": ("path | unit | allowed | default | ", parameters(DRIVE)),
-    "parameters of the machine shaft": ("path | unit | allowed | default | ", parameters(SHAFT)),
-    "results of the vibration drive": ("result | unit | ", results(DRIVE)),
-    "results of the machine shaft": ("result | unit | ", results(SHAFT)),
+    **{f"parameters of the {WORDS[name]}": (PARAMETER_HEADS, parameters(name)) for name in models.model_names()},
+    **{f"results of the {WORDS[name]}": ("result | unit | ", results(name)) for name in models.model_names()},
     "results of settled cases": ("result | unit | meaning ", results(DRIVE, settled=True)),
     "regimes": ("regime | meaning ", meanings(models.REGIME_SENTENCES)),
     "endings": ("ending | ", meanings(dict(models.ENDING_SENTENCES))),

@@ -78,4 +78,4 @@ _SENTENCES = {
 }
 
 #: Order in which compiled code numbers the endings; the position is the code.
-ENDING_CODES: tuple[Ending, ...] = tuple(Ending)
+ENDINGS: tuple[Ending, ...] = tuple(Ending)

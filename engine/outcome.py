@@ -17,7 +17,7 @@ class Batch:
     values : float64 array, shape (cases, results)
         In the order of the model's catalogue of results; NaN where a value could not be computed.
     endings : int8 array, shape (cases,)
-        Index into `sprag.engine.endings.ENDING_CODES`.
+        Index into `sprag.engine.endings.ENDINGS`.
     """
 
     values: NDArray[np.float64]

@@ -18,7 +18,7 @@ import pandas as pd
 
 from sprag.engine import ENGINE_VERSION, Ending, Run, Span
 from sprag.engine.catalogue import Parameter
-from sprag.engine.endings import ENDING_CODES
+from sprag.engine.endings import ENDINGS
 from sprag.engine.vibration_drive import simulate as _vibration_drive
 from sprag.engine.vibration_drive.cases import pendulum_count
 from sprag.engine.vibration_drive.parameters import PARAMETERS
@@ -71,7 +71,7 @@ def simulate(cases: Mapping[str, ArrayLike] | pd.DataFrame, run: Run | None = No
         _check(path, values)
     batch = _vibration_drive.simulate(columns, run or Run(), cases=count)
     infos = result_infos(pendulum_count(columns))
-    table: dict[str, Any] = {"ending": [ENDING_CODES[code].value for code in batch.endings.tolist()]}
+    table: dict[str, Any] = {"ending": [ENDINGS[code].value for code in batch.endings.tolist()]}
     table |= {info.name: batch.values[:, number] for number, info in enumerate(infos)}
     frame = pd.DataFrame(table, index=index)
     frame.attrs["units"] = {info.name: info.unit for info in infos}

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
+
+from sprag.worker import models
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
@@ -32,3 +35,12 @@ def test_what_lies_loose_in_the_service_is_the_ground() -> None:
     ground = re.search(r"ground that all of them stand on: ([^.]*)\.", PAGE)
     assert ground is not None
     assert set(re.findall(r"`(\w+)`", ground[1])) == loose
+
+
+def test_the_contracts_keep_every_model_apart() -> None:
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"][
+        "contracts"
+    ]
+    apart = {module for contract in contracts if contract["type"] == "independence" for module in contract["modules"]}
+    for name in models.model_names():
+        assert {f"sprag.engine.{name.replace('-', '_')}", type(models.model_of(name)).__module__} <= apart

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.workloads import COMPARED, EVENTS, Ints, Outcome, Workload
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.run import Run
 from sprag.engine.vibration_drive.results import result_infos
 from sprag.engine.vibration_drive.simulate import simulate
@@ -22,6 +22,6 @@ class SpragDrive:
     def run(self, cases: Ints) -> Outcome:
         """Run the cases as one batch."""
         batch = simulate(self.workload.columns(cases), self.settings, cases=len(cases))
-        assert np.all(batch.endings == ENDING_CODES.index(Ending.OK))
+        assert np.all(batch.endings == ENDINGS.index(Ending.OK))
         values = {name: batch.values[:, self.names.index(name)] for name in (*COMPARED, EVENTS)}
         return Outcome(cases, values, float(batch.values[:, self.names.index("run.steps")].sum()))

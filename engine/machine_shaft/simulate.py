@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.machine_shaft.balance import balanced, largest_work
 from sprag.engine.machine_shaft.decomposition import Decomposition, characteristics
 from sprag.engine.machine_shaft.flywheel import required_inertia
@@ -48,7 +48,7 @@ _OF_TIME = np.array([_NAMES.index("omega.mean_time"), _NAMES.index("irregularity
 _OF_MOTION = ("omega.", "irregularity", "acceleration.", "s1.", "s2.", "power.", "energy.m")
 #: The same for a motor that has no steady torque.
 _OF_MOTOR = ("drive_torque.", "work.drive", "balance.work", "energy.", "s3.", "s4.", "phi_c")
-_CODE = {ending: np.int8(code) for code, ending in enumerate(ENDING_CODES)}
+_CODE = {ending: np.int8(code) for code, ending in enumerate(ENDINGS)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -332,7 +332,7 @@ def check(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> None:
     row = Columns.of(model, columns, 1)
     check_relations(model, row)
     batch = simulate(model, columns, cases=1)
-    ending, result = ENDING_CODES[int(batch.endings[0])], dict(zip(_NAMES, batch.values[0], strict=True))
+    ending, result = ENDINGS[int(batch.endings[0])], dict(zip(_NAMES, batch.values[0], strict=True))
     if ending is not Ending.CANNOT_ASSEMBLE:
         machine = Machine(model, row)
         machine.check_finite()

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.machine_shaft.decomposition import Decomposition
 from sprag.engine.machine_shaft.machine import Columns, Machine, check_structure
 from sprag.engine.machine_shaft.panels import Points
@@ -73,7 +73,7 @@ def trajectory(model: MachineSpec, columns: Mapping[str, ArrayLike], angles: Arr
     with np.errstate(all="ignore"):
         *_, (_, solved) = attempts(model, row)
         settle(model, row, solved)
-    ending = ENDING_CODES[int(solved.endings[0])]
+    ending = ENDINGS[int(solved.endings[0])]
     if ending is not Ending.OK:
         return made(nothing[:, 0], nothing, ending)
     table = _table(solved.decomposition, model.phi_c, np.minimum(asked, cycle))

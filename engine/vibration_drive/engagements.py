@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.outcome import Engagement, Engagements, PeriodMeans
 from sprag.engine.run import Run, SettledRun
 from sprag.engine.vibration_drive.automaton import Clutch
@@ -97,7 +97,7 @@ def settled_engagements(columns: Mapping[str, ArrayLike], settings: SettledRun) 
         If a required parameter is missing or the number of pendulums or coefficients is out of range.
     """
     found = settle(columns, settings, cases=1)
-    regime, ending = Regime(int(found.regimes[0])), ENDING_CODES[int(found.endings[0])]
+    regime, ending = Regime(int(found.regimes[0])), ENDINGS[int(found.endings[0])]
     period = 1.0 / float(np.asarray(columns["excitation.frequency"]))
     repeats = regime.repeats
     names = [info.name for info in settled_infos(pendulum_count(columns))]
@@ -132,7 +132,7 @@ def _pieces(
     while True:
         done = integrate(module, matrix, run, starts=starts, pieces=room, since=since)
         if np.isnan(done.pieces[-1, 0]):
-            ending = ENDING_CODES[int(done.sums[0, OUT_ENDING])]
+            ending = ENDINGS[int(done.sums[0, OUT_ENDING])]
             return ending, Pieces.read(module.LAYOUT, done.pieces, float(matrix[0, Column.PERIOD]))
         room *= 2
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sprag.engine.compile.jit import part
 from sprag.engine.compile.ways import GROUP
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.taylor.elementary import cosine, sine
 from sprag.engine.taylor.roots import evaluate
 from sprag.engine.vibration_drive import states as ev
@@ -34,11 +34,11 @@ RUNUP_SHARE = 0.95
 
 _FREE, _LOCKED = int(Clutch.FREE), int(Clutch.LOCKED)
 _HELD, _ROTATING = int(Shaft.HELD), int(Shaft.ROTATING)
-_OK = ENDING_CODES.index(Ending.OK)
-_ACCURACY = ENDING_CODES.index(Ending.ACCURACY_NOT_REACHED)
-_CHATTER = ENDING_CODES.index(Ending.CHATTER)
-_STEP_BUDGET = ENDING_CODES.index(Ending.STEP_BUDGET)
-_DIVERGED = ENDING_CODES.index(Ending.DIVERGED)
+_OK = ENDINGS.index(Ending.OK)
+_ACCURACY = ENDINGS.index(Ending.ACCURACY_NOT_REACHED)
+_CHATTER = ENDINGS.index(Ending.CHATTER)
+_STEP_BUDGET = ENDINGS.index(Ending.STEP_BUDGET)
+_DIVERGED = ENDINGS.index(Ending.DIVERGED)
 _RUNNING = -1
 
 _NU, _PERIOD, _ACC_X, _ACC_Y = int(Column.NU), int(Column.PERIOD), int(Column.ACC_X), int(Column.ACC_Y)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.outcome import Portrait, Trajectory
 from sprag.engine.run import Run, SettledRun
 from sprag.engine.vibration_drive.automaton import Clutch
@@ -78,7 +78,7 @@ def settled_portrait(columns: Mapping[str, ArrayLike], settings: SettledRun) -> 
     """
     values = scalars(columns)
     found = settle(values, settings, cases=1)
-    regime, ending = Regime(int(found.regimes[0])), ENDING_CODES[int(found.endings[0])]
+    regime, ending = Regime(int(found.regimes[0])), ENDINGS[int(found.endings[0])]
     names = [info.name for info in settled_infos(pendulum_count(values))]
     row = dict(zip(names, found.values[0].tolist(), strict=True))
     order = int(row["regime.order"]) if regime.repeats else 0
@@ -103,7 +103,7 @@ def _strobes(values: Mapping[str, float], run: Run, periods: int) -> tuple[Endin
     matrix = with_lengths(case_matrix(values, run, 1), np.zeros(1), np.array([float(periods)]), windowed=False)
     kept = min(periods, MAX_STROBES)
     done = integrate(kernel_of(values, run.tolerance), matrix, run, strobes=kept)
-    ending = ENDING_CODES[int(done.sums[0, OUT_ENDING])]
+    ending = ENDINGS[int(done.sums[0, OUT_ENDING])]
     # A run that did not end ok has no more than its first strobes.
     rows = in_order(done.strobes, np.array([periods]))[0] if kept else done.strobes[0]
     told = ~np.isnan(rows[:, SHAFT])

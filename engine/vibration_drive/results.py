@@ -1,5 +1,8 @@
 """The characteristics of a vibration drive: names, units, meaning (docs/theory.md, "Characteristics")."""
 
+import math
+from collections.abc import Callable
+
 from sprag.engine.catalogue import Kind, ResultInfo
 
 
@@ -65,6 +68,18 @@ def _pendulum(index: int) -> tuple[ResultInfo, ...]:
 
 
 SHAFT_RESULTS: tuple[ResultInfo, ...] = _shaft()
+
+
+#: Results of the shaft at a steady speed (rad/s) for a time (s), without a load: the speed is 0 where it stands still.
+STEADY_SHAFT: dict[str, Callable[[float, float], float]] = {
+    "shaft.speed.mean": lambda speed, _: speed,
+    "shaft.speed.max": lambda speed, _: speed,
+    "shaft.speed.min": lambda speed, _: speed,
+    "shaft.irregularity": lambda speed, _: 0.0 if speed > 0.0 else math.nan,
+    "shaft.turn": lambda speed, time: speed * time,
+    "fraction.rotating": lambda speed, _: 1.0 if speed > 0.0 else 0.0,
+    "fraction.held": lambda speed, _: 0.0 if speed > 0.0 else 1.0,
+}
 
 
 def result_infos(pendulums: int) -> tuple[ResultInfo, ...]:

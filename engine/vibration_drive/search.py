@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.run import Run, SettledRun
 from sprag.engine.vibration_drive import newton, orbits
 from sprag.engine.vibration_drive.automaton import Clutch, Shaft
@@ -63,7 +63,7 @@ _SAME = 1e-7
 #: whole periods later are too.
 MOVED = 0.375
 
-_OK = ENDING_CODES.index(Ending.OK)
+_OK = ENDINGS.index(Ending.OK)
 _FREE, _HELD = float(Clutch.FREE), float(Shaft.HELD)
 
 

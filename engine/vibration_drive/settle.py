@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.run import MEANS_FROM_PERIODS, SettledRun
 from sprag.engine.vibration_drive.cases import Column, case_matrix, pendulum_count
 from sprag.engine.vibration_drive.irregular import BATCHES, Batches
@@ -16,7 +16,7 @@ from sprag.engine.vibration_drive.lanes import RUNUP_SHARE
 from sprag.engine.vibration_drive.no_load import limit_of
 from sprag.engine.vibration_drive.orbits import distances, settling_periods
 from sprag.engine.vibration_drive.regimes import Regime, means, settled_infos
-from sprag.engine.vibration_drive.results import result_infos
+from sprag.engine.vibration_drive.results import STEADY_SHAFT, result_infos
 from sprag.engine.vibration_drive.search import ROUND, Orbits, Search, transient_rounds
 from sprag.engine.vibration_drive.strobes import SHAFT_SPEED
 
@@ -29,7 +29,7 @@ _MOVE_AFTER = 140
 _OUT_OF_REACH = 1e6
 #: Periods in which the speed of an unloaded shaft must not change.
 _UNCHANGED = 40
-_OK = ENDING_CODES.index(Ending.OK)
+_OK = ENDINGS.index(Ending.OK)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class SettledBatch:
     values : array, shape (cases, results)
         Results in the order of ``settled_infos(pendulums)``; NaN where a value could not be computed.
     endings : int8 array, shape (cases,)
-        Index into ``sprag.engine.endings.ENDING_CODES``.
+        Index into ``sprag.engine.endings.ENDINGS``.
     regimes : int8 array, shape (cases,)
         Members of ``Regime``.
     points : array, shape (cases, strobes.width(n))
@@ -241,15 +241,11 @@ def _unloaded(module: Kernel, search: Search, cases: Ints, results: _Results) ->
 def _steady_shaft(search: Search, case: int, speed: float, results: _Results) -> None:
     """Write the results of a shaft at a steady speed that no clutch changes."""
     at = np.array([case])
-    order = results.values[case, results.column("regime.order")]
-    for name in ("shaft.speed.mean", "shaft.speed.max", "shaft.speed.min"):
-        results.put(at, name, speed)
-    results.put(at, "shaft.irregularity", 0.0 if speed > 0.0 else math.nan)
-    results.put(at, "shaft.turn", speed * order * search.matrix[case, Column.PERIOD])
-    results.put(at, "fraction.rotating", 1.0 if speed > 0.0 else 0.0)
-    results.put(at, "fraction.held", 0.0 if speed > 0.0 else 1.0)
-    results.points[case, SHAFT_SPEED] = speed
     period = search.matrix[case, Column.PERIOD]
+    time = results.values[case, results.column("regime.order")] * period
+    for name, value in STEADY_SHAFT.items():
+        results.put(at, name, value(speed, time))
+    results.points[case, SHAFT_SPEED] = speed
     rest = results.values[case, results.column("shaft.speed.from_rest")]
     started = search.matrix[case, Column.SPEED] == 0.0
     runup = _runup(search.turns[at], np.array([RUNUP_SHARE * rest * period]))

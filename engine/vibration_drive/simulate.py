@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDING_CODES
+from sprag.engine.endings import ENDINGS
 from sprag.engine.outcome import Batch, Trajectory
 from sprag.engine.run import Run, SettledRun
 from sprag.engine.vibration_drive.automaton import Clutch, Shaft
@@ -161,7 +161,7 @@ def sampled(values: Mapping[str, float], found: Integration, times: Floats) -> T
     named = {"shaft": [SHAFT_NAMES[int(s)] for s in states[:, 0]]}
     for i in range(n):
         named[f"pendulums.{i}"] = [CLUTCH_NAMES[int(s)] for s in states[:, 1 + i]]
-    ending = ENDING_CODES[int(found.sums[0, OUT_ENDING])]
+    ending = ENDINGS[int(found.sums[0, OUT_ENDING])]
     return Trajectory(times_done, names, units, np.column_stack([out[name] for name in names]), named, ending)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.outcome import Batch
 from sprag.engine.run import Run, SettledRun
 from sprag.engine.vibration_drive.cases import STOPS, Column, case_matrix, pendulum_count, stop_column
@@ -36,7 +36,7 @@ _STILL = 1e-6
 _FIRST = 20
 #: Last periods of these whose mean stands for the settled one where no orbit was found.
 _MEAN_OVER = 160
-_OK = ENDING_CODES.index(Ending.OK)
+_OK = ENDINGS.index(Ending.OK)
 
 
 @dataclass(frozen=True, slots=True)

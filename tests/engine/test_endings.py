@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.run import Run, Span
 from sprag.engine.vibration_drive.cases import Column, case_matrix
 from sprag.engine.vibration_drive.parameters import PARAMETERS
@@ -124,7 +124,7 @@ def test_extreme_machines_end(pendulums: int, reset: Any, data: st.DataObject) -
     run = periods(3.0, 1.0, 3.0, reset=reset, max_steps=2000, max_events_per_period=200)
     results = Results(columns, run, len(cases))
     for case, ending in enumerate(results.endings):
-        assert ending in ENDING_CODES
+        assert ending in ENDINGS
         row = results.row(case)
         assert not any(math.isinf(value) for value in row.values())
         if ending is Ending.OK:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from benchmarks.settled import NOT_COMPARED
 from benchmarks.workloads import W1
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.run import Run, SettledRun, Span
 from sprag.engine.vibration_drive.cases import case_matrix, with_lengths
 from sprag.engine.vibration_drive.characteristics import characteristics, combined
@@ -277,7 +277,7 @@ def test_a_short_search_says_that_the_motion_is_unsettled() -> None:
 
 def test_a_case_that_does_not_end_ok_has_no_regime() -> None:
     batch = settle(_one(25.0, 2e-3, 0.2), SettledRun(max_events_per_period=1), cases=1)
-    assert ENDING_CODES[batch.endings[0]] is Ending.CHATTER
+    assert ENDINGS[batch.endings[0]] is Ending.CHATTER
     assert Regime(int(batch.regimes[0])) is Regime.NONE
     assert np.isnan(batch.values).all()
 

@@ -14,6 +14,7 @@ from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.migration import MigrationContext
+from numpy.typing import NDArray
 
 import sprag.migrations as migrations
 from sprag.service.spec.document import parse_spec
@@ -23,6 +24,7 @@ from sprag.service.storage.session import Session
 from sprag.service.storage.sqlite_files import sqlite_driver
 from sprag.service.storage.store import Store
 from sprag.service.storage.tables import HEAD_REVISION, all_tables
+from sprag.worker import models
 from sprag.worker.states import StudyState
 from tests import postgres
 from tests.faults import refused
@@ -51,6 +53,26 @@ def thaw(frozen: Path, file: Path) -> None:
     connection.close()
 
 
+def frozen_values(file: Path, study: int, fresh: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values of a study's rows as the file has them, in the order of today's results; NaN where it has no such column.
+
+    ``fresh`` (cases, results) has the rows that the file lacks.
+    """
+    connection = sqlite_driver().connect(file)
+    found = connection.execute("SELECT * FROM vibration_drive_1 WHERE study = ?", (study,))
+    names = [about[0] for about in found.description]
+    today = [info.column for info in models.result_infos("vibration-drive", "1")]
+    values = fresh.copy()
+    for row in found:
+        kept = dict(zip(names, row, strict=True))
+        case = kept["case_number"]
+        values[case] = np.nan
+        for name in names[names.index("flags") + 1 :]:
+            values[case, today.index(name)] = np.nan if kept[name] is None else kept[name]
+    connection.close()
+    return values
+
+
 def set_revision(file: Path, revision: str) -> None:
     connection = sqlite_driver().connect(file)
     connection.execute("UPDATE alembic_version SET version_num = ?", (revision,))
@@ -77,6 +99,9 @@ def test_a_frozen_database_is_upgraded_and_then_used(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     thaw(frozen, file)
+    before = frozen_values(file, 1, np.full((5, fakes.RESULTS), np.nan))
+    then = frozen_values(file, 2, fakes.values(0, 5))
+    assert not np.isnan(before[:4]).all()
     assert upgrade(url) == (frozen.stem, HEAD_REVISION)
     with Store.open(url) as store:
         assert not [problem for problem in store.check().problems if "SQLite" not in problem]
@@ -85,8 +110,7 @@ def test_a_frozen_database_is_upgraded_and_then_used(
         assert (finished.state, finished.done, finished.ok) == (StudyState.FINISHED, 5, 4)
         assert store.progress(finished.id).endings == {"ok": 4, "crashed": 1}
         block = store.case_rows(finished.id)
-        np.testing.assert_array_equal(block.values[:4], fakes.values(0, 4))
-        assert np.isnan(block.values[4]).all()
+        np.testing.assert_array_equal(block.values, before)
         assert running.warnings == ("odd",)
         expected = fakes.study(5, "running")
         stored = store.study(running.id)
@@ -100,9 +124,24 @@ def test_a_frozen_database_is_upgraded_and_then_used(
         for chunk in chunks:
             assert store.commit(epoch, chunk, fakes.result(chunk.first, chunk.count))
         assert store.settle(epoch, running.number) is StudyState.FINISHED
-        np.testing.assert_array_equal(store.case_rows(running.id).values, fakes.values(0, 5))
+        np.testing.assert_array_equal(store.case_rows(running.id).values, then)
         store.delete_study(finished.id)
         assert store.create_study({}, fakes.study(3)).number > queued.number
+
+
+def test_rows_of_before_a_result_stay_empty_in_it(file: Path, url: str) -> None:
+    thaw(FROZEN[-1], file)
+    connection = sqlite_driver().connect(file)
+    connection.execute("ALTER TABLE vibration_drive_1 DROP COLUMN runup_time")
+    before = frozen_values(file, 1, np.full((5, fakes.RESULTS), np.nan))
+    connection.execute("ALTER TABLE vibration_drive_1 ADD COLUMN runup_time DOUBLE")
+    connection.commit()
+    connection.close()
+    names = [info.name for info in models.result_infos("vibration-drive", "1")]
+    assert np.flatnonzero(np.isnan(before[0])).tolist() == [names.index("runup.time")]
+    with Store.open(url) as store:
+        (finished,) = (study for study in store.list_studies().studies if study.name == "finished")
+        np.testing.assert_array_equal(store.case_rows(finished.id).values, before)
 
 
 def test_the_number_of_pendulums_became_the_variant(file: Path, url: str) -> None:

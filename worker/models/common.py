@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag.engine.endings import ENDING_CODES
+from sprag.engine.endings import ENDINGS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -42,7 +42,7 @@ class ChunkResult:
 
 def chunk_result(first: int, codes: NDArray[np.int8], flags: list[str], values: NDArray[np.float64]) -> ChunkResult:
     """The result from the engine's arrays: ``codes`` (count,) of its endings, ``values`` (count, results)."""
-    endings = [ENDING_CODES[code].value for code in codes.tolist()]
+    endings = [ENDINGS[code].value for code in codes.tolist()]
     # Adding zero makes negative zeros positive, because databases do not preserve their sign.
     return ChunkResult(first, endings, flags, np.ascontiguousarray(values, dtype=np.float64) + 0.0)
 

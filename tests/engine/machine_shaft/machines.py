@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.machine_shaft.results import result_infos
 from sprag.engine.machine_shaft.simulate import simulate
 from sprag.engine.machine_shaft.spec import MachineSpec, MechanismChoice, OperationChoice
@@ -38,7 +38,7 @@ PRESS_NUMBERS: dict[str, Any] = {
 def results_of(spec: MachineSpec, numbers: Mapping[str, Any], cases: int = 1) -> dict[str, NDArray[Any]]:
     """Results of cases that all end ok, by name."""
     batch = simulate(spec, numbers, cases=cases)
-    assert {ENDING_CODES[code] for code in batch.endings} == {Ending.OK}
+    assert {ENDINGS[code] for code in batch.endings} == {Ending.OK}
     return dict(zip(NAMES, batch.values.T, strict=True))
 
 
@@ -49,4 +49,4 @@ def one(spec: MachineSpec, numbers: Mapping[str, Any]) -> dict[str, float]:
 
 def ending_of(spec: MachineSpec, numbers: Mapping[str, Any]) -> Ending:
     """How one case ends."""
-    return ENDING_CODES[int(simulate(spec, numbers, cases=1).endings[0])]
+    return ENDINGS[int(simulate(spec, numbers, cases=1).endings[0])]

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import erf
 
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.machine_shaft.simulate import simulate
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
 from tests.engine.machine_shaft.machines import NAMES, one, results_of
@@ -63,8 +63,8 @@ def test_peaks_of_any_width_change_the_energy_at_once() -> None:
 
 def test_pulses_of_any_width_are_right_or_refused() -> None:
     batch = simulate(_torque("10 + 100*if(abs(phi-a) < w, 1/w, 0)"), NUMBERS, cases=200)
-    known = batch.endings == ENDING_CODES.index(Ending.OK)
-    assert set(batch.endings[~known]) <= {ENDING_CODES.index(Ending.QUADRATURE_NOT_REACHED)}
+    known = batch.endings == ENDINGS.index(Ending.OK)
+    assert set(batch.endings[~known]) <= {ENDINGS.index(Ending.QUADRATURE_NOT_REACHED)}
     assert known[WIDTHS > 1e-5].all()
     work = _work(lambda d: np.minimum(d, 1.0))
     np.testing.assert_allclose(-batch.values[known, NAMES.index("work.resistance")], work[known], rtol=1e-8)
@@ -111,7 +111,7 @@ def test_a_narrow_rise_of_the_inertia_is_seen_or_refused(width: float) -> None:
     spec = MachineSpec(mechanism=MechanismChoice("formula", formula="1 + 3*exp(-((phi-a)/w)^2)"), constants=("w", "a"))
     numbers = {"mean_speed": 50.0, "drive.inertia": 1.0, "constants.w": width, "constants.a": 2.3456}
     batch = simulate(spec, numbers, cases=1)
-    if width < 1e-4 and ENDING_CODES[batch.endings[0]] is Ending.QUADRATURE_NOT_REACHED:
+    if width < 1e-4 and ENDINGS[batch.endings[0]] is Ending.QUADRATURE_NOT_REACHED:
         # The rounding of the angle alone changes such an inertia by more than its precision.
         return
     result = one(spec, numbers)
@@ -126,7 +126,7 @@ def test_what_cannot_be_known_is_refused(formula: str) -> None:
         MachineSpec(operation=OperationChoice("torque", "formula", formula=formula)),
         {"mean_speed": 100.0, "drive.inertia": 5.0}, cases=1,
     )  # fmt: skip
-    assert ENDING_CODES[batch.endings[0]] is Ending.QUADRATURE_NOT_REACHED
+    assert ENDINGS[batch.endings[0]] is Ending.QUADRATURE_NOT_REACHED
 
 
 def test_a_case_does_not_depend_on_its_neighbours() -> None:

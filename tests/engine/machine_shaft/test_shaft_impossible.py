@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.machine_shaft.problems import AssemblyError, ExpressionError, RelationError, TableError
 from sprag.engine.machine_shaft.simulate import check, simulate
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
@@ -35,7 +35,7 @@ def formula(text: str, **more: Any) -> MachineSpec:
 
 def values_of(spec: MachineSpec, numbers: dict[str, Any], cases: int = 1) -> tuple[list[Ending], dict[str, Any]]:
     batch = simulate(spec, numbers, cases=cases)
-    return [ENDING_CODES[code] for code in batch.endings], dict(zip(NAMES, batch.values.T, strict=True))
+    return [ENDINGS[code] for code in batch.endings], dict(zip(NAMES, batch.values.T, strict=True))
 
 
 @pytest.mark.parametrize(("pressure", "says"), [(0.5e5, "below"), (MOST * 1.01, "cannot be reached"), (1e8, "81032")])

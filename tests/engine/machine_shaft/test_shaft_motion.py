@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.machine_shaft.machine import Columns, Machine
 from sprag.engine.machine_shaft.simulate import simulate
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MeanSpeed, MechanismChoice, OperationChoice
@@ -149,10 +149,10 @@ def test_every_feasible_mean_speed_is_reached(kind: MeanSpeed, spec: MachineSpec
     least = one(own, numbers)["least_mean_speed"]
     speeds = max(least, 0.1) * np.array([1.0001, 1.001, 1.01, 1.03, 1.05, 1.07, 1.1, 1.13, 1.2, 1.3, 1.5, 2.0, 5.0])
     batch = simulate(own, numbers | {"mean_speed": speeds}, cases=len(speeds))
-    ok = batch.endings == ENDING_CODES.index(Ending.OK)
+    ok = batch.endings == ENDINGS.index(Ending.OK)
     # The press has a smooth stop: as low a mean over time would take a shaft that stands nearly still.
     assert ok.sum() == (0 if least == 0.0 else len(speeds))
-    assert set(batch.endings) <= {ENDING_CODES.index(Ending.OK), ENDING_CODES.index(Ending.INERTIA_INSUFFICIENT)}
+    assert set(batch.endings) <= {ENDINGS.index(Ending.OK), ENDINGS.index(Ending.INERTIA_INSUFFICIENT)}
     assert batch.values[ok, NAMES.index("omega.mean")] == pytest.approx(speeds[ok], rel=1e-9)
     assert (batch.values[ok, NAMES.index("omega.min")] > 0.0).all()
 
@@ -185,7 +185,7 @@ def test_results_do_not_depend_on_what_cuts_other_cases_need() -> None:
     # One of them is slow somewhere and needs finer panels there.
     numbers["mean_speed"] = np.array([9.0, 9.0, 9.0, 9.0, 3.2])
     whole = simulate(spec, numbers, cases=5)
-    assert {ENDING_CODES[code] for code in whole.endings} == {Ending.OK}
+    assert {ENDINGS[code] for code in whole.endings} == {Ending.OK}
     for case in range(5):
         own = {path: np.broadcast_to(value, (5,))[case] for path, value in numbers.items()}
         assert simulate(spec, own, cases=1).values[0].tobytes() == whole.values[case].tobytes()
@@ -241,7 +241,7 @@ def test_rough_formulas_are_refined_or_refused() -> None:
     assert got["work.resistance"] == pytest.approx(-math.sqrt(math.pi / 400.0), rel=1e-10)
     needle = replace(spec, operation=OperationChoice("torque", "formula", formula="sin(20000*phi)^2"))
     batch = simulate(needle, {"mean_speed": 10.0, "drive.inertia": 0.5}, cases=1)
-    assert ENDING_CODES[batch.endings[0]] is Ending.QUADRATURE_NOT_REACHED
+    assert ENDINGS[batch.endings[0]] is Ending.QUADRATURE_NOT_REACHED
     assert np.isnan(batch.values[0, NAMES.index("omega.max")])
 
 
@@ -253,4 +253,4 @@ def test_near_the_least_mean_speed() -> None:
         assert got["omega.mean"] == pytest.approx(least, rel=2e-4)
         assert got["omega.min"] < 0.05 * got["omega.max"]
         below = simulate(spec, PRESS_NUMBERS | {"mean_speed": least * (1.0 - 1e-6)}, cases=1)
-        assert ENDING_CODES[below.endings[0]] is Ending.INERTIA_INSUFFICIENT
+        assert ENDINGS[below.endings[0]] is Ending.INERTIA_INSUFFICIENT

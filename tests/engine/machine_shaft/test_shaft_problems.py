@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.machine_shaft.estimate import estimate_seconds
 from sprag.engine.machine_shaft.parameters import parameters
 from sprag.engine.machine_shaft.problems import (
@@ -50,7 +50,7 @@ def test_insufficient_inertia_tells_the_least_mean_speed() -> None:
     assert error.value.least_mean_speed == pytest.approx(4.738, abs=5e-4)
     speeds = np.array([4.7, 4.8, 10.0])
     batch = simulate(PRESS, PRESS_NUMBERS | {"mean_speed": speeds}, cases=3)
-    assert [ENDING_CODES[code] for code in batch.endings] == [Ending.INERTIA_INSUFFICIENT, Ending.OK, Ending.OK]
+    assert [ENDINGS[code] for code in batch.endings] == [Ending.INERTIA_INSUFFICIENT, Ending.OK, Ending.OK]
     least = batch.values[:, NAMES.index("least_mean_speed")]
     assert least == pytest.approx(error.value.least_mean_speed, rel=1e-12)
     for name in ("omega.max", "omega.angle_at_max", "omega.angle_at_min"):
@@ -77,7 +77,7 @@ def test_assembly_tells_the_angle(spec: MachineSpec, numbers: dict[str, Any], de
         check(spec, numbers)
     assert math.degrees(error.value.angle) == pytest.approx(degrees, abs=1e-6)
     batch = simulate(spec, numbers, cases=1)
-    assert ENDING_CODES[batch.endings[0]] is Ending.CANNOT_ASSEMBLE
+    assert ENDINGS[batch.endings[0]] is Ending.CANNOT_ASSEMBLE
     assert batch.values[0, NAMES.index("assembly.angle")] == error.value.angle
     assert trajectory(spec, numbers, [0.0]).ending is Ending.CANNOT_ASSEMBLE
 

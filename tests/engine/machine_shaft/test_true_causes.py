@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.machine_shaft.problems import MotorOverrunError, MotorStalledError, NearSingularError
 from sprag.engine.machine_shaft.simulate import check, simulate
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
@@ -27,7 +27,7 @@ QUICK_RETURN = {"crank": 0.1, "link_arm": 0.05, "rod": 0.5, "rod_mass": 2.0, "ra
 
 
 def endings_of(spec: MachineSpec, numbers: dict[str, Any], cases: int) -> list[Ending]:
-    return [ENDING_CODES[code] for code in simulate(spec, numbers, cases=cases).endings]
+    return [ENDINGS[code] for code in simulate(spec, numbers, cases=cases).endings]
 
 
 def test_a_load_beyond_the_breakdown_torque_stalls_or_overruns_by_its_sign() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.endings import ENDING_CODES, Ending
+from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.outcome import Trajectory
 from sprag.engine.run import Run, Span
 from sprag.engine.vibration_drive.results import result_infos
@@ -59,7 +59,7 @@ class Results:
         count = 1 + max(int(path.split(".")[1]) for path in columns if path.startswith("pendulums."))
         self.names = [info.name for info in result_infos(count)]
         self.values = batch.values
-        self.endings = [ENDING_CODES[code] for code in batch.endings]
+        self.endings = [ENDINGS[code] for code in batch.endings]
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         return self.values[:, self.names.index(name)]
