@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -104,17 +104,12 @@ def prune(
 @contextmanager
 def _opened(db: str | None, *, existing: bool = True) -> Iterator[Session]:
     """Connections to the database; with ``existing``, a mistyped name creates no database."""
-    from sqlalchemy.engine import make_url
-    from sqlalchemy.exc import ArgumentError
-
-    from sprag.service.storage.session import Session
+    from sprag.service.storage.session import Session, file_of
 
     location = read_settings(database=db).database_url
-    with suppress(ArgumentError, ValueError):  # which the session reports better
-        url = make_url(location)
-        path = url.database if url.get_backend_name() == "sqlite" else None
-        if existing and path and not Path(path).exists():
-            raise WrongInputError("invalid-file", f"{path}: no such database")
+    file = file_of(location)
+    if existing and file is not None and not file.exists():
+        raise WrongInputError("invalid-file", f"{file}: no such database")
     session = Session(location)
     try:
         yield session

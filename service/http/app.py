@@ -36,6 +36,7 @@ from sprag.service.http.context import Context
 from sprag.service.http.drain import Drain
 from sprag.service.http.guard import Guard
 from sprag.service.http.metrics import Metrics
+from sprag.service.http.request_log import Noted, RequestLog
 from sprag.service.http.shares import Shares
 from sprag.service.http.views import API_PREFIX
 from sprag.service.http.web import case, compare, front, laboratory, login, pages, results, study, table
@@ -44,7 +45,6 @@ from sprag.service.http.web import schedules as schedule_pages
 from sprag.service.http.web.form import page as form
 from sprag.service.jobs import checks
 from sprag.service.jobs.housekeeping import Housekeeping
-from sprag.service.logs import Noted, RequestLog
 from sprag.service.settings import Settings, UnsafeSettingsError
 from sprag.service.spec.schema.axes import extension_schema
 from sprag.service.spec.schema.document import spec_schema

@@ -12,8 +12,6 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sqlalchemy.engine import make_url
-
 from sprag.service import logs
 from sprag.service.jobs.housekeeping import Housekeeping
 from sprag.service.jobs.maintenance import Maintenance, MaintenancePlan
@@ -22,7 +20,7 @@ from sprag.service.logs import LogFormat
 from sprag.service.storage.errors import DatabaseError
 from sprag.service.storage.part import SILENT_SECONDS, SystemClock
 from sprag.service.storage.readiness import LOCKED_SECONDS
-from sprag.service.storage.session import lock_of
+from sprag.service.storage.session import file_of, lock_of
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
@@ -231,9 +229,9 @@ def start_dispatcher_process(settings: WorkerSettings) -> SpawnProcess:
 
 def require_file(url: str) -> None:
     """Raise DatabaseError where the service's database file is gone: a worker must not create an empty one."""
-    place = make_url(url)
-    if place.get_backend_name() == "sqlite" and not Path(place.database or "").exists():
-        raise DatabaseError(f"the database file {place.database} was deleted or moved", "database-replaced")
+    file = file_of(url)
+    if file is not None and not file.exists():
+        raise DatabaseError(f"the database file {file} was deleted or moved", "database-replaced")
 
 
 def _child(settings: WorkerSettings, parent: int) -> None:

@@ -37,6 +37,15 @@ def _without_password(url: str) -> str:
     return re.sub(r"(://).*@", r"\1...@", url)
 
 
+def file_of(url: str) -> Path | None:
+    """The file of an SQLite database; None for one on a server, and for what is no URL of a database."""
+    try:
+        place = make_url(url)
+    except (sa.exc.ArgumentError, ValueError):
+        return None
+    return Path(place.database) if place.get_backend_name() == "sqlite" and place.database else None
+
+
 class Session:
     """Connections to one database.
 

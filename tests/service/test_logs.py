@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service.logs import REQUEST_HEADER, JsonFormatter, configure
+from sprag.service.http.request_log import REQUEST_HEADER
+from sprag.service.logs import JsonFormatter, configure
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
