@@ -96,9 +96,7 @@ class Jump(TypedDict):
     low: Annotated[float, Doc("its ends, values of x, SI")]
     high: float
     why: Annotated[str, Doc("failed, irregular, regime, order, no_value or steep")]
-    results: Annotated[
-        list[str], Doc("the results that are not interpolated there, of those whose error was asked for")
-    ]
+    results: Annotated[list[str], Doc("the results that are not interpolated there, of those with a requested error")]
 
 
 class Curve(TypedDict):
@@ -127,7 +125,7 @@ class Curve(TypedDict):
     ]
     jumps: NotRequired[Annotated[list[Jump], Doc("of a refined curve: where it is not interpolated")]]
     passed: NotRequired[
-        Annotated[bool, Doc("of a refined curve: whether no more points are needed for the error that was asked for")]
+        Annotated[bool, Doc("of a refined curve: whether no more points are needed for the requested error")]
     ]
 
 
@@ -138,7 +136,7 @@ class CurvesData(TypedDict):
     units: Annotated[dict[str, str], Doc("SI unit of every parameter in x, by and at")]
     results: dict[str, ResultMeaning]
     curves: list[Curve]
-    error_asked: NotRequired[Annotated[float, Doc("of refined curves: the error that was asked for")]]
+    error_asked: NotRequired[Annotated[float, Doc("of refined curves: the requested error")]]
 
 
 class Curves(CurvesData):
@@ -185,7 +183,7 @@ class MapData(TypedDict):
         ]
     ]
     points: NotRequired[Annotated[MapPoints, Doc("of a refined map: its cases")]]
-    error_asked: NotRequired[Annotated[float, Doc("of a refined map: the error that was asked for")]]
+    error_asked: NotRequired[Annotated[float, Doc("of a refined map: the requested error")]]
     error: NotRequired[
         Annotated[
             float | None,
@@ -194,7 +192,7 @@ class MapData(TypedDict):
     ]
     jumps_share: NotRequired[Annotated[float, Doc("of a refined map: share of its area that is not interpolated")]]
     passed: NotRequired[
-        Annotated[bool, Doc("of a refined map: whether no more points are needed for the error that was asked for")]
+        Annotated[bool, Doc("of a refined map: whether no more points are needed for the requested error")]
     ]
 
 

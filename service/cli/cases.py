@@ -1,4 +1,4 @@
-"""``sprag cases``: the finished cases of a study of a running service, those of a kind only where asked."""
+"""``sprag cases``: the finished cases of a study of a running service, optionally of one ending, regime or flag."""
 
 from __future__ import annotations
 

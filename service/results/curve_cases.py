@@ -107,7 +107,7 @@ def draw_map(
         return draw_refined_map(study, infos, plan, (x, y, z), at, fetch)
     (result,) = numeric_results(infos, "z", (z,))
     if study.combine == "zip":
-        raise refused("x", "not-a-grid", "a map needs a grid; the axes of this study go together (zip)")
+        raise refused("x", "not-a-grid", "a map needs a grid; the axes of this study are zipped")
     x_axis, y_axis = require_axis(study, "x", x), require_axis(study, "y", y)
     fixed = locate_axes(study, at)
     _no_axis_twice({x: x_axis}, "y", {y: y_axis}, fixed)

@@ -38,7 +38,7 @@ class RefinedMap:
     Attributes
     ----------
     asked, error : float
-        The error that was asked for, and the estimated one outside jumps (None: not known yet), relative to the range.
+        The requested error, and the estimated one outside jumps (None: not known yet), relative to the range.
     told : float
         Share of the map that is not interpolated.
     passed : bool

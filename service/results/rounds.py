@@ -56,7 +56,7 @@ def _most(rounds: RoundProgress) -> int:
 
 
 def _state(summary: dict[str, Any]) -> list[str]:
-    """What a summary says of the error that was asked for."""
+    """What a summary says of the requested error."""
     asked, error = summary.get("asked"), summary.get("error")
     if asked is None:
         return []

@@ -1,4 +1,4 @@
-"""Fields and lists of a spec that are no parameters, each described once for reader, JSON Schema and form."""
+"""Fields and lists of a spec that are not parameters, each described once for reader, JSON Schema and form."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> di
         first = [{"combine": study.combine, "axes": own}] if own else []
         return {**kept, "combine": "union", "axes": [*first, *items]}
     if study.combine != "grid":
-        report.fault("/axes", "conflict", "the axes of this study go together, case by case", allowed="`cases` instead")
+        report.fault("/axes", "conflict", "the axes of this study are zipped", allowed="`cases` instead")
         raise report.error()
     machine = read_machine(Report(), part_of(study.model), spec)
     for index, item in enumerate(items):

@@ -1,7 +1,7 @@
 """Curves on nested dyadic grids: which intervals are resolved, what their errors are, and where the jumps lie.
 
-An interval between two neighbouring known points is half of its parent, whose midpoint is one of the two. What the
-parent's midpoint misses the straight line between the parent's ends by is the parent's *difference*. A smooth curve's
+An interval between two neighbouring known points is half of its parent, whose midpoint is one of the two. The
+parent's *difference* is the distance of its midpoint from the straight line between its ends. A smooth curve's
 error in the interval is about a quarter of it (docs/refinement.md, "The test of an interval").
 """
 

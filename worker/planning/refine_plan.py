@@ -66,7 +66,7 @@ class RefinePlan:
     Attributes
     ----------
     results : tuple of str
-        Results that must be right to the error.
+        Results that must be accurate to within the error.
     error : float
         Largest error, relative to the range of the result over its curve or map.
     start : int

@@ -1,4 +1,4 @@
-"""The planner of refined curves: halves intervals until straight lines between the points are right to the error.
+"""The planner of refined curves: halves intervals until straight lines between points are accurate to within the error.
 
 All curves of a study advance together: a round halves every interval that is not resolved yet. The rows of all rounds
 say everything that there is to know, so that `describe` gives the same curves from the rows of a finished study.

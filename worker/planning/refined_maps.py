@@ -1,4 +1,4 @@
-"""The planner of refined maps: halves rectangular cells until the surface over them is right to the error.
+"""The planner of refined maps: halves rectangular cells until the surface over them is accurate to within the error.
 
 As on curves (`refined_curves`), all maps of a study advance together, and the rows of all rounds say everything.
 """

@@ -1,4 +1,4 @@
-"""What is told of one case beside its trajectory: engagements, strobes and orbit, as numbers, tables and pictures."""
+"""Further tables of one case: engagements, strobes and orbit, as numbers, tables and pictures."""
 
 from __future__ import annotations
 

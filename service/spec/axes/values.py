@@ -146,7 +146,7 @@ def count_text(count: int) -> str:
 def _three(report: Report, pointer: str, data: object, allowed: str) -> Sequence[Any] | None:
     if isinstance(data, list) and len(data) == 3:
         return data
-    report.fault(pointer, "wrong-type", "must be a list of three", data, allowed=allowed)
+    report.fault(pointer, "wrong-type", "must be a list of three values", data, allowed=allowed)
     return None
 
 

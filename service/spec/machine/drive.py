@@ -66,7 +66,7 @@ class Drive(Machine):
         if clutch is not None and rest.startswith("coefficients."):
             last = len(clutch.coefficients) - 1
             return f"the clutch has no such coefficient: they are numbered from 0 (c_1) to {last} (c_{last + 1})"
-        return "names no numeric parameter of the clutch" + did_you_mean(path, self.parameters)
+        return "is not a numeric parameter of the clutch" + did_you_mean(path, self.parameters)
 
 
 def read_drive(report: Report, data: object) -> Drive:

@@ -46,7 +46,7 @@ class Machine:
     def why_not(self, path: str) -> str:
         """A sentence that explains why an axis cannot vary ``path``, and what it can vary."""
         known = tuple(self.parameters)
-        return "names no numeric parameter of the base" + did_you_mean(path.removeprefix("base."), known)
+        return "is not a numeric parameter of the base" + did_you_mean(path.removeprefix("base."), known)
 
 
 def read_plain(report: Report, data: object, catalogue: tuple[Parameter, ...]) -> Machine:

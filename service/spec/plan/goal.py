@@ -204,7 +204,7 @@ def _read_within(
     if kind != "is" or info.kind != "real":
         if "within" in fields:
             report.fault(
-                join(where, "within"), "not-used", "has no meaning here", fields["within"],
+                join(where, "within"), "not-used", "is not used here", fields["within"],
                 allowed="only with `is` and a real number",
             )  # fmt: skip
         return 0.0
@@ -217,7 +217,7 @@ def _read_within(
         width = read_value(report, join(where, "within"), fields["within"], info)
     if width is not None and width <= 0.0:
         report.fault(
-            join(where, "within"), "out-of-range", "is no width", fields.get("within", "1 %"),
+            join(where, "within"), "out-of-range", "is not a valid width", fields.get("within", "1 %"),
             allowed='greater than 0, as in "2 %" of a value other than 0, or a quantity', unit=info.unit,
         )  # fmt: skip
         return None

@@ -52,7 +52,7 @@ def read_outline(report: Report, found: Mapping[str, Any], machine: Machine) -> 
         if name == kind or name not in found or (name == "combine" and found[name] == "grid"):
             continue
         report.fault(
-            f"/{name}", "conflict", f"does not go together with `{kind}`", found[name], allowed=f"without `{name}`"
+            f"/{name}", "conflict", f"cannot be combined with `{kind}`", found[name], allowed=f"without `{name}`"
         )
     outline = _goal(report, found, machine) if kind == "goal" else _refine(report, found, machine)
     return None if report.found > before else outline

@@ -1,4 +1,4 @@
-"""Refinement: curves and maps along adaptive axes, right to an error (`refine` of a spec)."""
+"""Refinement: curves and maps along adaptive axes, accurate to within a given error (`refine` of a spec)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FIELDS: Final = ("results", "error", "start", "finest", "most")
 #: Largest error that can be asked for, and the smallest.
 MIN_ERROR, MAX_ERROR = 1e-4, 0.2
 MIN_FINEST, MAX_FINEST = 16, 4096
-RESULTS: Final = Listed("results", 1, 16, "the results that must be right to the error")
+RESULTS: Final = Listed("results", 1, 16, "the results that must be accurate to within the error")
 START: Final = Described(
     "start",
     "Values at first",
@@ -85,7 +85,7 @@ def _adaptive(report: Report, pointer: str, item: object, machine: Machine) -> A
     paths = read_path_of(report, pointer, found.get("path"), machine)
     where, ends = join(pointer, "adaptive"), found.get("adaptive")
     if not isinstance(ends, list) or len(ends) != 2:
-        report.fault(where, "wrong-type", "must be a list of two", ends, allowed="[from, to]")
+        report.fault(where, "wrong-type", "must be a list of two values", ends, allowed="[from, to]")
         return None
     if paths is None:
         return None

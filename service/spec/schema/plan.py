@@ -45,7 +45,7 @@ def refine_schema() -> Schema:
             "most": MOST.schema(),
         },
         required=("results",),
-        description="curves (one adaptive axis) or maps (two) that are refined until they are right to an error",
+        description="curves (one adaptive axis) or maps (two), refined until they are accurate to the given error",
     )
 
 

@@ -46,7 +46,7 @@ class GoalPlanner:
 
     A round is a generation, without the designs that were evaluated before, or a step of the polish. Columns of the
     points are the variables of the plan in their order, then the paths of its operating points; the cases of a design,
-    one for each operating point, stand together.
+    one for each operating point, are stored next to each other.
     """
 
     def __init__(self, plan: GoalPlan) -> None:

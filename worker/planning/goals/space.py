@@ -59,7 +59,7 @@ class Space:
         return middle
 
     def cases(self, designs: Floats) -> Floats:
-        """The cases of designs: those of a design stand together, one for each operating point."""
+        """The cases of designs: those of a design are next to each other, one for each operating point."""
         points = len(self._at)
         rows = np.repeat(designs, points, axis=0)
         return np.hstack([rows, np.tile(self._at.reshape(points, -1), (len(designs), 1))])

@@ -1,4 +1,4 @@
-"""Violations that a search tolerates at first, so that it comes to thin sets of feasible designs from all around.
+"""Violations that a search tolerates at first, so that it can approach thin feasible sets from both sides.
 
 Designs whose violation is at most epsilon compete as if they were feasible. Epsilon starts as the violation that a
 fifth of the first generation stays below, and falls to 0 (T. Takahama, S. Sakai, "Constrained optimization by

@@ -103,10 +103,10 @@ def refine_fields() -> dict[str, Field]:
     error = f"{100.0 * refine.MIN_ERROR:g} % to {100.0 * refine.MAX_ERROR:g} %"
     finest = f'"1/{refine.MIN_FINEST}" to "1/{refine.MAX_FINEST}"'
     own = [
-        text("results", "Results", f"{refine.RESULTS.help}, parted by semicolons", "", "", required=True),
+        text("results", "Results", f"{refine.RESULTS.help}, separated by semicolons", "", "", required=True),
         text("error", "Error", "of straight lines between the points, relative to the range of a result", error, "1 %"),
         _described(refine.START, "/refine"),
-        text("finest", "Finest step", "no interval is divided further than to this part of the axis", finest, "1/256"),
+        text("finest", "Finest step", "smallest interval, as a fraction of the axis", finest, "1/256"),
         replace(_described(refine.MOST, "/refine"), default="no bound"),
     ]
     return {field.name.rpartition("/")[2]: field for field in own}

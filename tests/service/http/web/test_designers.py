@@ -172,7 +172,7 @@ def test_everything_works_without_javascript(visitor: Visitor, office: Office, e
     expect(wrong(page, "/base/shaft/inertia")).to_contain_text("not a unit of this field")
     named(page, "/base/shaft/inertia").fill("2e-3")
     named(page, "/axes/0/values").fill("0; 0.1; 0.2")
-    page.get_by_role("button", name="Look over").last.click()
+    page.get_by_role("button", name="Preview").last.click()
     expect(page.locator("[data-cases]")).to_have_text("3")
     page.get_by_role("button", name="Submit the study").click()
     page.wait_for_url("**/studies/st_*")
