@@ -55,6 +55,14 @@ ABOUT: Final[dict[str, About]] = {
     "question_drive_inertia": About("irregularity against the inertia of the drive", "the crank press"),
     "question_masses": About("irregularity against masses and geometry of the actuator", "the crank press"),
     "question_operation": About("irregularity against the diagram of the operation", "the crank press"),
+    "fastest_drive": About(
+        "a search for one goal: the fastest drive against 0.3 N*m whose clutch torques stay below 3 N*m",
+        "the rig of one_pendulum",
+    ),
+    "least_flywheel": About(
+        "a search with a limit that binds: the least flywheel that keeps the irregularity below 0.1 at two speeds",
+        "the crank press",
+    ),
 }
 
 

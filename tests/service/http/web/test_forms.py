@@ -35,7 +35,11 @@ def drives() -> list[dict[str, Any]]:
     files = [preset_text(name) for name in preset_names()]
     files += [(path.name, path.read_text()) for path in EXAMPLES.iterdir() if path.suffix in (".json", ".toml")]
     specs = [load_spec(text, format_of(name)) for name, text in files]
-    return [spec for spec in specs if isinstance(spec, dict) and spec.get("model") == "vibration-drive"]
+    return [
+        spec
+        for spec in specs
+        if isinstance(spec, dict) and spec.get("model") == "vibration-drive" and "goal" not in spec
+    ]
 
 
 def physics(study: Study) -> str:

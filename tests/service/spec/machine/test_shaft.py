@@ -272,6 +272,7 @@ def test_every_number_of_a_machine_can_be_an_axis() -> None:
     for name in preset_names():
         file, text = preset_text(name)
         spec: Any = load_spec(text, format_of(file))
+        spec.pop("goal", None)
         if spec["model"] != "machine-shaft":
             continue
         base = parse_spec(spec | {"axes": []}).study
