@@ -28,18 +28,20 @@ class Described:
     ----------
     name, label, help : its name, its label in the form, and its meaning
     kind : "whole" and "number", from ``low`` to ``high``; "periods", a text with a whole number of periods; "time", a
-        number of seconds or a text; "flag"; "choice", one of ``choices``: values and their labels in the form
+        number of seconds or a text; "text", a number or a text within ``limits``; "flag"; "choice", one of ``choices``:
+        values and their labels in the form
     default : what stands for a field that is not given; None where it is required or its absence means something
     """
 
     name: str
     label: str
     help: str
-    kind: Literal["whole", "number", "periods", "time", "flag", "choice"]
+    kind: Literal["whole", "number", "periods", "time", "text", "flag", "choice"]
     low: float = 0
     high: float = 0
     default: Any = None
     choices: tuple[tuple[str, str], ...] = ()
+    limits: str = ""
 
     @property
     def default_text(self) -> str:
@@ -55,7 +57,7 @@ class Described:
     def read(self, report: Report, pointer: str, found: Mapping[str, Any]) -> Any:
         """Its value in the object ``found`` at ``pointer``; None, and a problem noted, when it is wrong or missing.
 
-        Times are read where the frequencies of a study are known.
+        Times are read where the frequencies of a study are known, texts beside their descriptions.
         """
         given = self.name in found
         if not given and self.default is not None:
@@ -79,6 +81,8 @@ class Described:
             return {"type": "string", "examples": [self.default_text], "default": self.default_text, **told}
         if self.kind == "time":
             return {"type": ["number", "string"], "examples": ["60 periods", "2 s", 2.0], "minimum": 0, **told}
+        if self.kind == "text":
+            return {"type": ["number", "string"], "default": self.default, "description": f"{self.help}: {self.limits}"}
         if self.default is not None:
             told["default"] = self.default
         if self.kind == "choice":

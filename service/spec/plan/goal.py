@@ -42,7 +42,9 @@ SEARCH: Final = named(
 )
 FIELDS: Final = ("vary", "best", "subject_to", "at", *SEARCH)
 _KINDS: Final = ("is", "at_least", "at_most")
-_DEFAULT_WITHIN: Final = 0.01
+WITHIN: Final = Described(
+    "within", "", "how far from that", "text", default="1 %", limits="a quantity, or a share of the value"
+)
 
 Variables = list[dict[str, Any]]
 
@@ -210,14 +212,15 @@ def _read_within(
         return 0.0
     if value is None:
         return None
-    share = in_percent(fields["within"]) if "within" in fields else _DEFAULT_WITHIN
+    given = fields.get("within", WITHIN.default)
+    share = in_percent(given)
     if share is not None:
         width: float | None = abs(value) * share
     else:
-        width = read_value(report, join(where, "within"), fields["within"], info)
+        width = read_value(report, join(where, "within"), given, info)
     if width is not None and width <= 0.0:
         report.fault(
-            join(where, "within"), "out-of-range", "is not a valid width", fields.get("within", "1 %"),
+            join(where, "within"), "out-of-range", "is not a valid width", given,
             allowed='greater than 0, as in "2 %" of a value other than 0, or a quantity', unit=info.unit,
         )  # fmt: skip
         return None

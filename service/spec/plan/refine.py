@@ -37,8 +37,22 @@ START: Final = Described(
 )
 MOST: Final = Described("most", "Cases at most", "bound of the cases of all rounds", "whole", 2, MAX_PLANNED_CASES)
 OTHER: Final = named(START)
-_DEFAULT_ERROR: Final = 0.01
-DEFAULT_FINEST: Final = 256
+ERROR: Final = Described(
+    "error",
+    "Error",
+    "largest error of straight lines between the points, relative to the range of the result",
+    "text",
+    default="1 %",
+    limits=f"{100.0 * MIN_ERROR:g} % to {100.0 * MAX_ERROR:g} %",
+)
+FINEST: Final = Described(
+    "finest",
+    "Finest step",
+    "smallest interval, as a fraction of the axis, one over a power of 2",
+    "text",
+    default="1/256",
+    limits=f'"1/{MIN_FINEST}" to "1/{MAX_FINEST}"',
+)
 
 
 def is_adaptive(item: object) -> bool:
@@ -113,8 +127,8 @@ def read_refine(
     before = report.found
     names = RESULTS.read(report, "/refine/results", found.get("results")) or []
     results = read_results(report, "/refine/results", names, infos)
-    error = read_share(report, "/refine/error", found.get("error", _DEFAULT_ERROR), MIN_ERROR, MAX_ERROR)
-    finest = _read_finest(report, found.get("finest", DEFAULT_FINEST))
+    error = read_share(report, "/refine/error", found.get("error", ERROR.default), MIN_ERROR, MAX_ERROR)
+    finest = _read_finest(report, found.get("finest", FINEST.default))
     start = START.read(report, "/refine", found)
     most = MOST.read(report, "/refine", found) if "most" in found else None
     if start is not None and not _power_of_two(start - 1):
@@ -139,7 +153,7 @@ def read_refine(
             "/refine/finest",
             "too-many",
             f"may need {plan.most_cases:,} cases",
-            found.get("finest", DEFAULT_FINEST),
+            found.get("finest", FINEST.default),
             allowed=f"at most {MAX_PLANNED_CASES:,}; `most` limits them",
         )
         return None

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from sprag.service.spec.described import Listed
-from sprag.service.spec.plan.goal import AT, BEST, MAX, SEARCH, SUBJECT_TO, VARY
-from sprag.service.spec.plan.refine import DEFAULT_FINEST, MAX_FINEST, MIN_FINEST, MOST, RESULTS, START
+from sprag.service.spec.plan.goal import AT, BEST, MAX, SEARCH, SUBJECT_TO, VARY, WITHIN
+from sprag.service.spec.plan.refine import ERROR, FINEST, MOST, RESULTS, START
 from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema
 
 _RESULT: Final[Schema] = {"type": "string", "examples": ["shaft.speed.mean", "efficiency", "torque.max"]}
@@ -26,22 +26,12 @@ def adaptive_schema(path: Schema) -> Schema:
 
 def refine_schema() -> Schema:
     """Schema of `refine`."""
-    error: Schema = {
-        "type": ["number", "string"],
-        "default": "1 %",
-        "description": "largest error of straight lines between the points, relative to the range of the result",
-    }
-    finest: Schema = {
-        "type": ["integer", "string"],
-        "default": f"1/{DEFAULT_FINEST}",
-        "description": f"finest division of an adaptive axis, 1/{MIN_FINEST} to 1/{MAX_FINEST}, a power of 2",
-    }
     return object_schema(
         {
             "results": RESULTS.schema(_RESULT),
-            "error": error,
+            "error": ERROR.schema(),
             "start": START.schema(),
-            "finest": finest,
+            "finest": {**FINEST.schema(), "type": ["integer", "string"]},
             "most": MOST.schema(),
         },
         required=("results",),
@@ -65,11 +55,7 @@ def goal_schema(path: Schema) -> Schema:
         {
             "result": _RESULT,
             "is": {**QUANTITY, "description": "value that the result must have"},
-            "within": {
-                **QUANTITY,
-                "description": "how far from that: a quantity or a share",
-                "default": "1 %",
-            },
+            "within": WITHIN.schema(),
             "at_least": QUANTITY,
             "at_most": QUANTITY,
         },

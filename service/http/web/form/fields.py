@@ -96,17 +96,12 @@ def degree_field(pointer: str) -> Field:
 def refine_fields() -> dict[str, Field]:
     """The fields of a refinement, by name."""
 
-    def text(name: str, label: str, meaning: str, limits: str, default: str, *, required: bool = False) -> Field:
-        shown = "shaft.speed.mean; efficiency" if required else ""
-        return Field(f"/refine/{name}", label, "", "", "", meaning, limits, required, default, shown)
-
-    error = f"{100.0 * refine.MIN_ERROR:g} % to {100.0 * refine.MAX_ERROR:g} %"
-    finest = f'"1/{refine.MIN_FINEST}" to "1/{refine.MAX_FINEST}"'
+    meaning = f"{refine.RESULTS.help}, separated by semicolons"
     own = [
-        text("results", "Results", f"{refine.RESULTS.help}, separated by semicolons", "", "", required=True),
-        text("error", "Error", "of straight lines between the points, relative to the range of a result", error, "1 %"),
+        Field("/refine/results", "Results", "", "", "", meaning, "", True, "", "shaft.speed.mean; efficiency"),
+        _described(refine.ERROR, "/refine"),
         _described(refine.START, "/refine"),
-        text("finest", "Finest step", "smallest interval, as a fraction of the axis", finest, "1/256"),
+        _described(refine.FINEST, "/refine"),
         replace(_described(refine.MOST, "/refine"), default="no bound"),
     ]
     return {field.name.rpartition("/")[2]: field for field in own}
@@ -115,7 +110,7 @@ def refine_fields() -> dict[str, Field]:
 def _described(entry: Described, pointer: str) -> Field:
     ends = [number(int(end)) if entry.kind in ("whole", "periods") else f"{end:g}" for end in (entry.low, entry.high)]
     unit = " periods" if entry.kind == "periods" else ""
-    limits = f"{ends[0]} to {ends[1]}{unit}" if entry.high else ""
+    limits = f"{ends[0]} to {ends[1]}{unit}" if entry.high else entry.limits
     name = f"{pointer}/{entry.name}"
     return Field(name, entry.label, "", "", "", entry.help, limits, False, entry.default_text, "", entry.choices)
 

@@ -32,7 +32,10 @@ WAYS: Final = {
     "adaptive": ("from", "to"),
 }
 #: What is asked of a refinement in a form that was not about one.
-REFINE_DEFAULTS: Final[Values] = {"/refine/results": "shaft.speed.mean; efficiency", "/refine/error": "1 %"}
+REFINE_DEFAULTS: Final[Values] = {
+    "/refine/results": "shaft.speed.mean; efficiency",
+    "/refine/error": refine.ERROR.default_text,
+}
 #: The form's choice for a run of a given time, which a spec expresses by its duration or window.
 TIMED: Final = "time"
 _FIELDS: Final = frozenset({"sprag", "model", "name", "base", "run", "axes", "combine", "derive", "refine"})

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sprag.service.http.web.form.fields import refine_fields
 from sprag.service.jobs.preview import preview_json
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.longer import longer_spec
 from sprag.service.spec.report import SpecError
+from sprag.service.spec.schema.plan import refine_schema
 from sprag.worker.chunking import Chunking
 from sprag.worker.planning import most_cases, planner_of
 from sprag.worker.study import Study
@@ -51,6 +53,16 @@ def test_settled_studies_are_refined_by_their_regimes() -> None:
     assert study.plan["half_widths"] == ["shaft.speed.mean"]
     needed = set(planner_of(study.plan).results)
     assert {"regime", "regime.order", "shaft.speed.mean.half_width"} <= needed
+
+
+def test_schema_and_form_name_the_defaults_that_the_reader_takes() -> None:
+    fields = refine_schema()["properties"]
+    given = {name: fields[name]["default"] for name in ("error", "start", "finest")}
+    plan = parsed(refined({"/refine": {"results": ["efficiency"]}})).study.plan
+    assert parsed(refined({"/refine": {"results": ["efficiency"], **given}})).study.plan == plan
+    assert {name: field.default for name, field in refine_fields().items() if name in given} == {
+        name: str(default) for name, default in given.items()
+    }
 
 
 def test_ends_may_be_given_in_any_order_and_unit_and_fields_have_defaults() -> None:
