@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.derive import with_values
 from sprag.worker.limits import MAX_NAME_LENGTH
+from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -26,7 +27,8 @@ def design_spec(spec: Mapping[str, Any], study: Study, case: int, along: str | N
     spec : the study's own spec
     study : the same in SI numbers
     case : number of the case; IndexError when there is none
-    along : path of a parameter that the study varies from 0 to twice its value; by default nothing varies
+    along : path of a parameter that the study varies from 0, or a small value where 0 is not allowed, to twice its
+        value; by default nothing varies
     """
     values = {path: value for path, value in study.case_parameters(case).items() if path not in study.derive}
     kept = {key: value for key, value in spec.items() if key not in {"axes", "combine", "exclude", "refine", "goal"}}
@@ -38,7 +40,9 @@ def design_spec(spec: Mapping[str, Any], study: Study, case: int, along: str | N
     }
     if along is not None:
         most = _BEYOND * values.get(along, study.base[along])
-        made["axes"] = [{"path": along, "linspace": [0, _text(study, along, most), _VALUES]}]
+        entry = parameter_of(study, along)
+        least = 0.0 if entry is None or entry.accepts(0.0) else most / _VALUES
+        made["axes"] = [{"path": along, "linspace": [_text(study, along, least), _text(study, along, most), _VALUES]}]
     return made
 
 

@@ -83,6 +83,8 @@ def test_a_design_becomes_a_study_of_its_own(service: Service) -> None:
     along = parse_spec(design_spec(spec, study, 5, "shaft.load")).study
     assert along.axes[0].values[0] == 0.0
     assert along.axes[0].values[-1] == 2.0 * study.case_parameters(5)["shaft.load"]
+    stiff = parse_spec(design_spec(spec, study, 5, "shaft.inertia")).study  # 0 is not allowed
+    assert 0.0 < stiff.axes[0].values[0] < 0.1 * stiff.axes[0].values[-1]
     form = service.http.get(f"/new?clone={study_id}&case=5&along=shaft.load").text
     inertia = study.case_parameters(5)["shaft.inertia"]
     assert f'name="/base/shaft/inertia" value="{inertia!r} kg*m^2"' in form
