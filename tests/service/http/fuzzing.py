@@ -50,6 +50,7 @@ FURTHER_RULES: Final = (
     "fit_clutch",
     "list_studies",
     "get_curves",
+    "get_front",
     "get_map",
     "get_sensitivity",
     "get_trajectory",
