@@ -1,0 +1,46 @@
+"""Plans of refinements: plain JSON data, and what they refuse."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from sprag.worker.planning.refine import CurveRefiner
+from sprag.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan, half_widths_of
+from tests.worker.planning.test_refine import LOAD, MANY, PLAN
+
+
+def test_a_plan_is_the_same_after_json() -> None:
+    plan = replace(MANY, most=500)
+    assert RefinePlan.from_json(plan.to_json()) == plan
+    assert plan.needed == ("mean", "max", "regime", "regime.order", "mean.half_width")
+    assert half_widths_of(("mean", "max"), ("mean", "max", "mean.half_width")) == ("mean",)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"results": ()}, r"results: \[\] is not allowed; it must be at least one name"),
+        ({"results": ("a", "a")}, "results: .* different names"),
+        ({"error": 0.0}, r"error: 0\.0 is not allowed; it must be between 0 and 1"),
+        ({"start": 18}, "start: 18 is not allowed; it must be a power of two plus one, from 3 to 257"),
+        ({"start": 513}, "start: 513 "),
+        ({"finest": 200}, "finest: 200 is not allowed; it must be a power of two"),
+        ({"most": 0}, "most: 0 is not allowed; it must be at least 1"),
+        ({"adaptive": ()}, "adaptive: 0 "),
+        ({"adaptive": (AdaptiveAxis(("p",), 1.0, 1.0),)}, r"adaptive p: \[1\.0, 1\.0\] .* the first below the second"),
+        ({"fixed": (FixedAxis(("p",), (1.0, 1.0)),)}, r"fixed p: \[1\.0, 1\.0\] .* different values"),
+        ({"half_widths": ("b",)}, "half_widths: .* names of results"),
+        ({"finest": 65536, "adaptive": (LOAD, LOAD)}, "finest: 65536 is not allowed; it must be at most 8,000,000"),
+    ],
+)
+def test_invalid_plans_are_refused(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        replace(PLAN, **change)
+
+
+def test_the_planner_of_curves_takes_one_adaptive_axis() -> None:
+    with pytest.raises(ValueError, match="adaptive: 2 axes"):
+        CurveRefiner(replace(PLAN, adaptive=(LOAD, AdaptiveAxis(("p",), 0.0, 1.0)), finest=64))
