@@ -143,20 +143,22 @@ def _curve(samples: Samples, own: Intervals, index: int, part: slice) -> Curve:
     present = np.isfinite(values).any(axis=0)
     # A result that the whole curve lacks has no jumps beside those of the others.
     jumps, errors = own.jumps[part] & (present | ~present.any()), own.errors[part]
+    passed = len(places) > 1 and bool(own.resolved[part].all())
     return Curve(
         fixed=plan.fixed_values(index),
         x=plan.adaptive[0].at(places, plan.finest),
         ok=samples.ok[index, places],
         values={name: values[:, k] for k, name in enumerate(plan.results)},
         joined={name: ~own.jumps[part][:, k] for k, name in enumerate(plan.results)},
-        errors={name: _largest_of(errors[~jumps[:, k], k], len(places)) for k, name in enumerate(plan.results)},
+        errors={name: _largest_of(errors[~jumps[:, k], k], passed) for k, name in enumerate(plan.results)},
         jumps=tuple(_merged(plan, own.low[part], own.width[part], own.why[part], jumps)),
-        passed=len(places) > 1 and bool(own.resolved[part].all()),
+        passed=passed,
     )
 
 
-def _largest_of(errors: Floats, points: int) -> float | None:
-    if points < 2 or np.isnan(errors).any():
+def _largest_of(errors: Floats, passed: bool) -> float | None:
+    """The largest error; None where it is not known. Where no line is drawn, it has none once all is resolved."""
+    if np.isnan(errors).any() or not (errors.size or passed):
         return None
     return float(errors.max(initial=0.0))
 

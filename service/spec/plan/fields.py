@@ -85,7 +85,8 @@ def in_percent(value: object, *, plain: bool = False) -> float | None:
 
 def read_result(report: Report, pointer: str, value: object, infos: Sequence[ResultInfo]) -> ResultInfo | None:
     """The result of that name; None, and a fault recorded, where there is none."""
-    allowed = "the name of a result of this study, such as 'shaft.speed.mean'"
+    some = next((info.name for info in infos if info.kind == "real"), "")
+    allowed = f"the name of a result of this study, such as '{some}'"
     if not isinstance(value, str):
         missing = value is None
         message = "is required" if missing else "must be the name of a result"

@@ -193,6 +193,12 @@ def _read_constraints(report: Report, data: object, infos: Sequence[ResultInfo])
             )
             continue
         value = read_value(report, join(where, kind), fields[kind], info)
+        if value is not None and kind == "is" and info.kind == "count" and not value.is_integer():
+            report.fault(
+                join(where, kind), "not-a-number", "must be a whole number", fields[kind],
+                allowed="a whole number, or at_least and at_most",
+            )  # fmt: skip
+            continue
         within = _read_within(report, where, fields, info, kind, value)
         if value is not None and within is not None:
             found.append({"result": info.name, kind: value, **({"within": within} if within else {})})

@@ -168,6 +168,9 @@ def _read_finest(report: Report, value: object) -> int | None:
     if isinstance(value, str) and match is None:
         report.fault("/refine/finest", "not-a-number", "is not a part of the axis", value, allowed=allowed)
         return None
+    if match and not MIN_FINEST <= int(match[1]) <= MAX_FINEST:
+        report.fault("/refine/finest", "out-of-range", "is out of range", value, allowed=allowed)
+        return None
     whole = read_whole(report, "/refine/finest", number, MIN_FINEST, MAX_FINEST)
     if whole is not None and not _power_of_two(whole):
         report.fault("/refine/finest", "out-of-range", "is not a power of 2", value, allowed=allowed)

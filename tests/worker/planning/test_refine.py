@@ -378,6 +378,13 @@ def test_the_most_valuable_cases_come_first_and_a_bound_of_cases_holds() -> None
     assert any(jump["low"] <= 1.31 <= jump["high"] for jump in step.summary["curves"][0]["jumps"])
 
 
+def test_the_error_of_a_curve_without_any_line_is_not_known() -> None:
+    _, step = refined(replace(PLAN, start=3, most=3), lambda points: {"a": np.sin(3.0 * points[:, -1])})
+    (curve,) = step.summary["curves"]
+    assert (curve["errors"], curve["passed"], step.summary["error"]) == ({"a": None}, False, None)
+    assert [(jump["low"], jump["high"]) for jump in curve["jumps"]] == [(0.0, 1.6)]
+
+
 def test_before_the_first_rows_nothing_is_known() -> None:
     summary = CurveRefiner(MANY).ask().summary
     assert (summary["error"], summary["cases"], summary["passed"]) == (None, 0, False)

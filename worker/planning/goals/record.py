@@ -44,7 +44,7 @@ class Record:
         goals = survivors.goals[survivors.feasible]
         if not len(goals):
             return
-        self._best = goals.min(axis=0) * self._signs
+        self._best = goals.min(axis=0) * self._signs + 0.0  # no negative zero
         if 2 <= len(self._signs) <= MOST_GOALS:
             if self._reference is None and len(goals) >= max(2, self._plan.population // 10):
                 self._reference = goals.max(axis=0)

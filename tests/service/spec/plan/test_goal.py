@@ -87,6 +87,7 @@ def test_a_goal_is_read_in_si() -> None:
         ({"subject_to": [{"result": "torque.max"}]}, "/goal/subject_to/0", "exactly-one"),
         ({"subject_to": [{"result": "torque.max", "at_most": "5 m"}]}, "/goal/subject_to/0/at_most", "wrong-unit"),
         ({"subject_to": [{"result": "regime", "at_most": 1}]}, "/goal/subject_to/0/at_most", "not-numeric"),
+        ({"subject_to": [{"result": "regime.order", "is": 1.5}]}, "/goal/subject_to/0/is", "not-a-number"),
         ({"subject_to": [{"result": "regime", "is": "round"}]}, "/goal/subject_to/0/is", "invalid-choice"),
         (
             {"subject_to": [{"result": "shaft.speed.mean", "is": 0.0}]},
