@@ -42,7 +42,8 @@ def sentence(rounds: RoundProgress) -> str:
     if not rounds.latest.cases:
         number = _number(rounds)
         told = [f"{number} round" if number == 1 else f"{number} rounds"]
-    return ", ".join([*told, *_state(rounds.latest.summary)])
+    ended = not rounds.latest.cases
+    return ", ".join([*told, *_state(rounds.latest.summary, ended=ended)])
 
 
 def _number(rounds: RoundProgress) -> int:
@@ -55,13 +56,15 @@ def _most(rounds: RoundProgress) -> int:
     return max(rounds.most, _number(rounds))
 
 
-def _state(summary: dict[str, Any]) -> list[str]:
+def _state(summary: dict[str, Any], *, ended: bool) -> list[str]:
     """What a summary says of the requested error."""
     asked, error = summary.get("asked"), summary.get("error")
     if asked is None:
         return []
-    now = "error not known yet" if error is None else f"error now {100.0 * error:.2g} %"
-    return [now, f"asked {100.0 * asked:.2g} %"]
+    when = "" if ended else " yet"
+    now = f"error not known{when}" if error is None else f"error now {100.0 * error:.2g} %"
+    missed = ["not reached with the cases allowed"] if ended and not summary.get("passed", True) else []
+    return [now, f"asked {100.0 * asked:.2g} %", *missed]
 
 
 def _search(summary: dict[str, Any]) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from dataclasses import replace
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.figure import BANDS, Figure, Line
 from sprag.service.results.pictures.curves import paint_figure, painting
 from sprag.service.results.report.content import report_of
+from sprag.service.results.rounds import sentence
+from sprag.service.storage.records import RoundProgress, RoundRecord
 from sprag.worker import models
 from sprag.worker.study import Study
 from tests.service.conftest import API, Service
@@ -205,3 +208,13 @@ def test_a_study_in_which_nothing_varies_has_no_first_curves(service: Service) -
     answer = service.http.get(f"{API}/studies/{service.submit(spec)}/curves")
     assert answer.status_code == 422
     assert "nothing varies" in answer.json()["errors"][0]["message"]
+
+
+def test_a_sentence_says_when_the_bound_of_cases_ended_the_rounds() -> None:
+    summary = {"kind": "refine", "asked": 0.01, "error": None, "passed": False}
+    record = RoundRecord(1, range(3, 3), summary, datetime(2026, 1, 1, tzinfo=UTC))
+    assert sentence(RoundProgress(record, 5, 3)) == (
+        "1 round, error not known, asked 1 %, not reached with the cases allowed"
+    )
+    going = RoundRecord(1, range(3, 5), {**summary, "error": 0.021}, record.planned_at)
+    assert sentence(RoundProgress(going, 5, 9)) == "round 2 of at most 5, error now 2.1 %, asked 1 %"
