@@ -83,13 +83,13 @@ def _create(store: Store) -> str:
 
 def _run(url: str, study: str, fatal: int, killed: Counter[str]) -> None:
     """Run the study in a process of its own that ends before event number ``fatal``; 0: it ends with the study."""
-    told = subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-m", "benchmarks.faults.rounds", url, study, str(fatal)],
         cwd=ROOT, env=environment(), stdout=subprocess.PIPE, text=True, check=False,
     )  # fmt: skip
-    assert told.returncode == (-signal.SIGKILL if told.stdout else 0), told
-    if told.stdout:
-        killed[told.stdout.strip()] += 1
+    assert done.returncode == (-signal.SIGKILL if done.stdout else 0), done
+    if done.stdout:
+        killed[done.stdout.strip()] += 1
 
 
 def _whole(store: Store, study: str) -> tuple[Any, ...]:

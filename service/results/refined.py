@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sprag.service.results.wording import percent
 from sprag.worker import models
 from sprag.worker.planning.refine import Curve as Refined
 from sprag.worker.planning.refine import describe
@@ -24,10 +25,15 @@ if TYPE_CHECKING:
 
 def curve_plan(study: Study) -> RefinePlan | None:
     """The plan of a study that refines curves; None for any other, also one that refines maps."""
+    return refine_plan(study, 1)
+
+
+def refine_plan(study: Study, adaptive: int) -> RefinePlan | None:
+    """The plan of a study that refines along so many axes; None for any other."""
     if study.plan is None or study.plan["kind"] != REFINE:
         return None
     plan = RefinePlan.from_json(study.plan)
-    return plan if len(plan.adaptive) == 1 else None
+    return plan if len(plan.adaptive) == adaptive else None
 
 
 def plan_along(study: Study, path: str) -> RefinePlan | None:
@@ -115,22 +121,21 @@ def sentence(plan: RefinePlan, curves: Sequence[Refined], names: Iterable[str]) 
     every = [curve.errors[name] for curve in curves for name in asked if np.isfinite(curve.values[name]).any()]
     error = None if None in every or not every else max(error for error in every if error is not None)
     passed = all(curve.passed for curve in curves)
-    if error is None:
-        told = f"The error is not known yet; {percent(plan.error)} of the range is asked."
-    elif passed and error <= plan.error:
-        told = f"Within {percent(plan.error)} of the range, as asked,{outside} (estimate: {percent(error)})."
-        told = told.replace(", (", " (")
-    else:
-        told = f"Not reached: {percent(error)} of the range now{outside}, {percent(plan.error)} asked."
+    told = reached(plan.error, error, outside, passed=passed)
     others = [name for name in drawn if name not in asked]
     return f"{told} No error was asked for {', '.join(others)}." if others else told
+
+
+def reached(asked: float, error: float | None, outside: str, *, passed: bool) -> str:
+    """Whether a requested error is reached, for people; ``outside`` is " outside 2 jumps", or "" without jumps."""
+    if error is None:
+        return f"The error is not known yet; {percent(asked)} of the range is asked."
+    if passed and error <= asked:
+        comma = "," if outside else ""
+        return f"Within {percent(asked)} of the range, as asked{comma}{outside} (estimate: {percent(error)})."
+    return f"Not reached: {percent(error)} of the range now{outside}, {percent(asked)} asked."
 
 
 def _apart(jumps: Sequence[Jump]) -> int:
     """Number of jumps; neighbours of different reasons are one."""
     return len({jump["low"] for jump in jumps} - {jump["high"] for jump in jumps})
-
-
-def percent(share: float) -> str:
-    """A share for display."""
-    return f"{100.0 * share:.2g} %"

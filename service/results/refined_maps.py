@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.results.curves import Fetch, Map, not_run
-from sprag.service.results.refined import percent
+from sprag.service.results.refined import reached, refine_plan
 from sprag.service.results.selection import axis_name, held_texts, listed, locate_axes, numeric_results, refused
+from sprag.service.results.wording import percent
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 from sprag.worker.codes import PENDING
 from sprag.worker.planning.refine import describe_maps
-from sprag.worker.planning.refine_plan import REFINE, RefinePlan
+from sprag.worker.planning.refine_plan import RefinePlan
 from sprag.worker.planning.rounds import Rows
 
 if TYPE_CHECKING:
@@ -61,20 +62,12 @@ class RefinedMap:
     def sentence(self) -> str:
         """How right the map is, for people."""
         outside = f" outside jumps ({percent(self.told)} of the map)" if self.told else ""
-        if self.error is None:
-            return f"The error is not known yet; {percent(self.asked)} of the range is asked."
-        if self.passed and self.error <= self.asked:
-            estimate = f"estimate: {percent(self.error)}"
-            return f"Within {percent(self.asked)} of the range, as asked{',' + outside if outside else ''}; {estimate}."
-        return f"Not reached: {percent(self.error)} of the range now{outside}, {percent(self.asked)} asked."
+        return reached(self.asked, self.error, outside, passed=self.passed)
 
 
 def map_plan(study: Study) -> RefinePlan | None:
     """The plan of a study that refines maps; None for any other."""
-    if study.plan is None or study.plan["kind"] != REFINE:
-        return None
-    plan = RefinePlan.from_json(study.plan)
-    return plan if len(plan.adaptive) == 2 else None
+    return refine_plan(study, 2)
 
 
 def squares(plan: RefinePlan) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from sprag.service.results.wording import percent
 from sprag.worker.planning.goals.plan import GOAL
 
 if TYPE_CHECKING:
@@ -62,9 +63,9 @@ def _state(summary: dict[str, Any], *, ended: bool) -> list[str]:
     if asked is None:
         return []
     when = "" if ended else " yet"
-    now = f"error not known{when}" if error is None else f"error now {100.0 * error:.2g} %"
+    now = f"error not known{when}" if error is None else f"error now {percent(error)}"
     missed = ["not reached with the cases allowed"] if ended and not summary.get("passed", True) else []
-    return [now, f"asked {100.0 * asked:.2g} %", *missed]
+    return [now, f"asked {percent(asked)}", *missed]
 
 
 def _search(summary: dict[str, Any]) -> list[str]:

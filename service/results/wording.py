@@ -65,3 +65,8 @@ def words(name: str) -> str:
     text = name.replace(".", " ").replace("_", " ").strip()
     text = re.sub(r"^pendulums (\d+)", r"pendulum \1", text)
     return text[:1].upper() + text[1:] if text[:1].isascii() else text
+
+
+def percent(share: float) -> str:
+    """A share for display."""
+    return f"{100.0 * share:.2g} %"

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.derive import with_values
+from sprag.service.spec.fields import WHICH_CASES
 from sprag.worker.limits import MAX_NAME_LENGTH
 from sprag.worker.models.parameters import parameter_of
 
@@ -31,7 +32,7 @@ def design_spec(spec: Mapping[str, Any], study: Study, case: int, along: str | N
         value; by default nothing varies
     """
     values = {path: value for path, value in study.case_parameters(case).items() if path not in study.derive}
-    kept = {key: value for key, value in spec.items() if key not in {"axes", "combine", "exclude", "refine", "goal"}}
+    kept = {key: value for key, value in spec.items() if key not in WHICH_CASES}
     name, suffix = spec.get("name", ""), f", design of case {case}"
     made = {
         **kept,

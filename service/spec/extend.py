@@ -13,7 +13,7 @@ from sprag.service.faults import Fault
 from sprag.service.spec.axes.axes import axis_values
 from sprag.service.spec.derive import read_machine
 from sprag.service.spec.document import ParsedSpec, parse_spec
-from sprag.service.spec.fields import read_object
+from sprag.service.spec.fields import WHICH_CASES, read_object
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.report import Report, SpecError, join, quantity_text
 
@@ -78,7 +78,7 @@ def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> di
             f"/{given[0]}", "wrong-type", "must be a list", items, allowed="1 item or more, as in the axes of a spec"
         )
         raise report.error()
-    kept = {key: value for key, value in spec.items() if key not in {"axes", "combine", "exclude"}}
+    kept = {key: value for key, value in spec.items() if key not in WHICH_CASES}
     kept["name"] = found.get("name", study.name)
     own = [{"path": list(axis.paths), "values": list(axis.values)} for axis in study.axes]
     if given == ["cases"]:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
+from typing import Any, Final
 
 from sprag.service.spec.report import Report, did_you_mean, join
 from sprag.service.spec.units import PERIOD_NAMES, QuantityError, example, parse_exact, split_quantity, to_float
 from sprag.worker.models import Parameter
+
+#: Fields of a spec that say which cases a study has.
+WHICH_CASES: Final = frozenset({"axes", "combine", "exclude", "refine", "goal"})
 
 
 def coefficient_unit(index: int) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.service.spec.fields import WHICH_CASES
 from sprag.service.spec.run import SETTLED_FIELDS, TIMED_FIELDS
 from sprag.worker.limits import MAX_NAME_LENGTH, MAX_RUN_PERIODS, MAX_SETTLED_PERIODS
 from sprag.worker.models import SETTLED, is_settled
@@ -33,7 +34,7 @@ def longer_spec(
     cases : numbers of cases, at least one
     at_most : by default `TIMES` times as many as the study allows
     """
-    kept = {key: value for key, value in spec.items() if key not in {"axes", "combine", "exclude", "refine", "goal"}}
+    kept = {key: value for key, value in spec.items() if key not in WHICH_CASES}
     if is_settled(study.run):
         most = min(TIMES * study.run["at_most"], MAX_SETTLED_PERIODS) if at_most is None else at_most
         run = {key: value for key, value in spec.get("run", {}).items() if key not in TIMED_FIELDS}

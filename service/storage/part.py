@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 
 from sprag.service.storage.errors import StudyNotFound
-from sprag.service.storage.tables import DISPATCHER, STUDIES
+from sprag.service.storage.tables import CHUNKS, DISPATCHER, STUDIES
 from sprag.worker.ports import EpochLostError
-from sprag.worker.states import StudyEvent, StudyState, follow
+from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from sprag.service.storage.session import Session
-    from sprag.worker.ports import Clock
+    from sprag.worker.ports import Chunk, Clock
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
@@ -57,6 +59,22 @@ def announce(connection: sa.Connection) -> None:
     """Notify dispatchers of a change once this transaction is committed, where the database supports it."""
     if connection.dialect.name == "postgresql":
         connection.exec_driver_sql("NOTIFY sprag")
+
+
+def add_chunks(connection: sa.Connection, chunks: Iterable[Chunk], detail: str | None = None) -> None:
+    """Add waiting chunks; ``detail`` says where they come from."""
+    rows = [
+        {
+            "study": chunk.study,
+            "first": chunk.first,
+            "count": chunk.count,
+            "state": ChunkState.WAITING,
+            "failures": chunk.failures,
+            "detail": detail,
+        }
+        for chunk in chunks
+    ]
+    connection.execute(sa.insert(CHUNKS), rows)
 
 
 class Part:

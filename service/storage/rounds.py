@@ -8,15 +8,16 @@ import numpy as np
 import sqlalchemy as sa
 
 from sprag.service.storage.cases import Cases
+from sprag.service.storage.part import add_chunks
 from sprag.service.storage.round_table import add_round, rounds_of
 from sprag.service.storage.studies import Studies
-from sprag.service.storage.tables import CHUNKS, STUDIES
+from sprag.service.storage.tables import ROUNDS, STUDIES
 from sprag.service.storage.work import Work
 from sprag.worker import models
 from sprag.worker.chunking import spans
 from sprag.worker.planning.rounds import Rows
 from sprag.worker.ports import Chunk
-from sprag.worker.states import ChunkState, StudyState
+from sprag.worker.states import StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -38,7 +39,9 @@ class Rounds(Studies, Cases, Work):
         with self.session.read() as connection:
             if not _needs_round(connection, number):
                 return None
-            return [found.cases for found in rounds_of(connection, number) if found.cases]
+            c = ROUNDS.c
+            query = sa.select(c.first, c["count"]).where(c.study == number, c["count"] > 0).order_by(c.round)
+            return [range(first, first + count) for first, count in connection.execute(query)]
 
     def round_rows(self, number: int, study: Study, cases: range, results: Sequence[str]) -> Rows:
         """The rows of one round."""
@@ -64,19 +67,7 @@ class Rounds(Studies, Cases, Work):
                 return None
             add_round(connection, number, first, count, summary, self._now())
             chunks = [Chunk(number, first + start, size) for start, size in sizes]
-            connection.execute(
-                sa.insert(CHUNKS),
-                [
-                    {
-                        "study": number,
-                        "first": chunk.first,
-                        "count": chunk.count,
-                        "state": ChunkState.WAITING,
-                        "failures": 0,
-                    }
-                    for chunk in chunks
-                ],
-            )
+            add_chunks(connection, chunks)
             self._change(connection, number, cases=study.cases, study=text)
         self._forget_reuse(number)
         return chunks

@@ -15,7 +15,15 @@ from cachetools import LRUCache
 
 from sprag.service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyEnded, StudyNotFound
 from sprag.service.storage.order import Orders
-from sprag.service.storage.part import MAX_INTEGER, SILENT_SECONDS, announce, micros_of, moment, optional_moment
+from sprag.service.storage.part import (
+    MAX_INTEGER,
+    SILENT_SECONDS,
+    add_chunks,
+    announce,
+    micros_of,
+    moment,
+    optional_moment,
+)
 from sprag.service.storage.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
 from sprag.service.storage.records import Progress, RoundProgress, StudyPage, StudyRecord, record_of
 from sprag.service.storage.round_table import add_round, latest_round
@@ -34,6 +42,7 @@ from sprag.worker import models
 from sprag.worker.chunking import Chunking, spans
 from sprag.worker.limits import MAX_AXIS_VALUES
 from sprag.worker.planning import planner_of
+from sprag.worker.ports import Chunk
 from sprag.worker.reuse import kin_hash
 from sprag.worker.states import TERMINAL, ChunkState, StudyEvent, StudyState
 from sprag.worker.study import Study
@@ -126,13 +135,7 @@ class Studies(Orders):
             number = connection.execute(sa.insert(STUDIES).values(values).returning(STUDIES.c.number)).scalar_one()
             if row["most_cases"] is not None:
                 add_round(connection, number, 0, row["cases"], {}, values["created_at"])
-            connection.execute(
-                sa.insert(CHUNKS),
-                [
-                    {"study": number, "first": first, "count": count, "state": ChunkState.WAITING, "failures": 0}
-                    for first, count in spans(row["cases"], row["chunk_cases"])
-                ],
-            )
+            add_chunks(connection, [Chunk(number, *span) for span in spans(row["cases"], row["chunk_cases"])])
             if idempotency_key is not None:
                 connection.execute(
                     sa.insert(IDEMPOTENCY_KEYS).values(

@@ -9,7 +9,7 @@ import numpy as np
 import sqlalchemy as sa
 
 from sprag.service.storage.owners import own_study, why_abandoned
-from sprag.service.storage.part import micros_of, moment, optional_moment
+from sprag.service.storage.part import add_chunks, micros_of, moment, optional_moment
 from sprag.service.storage.records import DispatcherRecord
 from sprag.service.storage.reuse import Reuse, copy_rows, endings_of, mark_origin
 from sprag.service.storage.round_table import add_round, latest_round
@@ -274,20 +274,7 @@ class Work(Reuse):
             if not self._claimed(connection, epoch, chunk):
                 return
             connection.execute(sa.delete(CHUNKS).where(_is(chunk)))
-            connection.execute(
-                sa.insert(CHUNKS),
-                [
-                    {
-                        "study": part.study,
-                        "first": part.first,
-                        "count": part.count,
-                        "state": ChunkState.WAITING,
-                        "failures": part.failures,
-                        "detail": detail,
-                    }
-                    for part in parts
-                ],
-            )
+            add_chunks(connection, parts, detail)
 
     def quarantine(self, epoch: int, chunk: Chunk, ending: str, detail: str) -> None:
         """Give every case of a claimed chunk ``ending`` without results and mark the chunk done."""

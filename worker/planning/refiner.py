@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,15 +49,19 @@ class Refiner(ABC):
         self.results = plan.needed
         self.most_cases = plan.most_cases
         self.most_rounds = 1 + self.rounds_per_halving * ((plan.finest // (plan.start - 1)).bit_length() - 1)
-        self.samples = Samples(plan)
         self.rounds = 0
 
+    @cached_property
+    def samples(self) -> Samples:
+        """The rows so far. Their arrays can be large, and the bounds of a plan need none."""
+        return Samples(self.plan)
+
     def tell(self, rows: Rows) -> None:
-        """Take the rows of the next round; ValueError where they are not the points asked for."""
-        combinations, positions = self._places()
-        if not np.array_equal(rows.points, self.plan.points(combinations, positions)):
-            raise ValueError(f"round {self.rounds}: the rows are not those of the points asked for")
-        self.samples.put(combinations, positions, rows.ok, rows.values)
+        """Take the rows of the next round; ValueError where one is not a point of the plan.
+
+        Any points of the plan will do: where failed cases were run again, another planner may have asked for others.
+        """
+        self.samples.add(rows)
         self.rounds += 1
         self.changed()
 

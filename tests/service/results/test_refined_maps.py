@@ -48,7 +48,7 @@ def test_a_smooth_map_is_right_to_the_error_everywhere(study: Study) -> None:
     assert {ending for row in found.endings for ending in row} == {"interpolated"}
     assert found.refined is not None
     assert found.refined.passed
-    assert found.refined.sentence.startswith("Within 2 % of the range, as asked; estimate: ")
+    assert found.refined.sentence.startswith("Within 2 % of the range, as asked (estimate: ")
     assert found.refined.x.size < 33 * 33 / 4
 
 
