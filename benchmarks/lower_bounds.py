@@ -20,7 +20,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parents[1]
-#: Extras whose packages are tried too.
+#: Extras whose packages are included.
 EXTRAS = ("tables", "server", "postgres", "cluster")
 TOOLS = ("pytest", "hypothesis", "jsonschema", "openpyxl", "pandas", "polars", "psutil", "openapi-spec-validator")
 TESTS = (
@@ -50,7 +50,7 @@ def lowest() -> dict[str, str]:
 
 
 def main() -> int:
-    """Install, say which versions there are, run the tests."""
+    """Install the packages, print their versions, run the tests."""
     low = lowest()
     with tempfile.TemporaryDirectory() as folder:
         python = Path(folder) / "bin" / "python"

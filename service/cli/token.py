@@ -76,12 +76,12 @@ def revoke(
     as_json: JsonFlag = False,
 ) -> None:
     """Revoke a token and end the browser sessions that it started, within two seconds."""
-    from sprag.service.storage.errors import TokenNotFound
+    from sprag.service.storage.errors import TokenNotFoundError
 
     with _store(db) as store:
         try:
             record = store.revoke_token(token_id)
-        except TokenNotFound as error:
+        except TokenNotFoundError as error:
             raise WrongInputError("token-not-found", str(error)) from error
     if as_json:
         write_json(_json(record))

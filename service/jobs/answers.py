@@ -33,7 +33,7 @@ FEW: Final = 20_000
 
 
 def curves_of(library: Library, study_id: str, query: CurveQuery) -> Curves:
-    """The curves of a study; raises StudyNotFound, and SelectionError as `select` does."""
+    """The curves of a study; raises StudyNotFoundError, and SelectionError as `select` does."""
     study = library.store.study(study_id)
     selection = select(study, models.study_results(study), query)
     return draw(selection, partial(library.store.rows_for_cases, study_id))
@@ -122,7 +122,7 @@ def map_picture(library: Library, study_id: str, query: CurveQuery, title: str, 
 
 
 def front_of(library: Library, study_id: str, exact: bool) -> Designs:
-    """The designs of a study; raises StudyNotFound, and FaultError for a study without a goal."""
+    """The designs of a study; raises StudyNotFoundError, and FaultError for a study without a goal."""
     store = library.store
     return designs_of(
         store.study(study_id), store.rounds(study_id), partial(store.rows_for_cases, study_id), exact=exact

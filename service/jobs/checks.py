@@ -97,7 +97,7 @@ def extended_study(
     now: datetime,
     given: Mapping[str, object],
 ) -> Submission:
-    """A study extended by the body of a request; raises SpecError and StudyNotFound."""
+    """A study extended by the body of a request; raises SpecError and StudyNotFoundError."""
     store = library.store
     parsed = parse_extended(store.spec(study_id), store.study(study_id), load_spec(content, form))
     return submission(parsed, store, now, finish_by=finish, given=given)
@@ -113,7 +113,7 @@ def longer_study(
 ) -> Submission:
     """The cases of a study with that regime, or with that flag where there are no regimes, with more time to settle.
 
-    There must be at least one. Raises SpecError and StudyNotFound.
+    There must be at least one. Raises SpecError and StudyNotFoundError.
     """
     store = library.store
     named = {"regime" if models.is_settled(store.study(study_id).run) else "flag": kind}

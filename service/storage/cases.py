@@ -83,7 +83,7 @@ class Cases(Orders):
         )
 
     def case_rows(self, study_id: str, after_case: int = -1, limit: int = BLOCK_ROWS) -> RowBlock:
-        """At most ``limit`` finished cases with numbers above ``after_case``, in order; raises StudyNotFound."""
+        """At most ``limit`` finished cases with numbers above ``after_case``, in order; raises StudyNotFoundError."""
         with self.session.read() as connection:
             rows = self._rows(connection, study_id)
             return _block(rows.infos, _read(connection, rows, after_case, limit))
@@ -113,7 +113,7 @@ class Cases(Orders):
         return _block(rows.infos, found)
 
     def kinds(self, study_id: str) -> Kinds:
-        """How many finished cases have which regime and which flag; raises StudyNotFound.
+        """How many finished cases have which regime and which flag; raises StudyNotFoundError.
 
         Counting reads every row of the study, so that the counts of a revision, with which its rows change, are kept.
         Until the study is over, only the rows of chunks that finished since are counted; afterwards a retry may replace
@@ -157,7 +157,7 @@ class Cases(Orders):
         return frozenset((first, count, finished_at) for first, count, finished_at in found)
 
     def cases_of_kind(self, study_id: str, regime: str | None = None, flag: str | None = None) -> NDArray[np.int64]:
-        """Numbers of the cases of a regime or with a flag, ascending; raises StudyNotFound."""
+        """Numbers of the cases of a regime or with a flag, ascending; raises StudyNotFoundError."""
         with self.session.read() as connection:
             rows = self._rows(connection, study_id)
             kind = _of_kind(rows, regime, flag)
@@ -176,14 +176,14 @@ class Cases(Orders):
             after = int(found.cases[-1])
 
     def case_row(self, study_id: str, case: int) -> CaseRow | None:
-        """One case, None while it is not finished; raises StudyNotFound."""
+        """One case, None while it is not finished; raises StudyNotFoundError."""
         found = self.case_page(study_id, case - 1, 1)
         return next(found.rows()) if len(found) and found.cases[0] == case else None
 
     def rows_for_cases(self, study_id: str, cases: ArrayLike, names: Sequence[str]) -> CaseColumns:
         """Results ``names`` of the given case numbers (shape (m,), any order), aligned with them.
 
-        Raises StudyNotFound, and KeyError for a name that is not a result of the study.
+        Raises StudyNotFoundError, and KeyError for a name that is not a result of the study.
         """
         wanted: NDArray[np.int64] = np.asarray(cases, dtype=np.int64).reshape(-1)
         unique, position = np.unique(wanted, return_inverse=True)

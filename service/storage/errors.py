@@ -7,17 +7,17 @@ __all__ = [
     "DatabaseError",
     "DatabaseFullError",
     "EndingError",
-    "IdempotencyConflict",
-    "NothingToRetry",
+    "IdempotencyConflictError",
+    "NothingToRetryError",
     "PageTokenError",
-    "ScheduleNotFound",
+    "ScheduleNotFoundError",
     "SchemaError",
     "StoreError",
-    "StudyBusy",
-    "StudyEnded",
-    "StudyNotFound",
-    "TokenNotFound",
-    "TooManySchedules",
+    "StudyBusyError",
+    "StudyEndedError",
+    "StudyNotFoundError",
+    "TokenNotFoundError",
+    "TooManySchedulesError",
     "busy",
 ]
 
@@ -58,7 +58,7 @@ class DatabaseFullError(DatabaseError, StoreFullError):
     code = "storage-full"
 
 
-class StudyNotFound(StoreError):  # noqa: N818 - the name callers read
+class StudyNotFoundError(StoreError):
     """There is no study of that id."""
 
     code = "study-not-found"
@@ -67,11 +67,11 @@ class StudyNotFound(StoreError):  # noqa: N818 - the name callers read
         super().__init__(f"there is no study {study_id!r}")
         self.study_id = study_id
 
-    def __reduce__(self) -> "tuple[type[StudyNotFound], tuple[str]]":
-        return StudyNotFound, (self.study_id,)
+    def __reduce__(self) -> "tuple[type[StudyNotFoundError], tuple[str]]":
+        return StudyNotFoundError, (self.study_id,)
 
 
-class ScheduleNotFound(StoreError):  # noqa: N818
+class ScheduleNotFoundError(StoreError):
     """There is no schedule of that id."""
 
     code = "schedule-not-found"
@@ -80,13 +80,13 @@ class ScheduleNotFound(StoreError):  # noqa: N818
         super().__init__(f"there is no schedule {schedule_id!r}")
 
 
-class TooManySchedules(StoreError):  # noqa: N818
+class TooManySchedulesError(StoreError):
     """The limit of schedules is reached."""
 
     code = "wrong-state"
 
 
-class TokenNotFound(StoreError):  # noqa: N818
+class TokenNotFoundError(StoreError):
     """There is no token of that id."""
 
     code = "token-not-found"
@@ -95,25 +95,25 @@ class TokenNotFound(StoreError):  # noqa: N818
         super().__init__(f"there is no token {token_id!r}")
 
 
-class StudyBusy(StoreError):  # noqa: N818
+class StudyBusyError(StoreError):
     """The study has not ended, so it cannot be deleted."""
 
     code = "wrong-state"
 
 
-class StudyEnded(StoreError):  # noqa: N818
+class StudyEndedError(StoreError):
     """The study has ended, so its priority cannot be changed."""
 
     code = "wrong-state"
 
 
-class NothingToRetry(StoreError):  # noqa: N818
+class NothingToRetryError(StoreError):
     """The study has no case to run again as requested."""
 
     code = "wrong-state"
 
 
-class IdempotencyConflict(StoreError):  # noqa: N818
+class IdempotencyConflictError(StoreError):
     """The idempotency key was already used with another body or other parameters."""
 
     code = "idempotency-conflict"

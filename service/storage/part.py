@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
 
-from sprag.service.storage.errors import StudyNotFound
+from sprag.service.storage.errors import StudyNotFoundError
 from sprag.service.storage.tables import CHUNKS, DISPATCHER, STUDIES
 from sprag.worker.ports import EpochLostError
 from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
@@ -89,12 +89,12 @@ class Part:
         return micros_of(self.clock.now())
 
     def _row(self, connection: sa.Connection, study_id: str, *columns: sa.ColumnElement[Any]) -> sa.Row[Any]:
-        """Columns of the study of that id; raises StudyNotFound."""
+        """Columns of the study of that id; raises StudyNotFoundError."""
         found = connection.execute(
             sa.select(*columns).where(STUDIES.c.id == study_id, STUDIES.c.deleted_at.is_(None))
         ).one_or_none()
         if found is None:
-            raise StudyNotFound(study_id)
+            raise StudyNotFoundError(study_id)
         return found
 
     def _own(self, connection: sa.Connection, epoch: int) -> None:

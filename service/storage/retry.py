@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sqlalchemy as sa
 
-from sprag.service.storage.errors import NothingToRetry
+from sprag.service.storage.errors import NothingToRetryError
 from sprag.service.storage.order import Orders
 from sprag.service.storage.records import StudyRecord, record_of
 from sprag.service.storage.tables import CHUNKS, ENDINGS, RECORD_COLUMNS, STUDIES, results_table
@@ -43,8 +43,8 @@ class Retries(Orders):
     def retry_study(self, study_id: str, endings: Collection[str] | None = None) -> StudyRecord:
         """Run the cases of an ended study again that did not end ok, or that have one of ``endings``.
 
-        All other rows are kept. Raises StudyNotFound, TransitionError when the study has not ended or was cancelled,
-        and NothingToRetry when there is no such case.
+        All other rows are kept. Raises StudyNotFoundError, TransitionError when the study has not ended or was
+        cancelled, and NothingToRetryError when there is no such case.
         """
         c = STUDIES.c
         while True:
@@ -53,7 +53,7 @@ class Retries(Orders):
                 follow(StudyState(row.state), StudyEvent.RETRY)
                 counts = _failed(connection, row.number, endings)
                 if not counts:
-                    raise NothingToRetry(_nothing(endings))
+                    raise NothingToRetryError(_nothing(endings))
                 order = self._order(row.number, connection)
                 ended = tuple(counts)
                 runs = _runs(connection, row, ended) if order is None else _places(connection, row, ended, order)
@@ -108,7 +108,7 @@ def _places(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...
 
 def _few(runs: list[Run]) -> list[Run]:
     if len(runs) > MAX_CHUNKS:
-        raise NothingToRetry(
+        raise NothingToRetryError(
             f"the failed cases lie in more than {MAX_CHUNKS} places: select fewer by their ending, or submit them as "
             "a study of their own"
         )

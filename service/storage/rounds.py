@@ -30,7 +30,7 @@ class Rounds(Studies, Cases, Work):
     """The rounds of studies."""
 
     def rounds(self, study_id: str) -> list[RoundRecord]:
-        """The rounds of a study, in order; none where its cases were given. Raises StudyNotFound."""
+        """The rounds of a study, in order; none where its cases were given. Raises StudyNotFoundError."""
         with self.session.read() as connection:
             return rounds_of(connection, self._row(connection, study_id, STUDIES.c.number).number)
 

@@ -12,7 +12,7 @@ import sqlalchemy as sa
 
 from sprag.service.schedules.fields import ScheduleFields
 from sprag.service.schedules.times import Timing, Window, read_time_of_day
-from sprag.service.storage.errors import IdempotencyConflict, ScheduleNotFound, TooManySchedules
+from sprag.service.storage.errors import IdempotencyConflictError, ScheduleNotFoundError, TooManySchedulesError
 from sprag.service.storage.part import Part, micros_of, moment, optional_moment
 from sprag.service.storage.schedule_tables import SCHEDULE_RUNS, SCHEDULES
 from sprag.service.storage.tables import STUDIES, WAITS_FOR_WINDOW
@@ -91,10 +91,10 @@ class Schedules(Part):
     def create_schedule(
         self, fields: ScheduleFields, *, idempotency_key: str | None = None, body_hash: str = ""
     ) -> ScheduleRecord:
-        """Store a new schedule; raises TooManySchedules.
+        """Store a new schedule; raises TooManySchedulesError.
 
         A key that was used before with the same ``body_hash`` returns the schedule of that request; with another hash
-        it raises IdempotencyConflict.
+        it raises IdempotencyConflictError.
         """
         schedule_id = f"sc_{secrets.token_hex(8)}"
         asked = {"idempotency_key": idempotency_key, "body_hash": body_hash} if idempotency_key is not None else {}
@@ -105,14 +105,14 @@ class Schedules(Part):
                     return earlier
             alive = sa.select(sa.func.count()).select_from(SCHEDULES).where(_S.deleted_at.is_(None))
             if connection.execute(alive).scalar_one() >= MAX_SCHEDULES:
-                raise TooManySchedules(f"there are {MAX_SCHEDULES} schedules already; delete one first")
+                raise TooManySchedulesError(f"there are {MAX_SCHEDULES} schedules already; delete one first")
             connection.execute(
                 sa.insert(SCHEDULES).values(id=schedule_id, created_at=self._now(), **asked, **self._values(fields))
             )
             return self._schedule(connection, schedule_id)
 
     def schedule_of_key(self, idempotency_key: str, body_hash: str) -> ScheduleRecord | None:
-        """The schedule that was sent with that key; raises IdempotencyConflict when it was sent with another body."""
+        """The schedule that was sent with that key; raises IdempotencyConflictError when its body was another."""
         with self.session.read() as connection:
             return self._schedule_of_key(connection, idempotency_key, body_hash)
 
@@ -121,11 +121,11 @@ class Schedules(Part):
         if row is None:
             return None
         if row.body_hash != body_hash:
-            raise IdempotencyConflict(f"the idempotency key {key!r} was already used with another body")
+            raise IdempotencyConflictError(f"the idempotency key {key!r} was already used with another body")
         return self._record(connection, row)
 
     def get_schedule(self, schedule_id: str) -> ScheduleRecord:
-        """The schedule of that id; raises ScheduleNotFound."""
+        """The schedule of that id; raises ScheduleNotFoundError."""
         with self.session.read() as connection:
             return self._schedule(connection, schedule_id)
 
@@ -136,7 +136,7 @@ class Schedules(Part):
             return tuple(self._record(connection, row) for row in connection.execute(query).all())
 
     def schedule_runs(self, schedule_id: str) -> tuple[RunRecord, ...]:
-        """The latest due times of the schedule, latest first; raises ScheduleNotFound."""
+        """The latest due times of the schedule, latest first; raises ScheduleNotFoundError."""
         with self.session.read() as connection:
             number = self._schedule_row(connection, schedule_id).number
             return self._runs(connection, number, SHOWN_RUNS)
@@ -159,7 +159,7 @@ class Schedules(Part):
             return self._schedule(connection, schedule_id)
 
     def delete_schedule(self, schedule_id: str) -> None:
-        """Delete the schedule; its studies are kept, with their window. Raises ScheduleNotFound."""
+        """Delete the schedule; its studies are kept, with their window. Raises ScheduleNotFoundError."""
         with self.session.write() as connection:
             number = self._schedule_row(connection, schedule_id).number
             connection.execute(
@@ -308,7 +308,7 @@ class Schedules(Part):
             sa.select(SCHEDULES).where(_S.id == schedule_id, _S.deleted_at.is_(None))
         ).one_or_none()
         if row is None:
-            raise ScheduleNotFound(schedule_id)
+            raise ScheduleNotFoundError(schedule_id)
         return row
 
     def _schedule(self, connection: sa.Connection, schedule_id: str) -> ScheduleRecord:

@@ -13,7 +13,13 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 from cachetools import LRUCache
 
-from sprag.service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyEnded, StudyNotFound
+from sprag.service.storage.errors import (
+    IdempotencyConflictError,
+    PageTokenError,
+    StudyBusyError,
+    StudyEndedError,
+    StudyNotFoundError,
+)
 from sprag.service.storage.order import Orders
 from sprag.service.storage.part import (
     MAX_INTEGER,
@@ -90,7 +96,7 @@ class Studies(Orders):
         """Accept a study: the study and its chunks in one transaction.
 
         ``spec`` is the user's own, kept verbatim. A key that was used before with the same ``body_hash`` returns the
-        study of that request; with another hash it raises IdempotencyConflict. A ``fresh`` study reuses no rows of
+        study of that request; with another hash it raises IdempotencyConflictError. A ``fresh`` study reuses no rows of
         others. A study with a deadline ``finish_by`` is run coarse to fine and held at that time.
         """
         return self.insert_study(
@@ -147,7 +153,7 @@ class Studies(Orders):
             return self._told(connection, record_of(written))
 
     def get_study(self, study_id: str) -> StudyRecord:
-        """The study of that id; raises StudyNotFound."""
+        """The study of that id; raises StudyNotFoundError."""
         with self.session.read() as connection:
             return self._study_record(connection, study_id)
 
@@ -169,13 +175,13 @@ class Studies(Orders):
         )
 
     def spec(self, study_id: str) -> dict[str, Any]:
-        """The user's spec, verbatim; raises StudyNotFound."""
+        """The user's spec, verbatim; raises StudyNotFoundError."""
         with self.session.read() as connection:
             spec: dict[str, Any] = json.loads(self._row(connection, study_id, STUDIES.c.spec).spec)
         return spec
 
     def study(self, study_id: str) -> Study:
-        """The study in SI numbers; raises StudyNotFound.
+        """The study in SI numbers; raises StudyNotFoundError.
 
         Some are kept in memory, because they change only by further rounds.
         """
@@ -230,11 +236,11 @@ class Studies(Orders):
             return connection.execute(query).scalar_one()
 
     def progress(self, study_id: str) -> Progress:
-        """Progress of the study; raises StudyNotFound."""
+        """Progress of the study; raises StudyNotFoundError."""
         return self.look(study_id)[1]
 
     def look(self, study_id: str) -> tuple[StudyRecord, Progress]:
-        """The study and its progress, both read in one transaction; raises StudyNotFound."""
+        """The study and its progress, both read in one transaction; raises StudyNotFoundError."""
         with self.session.read() as connection:
             row = self._row(connection, study_id, *RECORD_COLUMNS)
             endings = connection.execute(
@@ -278,15 +284,15 @@ class Studies(Orders):
         return record, Progress(state, row.cases, row.done, row.ok, dict(endings), rate, left, covered, rounds, *times)
 
     def pause_study(self, study_id: str) -> StudyRecord:
-        """Hold the study until it is resumed; raises StudyNotFound, TransitionError when it has ended."""
+        """Hold the study until it is resumed; raises StudyNotFoundError, TransitionError when it has ended."""
         return self._wish(study_id, StudyEvent.PAUSE)
 
     def resume_study(self, study_id: str) -> StudyRecord:
-        """Let a held study continue; raises StudyNotFound, TransitionError when it has ended."""
+        """Let a held study continue; raises StudyNotFoundError, TransitionError when it has ended."""
         return self._wish(study_id, StudyEvent.RESUME)
 
     def cancel_study(self, study_id: str) -> StudyRecord:
-        """Request the end of the study; raises StudyNotFound, TransitionError when it is finished or failed."""
+        """Request the end of the study; raises StudyNotFoundError, TransitionError when it is finished or failed."""
         return self._wish(study_id, StudyEvent.CANCEL)
 
     def _wish(self, study_id: str, event: StudyEvent) -> StudyRecord:
@@ -304,13 +310,13 @@ class Studies(Orders):
     def prioritize_study(self, study_id: str, priority: int) -> StudyRecord:
         """Change the priority of the study: among waiting studies the highest runs first.
 
-        Raises StudyNotFound, and StudyEnded where the study has ended.
+        Raises StudyNotFoundError, and StudyEndedError where the study has ended.
         """
         with self.session.write() as connection:
             row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.state)
             number, state = row.number, StudyState(row.state)
             if state.terminal:
-                raise StudyEnded(f"the study {study_id} is {state.value}: its priority no longer matters")
+                raise StudyEndedError(f"the study {study_id} is {state.value}: its priority no longer matters")
             self._change(connection, number, STUDIES.c.priority != priority, priority=priority)
             announce(connection)
             return self._study_record(connection, study_id)
@@ -318,13 +324,15 @@ class Studies(Orders):
     def study_of_key(self, idempotency_key: str, body_hash: str | None) -> StudyRecord | None:
         """The study that was submitted with that key; ``body_hash`` None stands for any body.
 
-        Raises IdempotencyConflict when it was submitted with another body.
+        Raises IdempotencyConflictError when it was submitted with another body.
         """
         with self.session.read() as connection:
             return _study_of_key(connection, idempotency_key, body_hash)
 
     def delete_study(self, study_id: str) -> None:
-        """Delete a study that has ended or is held at its deadline; raises StudyNotFound, or StudyBusy for any other.
+        """Delete a study that has ended or is held at its deadline.
+
+        Raises StudyNotFoundError, or StudyBusyError for any other study.
 
         The study is invisible when this returns; `Purging.purge_steps` removes its rows later.
         """
@@ -332,7 +340,7 @@ class Studies(Orders):
             row = self._row(connection, study_id, STUDIES.c.number, STUDIES.c.state, STUDIES.c.waits_for)
             state = StudyState(row.state)
             if not state.terminal and row.waits_for != HELD_AT_DEADLINE:
-                raise StudyBusy(f"the study {study_id} is {state.value}: cancel it before it is deleted")
+                raise StudyBusyError(f"the study {study_id} is {state.value}: cancel it before it is deleted")
             for table in (ENDINGS, IDEMPOTENCY_KEYS):
                 connection.execute(sa.delete(table).where(table.c.study == row.number))
             connection.execute(sa.update(STUDIES).where(STUDIES.c.number == row.number).values(deleted_at=self._now()))
@@ -350,7 +358,7 @@ class Studies(Orders):
         with self.session.read() as connection:
             found = list(connection.execute(sa.select(c.id).where(old).order_by(c.number)).scalars())
         for study_id in () if dry else found:
-            with suppress(StudyNotFound, StudyBusy):  # somebody else has deleted it or runs it again
+            with suppress(StudyNotFoundError, StudyBusyError):  # somebody else has deleted it or runs it again
                 self.delete_study(study_id)
         return found
 
@@ -393,7 +401,9 @@ def _study_of_key(connection: sa.Connection, key: str, body_hash: str | None) ->
     if row is None:
         return None
     if body_hash is not None and row.body_hash != body_hash:
-        raise IdempotencyConflict(f"the idempotency key {key!r} was already used with another body or other parameters")
+        raise IdempotencyConflictError(
+            f"the idempotency key {key!r} was already used with another body or other parameters"
+        )
     return record_of(row)
 
 

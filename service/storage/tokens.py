@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import sqlalchemy as sa
 
-from sprag.service.storage.errors import TokenNotFound
+from sprag.service.storage.errors import TokenNotFoundError
 from sprag.service.storage.part import Part, moment, optional_moment
 from sprag.service.storage.scopes import TokenScope
 from sprag.service.storage.tables import METADATA
@@ -81,7 +81,7 @@ class Tokens(Part):
         return tuple(map(_record, rows))
 
     def revoke_token(self, token_id: str) -> TokenRecord:
-        """Revoke a token; raises TokenNotFound. Revoking it twice has no further effect."""
+        """Revoke a token; raises TokenNotFoundError. Revoking it twice has no further effect."""
         with self.session.write() as connection:
             row = connection.execute(
                 sa.update(TOKENS)
@@ -90,7 +90,7 @@ class Tokens(Part):
                 .returning(TOKENS)
             ).one_or_none()
             if row is None:
-                raise TokenNotFound(token_id)
+                raise TokenNotFoundError(token_id)
             return _record(row)
 
 

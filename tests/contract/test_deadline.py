@@ -9,7 +9,7 @@ from datetime import timedelta
 import numpy as np
 import pytest
 
-from sprag.service.storage.errors import NothingToRetry
+from sprag.service.storage.errors import NothingToRetryError
 from sprag.service.storage.records import InTime, StudyRecord
 from sprag.service.storage.store import Store
 from sprag.worker import models
@@ -150,7 +150,7 @@ def test_failed_cases_run_again_and_no_others(store: Store, clock: fakes.HandClo
     assert store.settle(epoch, record.number) is StudyState.FINISHED
     np.testing.assert_array_equal(store.case_rows(record.id).values, fakes.values(0, 9))
     assert store.progress(record.id).endings == {"ok": 9}
-    with pytest.raises(NothingToRetry):
+    with pytest.raises(NothingToRetryError):
         store.retry_study(record.id)
 
 

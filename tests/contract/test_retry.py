@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sprag.service.storage.errors import NothingToRetry, StudyNotFound
+from sprag.service.storage.errors import NothingToRetryError, StudyNotFoundError
 from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.store import Store
 from sprag.worker import models
@@ -63,7 +63,7 @@ def test_exactly_the_failed_cases_run_again(store: Store, endings: list[str], ch
     record = made(store, endings)
     failed = [case for case, name in enumerate(endings) if (name in chosen if chosen else name != "ok")]
     if not failed:
-        with pytest.raises(NothingToRetry):
+        with pytest.raises(NothingToRetryError):
             store.retry_study(record.id, chosen or None)
         assert store.get_study(record.id) == record
         return
@@ -127,15 +127,15 @@ def test_a_study_that_has_not_ended_or_was_cancelled_is_not_run_again(store: Sto
     store.settle(store.take_over("test"), record.number)
     with pytest.raises(TransitionError, match="cancelled"):
         store.retry_study(record.id)
-    with pytest.raises(StudyNotFound):
+    with pytest.raises(StudyNotFoundError):
         store.retry_study("st_nothing")
 
 
 def test_nothing_to_run_again_is_said(store: Store) -> None:
     record = made(store, [models.OK] * 3)
-    with pytest.raises(NothingToRetry, match="every case of the study ended ok"):
+    with pytest.raises(NothingToRetryError, match="every case of the study ended ok"):
         store.retry_study(record.id)
     failed = made(store, ["diverged"] * 3)
-    with pytest.raises(NothingToRetry, match="ended as crashed or timed_out"):
+    with pytest.raises(NothingToRetryError, match="ended as crashed or timed_out"):
         store.retry_study(failed.id, ["timed_out", "crashed"])
     assert store.retry_study(failed.id, ["diverged"]).state is StudyState.QUEUED

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.storage.errors import StudyNotFound
+from sprag.service.storage.errors import StudyNotFoundError
 from sprag.service.storage.part import SystemClock
 from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.store import Store
@@ -290,7 +290,7 @@ def test_a_deleted_study_takes_its_rounds_with_it(store: Store) -> None:
     record = create(store)
     finish(store, record)
     store.delete_study(record.id)
-    with pytest.raises(StudyNotFound):
+    with pytest.raises(StudyNotFoundError):
         store.rounds(record.id)
     store.purge()
     with store.session.read() as connection:

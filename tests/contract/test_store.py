@@ -8,7 +8,7 @@ from functools import partial
 import pytest
 
 from sprag.service.storage import sqlite_files
-from sprag.service.storage.errors import IdempotencyConflict, PageTokenError, StudyBusy, StudyNotFound
+from sprag.service.storage.errors import IdempotencyConflictError, PageTokenError, StudyBusyError, StudyNotFoundError
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.ports import Chunk
@@ -34,9 +34,9 @@ def test_a_study_comes_back_as_it_was_given(store: Store) -> None:
 def test_unknown_studies_are_not_found(store: Store) -> None:
     asked = (store.get_study, store.spec, store.study, store.progress, store.cancel_study, store.delete_study)
     for ask in (*asked, partial(store.prioritize_study, priority=1)):
-        with pytest.raises(StudyNotFound, match="st_nothing"):
+        with pytest.raises(StudyNotFoundError, match="st_nothing"):
             ask("st_nothing")
-    with pytest.raises(StudyNotFound):
+    with pytest.raises(StudyNotFoundError):
         store.case_rows("st_nothing")
 
 
@@ -53,7 +53,7 @@ def test_the_same_key_gives_the_same_study(store: Store) -> None:
     first = create(store, idempotency_key="k", body_hash="a")
     again = create(store, idempotency_key="k", body_hash="a")
     assert again == first
-    with pytest.raises(IdempotencyConflict, match="'k'"):
+    with pytest.raises(IdempotencyConflictError, match="'k'"):
         create(store, idempotency_key="k", body_hash="b")
     assert create(store, idempotency_key="other", body_hash="b").id != first.id
     assert len(store.list_studies().studies) == 2
@@ -118,12 +118,12 @@ def test_every_change_raises_the_revision(store: Store) -> None:
 
 def test_only_ended_studies_are_deleted_and_then_wholly(store: Store) -> None:
     record, other = create(store, idempotency_key="k", body_hash="a"), create(store)
-    with pytest.raises(StudyBusy, match="queued"):
+    with pytest.raises(StudyBusyError, match="queued"):
         store.delete_study(record.id)
     finish(store, record)
     finish(store, other)
     store.delete_study(record.id)
-    with pytest.raises(StudyNotFound):
+    with pytest.raises(StudyNotFoundError):
         store.get_study(record.id)
     store.purge()
     assert [study.id for study in store.list_studies().studies] == [other.id]

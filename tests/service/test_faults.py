@@ -71,7 +71,7 @@ def test_every_fault_of_a_machine_is_told_with_a_code() -> None:
         SpecError([Fault("/run", "wrong-type", "must be an object", 1, "an object")]),
         SelectionError([ParameterFault("at", "unknown-value", "the axis has no such value")]),
         FaultError("queue-full", "Too many studies wait.", retry_after=5),
-        storage.StudyNotFound("st_1"),
+        storage.StudyNotFoundError("st_1"),
     ],
 )
 def test_a_fault_is_the_same_in_another_process(error: Exception) -> None:

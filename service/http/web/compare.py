@@ -75,7 +75,7 @@ class Comparison:
 
 
 def comparison(context: Context, given: QueryParams) -> Comparison:
-    """The comparison of a URL; SelectionError where the studies have nothing in common, StudyNotFound for
+    """The comparison of a URL; SelectionError where the studies have nothing in common, StudyNotFoundError for
     unknown ones.
     """
     ids = list(dict.fromkeys(name for name in given.getlist("study") if name))[:_MOST]

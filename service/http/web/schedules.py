@@ -24,7 +24,7 @@ from sprag.service.presets import preset_names
 from sprag.service.schedules.fields import ScheduleFields, change_fields
 from sprag.service.schedules.times import zones
 from sprag.service.spec.report import SpecError
-from sprag.service.storage.errors import StudyNotFound, TooManySchedules
+from sprag.service.storage.errors import StudyNotFoundError, TooManySchedulesError
 from sprag.worker.limits import MAX_PRIORITY
 
 router = APIRouter(include_in_schema=False)
@@ -102,7 +102,7 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
             first = fault.where.split("/")[1] if fault.where else ""
             sentence = f"{fault.message}; allowed: {fault.allowed}" if fault.allowed else fault.message
             faults.setdefault(_FIELD_OF.get(first, first), []).append(sentence)
-    except (StudyNotFound, TooManySchedules) as error:
+    except (StudyNotFoundError, TooManySchedulesError) as error:
         faults["source"] = [str(error)]
     if faults:
         return await run_in_threadpool(_form, context, values, faults, schedule_id, status=422)
@@ -186,5 +186,5 @@ def _form(
 def _known(context: Context, study_id: str) -> list[Any]:
     try:
         return [context.store.get_study(study_id)]
-    except StudyNotFound:
+    except StudyNotFoundError:
         return []

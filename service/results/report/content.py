@@ -77,7 +77,7 @@ class Report:
 
 
 def report_of(store: Store, study_id: str) -> Report:
-    """The report of a stored study; raises StudyNotFound."""
+    """The report of a stored study; raises StudyNotFoundError."""
     record, progress = store.look(study_id)
     report = make_report(
         record,

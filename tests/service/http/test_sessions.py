@@ -17,7 +17,7 @@ from pydantic import SecretStr
 from sprag.service.http import access
 from sprag.service.http.app import create_app
 from sprag.service.settings import Settings
-from sprag.service.storage.errors import TokenNotFound
+from sprag.service.storage.errors import TokenNotFoundError
 from sprag.service.storage.scopes import TokenScope
 from sprag.service.storage.store import Store
 from sprag.worker.states import StudyState
@@ -96,7 +96,7 @@ def test_a_revoked_token_is_worthless_and_the_service_stays_shut(
     monkeypatch.setattr(access, "BELIEVED_SECONDS", 0.0)
     assert client.get("/api/v1/studies").status_code == 401
     assert browser.get("/").status_code == 303
-    with pytest.raises(TokenNotFound):
+    with pytest.raises(TokenNotFoundError):
         office.store.revoke_token("tk_0")
 
 

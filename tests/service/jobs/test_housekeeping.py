@@ -11,7 +11,7 @@ import pytest
 
 from sprag.service.jobs.housekeeping import Housekeeping
 from sprag.service.storage import purging
-from sprag.service.storage.errors import DatabaseBusyError, StudyNotFound
+from sprag.service.storage.errors import DatabaseBusyError, StudyNotFoundError
 from sprag.service.storage.records import StudyRecord
 from sprag.service.storage.store import Store
 from sprag.worker.chunking import Chunking
@@ -46,7 +46,7 @@ def test_deleting_removes_no_row_itself_and_each_step_few(store: Store, monkeypa
     monkeypatch.setattr(purging, "PURGED_ROWS", 4)
     record, other = finished(store), finished(store)
     store.delete_study(record.id)
-    with pytest.raises(StudyNotFound):
+    with pytest.raises(StudyNotFoundError):
         store.get_study(record.id)
     assert count(store, "vibration_drive_1") == 18
     assert list(store.purge_steps()) == [4, 4, 1, 4, 1, 1]  # rows, chunks, the study itself

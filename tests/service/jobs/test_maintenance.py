@@ -15,7 +15,7 @@ from sprag.service.jobs.dispatching import worker_settings
 from sprag.service.jobs.maintenance import Maintenance, MaintenancePlan, backups
 from sprag.service.jobs.submission import accept
 from sprag.service.spec.document import parse_spec
-from sprag.service.storage.errors import StudyNotFound
+from sprag.service.storage.errors import StudyNotFoundError
 from sprag.service.storage.store import Store
 from tests.service.timed_spec import SPEC
 from tests.worker.fakes import HandClock
@@ -116,7 +116,7 @@ def test_a_fault_of_one_task_leaves_the_others_and_the_nights_to_come(
     with monkeypatch.context() as patch:
         patch.setattr(store, "backup", lambda _: 1 / 0)
         maintenance.look()
-    with pytest.raises(StudyNotFound):
+    with pytest.raises(StudyNotFoundError):
         store.get_study(study.id)
     clock.seconds += 601.0
     maintenance.look()
@@ -147,7 +147,7 @@ def test_studies_that_ended_long_ago_are_deleted_and_no_others(store: Store, clo
     assert store.get_study(old.id)
     clock.seconds = 31 * DAY
     maintenance.look()
-    with pytest.raises(StudyNotFound):
+    with pytest.raises(StudyNotFoundError):
         store.get_study(old.id)
     assert {store.get_study(running.id).id, store.get_study(young.id).id} == {running.id, young.id}
 

@@ -13,7 +13,7 @@ from sprag.service.http.app import chunking
 from sprag.service.jobs import scheduler as module
 from sprag.service.jobs.scheduler import Scheduler
 from sprag.service.schedules.fields import ScheduleFields, read_fields
-from sprag.service.storage.errors import DatabaseBusyError, ScheduleNotFound
+from sprag.service.storage.errors import DatabaseBusyError, ScheduleNotFoundError
 from sprag.service.storage.schedules import RunState
 from sprag.service.storage.store import Store
 from sprag.worker.states import StudyState
@@ -197,7 +197,7 @@ def test_the_window_stays_when_the_schedule_is_deleted(service: Service, clock: 
     clock.set("2026-01-01T12:00")
     look()
     store.delete_schedule(kept.id)
-    with pytest.raises(ScheduleNotFound):
+    with pytest.raises(ScheduleNotFoundError):
         store.get_schedule(kept.id)
     clock.set("2026-01-01T23:00")
     look()

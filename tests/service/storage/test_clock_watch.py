@@ -19,7 +19,7 @@ from sprag.service.schedules.fields import read_fields
 from sprag.service.settings import Settings
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.clock_watch import ClockWatch
-from sprag.service.storage.errors import StudyNotFound
+from sprag.service.storage.errors import StudyNotFoundError
 from sprag.service.storage.store import Store
 from tests.service.conftest import InThread
 from tests.service.timed_spec import SPEC
@@ -87,7 +87,7 @@ def test_a_jump_deletes_nothing_and_is_told_and_survives_a_restart(
     assert store.get_study(study).id == study
     clock.seconds = 31.5 * DAY
     looker.look()
-    with pytest.raises(StudyNotFound):
+    with pytest.raises(StudyNotFoundError):
         store.get_study(study)
 
 
@@ -135,7 +135,7 @@ def test_the_command_deletes_nothing_on_the_word_of_a_clock_that_jumped(
     assert store.get_study(study).id == study
     assert execute(["db", "clock", "--db", settings.database]) == 0
     assert execute(command) == 0
-    with pytest.raises(StudyNotFound):
+    with pytest.raises(StudyNotFoundError):
         store.get_study(study)
 
 
@@ -146,7 +146,7 @@ def test_what_was_missed_is_deleted_at_the_start_and_while_backups_fail(
     folder.write_text("a file where the folder is to be")
     clock.seconds = 31.4 * DAY  # the machine is off at 02:30, always
     Maintenance(store, MaintenancePlan(folder, study_days=30)).look()
-    with pytest.raises(StudyNotFound):
+    with pytest.raises(StudyNotFoundError):
         store.get_study(study)
 
 
