@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 from typing import TYPE_CHECKING, Any
 
@@ -78,7 +79,7 @@ def test_reading_that_is_cut_off_is_told_to_come_back(portal: BlockingPortal) ->
     portal.call(cut)
     assert sent.status == 503
     assert (b"retry-after", b"5") in sent.messages[0]["headers"]
-    assert b"The service is ending" in sent.messages[1]["body"]
+    assert json.loads(sent.messages[1]["body"])["type"] == "/problems/unavailable"
 
 
 def test_no_write_begins_after_the_cut_and_the_one_under_way_is_kept(service: Service, spec: Any) -> None:

@@ -207,7 +207,7 @@ def test_a_study_in_which_nothing_varies_has_no_first_curves(service: Service) -
     spec = {name: value for name, value in SPEC.items() if name not in {"axes", "refine"}}
     answer = service.http.get(f"{API}/studies/{service.submit(spec)}/curves")
     assert answer.status_code == 422
-    assert "nothing varies" in answer.json()["errors"][0]["message"]
+    assert answer.json()["errors"][0]["code"] == "not-an-axis"
 
 
 def test_a_sentence_says_when_the_bound_of_cases_ended_the_rounds() -> None:

@@ -207,7 +207,9 @@ def test_a_map_has_rows_of_y(service: Service, grid: dict[str, Any]) -> None:
     twice = ask(service, study_id, "x=shaft.load&y=shaft.load&z=torque.max&at=excitation.frequency=25", "map")
     assert [item["parameter"] for item in twice.json()["errors"]] == ["y"]
     left = ask(service, study_id, "x=shaft.load&y=excitation.frequency&z=torque.max", "map")
-    assert "left open: give its value as at=excitation.amplitude_x=VALUE" in left.json()["detail"]
+    (error,) = left.json()["errors"]
+    assert error["parameter"] == "at"
+    assert "at=excitation.amplitude_x=" in left.json()["detail"]
     assert "by=" not in left.json()["detail"]
 
 
