@@ -213,6 +213,19 @@ class AxisEffect(TypedDict):
     first_order_error: Annotated[float | None, Doc("half width of its 95 % interval; null where it is exact")]
     total: Annotated[float | None, Doc("share that would remain if everything but this axis were fixed")]
     total_error: Annotated[float | None, Doc("half width of its 95 % interval; null where it is exact")]
+    mu: Annotated[float | None, Doc("mean elementary effect of the whole range, in the result's unit; morris only")]
+    mu_star: Annotated[float | None, Doc("mean of the absolute elementary effects")]
+    mu_star_error: Annotated[float | None, Doc("half width of its 95 % interval")]
+    sigma: Annotated[float | None, Doc("standard deviation of the elementary effects")]
+
+
+class PairEffect(TypedDict):
+    """The interaction of two axes."""
+
+    paths: list[str]
+    other_paths: list[str]
+    second_order: Annotated[float | None, Doc("share of the variance by the interaction of these two axes alone")]
+    error: Annotated[float | None, Doc("half width of its 95 % interval; null where it is exact")]
 
 
 class ResultSensitivity(TypedDict):
@@ -222,13 +235,18 @@ class ResultSensitivity(TypedDict):
     unit: str
     description: str
     method: Annotated[
-        str, Doc("grid: exact; saltelli: by the design for it; rbd-fast: from a sample; none: a note says why")
+        str,
+        Doc(
+            "grid: exact; saltelli: by the design for it; morris: elementary effects; rbd-fast: from a sample; "
+            "none: a note says why"
+        ),
     ]
     cases: Annotated[int, Doc("cases that have the result")]
     missing: Annotated[int, Doc("cases that do not have it")]
     mean: float | None
     variance: float | None
     effects: list[AxisEffect]
+    pairs: Annotated[list[PairEffect], Doc("second-order indices; empty where the method does not give them")]
     notes: list[str]
 
 

@@ -24,6 +24,9 @@ PictureFile = Annotated[
 ]
 
 _PICTURES = ("svg", "png", "pdf")
+#: Indices and the headings of their columns.
+_SHARES = {"first_order": "first order", "first_order_error": "+-", "total": "total", "total_error": "+-"}
+_ELEMENTARY = {"mu": "mu", "mu_star": "mu*", "mu_star_error": "+-", "sigma": "sigma"}
 
 
 def file_format(file: str, allowed: tuple[str, ...], what: str) -> str:
@@ -151,14 +154,20 @@ def _show_sensitivity(found: dict[str, Any]) -> None:
 def _show_effects(result: dict[str, Any]) -> None:
     way = "no shares" if result["method"] == "none" else f"method {result['method']}"
     title = f"{heading(result['result'], result['unit'])}: {result['cases']} cases, {way}"
-    columns = [("axis", False), ("first order", True), ("+-", True), ("total", True), ("+-", True)]
+    names = _ELEMENTARY if result["method"] == "morris" else _SHARES
+    columns = [("axis", False), *((name, True) for name in names.values())]
     columns += [("least mean", True), ("largest mean", True)]
     rows = []
     for effect in result["effects"]:
         means = [value for value in effect["means"] if value is not None]
-        shares = [effect[name] for name in ("first_order", "first_order_error", "total", "total_error")]
-        rows.append((", ".join(effect["paths"]), *shares, min(means, default=None), max(means, default=None)))
+        indices = [effect[name] for name in names]
+        rows.append((", ".join(effect["paths"]), *indices, min(means, default=None), max(means, default=None)))
     show_table(title, columns, rows)
+    if result["pairs"]:
+        told = [(", ".join(pair["paths"]), ", ".join(pair["other_paths"]), pair["second_order"], pair["error"])
+                for pair in result["pairs"]]  # fmt: skip
+        columns = [("axis", False), ("with", False), ("second order", True), ("+-", True)]
+        show_table("interactions of two axes", columns, told)
     say(*(f"note: {text}" for text in result["notes"]))
 
 

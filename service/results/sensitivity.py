@@ -1,24 +1,23 @@
 """What the results of a study depend on: main effects of every axis, and shares of the variance (Sobol indices).
 
 First-order index of an axis: the share of a result's variance that would vanish if only this axis were fixed. Total
-index: the share that would remain if everything but this axis were fixed; it includes interactions. (Saltelli et al.,
-Computer Physics Communications 181 (2010) 259; Tarantola et al., Reliability Engineering 91 (2006) 717.)
+index: the share that would remain if everything but this axis were fixed; it includes interactions. Second-order index
+of two axes: the share by their interaction alone. (Saltelli et al., Computer Physics Communications 181 (2010) 259;
+Tarantola et al., Reliability Engineering 91 (2006) 717.) Of trajectories, elementary effects instead (Morris,
+Technometrics 33 (1991) 161; Campolongo et al., Environmental Modelling & Software 22 (2007) 1509).
 """
 
 from __future__ import annotations
 
-import math
-import warnings
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
 from sprag.service.answers import filled
-from sprag.service.answers.results import AxisEffect, ResultSensitivity
+from sprag.service.answers.results import AxisEffect, PairEffect, ResultSensitivity
 from sprag.service.faults import Fault
 from sprag.service.json_text import numbers
 from sprag.service.results.curves import Fetch
@@ -32,6 +31,17 @@ from sprag.service.results.sensitivity_design import (
     scattered,
     why_no_shares,
 )
+from sprag.service.results.sensitivity_indices import (
+    LEAST_CASES,
+    Indices,
+    Pair,
+    grid_indices,
+    morris_indices,
+    nothing,
+    saltelli_indices,
+    sample_indices,
+)
+from sprag.service.spec.axes.sample import LEVELS, cases_of
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
 
@@ -43,15 +53,13 @@ if TYPE_CHECKING:
 
     Numbers = NDArray[np.float64]
 
-#: Method of the indices: exact from a full grid, from the Saltelli design, from a sample, or none.
-Method = Literal["grid", "saltelli", "rbd-fast", "none"]
+#: Method of the indices: exact from a full grid, from the Saltelli design, elementary effects of trajectories, from a
+#: sample, or none.
+Method = Literal["grid", "saltelli", "morris", "rbd-fast", "none"]
 #: Most cases that are used; more take seconds and add nothing.
 MOST_CASES: Final = 1_000_000
 #: Groups of values of an axis without a grid, for its main effect.
 BINS: Final = 10
-#: Fewest cases from which indices are estimated.
-LEAST_CASES: Final = 65
-_SEED: Final = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,20 +70,19 @@ class Effect:
     ----------
     values, means : arrays of one length
         Values of the axis (SI), or middles of groups of them, and the mean of the result there; NaN for none.
-    first_order, total : float or None
-        Indices, None where the method does not tell them.
-    first_order_error, total_error : float or None
-        Half widths of their 95 % intervals; None where they are exact.
+    indices : Indices
     """
 
     paths: tuple[str, ...]
     unit: str
     values: Numbers
     means: Numbers
-    first_order: float | None
-    first_order_error: float | None
-    total: float | None
-    total_error: float | None
+    indices: Indices
+
+    def to_json(self) -> AxisEffect:
+        """The same as JSON data."""
+        given = {"paths": list(self.paths), "unit": self.unit}
+        return filled(AxisEffect, self.indices, **given, values=numbers(self.values), means=numbers(self.means))
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,15 +96,18 @@ class Sensitivity:
     mean: float | None
     variance: float | None
     effects: tuple[Effect, ...]
+    pairs: tuple[Pair, ...]
     notes: tuple[str, ...]
 
     def to_json(self) -> ResultSensitivity:
         """The same as JSON data."""
-        info, effects = self.info, []
-        for effect in self.effects:
-            effects.append(filled(AxisEffect, effect, values=numbers(effect.values), means=numbers(effect.means)))
-        told = {"result": info.name, "unit": info.unit, "description": info.description, "effects": effects}
-        return filled(ResultSensitivity, self, **told)
+        info, effects = self.info, [effect.to_json() for effect in self.effects]
+        pairs = []
+        for pair in self.pairs:
+            first, second = (list(self.effects[at].paths) for at in (pair.first, pair.second))
+            pairs.append(PairEffect(paths=first, other_paths=second, second_order=pair.index, error=pair.error))
+        given = {"result": info.name, "unit": info.unit, "description": info.description}
+        return filled(ResultSensitivity, self, **given, effects=effects, pairs=pairs)
 
 
 def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fetch: Fetch) -> list[Sensitivity]:
@@ -118,19 +128,21 @@ def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fet
     kinds = kind_columns(regime)
     columns = fetch(np.arange(study.cases, dtype=np.int64), list(dict.fromkeys([*names, *kinds])))
     regimes, _ = kinds_of(columns.values, regime)
-    base = _saltelli_base(study, spec)
-    return [_of_result(study, varying, info, columns.values[info.name], regimes, base) for info in results]
+    sample = _design(study, spec)
+    return [_of_result(study, varying, info, columns.values[info.name], regimes, sample) for info in results]
 
 
-def _saltelli_base(study: Study, spec: Mapping[str, Any]) -> int | None:
-    """Number of base points of the study's Saltelli design; None when its cases are not such a design."""
+def _design(study: Study, spec: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """The sample whose cases are those of the study, where it is a design for indices; None otherwise."""
     axes = spec.get("axes")
     if not (isinstance(axes, list) and len(axes) == 1 and isinstance(axes[0], Mapping)) or spec.get("exclude"):
         return None
     sample = axes[0]
-    if sample.get("sample") != "saltelli" or sample.get("count", 0) * (len(study.axes) + 2) != study.cases:
+    if sample.get("sample") not in {"saltelli", "morris"}:
         return None
-    return int(sample["count"])
+    second = sample.get("second_order", False)
+    cases = cases_of(sample["sample"], sample.get("count", 0), len(study.axes), second_order=second)
+    return sample if cases == study.cases else None
 
 
 def _settled_only(y: Numbers, regimes: list[str | None] | None, notes: list[str]) -> Numbers:
@@ -155,7 +167,7 @@ def _of_result(
     info: ResultInfo,
     y: Numbers,
     regimes: list[str | None] | None,
-    base: int | None,
+    sample: Mapping[str, Any] | None,
 ) -> Sensitivity:
     kinds: list[str] = []
     y = _settled_only(y, regimes, kinds)
@@ -169,37 +181,38 @@ def _of_result(
     columns = np.stack([axis.array[every[at]] for axis, at in zip(varying, positions, strict=True)], axis=1)
     notes = [f"{missing} cases without this result are left out"] if missing else []
     method: Method = "none"
-    indices: list[Indices] = [(None, None, None, None)] * len(varying)
+    indices, pairs = nothing(len(varying))
     if not cases:
         notes = ["no case has this result"]
     elif study.combine == "grid" and not missing:
         method = "grid"
-        indices = _grid_indices(y.reshape(study.shape), positions)
-    elif base is not None:
-        method = "saltelli"
-        indices = _saltelli_indices(y, base, len(study.axes), notes)
-        indices = [indices[at] for at in positions]
+        indices, pairs = grid_indices(y.reshape(study.shape), positions)
+    elif sample is not None and len(varying) == len(study.axes):
+        method = sample["sample"]
+        if method == "morris":
+            indices, pairs = morris_indices(columns, y, LEVELS, notes)
+        else:
+            second = sample.get("second_order", False)
+            indices, pairs = saltelli_indices(y, sample["count"], len(varying), notes, second_order=second)
     elif study.combine == "zip" and (scarce := _too_few(columns[known])):
         notes.append(scarce)
     elif study.combine == "zip" and is_sample(columns[known]):
         method = "rbd-fast"
-        indices = _sample_indices(columns[known], values, notes)
+        indices, pairs = sample_indices(columns[known], values, notes)
     elif not missing and is_factorial(columns):
         method = "grid"
-        indices = _grid_indices(factorial_table(columns, y), list(range(len(varying))))
+        indices, pairs = grid_indices(factorial_table(columns, y), list(range(len(varying))))
     else:
         notes.append(why_no_shares(columns, known, [axis_name(study, axis.paths[0]) for axis in varying]))
     if mean is not None and variance is not None and variance <= (1e-13 * mean) ** 2:
         notes.append("the result is the same in every case")
-        indices = [(None, None, None, None)] * len(varying)
+        indices, pairs = nothing(len(varying))
     effects = tuple(
-        Effect(axis.paths, unit_of(study, axis.paths[0]), *_main_effect(axis, column[known], values), *numbers_)
-        for axis, column, numbers_ in zip(varying, columns.T, indices, strict=True)
+        Effect(axis.paths, unit_of(study, axis.paths[0]), *_main_effect(axis, column[known], values), own)
+        for axis, column, own in zip(varying, columns.T, indices, strict=True)
     )
-    return Sensitivity(info, method, cases, missing, mean, variance, effects, (*kinds, *notes))
-
-
-Indices = tuple[float | None, float | None, float | None, float | None]
+    told = (*kinds, *notes)
+    return Sensitivity(info, method, cases, missing, mean, variance, effects, tuple(pairs), told)
 
 
 def _main_effect(axis: Axis, column: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:
@@ -221,66 +234,7 @@ def _main_effect(axis: Axis, column: Numbers, y: Numbers) -> tuple[Numbers, Numb
         return values, np.asarray(np.where(count > 0, total / np.maximum(count, 1), np.nan), dtype=np.float64)
 
 
-def _grid_indices(table: Numbers, positions: list[int]) -> list[Indices]:
-    """Exact shares of the variance over the points of a full grid, all with equal weight."""
-    variance = float(table.var())
-    every = tuple(range(table.ndim))
-    found: list[Indices] = []
-    for axis in positions:
-        others = tuple(other for other in every if other != axis)
-        first = float(table.mean(axis=others).var()) if others else variance
-        total = float(table.var(axis=axis).mean())
-        found.append((first / variance, None, total / variance, None) if variance > 0.0 else (None,) * 4)
-    return found
-
-
-def _saltelli_indices(y: Numbers, base: int, dimensions: int, notes: list[str]) -> list[Indices]:
-    """SALib's estimates; a point with any missing case is left out with all its cases."""
-    from SALib.analyze import sobol
-
-    blocks = y.reshape(base, dimensions + 2)
-    whole = np.isfinite(blocks).all(axis=1)
-    if not whole.all():
-        notes.append(f"{int((~whole).sum())} of {base} points of the design are left out with all their cases")
-    if whole.sum() * (dimensions + 2) < LEAST_CASES:
-        notes.append("too few cases for indices")
-        return [(None, None, None, None)] * dimensions
-    with _quiet():
-        found = sobol.analyze(_problem(dimensions), blocks[whole].reshape(-1), calc_second_order=False, seed=_SEED)
-    return [
-        tuple(_finite(found[key][index]) for key in ("S1", "S1_conf", "ST", "ST_conf"))  # type: ignore[misc]
-        for index in range(dimensions)
-    ]
-
-
 def _too_few(x: Numbers) -> str:
     """The sentence about too few cases of a sample, shape (cases, axes); "" where they suffice or are not a sample."""
     few = len(x) < LEAST_CASES and going_together(x) is None and all(scattered(column) for column in x.T)
     return f"too few cases for indices: {len(x)}, and {LEAST_CASES} are needed" if few else ""
-
-
-def _sample_indices(x: Numbers, y: Numbers, notes: list[str]) -> list[Indices]:
-    """First-order indices from a sample (`is_sample`), by SALib's random balance design."""
-    from SALib.analyze import rbd_fast
-
-    notes.append("total indices need a full grid or a sample by the method saltelli")
-    with _quiet():
-        found = rbd_fast.analyze(_problem(x.shape[1]), x, y, M=max(2, min(10, (len(y) - 1) // 10)), seed=_SEED)
-    return [(_finite(found["S1"][i]), _finite(found["S1_conf"][i]), None, None) for i in range(x.shape[1])]
-
-
-def _problem(dimensions: int) -> dict[str, Any]:
-    names = [str(index) for index in range(dimensions)]
-    return {"num_vars": dimensions, "names": names, "bounds": [[0.0, 1.0]] * dimensions}
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Silence SALib's division by a zero variance; such indices are meaningless and become None."""
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")
-        yield
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

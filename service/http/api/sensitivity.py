@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,6 +21,7 @@ from sprag.service.http.work import CHECK_PROBLEMS, Attended
 from sprag.service.results import exports
 from sprag.service.results.pictures.sensitivity import draw_sensitivity
 from sprag.service.results.sensitivity import Sensitivity, sensitivity
+from sprag.service.results.sensitivity_indices import Indices
 
 if TYPE_CHECKING:
     from sprag.service.storage.records import StudyRecord
@@ -44,7 +46,7 @@ async def get_sensitivity(
     ],
     form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
-    """Main effects of every axis on results, and shares of their variance (Sobol indices)."""
+    """Main effects of every axis on results, and shares of their variance (Sobol indices) or elementary effects."""
     chosen = choose_format(work.request, form, DRAWN_FORMATS)
 
     def make(record: StudyRecord) -> Response | Drawing:
@@ -63,19 +65,18 @@ async def get_sensitivity(
 
 
 def indices_csv(found: list[Sensitivity]) -> bytes:
-    """A row for each result and axis: the indices with the half widths of their intervals."""
-    indices = ("first_order", "first_order_error", "total", "total_error")
-    rows = [
-        [
-            item.info.name,
-            " ".join(effect.paths),
-            *(getattr(effect, name) for name in indices),
-            item.method,
-            item.cases,
-            "; ".join(item.notes),
-        ]
-        for item in found
-        for effect in item.effects
-    ]
-    header = ["result", "paths", *indices, "method", "cases", "notes"]
+    """A row for each result and axis: the indices with the half widths of their intervals; then one for each pair."""
+    indices = [field.name for field in fields(Indices)]
+    header = ["result", "paths", *indices, "other_paths", "second_order", "second_order_error"]
+    header += ["method", "cases", "notes"]
+    rows = []
+    for item in found:
+        about = [item.method, item.cases, "; ".join(item.notes)]
+        names = [" ".join(effect.paths) for effect in item.effects]
+        for name, effect in zip(names, item.effects, strict=True):
+            own = [getattr(effect.indices, index) for index in indices]
+            rows.append([item.info.name, name, *own, None, None, None, *about])
+        for pair in item.pairs:
+            first, second, nothing = names[pair.first], names[pair.second], [None] * len(indices)
+            rows.append([item.info.name, first, *nothing, second, pair.index, pair.error, *about])
     return exports.table_csv(header, zip(*rows, strict=True) if rows else [[] for _ in header])

@@ -1,4 +1,4 @@
-"""Pictures of sensitivities: shares of the variance as bars, main effects as lines."""
+"""Pictures of sensitivities: shares of the variance or elementary effects as bars, main effects as lines."""
 
 from __future__ import annotations
 
@@ -17,8 +17,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from sprag.service.results.sensitivity import Sensitivity
+    from sprag.service.results.sensitivity_indices import Pair
 
 MOST_RESULTS: Final = 8
+#: Interactions that are drawn, and the least share of one.
+MOST_PAIRS: Final = 6
+_LEAST_SHARE: Final = 0.005
 #: Characters of a line of notes that fit into the width of a picture.
 _NOTE_WIDTH: Final = 110
 
@@ -26,7 +30,7 @@ _NOTE_WIDTH: Final = 110
 def draw_sensitivity(found: Sequence[Sensitivity], title: str, picture: Picture) -> bytes:
     """A row of two plots for each result; raises SelectionError when there are more than one picture can show."""
     check_size("results", len(found), MOST_RESULTS, "y")
-    axes = len(found[0].effects)
+    axes = max(len(item.effects) + len(_largest(item)) for item in found)
     return render(partial(_paint, found, title), picture, (10.0, 0.8 + len(found) * max(2.6, 1.0 + 0.45 * axes)))
 
 
@@ -40,13 +44,26 @@ def _paint(found: Sequence[Sensitivity], title: str, figure: Figure) -> None:
 
 
 def _bars(axes: Axes, item: Sensitivity) -> None:
+    """The indices of every axis; below them those of the strongest pairs."""
+    pairs = _largest(item)
     names = ["\n".join(effect.paths[:2]) for effect in item.effects]
+    names += [f"{item.effects[pair.first].paths[0]}\nwith {item.effects[pair.second].paths[0]}" for pair in pairs]
+    every = [effect.indices for effect in item.effects]
+    blank: list[tuple[float | None, float | None]] = [(None, None)] * len(pairs)
+    bars: tuple[tuple[str, list[tuple[float | None, float | None]], float], ...]
+    if item.method == "morris":
+        bars = (
+            ("mu*, mean of absolute effects", [(own.mu_star, own.mu_star_error) for own in every], -0.2),
+            ("sigma, their standard deviation", [(own.sigma, None) for own in every], 0.2),
+        )
+    else:
+        bars = (
+            ("first order", [*((own.first_order, own.first_order_error) for own in every), *blank], -0.2),
+            ("total", [*((own.total, own.total_error) for own in every), *blank], 0.2),
+            ("second order", [*[(None, None)] * len(every), *((pair.index, pair.error) for pair in pairs)], 0.0),
+        )
     places = np.arange(len(names))
-    shares = (
-        ("first order", [(effect.first_order, effect.first_order_error) for effect in item.effects], -0.2),
-        ("total", [(effect.total, effect.total_error) for effect in item.effects], 0.2),
-    )
-    for index, (name, values, offset) in enumerate(shares):
+    for index, (name, values, offset) in enumerate(bars):
         if all(value is None for value, _ in values):
             continue
         axes.barh(
@@ -59,11 +76,19 @@ def _bars(axes: Axes, item: Sensitivity) -> None:
         )
     axes.set_yticks(places, names, fontsize=8)
     axes.invert_yaxis()
-    axes.set_xlabel(f"share of the variance of {item.info.name}")
+    what = "elementary effects on" if item.method == "morris" else "share of the variance of"
+    unit = item.info.unit if item.method == "morris" else "1"
+    axes.set_xlabel(f"{what} {axis_label(item.info.name, unit)}")
     if axes.has_data():
         axes.legend(fontsize=8, loc="best")
     else:
         _tell(axes, "no shares of the variance" if item.cases else "no case has this result")
+
+
+def _largest(item: Sensitivity) -> list[Pair]:
+    """The strongest interactions, at most `MOST_PAIRS`."""
+    known = [pair for pair in item.pairs if pair.index is not None and abs(pair.index) > _LEAST_SHARE]
+    return sorted(known, key=lambda pair: -abs(pair.index or 0.0))[:MOST_PAIRS]
 
 
 def _lines(axes: Axes, item: Sensitivity) -> None:

@@ -24,13 +24,18 @@ if TYPE_CHECKING:
 
 _METHOD_HELP: Final = (
     "latin_hypercube and sobol fill the ranges evenly; saltelli is the design for Sobol indices, of "
-    "count * (ranges + 2) cases"
+    "count * (ranges + 2) cases; morris are count trajectories of ranges + 1 cases, for elementary effects"
 )
+_SECOND_HELP: Final = "of a saltelli sample: indices of pairs too, by count * (2 * ranges + 2) cases"
 SAMPLE: Final = named(
-    choice("sample", _METHOD_HELP, "latin_hypercube", "sobol", "saltelli"),
+    choice("sample", _METHOD_HELP, "latin_hypercube", "sobol", "saltelli", "morris"),
     Described("count", "", "points; sobol and saltelli take a power of 2", "whole", 1, MAX_AXIS_VALUES),
     Described("seed", "", "seed of the random numbers", "whole", 0, 2**32 - 1, 0),
+    Described("second_order", "", _SECOND_HELP, "flag", default=False),
 )
+#: Levels of the trajectories of a morris sample: so many that hardly any two of them share a point.
+LEVELS: Final = 4096
+MOST_TRAJECTORIES: Final = 1000
 RANGES: Final = Listed("ranges", 1, MAX_AXES)
 SCALE: Final = choice("scale", "log: even in the logarithm", "linear", "log", default="linear")
 
@@ -57,12 +62,12 @@ def read_sample(report: Report, pointer: str, data: Mapping[str, Any], machine: 
     """Read the block of a sample; None, with the faults recorded, when it is invalid."""
     before = report.found
     found = read_object(report, pointer, data, (*SAMPLE, "ranges")) or {}
-    method, count, seed = (field.read(report, pointer, found) for field in SAMPLE.values())
+    method, count, seed, second_order = (field.read(report, pointer, found) for field in SAMPLE.values())
     items = RANGES.read(report, join(pointer, "ranges"), found.get("ranges"))
     if items is None:
         return None
     ranges = [_read_range(report, join(pointer, "ranges", index), item, machine) for index, item in enumerate(items)]
-    if count is not None and method != "latin_hypercube" and count & (count - 1):
+    if count is not None and method in {"sobol", "saltelli"} and count & (count - 1):
         report.fault(
             join(pointer, "count"),
             "out-of-range",
@@ -70,12 +75,31 @@ def read_sample(report: Report, pointer: str, data: Mapping[str, Any], machine: 
             count,
             allowed="a power of 2",
         )
+    if second_order and method != "saltelli":
+        report.fault(
+            join(pointer, "second_order"), "conflict", f"is given for a {method} sample", allowed="saltelli samples"
+        )
+    elif second_order and len(items) < 3:
+        report.fault(join(pointer, "ranges"), "out-of-range", "two parameters interact by what total exceeds first "
+                     "order by; indices of pairs are for more", len(items), allowed="at least 3 ranges")  # fmt: skip
+    if method == "morris":
+        _check_trajectories(report, pointer, count, len(items))
     if report.found > before or method is None or count is None or seed is None:
         return None
     known = tuple(item for item in ranges if item is not None)
-    cases = count * (len(known) + 2) if method == "saltelli" else count
-    make = partial(draw, method, count, seed, known)
+    cases = cases_of(method, count, len(known), second_order=second_order)
+    make = partial(draw, method, count, seed, known, second_order=second_order)
     return Block(pointer, tuple(path for item in known for path in item.paths), cases, make)
+
+
+def _check_trajectories(report: Report, pointer: str, count: int | None, ranges: int) -> None:
+    """Refuse a single range, which needs no screening, and so many trajectories that some share points."""
+    if ranges < 2:
+        report.fault(join(pointer, "ranges"), "out-of-range", "a morris sample compares parameters", ranges,
+                     allowed="at least 2 ranges")  # fmt: skip
+    if count is not None and count > MOST_TRAJECTORIES:
+        report.fault(join(pointer, "count"), "out-of-range", "is more than elementary effects need", count,
+                     allowed=f"at most {MOST_TRAJECTORIES:,} trajectories")  # fmt: skip
 
 
 def _read_range(report: Report, pointer: str, data: object, machine: Machine) -> SampleRange | None:
@@ -107,29 +131,55 @@ def _read_range(report: Report, pointer: str, data: object, machine: Machine) ->
     return None if scale is None else SampleRange(paths, low, high, scale)
 
 
-def draw(method: str, count: int, seed: int, ranges: tuple[SampleRange, ...]) -> dict[str, NDArray[np.float64]]:
+def cases_of(method: str, count: int, dimensions: int, *, second_order: bool = False) -> int:
+    """Number of cases of a sample."""
+    each = {"saltelli": 2 * dimensions + 2 if second_order else dimensions + 2, "morris": dimensions + 1}
+    return count * each.get(method, 1)
+
+
+def draw(
+    method: str, count: int, seed: int, ranges: tuple[SampleRange, ...], *, second_order: bool = False
+) -> dict[str, NDArray[np.float64]]:
     """Draw the sample; equal arguments give equal samples on every machine."""
-    unit = unit_sample(method, count, seed, len(ranges))
+    unit = unit_sample(method, count, seed, len(ranges), second_order=second_order)
     found: dict[str, NDArray[np.float64]] = {}
     for index, item in enumerate(ranges):
         found.update(dict.fromkeys(item.paths, item.place(unit[:, index])))
     return found
 
 
-def unit_sample(method: str, count: int, seed: int, dimensions: int) -> NDArray[np.float64]:
-    """Points in the unit cube, shape (cases, dimensions); the Saltelli design has count*(dimensions + 2) of them."""
+def unit_sample(
+    method: str, count: int, seed: int, dimensions: int, *, second_order: bool = False
+) -> NDArray[np.float64]:
+    """Points in the unit cube, shape (cases, dimensions), as many as `cases_of` says."""
     from scipy.stats import qmc
 
     if method == "latin_hypercube":
         points = qmc.LatinHypercube(dimensions, rng=np.random.default_rng(seed)).random(count)
     elif method == "sobol":
         points = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(count)
+    elif method == "morris":
+        points = _trajectories(count, seed, dimensions)
     else:
         from SALib.sample import sobol
 
-        names = [str(index) for index in range(dimensions)]
-        problem = {"num_vars": dimensions, "names": names, "bounds": [[0, 1]] * dimensions}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)
-            points = sobol.sample(problem, count, calc_second_order=False, seed=seed)
+            points = sobol.sample(_problem(dimensions), count, calc_second_order=second_order, seed=seed)
     return np.asarray(points, dtype=np.float64)
+
+
+def _trajectories(count: int, seed: int, dimensions: int) -> NDArray[np.float64]:
+    """SALib's trajectories, those left out that share a point with an earlier one: no case is run twice."""
+    from SALib.sample import morris
+
+    drawn = morris.sample(_problem(dimensions), 2 * count, num_levels=LEVELS, seed=seed)
+    _, first, group = np.unique(drawn, axis=0, return_index=True, return_inverse=True)
+    new = first[group.reshape(-1)] == np.arange(len(drawn))
+    whole = new.reshape(2 * count, dimensions + 1).all(axis=1)
+    return np.asarray(drawn.reshape(2 * count, dimensions + 1, dimensions)[whole][:count].reshape(-1, dimensions))
+
+
+def _problem(dimensions: int) -> dict[str, Any]:
+    names = [str(index) for index in range(dimensions)]
+    return {"num_vars": dimensions, "names": names, "bounds": [[0, 1]] * dimensions}

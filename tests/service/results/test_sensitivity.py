@@ -9,12 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from SALib.analyze import morris as morris_analyze
+from SALib.sample import morris as morris_sample
 
 from sprag.service.answers import results
+from sprag.service.cli.pictures import _show_effects
 from sprag.service.results.curves import Fetch
 from sprag.service.results.selection import SelectionError
 from sprag.service.results.sensitivity import sensitivity
 from sprag.service.results.unaffected import unaffected
+from sprag.service.spec.axes.sample import LEVELS
 from sprag.service.storage.records import CaseColumns
 from sprag.worker import models
 from sprag.worker.models import ChunkResult
@@ -63,14 +67,14 @@ def test_a_full_grid_gives_exact_shares() -> None:
     }
     # Values are centred: of y = 3 u + v, the variances are 9 * 2/3 and 4; of a product nothing is first order.
     linear = effects(grid, lambda p: 3.0 * p["excitation.phase"] + p["pendulums.0.initial_angle"])
-    assert [effect.first_order for effect in linear.effects] == pytest.approx([0.6, 0.4, 0.0], abs=1e-12)
-    assert [effect.total for effect in linear.effects] == pytest.approx([0.6, 0.4, 0.0], abs=1e-12)
+    assert [effect.indices.first_order for effect in linear.effects] == pytest.approx([0.6, 0.4, 0.0], abs=1e-12)
+    assert [effect.indices.total for effect in linear.effects] == pytest.approx([0.6, 0.4, 0.0], abs=1e-12)
     assert linear.effects[0].means.tolist() == pytest.approx([-3.0, 0.0, 3.0])
     assert (linear.method, linear.cases, linear.missing) == ("grid", 12, 0)
     assert linear.variance == pytest.approx(10.0)
     product = effects(grid, lambda p: p["excitation.phase"] * p["pendulums.0.initial_angle"])
-    assert [effect.first_order for effect in product.effects] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
-    assert [effect.total for effect in product.effects] == pytest.approx([1.0, 1.0, 0.0], abs=1e-12)
+    assert [effect.indices.first_order for effect in product.effects] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    assert [effect.indices.total for effect in product.effects] == pytest.approx([1.0, 1.0, 0.0], abs=1e-12)
 
 
 def ishigami(p: dict[str, Any]) -> Any:
@@ -86,9 +90,86 @@ def test_the_design_for_indices_gives_those_of_the_ishigami_function() -> None:
     assert (found.method, found.cases) == ("saltelli", 1024 * 5)
     # Closed form for a = 7, b = 0.1 (Ishigami and Homma 1990).
     for effect, first, total in zip(found.effects, (0.3139, 0.4424, 0.0), (0.5576, 0.4424, 0.2437), strict=True):
-        assert effect.first_order == pytest.approx(first, abs=0.03)
-        assert effect.total == pytest.approx(total, abs=0.03)
-        assert 0.0 < effect.total_error < 0.1
+        assert effect.indices.first_order == pytest.approx(first, abs=0.03)
+        assert effect.indices.total == pytest.approx(total, abs=0.03)
+        assert 0.0 < effect.indices.total_error < 0.1
+
+
+def test_second_order_indices_of_the_ishigami_function_are_those_of_the_closed_form() -> None:
+    spans = ranges(-np.pi, np.pi)
+    spans[2] |= {"from": -1, "to": 1}
+    sample = {"sample": "saltelli", "count": 1024, "second_order": True, "ranges": spans}
+    found = effects({"axes": [sample]}, ishigami)
+    assert (found.method, found.cases) == ("saltelli", 1024 * 8)
+    # Only the first and the third parameter interact.
+    pairs = {(pair.first, pair.second): pair for pair in found.pairs}
+    assert list(pairs) == [(0, 1), (0, 2), (1, 2)]
+    for at, index in zip(pairs, (0.0, 0.2437, 0.0), strict=True):
+        assert pairs[at].index == pytest.approx(index, abs=0.04)
+        assert 0.0 < pairs[at].error < 0.12
+    for effect, total in zip(found.effects, (0.5576, 0.4424, 0.2437), strict=True):
+        assert effect.indices.total == pytest.approx(total, abs=0.03)
+
+
+def sobol_g(p: dict[str, Any]) -> Any:
+    """The g-function of Sobol on -1..1 with a = 0, 1, 4.5."""
+    values = (p["excitation.phase"], p["pendulums.0.initial_angle"], p["pendulums.0.arm"])
+    parts = [(np.abs(2.0 * value) + a) / (1.0 + a) for value, a in zip(values, (0.0, 1.0, 4.5), strict=True)]
+    return np.prod(parts, axis=0)
+
+
+def test_indices_of_all_orders_are_those_of_the_g_function() -> None:
+    sample = {"sample": "saltelli", "count": 2048, "second_order": True, "ranges": ranges(-1, 1)}
+    found = effects({"axes": [sample]}, sobol_g)
+    # Closed form: partial variances 1/3 / (1 + a)^2 and their products (Saltelli et al. 2010).
+    parts = 1.0 / 3.0 / (1.0 + np.array([0.0, 1.0, 4.5])) ** 2
+    whole = np.prod(1.0 + parts) - 1.0
+    for at, effect in enumerate(found.effects):
+        others = np.prod(1.0 + np.delete(parts, at))
+        assert effect.indices.first_order == pytest.approx(parts[at] / whole, abs=0.03)
+        assert effect.indices.total == pytest.approx(parts[at] * others / whole, abs=0.03)
+    for pair in found.pairs:
+        assert pair.index == pytest.approx(parts[pair.first] * parts[pair.second] / whole, abs=0.03)
+
+
+def test_a_full_grid_gives_exact_indices_of_pairs() -> None:
+    grid = {
+        "axes": [{"path": path, "values": [-1, 0, 1]} for path in ("excitation.phase", "pendulums.0.initial_angle")]
+    }
+    found = effects(grid, lambda p: p["excitation.phase"] * (1.0 + p["pendulums.0.initial_angle"]))
+    # Of u + u v, both of mean 0 and variance 2/3: shares 2/3 and 4/9 of 10/9.
+    (pair,) = found.pairs
+    assert (pair.index, pair.error) == (pytest.approx(0.4), None)
+    assert [effect.indices.first_order for effect in found.effects] == pytest.approx([0.6, 0.0])
+
+
+def test_trajectories_give_the_elementary_effects_of_salib() -> None:
+    sample = {"sample": "morris", "count": 40, "seed": 3, "ranges": ranges(-1, 1)}
+    found = effects({"axes": [sample]}, ishigami)
+    assert (found.method, found.cases) == ("morris", 160)
+    problem = {"num_vars": 3, "names": list("abc"), "bounds": [[-1, 1]] * 3}
+    drawn = morris_sample.sample(problem, 80, num_levels=LEVELS, seed=3)[:160]
+    names = ("excitation.phase", "pendulums.0.initial_angle", "pendulums.0.arm")
+    direct = morris_analyze.analyze(problem, drawn, ishigami(dict(zip(names, drawn.T, strict=True))), num_levels=LEVELS)
+    for name in ("mu", "mu_star", "sigma"):
+        assert [getattr(effect.indices, name) for effect in found.effects] == pytest.approx(list(direct[name]))
+    assert all(0.0 < effect.indices.mu_star_error < effect.indices.mu_star for effect in found.effects)
+    linear = effects({"axes": [sample]}, lambda p: 3.0 * p["excitation.phase"] - p["pendulums.0.arm"])
+    # Of a linear function each effect is the slope times the range.
+    assert [effect.indices.mu for effect in linear.effects] == pytest.approx([6.0, 0.0, -2.0])
+    assert [effect.indices.sigma for effect in linear.effects] == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+    assert {effect.indices.first_order for effect in linear.effects} == {None}
+
+
+def test_trajectories_with_a_missing_case_are_left_out_whole() -> None:
+    sample = {"sample": "morris", "count": 40, "seed": 3, "ranges": ranges(-1, 1)}
+    spec = {"axes": [sample]}
+    found = effects(spec, lambda p: np.where(p["excitation.phase"] > 0.95, np.nan, p["pendulums.0.arm"]))
+    assert found.missing > 0
+    assert [effect.indices.mu for effect in found.effects] == pytest.approx([0.0, 0.0, 2.0])
+    assert any("trajectories are left out" in note for note in found.notes)
+    none = effects(spec, lambda p: np.where(p["excitation.phase"] > -2.0, np.nan, p["pendulums.0.arm"]))
+    assert none.notes == ("no case has this result",)
 
 
 def test_points_of_the_design_with_a_missing_case_are_left_out_whole() -> None:
@@ -99,7 +180,7 @@ def test_points_of_the_design_with_a_missing_case_are_left_out_whole() -> None:
 
     found = effects({"axes": [sample]}, function)
     assert found.missing > 0
-    assert found.effects[1].first_order == pytest.approx(1.0, abs=0.05)
+    assert found.effects[1].indices.first_order == pytest.approx(1.0, abs=0.05)
     assert any("points of the design are left out" in note for note in found.notes)
 
 
@@ -107,8 +188,8 @@ def test_any_sample_gives_first_order_shares() -> None:
     sample = {"sample": "latin_hypercube", "count": 2000, "seed": 5, "ranges": ranges(-1, 1)}
     found = effects({"axes": [sample]}, lambda p: 2.0 * p["excitation.phase"] + p["pendulums.0.initial_angle"])
     assert found.method == "rbd-fast"
-    assert [effect.first_order for effect in found.effects] == pytest.approx([0.8, 0.2, 0.0], abs=0.04)
-    assert {effect.total for effect in found.effects} == {None}
+    assert [effect.indices.first_order for effect in found.effects] == pytest.approx([0.8, 0.2, 0.0], abs=0.04)
+    assert {effect.indices.total for effect in found.effects} == {None}
     line = found.effects[0]
     assert len(line.values) == 10
     np.testing.assert_allclose(line.means, 2.0 * line.values, atol=0.15)
@@ -117,9 +198,9 @@ def test_any_sample_gives_first_order_shares() -> None:
 def test_what_cannot_be_told_is_not_told() -> None:
     few = {"sample": "sobol", "count": 16, "ranges": ranges(-1, 1)}
     found = effects({"axes": [few]}, lambda p: p["excitation.phase"])
-    assert {effect.first_order for effect in found.effects} == {None}
+    assert {effect.indices.first_order for effect in found.effects} == {None}
     constant = effects({"axes": [{**few, "count": 128}]}, lambda _: 5.0)
-    assert {effect.first_order for effect in constant.effects} == {None}
+    assert {effect.indices.first_order for effect in constant.effects} == {None}
     assert "the result is the same in every case" in constant.notes
     with pytest.raises(SelectionError, match="nothing varies"):
         effects({"axes": []}, lambda _: 5.0)
@@ -153,7 +234,7 @@ def test_the_interface_tells_effects_and_axes_without_any(service: Service, spec
         assert (answer["warnings"], answer["warning_codes"]) == ([sentence], ["no-effect"])
     table = service.http.get(f"{API}/studies/{study_id}/sensitivity?y={SPEED}&format=csv").text
     rows = list(csv.DictReader(io.StringIO(table)))
-    assert [row["paths"] for row in rows] == [
+    assert [row["paths"] for row in rows if not row["other_paths"]] == [
         path for effect in found["results"][0]["effects"] for path in effect["paths"]
     ]
     for form, start in (("svg", b"<?xml"), ("png", b"\x89PNG"), ("pdf", b"%PDF")):
@@ -162,6 +243,31 @@ def test_the_interface_tells_effects_and_axes_without_any(service: Service, spec
     refused = service.http.get(f"{API}/studies/{study_id}/sensitivity?y=shaft.speed.men")
     assert refused.status_code == 422
     assert "did you mean 'shaft.speed.mean'" in refused.json()["errors"][0]["message"]
+
+
+def test_pairs_and_elementary_effects_are_in_every_form(
+    service: Service, spec: dict[str, Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    spans = [{"path": "shaft.load", "from": 0, "to": 1}, {"path": "excitation.frequency", "from": 16, "to": 30}]
+    three = [*spans, {"path": "pendulums.0.arm", "from": "20 mm", "to": "30 mm"}]
+    pair = {"sample": "saltelli", "count": 32, "second_order": True, "ranges": three}
+    for sample, column, heading in (
+        (pair, "second_order", "second order"),
+        ({"sample": "morris", "count": 8, "ranges": spans}, "mu_star", "mu*"),
+    ):
+        study_id = service.submit({**spec, "axes": [sample]})
+        fill(service, study_id, lambda p: p["shaft.load"] * p["excitation.frequency"])
+        place = f"{API}/studies/{study_id}/sensitivity?y={SPEED}"
+        answer = service.http.get(place).json()
+        fits(results.SensitivityReport, answer)
+        rows = list(csv.DictReader(io.StringIO(service.http.get(f"{place}&format=csv").text)))
+        (found,) = answer["results"]
+        numbers = [item[column] for item in [*found["effects"], *found["pairs"]] if column in item]
+        assert numbers
+        assert [float(row[column]) for row in rows if row[column]] == numbers
+        assert service.http.get(f"{place}&format=svg").status_code == 200
+        _show_effects(found)
+        assert heading in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

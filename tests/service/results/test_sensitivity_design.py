@@ -25,7 +25,10 @@ NONE = (None, None, None, None)
 
 
 def indices(found: Sensitivity) -> set[tuple[float | None, ...]]:
-    return {(e.first_order, e.first_order_error, e.total, e.total_error) for e in found.effects}
+    return {
+        (e.indices.first_order, e.indices.first_order_error, e.indices.total, e.indices.total_error)
+        for e in found.effects
+    }
 
 
 def linspace(path: str, low: float, high: float, count: int) -> dict[str, Any]:
@@ -61,7 +64,7 @@ def test_an_axis_that_changes_nothing_has_no_share_of_a_grid_that_lacks_a_case()
     # 55 values in groups of 6 and 5: a value's two cases stay together.
     whole = effects({"axes": [axes[0], linspace(C, 0.0, 5.4, 55)]}, lambda p: p[A])
     assert whole.effects[1].means.tolist() == pytest.approx([0.5] * 10)
-    assert [effect.first_order for effect in whole.effects] == pytest.approx([1.0, 0.0])
+    assert [effect.indices.first_order for effect in whole.effects] == pytest.approx([1.0, 0.0])
 
 
 def test_what_is_left_of_a_grid_may_be_a_grid() -> None:
@@ -69,11 +72,11 @@ def test_what_is_left_of_a_grid_may_be_a_grid() -> None:
     found = effects({"axes": axes, "exclude": [{A: {"is": 3}}]}, linear)
     # Values 0..2 and 0..4: variances 100 * 2/3 and 2.
     assert found.method == "grid"
-    assert [effect.first_order for effect in found.effects] == pytest.approx([200 / 206, 6 / 206])
-    assert [effect.total for effect in found.effects] == pytest.approx([200 / 206, 6 / 206])
+    assert [effect.indices.first_order for effect in found.effects] == pytest.approx([200 / 206, 6 / 206])
+    assert [effect.indices.total for effect in found.effects] == pytest.approx([200 / 206, 6 / 206])
     shuffled = "excitation.phase,pendulums.0.initial_angle\n2,0\n0,1\n0,0\n1,1\n2,1\n1,0\n"
     points = effects({"axes": [{"points": shuffled}]}, linear)
-    assert (points.method, [effect.first_order for effect in points.effects]) == (
+    assert (points.method, [effect.indices.first_order for effect in points.effects]) == (
         "grid",
         pytest.approx([800 / 803, 3 / 803]),
     )
@@ -110,8 +113,8 @@ def test_samples_give_what_they_gave() -> None:
         problem = {"num_vars": 3, "names": list("abc"), "bounds": [[-1, 1]] * 3}
         direct = rbd_fast.analyze(problem, x, 2.0 * x[:, 0] + x[:, 1], M=min(10, (count - 1) // 10), seed=1)
         assert found.method == "rbd-fast"
-        assert [effect.first_order for effect in found.effects] == direct["S1"]
-        assert [effect.first_order for effect in found.effects] == pytest.approx([0.8, 0.2, 0.0], abs=0.15)
+        assert [effect.indices.first_order for effect in found.effects] == direct["S1"]
+        assert [effect.indices.first_order for effect in found.effects] == pytest.approx([0.8, 0.2, 0.0], abs=0.15)
 
 
 def test_a_sample_that_failed_cases_make_lopsided_is_none() -> None:
@@ -119,7 +122,9 @@ def test_a_sample_that_failed_cases_make_lopsided_is_none() -> None:
     fair = effects(sample, lambda p: np.where(p[A] > 0.8, np.nan, 2.0 * p[A] + p[B]))
     # Variances 4 * 0.8^2 / 12 and 1 / 12.
     assert fair.method == "rbd-fast"
-    assert [effect.first_order for effect in fair.effects] == pytest.approx([2.56 / 3.56, 1 / 3.56, 0.0], abs=0.06)
+    assert [effect.indices.first_order for effect in fair.effects] == pytest.approx(
+        [2.56 / 3.56, 1 / 3.56, 0.0], abs=0.06
+    )
     corner = effects(sample, lambda p: np.where(p[A] + p[B] > 1.2, np.nan, p[A]))
     assert (corner.method, indices(corner)) == ("none", {NONE})
     assert "neither a complete grid nor a sample: their axes are not independent of each other" in corner.notes[-1]

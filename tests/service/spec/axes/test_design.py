@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from sprag.service.spec.axes.sample import unit_sample
+from sprag.service.spec.axes.sample import LEVELS, unit_sample
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.service.spec.report import SpecError
@@ -97,6 +97,32 @@ def test_a_sample_meets_an_axis_in_a_grid() -> None:
 def test_a_sobol_sequence_is_scipys() -> None:
     expected = qmc.Sobol(3, rng=np.random.default_rng(11)).random(16)
     np.testing.assert_array_equal(unit_sample("sobol", 16, 11, 3), expected)
+
+
+def test_trajectories_share_no_point_and_have_one_step_for_each_range() -> None:
+    for count, seed, dimensions in ((1000, 0, 2), (20, 1, 12)):
+        unit = unit_sample("morris", count, seed, dimensions)
+        assert len(np.unique(unit, axis=0)) == len(unit) == count * (dimensions + 1)
+        steps = np.diff(unit.reshape(count, dimensions + 1, dimensions), axis=1)
+        moved = np.abs(steps) > 0.0
+        assert (moved.sum(axis=1) == 1).all()
+        assert (moved.sum(axis=2) == 1).all()
+        np.testing.assert_allclose(np.abs(steps[moved]), LEVELS / 2.0 / (LEVELS - 1.0))
+
+
+def test_samples_for_screening_and_pairs_have_their_cases_and_faults() -> None:
+    spans = [{"path": "shaft.load", "from": 0, "to": 1}, {"path": "excitation.frequency", "from": 16, "to": 30}]
+    assert study_of([{"sample": "morris", "count": 5, "ranges": spans}]).cases == 15
+    pairs = {"sample": "saltelli", "count": 4, "second_order": True}
+    three = [*spans, {"path": "pendulums.0.arm", "from": "20 mm", "to": "30 mm"}]
+    assert study_of([{**pairs, "ranges": three}]).cases == 32
+    assert problems({"/axes": [{**pairs, "ranges": spans}]})["/axes/0/ranges"].code == "out-of-range"
+    found = problems({"/axes": [{"sample": "morris", "count": 1001, "second_order": True, "ranges": spans[:1]}]})
+    assert {place: fault.code for place, fault in found.items()} == {
+        "/axes/0/count": "out-of-range",
+        "/axes/0/ranges": "out-of-range",
+        "/axes/0/second_order": "conflict",
+    }
 
 
 def test_the_design_for_indices_has_its_blocks() -> None:

@@ -1,0 +1,157 @@
+"""Indices of sensitivity: Sobol indices of grids, designs and samples, elementary effects of trajectories (Morris)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Numbers = NDArray[np.float64]
+
+#: Fewest cases from which indices are estimated.
+LEAST_CASES: Final = 65
+#: Fewest trajectories from which elementary effects are reported: their interval is a bootstrap of them.
+LEAST_TRAJECTORIES: Final = 4
+_SEED: Final = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Indices:
+    """The indices of one axis, None where the method does not give them; errors are half widths of 95 % intervals.
+
+    ``mu``, ``mu_star`` and ``sigma`` are mean, mean of the absolute values and standard deviation of the elementary
+    effects, in the unit of the result for the whole range of the axis.
+    """
+
+    first_order: float | None = None
+    first_order_error: float | None = None
+    total: float | None = None
+    total_error: float | None = None
+    mu: float | None = None
+    mu_star: float | None = None
+    mu_star_error: float | None = None
+    sigma: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """The second-order index of two axes, by position: the share of the variance by their interaction alone."""
+
+    first: int
+    second: int
+    index: float | None
+    error: float | None
+
+
+Found = tuple[list[Indices], list[Pair]]
+
+
+def nothing(axes: int) -> Found:
+    """No indices at all."""
+    return [Indices()] * axes, []
+
+
+def grid_indices(table: Numbers, positions: list[int]) -> Found:
+    """Exact shares of the variance over the points of a full grid, all with equal weight."""
+    variance = float(table.var())
+    if not variance > 0.0:
+        return nothing(len(positions))
+    every = tuple(range(table.ndim))
+
+    def explained(*axes: int) -> float:
+        others = tuple(axis for axis in every if axis not in axes)
+        return (float(table.mean(axis=others).var()) if others else variance) / variance
+
+    first = {axis: explained(axis) for axis in positions}
+    found = [Indices(first[axis], None, float(table.var(axis=axis).mean()) / variance) for axis in positions]
+    pairs = [
+        Pair(i, j, explained(a, b) - first[a] - first[b], None)
+        for (i, a), (j, b) in itertools.combinations(enumerate(positions), 2)
+    ]
+    return found, pairs
+
+
+def saltelli_indices(y: Numbers, base: int, dimensions: int, notes: list[str], *, second_order: bool) -> Found:
+    """SALib's estimates; a point with any missing case is left out with all its cases."""
+    from SALib.analyze import sobol
+
+    cases = 2 * dimensions + 2 if second_order else dimensions + 2
+    blocks = y.reshape(base, cases)
+    whole = _whole(blocks, "points of the design", notes)
+    if whole.sum() * cases < LEAST_CASES:
+        notes.append("too few cases for indices")
+        return nothing(dimensions)
+    with _quiet():
+        found = sobol.analyze(
+            _problem(dimensions), blocks[whole].reshape(-1), calc_second_order=second_order, seed=_SEED
+        )
+    names = {"first_order": "S1", "first_order_error": "S1_conf", "total": "ST", "total_error": "ST_conf"}
+    indices = [Indices(**{name: _finite(found[key][i]) for name, key in names.items()}) for i in range(dimensions)]
+    pairs = [
+        Pair(i, j, _finite(found["S2"][i, j]), _finite(found["S2_conf"][i, j]))
+        for i, j in (itertools.combinations(range(dimensions), 2) if second_order else ())
+    ]
+    return indices, pairs
+
+
+def morris_indices(x: Numbers, y: Numbers, levels: int, notes: list[str]) -> Found:
+    """SALib's elementary effects; a trajectory with any missing case is left out. ``x`` has the shape (cases, axes)."""
+    from SALib.analyze import morris
+
+    dimensions = x.shape[1]
+    blocks = y.reshape(-1, dimensions + 1)
+    whole = _whole(blocks, "trajectories", notes)
+    if whole.sum() < LEAST_TRAJECTORIES:
+        notes.append(f"too few trajectories: {int(whole.sum())}, and {LEAST_TRAJECTORIES} are needed")
+        return nothing(dimensions)
+    places = x.reshape(*blocks.shape, dimensions)[whole].reshape(-1, dimensions)
+    with _quiet():
+        found = morris.analyze(
+            _problem(dimensions), places, blocks[whole].reshape(-1), num_levels=levels, num_resamples=1000, seed=_SEED
+        )
+    names = {"mu": "mu", "mu_star": "mu_star", "mu_star_error": "mu_star_conf", "sigma": "sigma"}
+    return [Indices(**{name: _finite(found[key][i]) for name, key in names.items()}) for i in range(dimensions)], []
+
+
+def sample_indices(x: Numbers, y: Numbers, notes: list[str]) -> Found:
+    """First-order indices from a sample (`is_sample`), by SALib's random balance design."""
+    from SALib.analyze import rbd_fast
+
+    notes.append("total indices need a full grid or a sample by the method saltelli")
+    with _quiet():
+        found = rbd_fast.analyze(_problem(x.shape[1]), x, y, M=max(2, min(10, (len(y) - 1) // 10)), seed=_SEED)
+    return [Indices(_finite(found["S1"][i]), _finite(found["S1_conf"][i])) for i in range(x.shape[1])], []
+
+
+def _whole(blocks: Numbers, what: str, notes: list[str]) -> NDArray[np.bool_]:
+    """Which rows of ``blocks`` have no missing number; others are noted."""
+    whole = np.isfinite(blocks).all(axis=1)
+    if not whole.all():
+        notes.append(f"{int((~whole).sum())} of {len(blocks)} {what} are left out with all their cases")
+    return np.asarray(whole)
+
+
+def _problem(dimensions: int) -> dict[str, Any]:
+    names = [str(index) for index in range(dimensions)]
+    return {"num_vars": dimensions, "names": names, "bounds": [[0.0, 1.0]] * dimensions}
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Silence SALib's division by a zero variance; such indices are meaningless and become None."""
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _finite(value: Any) -> float | None:
+    return float(value) if value is not np.ma.masked and math.isfinite(value) else None
