@@ -18,8 +18,8 @@ from sprag.service.http.respond import json_response
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.figures.shaft import SAMPLES, machine_case, overridden
 from sprag.service.http.web.form.check import message
+from sprag.service.http.web.form.entries import plain
 from sprag.service.http.web.form.page import form_page, look_over
-from sprag.service.http.web.form.spec import plain
 from sprag.service.http.web.templates import fragment, page, spec_text
 from sprag.service.http.work import Attended
 from sprag.service.presets import preset_names

@@ -15,7 +15,7 @@ from sprag.service.http.context import Context, Ctx
 from sprag.service.http.problems import ApiError
 from sprag.service.http.schedule_views import summary
 from sprag.service.http.views import preset_of
-from sprag.service.http.web.form.spec import Values
+from sprag.service.http.web.form.entries import Values
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended, Work

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from starlette.responses import Response
 
     from sprag.service.http.problems import ApiError
-    from sprag.service.http.web.form.spec import Values
+    from sprag.service.http.web.form.entries import Values
 
 LOGIN_PATH: Final = "/login"
 #: Field of the login that states that a form is sent afterwards, and the prefix of the names of its fields.

@@ -35,9 +35,9 @@ OVER: Final = choice(
 )
 SEARCH: Final = named(
     OVER,
-    Described("population", "", "designs of one generation", "whole", 4, 1000, 100),
-    Described("generations", "", "generations", "whole", 1, 10_000, 60),
-    Described("seed", "", "seed of the random numbers", "whole", 0, 2**32 - 1, 1),
+    Described("population", "Designs of a generation", "designs of one generation", "whole", 4, 1000, 100),
+    Described("generations", "Generations", "generations, each chosen from the ones before", "whole", 1, 10_000, 60),
+    Described("seed", "Seed", "seed of the random numbers", "whole", 0, 2**32 - 1, 1),
     Described("polish", "", "whether equalities are met exactly at the end", "flag", default=True),
 )
 FIELDS: Final = ("vary", "best", "subject_to", "at", *SEARCH)

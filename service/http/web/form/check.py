@@ -9,7 +9,8 @@ from urllib.parse import urlencode
 
 from sprag.service.faults import Fault
 from sprag.service.http.web.figures.fit import FitChart, fit_chart
-from sprag.service.http.web.form.spec import Faults, clutch_pointers, field_of, pendulums_of, spec_of
+from sprag.service.http.web.form.entries import Faults
+from sprag.service.http.web.form.spec import clutch_pointers, field_of, pendulums_of, spec_of
 from sprag.service.jobs.preview import preview_json
 from sprag.service.results.fits import fit_json
 from sprag.service.results.wording import unit_text
@@ -104,7 +105,9 @@ def check_form(
             name = field_of(item.where or "", values)
             # Faults of unreadable data were reported already, line by line.
             if not (name in faults and name.endswith("/data")):
-                found.faults.setdefault(name, []).append(message(item))
+                texts = found.faults.setdefault(name, [])
+                # One field can stand for several places of the spec, as the value of a parameter at all points does.
+                texts += [text for text in [message(item)] if text not in texts]
     if found.faults:
         found.parsed = None
     if found.parsed is not None:

@@ -13,7 +13,7 @@ from typing import Final
 from sprag.service.results.wording import number, words
 from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN, Described
 from sprag.service.spec.fields import placed
-from sprag.service.spec.plan import refine
+from sprag.service.spec.plan import goal, refine
 from sprag.service.spec.units import example
 from sprag.worker import models
 from sprag.worker.models import Parameter
@@ -107,6 +107,11 @@ def refine_fields() -> dict[str, Field]:
     return {field.name.rpartition("/")[2]: field for field in own}
 
 
+def search_fields() -> list[Field]:
+    """The fields of a search that take one number each."""
+    return [_described(goal.SEARCH[name], "/goal") for name in ("population", "generations", "seed")]
+
+
 def _described(entry: Described, pointer: str) -> Field:
     ends = [number(int(end)) if entry.kind in ("whole", "periods") else f"{end:g}" for end in (entry.low, entry.high)]
     unit = " periods" if entry.kind == "periods" else ""
@@ -127,34 +132,55 @@ def range_words(entry: Parameter) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class PathChoice:
-    """A parameter that an axis can vary: its path, its label and its unit."""
+class Choice:
+    """A parameter that can vary or a result that can be asked for: its path or name, its label and its unit."""
 
     path: str
     label: str
     unit: str
 
 
-def path_choices(pendulums: int, coefficients: dict[str, int]) -> list[tuple[str, list[PathChoice]]]:
-    """The parameters that an axis can vary, by group.
+Groups = list[tuple[str, list[Choice]]]
+
+
+def result_choices(pendulums: int, *, numbers: bool = False) -> Groups:
+    """The results that a search can ask for, by group; with ``numbers`` no categories."""
+    groups: dict[str, list[Choice]] = {}
+    for entry in models.result_catalogue(FORM_MODEL):
+        for index in range(pendulums if ".N." in entry.name else 1):
+            name = entry.name.replace(".N.", f".{index}.")
+            parts = name.split(".")
+            group = words(".".join(parts[:2] if parts[0] == "pendulums" else parts[:1]))
+            if not (numbers and entry.kind == "category"):
+                groups.setdefault(group, []).append(Choice(name, words(name), entry.unit))
+    return list(groups.items())
+
+
+def categories() -> tuple[str, ...]:
+    """The values of the results that are categories."""
+    return tuple(value for entry in models.result_catalogue(FORM_MODEL) for value in entry.categories)
+
+
+def path_choices(pendulums: int, coefficients: dict[str, int]) -> Groups:
+    """The parameters that can vary, by group.
 
     Parameters
     ----------
     pendulums : number of pendulums
     coefficients : prefix of a clutch law's paths ("clutch.", "pendulums.0.clutch.") -> number of its coefficients
     """
-    groups: dict[str, list[PathChoice]] = {}
+    groups: dict[str, list[Choice]] = {}
     for entry in models.parameter_catalogue(FORM_MODEL):
         if entry.path.startswith("clutch."):
             continue
         for index in range(pendulums if ".N." in entry.path else 1):
             path = entry.path.replace(".N.", f".{index}.")
             group = words(path.rpartition(".")[0]) or "Surroundings"
-            groups.setdefault(group, []).append(PathChoice(path, words(path), entry.unit))
+            groups.setdefault(group, []).append(Choice(path, words(path), entry.unit))
     for prefix, count in coefficients.items():
         for index in range(count):
             path = f"{prefix}coefficients.{index}"
             entry = placed(models.CLUTCH_COEFFICIENT, path)
-            choice = PathChoice(path, f"{words(prefix.rstrip('.'))} coefficient c{index + 1}", entry.unit)
+            choice = Choice(path, f"{words(prefix.rstrip('.'))} coefficient c{index + 1}", entry.unit)
             groups.setdefault(words(prefix.rstrip(".")), []).append(choice)
     return list(groups.items())

@@ -19,21 +19,26 @@ from sprag.service.http.respond import json_response
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form import study_check
 from sprag.service.http.web.form.check import Checked
+from sprag.service.http.web.form.entries import Values
 from sprag.service.http.web.form.fields import (
     FORM_MODEL,
+    categories,
     degree_field,
     path_choices,
     pendulum,
     refine_fields,
+    result_choices,
     run_fields,
+    search_fields,
     sections,
 )
+from sprag.service.http.web.form.goal import GOAL_DEFAULTS, LIMITS
+from sprag.service.http.web.form.parts import PARTS, add_row, copy, count_of, drop, drop_row
 from sprag.service.http.web.form.spec import (
     FORMULA,
     REFINE_DEFAULTS,
-    Values,
-    axes_of,
     clutch_pointers,
+    is_search,
     pendulums_of,
     spec_of,
     values_of,
@@ -46,7 +51,6 @@ from sprag.service.jobs.submission import Submission, take_in
 from sprag.service.presets import preset_names
 from sprag.service.spec.design import design_spec
 from sprag.worker import models
-from sprag.worker.limits import MAX_AXES
 from sprag.worker.models import MAX_PENDULUMS
 
 router = APIRouter(include_in_schema=False)
@@ -54,13 +58,18 @@ router = APIRouter(include_in_schema=False)
 #: Initial values of an empty form.
 EMPTY_FORM: Final[Values] = {
     "pendulums": "1",
+    "asks": "axes",
     "axes": "1",
     "/combine": "grid",
     **{f"/run/{name}": run_fields()[name].default for name in ("until", "at_most", "tolerance", "reset")},
     "/base/clutch/kind": "law",
     "/axes/0/way": "linspace",
     **REFINE_DEFAULTS,
+    **GOAL_DEFAULTS,
 }
+#: Beginnings of the fields of the other question, which the page keeps though it does not show them.
+_OF_AXES: Final = ("/axes/", "/refine/", "/combine")
+_OF_SEARCH: Final = ("/goal/",)
 
 
 @router.get("/new")
@@ -162,26 +171,23 @@ async def look_over(context: Context, work: Work, values: Mapping[str, str]) -> 
 
 
 def reshape(values: Values, wanted: str) -> None:
-    """Add or remove a pendulum or an axis, as the pressed button requests; the other fields are kept."""
+    """Add or remove a pendulum or a row of a part, as the pressed button requests; the other fields are kept."""
     action, _, index = wanted.partition(" ")
+    verb, _, part = action.partition("-")
     if action == "add-pendulum":
         count = pendulums_of(values)
         if count < MAX_PENDULUMS:
-            _copy(values, f"/base/pendulums/{count - 1}/", f"/base/pendulums/{count}/")
+            copy(values, f"/base/pendulums/{count - 1}/", f"/base/pendulums/{count}/")
             _adapt_formulas(values, count)
         values["pendulums"] = str(min(count + 1, MAX_PENDULUMS))
     elif action == "drop-pendulum":
         count = pendulums_of(values)
-        _drop(values, f"/base/pendulums/{count - 1}/")
+        drop(values, f"/base/pendulums/{count - 1}/")
         values["pendulums"] = str(max(count - 1, 1))
-    elif action == "add-axis":
-        values[f"/axes/{axes_of(values)}/way"] = "linspace"
-        values["axes"] = str(min(axes_of(values) + 1, MAX_AXES))
-    elif action == "drop-axis" and index.isdigit() and int(index) < axes_of(values):
-        for number in range(int(index), axes_of(values)):
-            _drop(values, f"/axes/{number}/")
-            _copy(values, f"/axes/{number + 1}/", f"/axes/{number}/")
-        values["axes"] = str(axes_of(values) - 1)
+    elif part in PARTS and verb == "add":
+        add_row(values, part)
+    elif part in PARTS and verb == "drop" and index.isdigit():
+        drop_row(values, part, int(index))
 
 
 def share_clutches(values: Values) -> None:
@@ -190,18 +196,12 @@ def share_clutches(values: Values) -> None:
     own = values.get("clutches") == "own"
     if own and f"{common}kind" in values:
         for index in range(pendulums_of(values)):
-            _copy(values, common, f"/base/pendulums/{index}/clutch/")
-        _drop(values, common)
+            copy(values, common, f"/base/pendulums/{index}/clutch/")
+        drop(values, common)
     elif not own and f"{common}kind" not in values and f"{first}kind" in values:
-        _copy(values, first, common)
+        copy(values, first, common)
         for index in range(pendulums_of(values)):
-            _drop(values, f"/base/pendulums/{index}/clutch/")
-
-
-def _copy(values: Values, source: str, target: str) -> None:
-    values |= {
-        target + name.removeprefix(source): text for name, text in list(values.items()) if name.startswith(source)
-    }
+            drop(values, f"/base/pendulums/{index}/clutch/")
 
 
 def _adapt_formulas(values: Values, index: int) -> None:
@@ -209,11 +209,6 @@ def _adapt_formulas(values: Values, index: int) -> None:
     for name, text in list(values.items()):
         if name.startswith(f"/base/pendulums/{index}/") and FORMULA in text:
             values[name] = text.replace(f"pendulums.{index - 1}.", f"pendulums.{index}.")
-
-
-def _drop(values: Values, prefix: str) -> None:
-    for name in [name for name in values if name.startswith(prefix)]:
-        del values[name]
 
 
 def form_page(request: Request, values: Values, checked: Checked | None, status: int = 200) -> Response:
@@ -233,16 +228,29 @@ def form_page(request: Request, values: Values, checked: Checked | None, status:
         sections=sections(),
         pendulums=[pendulum(index) for index in range(0 if text_mode else pendulums_of(values))],
         most_pendulums=MAX_PENDULUMS,
-        most_axes=MAX_AXES,
+        parts=PARTS,
+        rows={name: range(0 if text_mode else count_of(values, name)) for name in PARTS},
+        search=is_search(values),
+        kept=_kept(values),
         clutches=list(laws),
-        axes=range(0 if text_mode else axes_of(values)),
         choices=[] if text_mode else path_choices(pendulums_of(values), prefixes),
         presets=[preset for preset in map(preset_of, preset_names()) if text_mode or _fits_form(preset)],
         most_coefficients=models.MAX_COEFFICIENTS,
         run=run_fields(),
         refine=refine_fields(),
+        limits=LIMITS,
+        categories=categories(),
+        search_fields=search_fields(),
+        goals=result_choices(pendulums_of(values), numbers=True),
+        limited=result_choices(pendulums_of(values)),
         degree_field=degree_field,
     )
+
+
+def _kept(values: Values) -> Values:
+    """The fields of the question that the form does not ask, so that what was entered is there when it is."""
+    others = _OF_AXES if is_search(values) else _OF_SEARCH
+    return {name: text for name, text in values.items() if name.startswith(others)}
 
 
 def _fits_form(preset: Mapping[str, Any]) -> bool:

@@ -7,22 +7,27 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from sprag.service.faults import Fault
+from sprag.service.http.web.form.entries import (
+    Faults,
+    Values,
+    count_in,
+    list_of,
+    names_of,
+    path_values,
+    paths_of,
+    plain,
+    text_of,
+)
 from sprag.service.http.web.form.fields import FORM_MODEL, pendulum, sections
+from sprag.service.http.web.form.goal import GOAL_DEFAULTS, field_of_goal, goal_of, goal_values
+from sprag.service.http.web.form.parts import count_of
 from sprag.service.spec.derive import formulas_of, with_values
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.service.spec.plan import refine
 from sprag.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
 from sprag.service.spec.units import QuantityError, parse_quantity
-from sprag.worker.limits import MAX_AXES
 from sprag.worker.models import MAX_PENDULUMS, SETTLED
 
-Values = dict[str, str]
-Faults = dict[str, list[str]]
-
-_NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
-_WHOLE: Final = re.compile(r"[+-]?[0-9]{1,18}")
-#: Separator of a list: a comma counts only before a blank, so that a decimal comma is reported as a fault.
-_BETWEEN: Final = re.compile(r"[;\n]|,\s")
 #: Fields of an axis for each way of giving its values.
 WAYS: Final = {
     "values": ("values",),
@@ -38,21 +43,19 @@ REFINE_DEFAULTS: Final[Values] = {
 }
 #: The form's choice for a run of a given time, which a spec expresses by its duration or window.
 TIMED: Final = "time"
-_FIELDS: Final = frozenset({"sprag", "model", "name", "base", "run", "axes", "combine", "derive", "refine"})
+_FIELDS: Final = frozenset({"sprag", "model", "name", "base", "run", "axes", "combine", "derive", "refine", "goal"})
 #: Beginning of a field with the formula of a derived parameter.
 FORMULA: Final = "="
 
 
 def pendulums_of(values: Mapping[str, str]) -> int:
     """How many pendulums the form has."""
-    text = values.get("pendulums", "1")
-    return min(max(int(text) if _WHOLE.fullmatch(text) else 1, 1), MAX_PENDULUMS)
+    return count_in(values, "pendulums", 1, 1, MAX_PENDULUMS)
 
 
-def axes_of(values: Mapping[str, str]) -> int:
-    """How many axes the form has."""
-    text = values.get("axes", "0")
-    return min(max(int(text) if _WHOLE.fullmatch(text) else 0, 0), MAX_AXES)
+def is_search(values: Mapping[str, str]) -> bool:
+    """Whether the form asks for the best designs, not for cases along axes."""
+    return values.get("asks") == "goal"
 
 
 def clutch_pointers(values: Mapping[str, str]) -> list[str]:
@@ -89,7 +92,9 @@ def spec_of(values: Mapping[str, str]) -> tuple[dict[str, Any], Faults]:
     if derive:
         spec["derive"] = derive
     spec["run"] = _run(values)
-    axes = [_axis(values, index) for index in range(axes_of(values))]
+    if is_search(values):
+        return spec | {"goal": goal_of(values, faults)}, faults
+    axes = [_axis(values, index) for index in range(count_of(values, "axes"))]
     spec["axes"] = [axis for axis in axes if axis is not None]
     spec["combine"] = values.get("/combine", "grid")
     if any("adaptive" in axis for axis in spec["axes"]):
@@ -100,7 +105,7 @@ def spec_of(values: Mapping[str, str]) -> tuple[dict[str, Any], Faults]:
 def _refine(values: Mapping[str, str]) -> dict[str, Any]:
     """What a form with an adaptive axis asks for."""
     found = _object(values, "/refine", [f"/refine/{name}" for name in refine.FIELDS if name != "results"])
-    names = [name.strip() for name in re.split(r"[;,\s]+", values.get("/refine/results", "")) if name.strip()]
+    names = names_of(values.get("/refine/results", ""))
     return {**({"results": names} if names else {}), **found}
 
 
@@ -123,14 +128,6 @@ def _formulas(base: dict[str, Any]) -> dict[str, str]:
     return found
 
 
-def plain(text: str) -> Any:
-    """A field's text for the spec: a number where it is one, otherwise the text with its unit."""
-    text = text.strip()
-    if _WHOLE.fullmatch(text):
-        return int(text)
-    return float(text) if _NUMBER.fullmatch(text) else text
-
-
 def _given(values: Mapping[str, str], name: str, key: str) -> dict[str, Any]:
     text = values.get(name, "").strip()
     return {key: plain(text)} if text else {}
@@ -143,10 +140,6 @@ def _object(values: Mapping[str, str], pointer: str, names: list[str]) -> dict[s
     return found
 
 
-def _list(text: str) -> list[Any]:
-    return [plain(item) for item in _BETWEEN.split(text) if item.strip()]
-
-
 def _clutch(values: Mapping[str, str], pointer: str, faults: Faults) -> dict[str, Any]:
     if values.get(f"{pointer}/kind", "law") != "data":
         coefficients = values.get(f"{pointer}/coefficients", "")
@@ -154,7 +147,7 @@ def _clutch(values: Mapping[str, str], pointer: str, faults: Faults) -> dict[str
         if re.fullmatch(r"[-+0-9.eE\s]+", coefficients):
             coefficients = "; ".join(coefficients.split())
         return {
-            **({"coefficients": _list(coefficients)} if coefficients.strip() else {}),
+            **({"coefficients": list_of(coefficients)} if coefficients.strip() else {}),
             **_given(values, f"{pointer}/windup_limit", "windup_limit"),
         }
     found: dict[str, Any] = {"data": None}
@@ -197,16 +190,14 @@ def _run(values: Mapping[str, str]) -> dict[str, Any]:
 def _axis(values: Mapping[str, str], index: int) -> dict[str, Any] | None:
     """One axis; None for one in which nothing is filled in."""
     pointer = f"/axes/{index}"
-    paths = [values.get(f"{pointer}/path", "").strip()]
-    paths += [path.strip() for path in re.split(r"[;,\s]+", values.get(f"{pointer}/tied", "")) if path.strip()]
-    paths = [path for path in paths if path]
+    path = paths_of(values, pointer)
     way = values.get(f"{pointer}/way", "values")
     names = WAYS.get(way, ("values",))
     texts = [values.get(f"{pointer}/{name}", "").strip() for name in names]
-    if not paths and not any(texts):
+    if not path and not any(texts):
         return None
-    axis: dict[str, Any] = {"path": (paths[0] if len(paths) == 1 else paths) if paths else None}
-    axis[way] = _list(texts[0]) if way == "values" else [plain(text) for text in texts]
+    axis: dict[str, Any] = {"path": path}
+    axis[way] = list_of(texts[0]) if way == "values" else [plain(text) for text in texts]
     return axis
 
 
@@ -216,10 +207,12 @@ def field_of(pointer: str, values: Mapping[str, str]) -> str:
         pointer = "/base/" + pointer.removeprefix("/derive/").replace(".", "/")
     if pointer == "/refine" or pointer.startswith("/refine/results"):
         return "/refine/results"
+    if pointer.startswith("/goal"):
+        return field_of_goal(pointer, values)
     match = re.fullmatch(r"/axes/(\d+)(?:/(.*))?", pointer)
     if match:
         # Axes that are not filled in are not in the spec.
-        filled = [index for index in range(axes_of(values)) if _axis(values, index) is not None]
+        filled = [index for index in range(count_of(values, "axes")) if _axis(values, index) is not None]
         index = filled[int(match[1])] if int(match[1]) < len(filled) else int(match[1])
         rest = match[2] or "path"
         way, _, item = rest.partition("/")
@@ -257,21 +250,22 @@ def values_of(spec: Mapping[str, Any]) -> Values:
                 if "clutch" in item:
                     values["clutches"] = "own"
                     values |= _clutch_values(f"/base/pendulums/{index}/clutch", item["clutch"])
-                values |= {f"/base/pendulums/{index}/{k}": _text(v) for k, v in item.items() if k != "clutch"}
+                values |= {f"/base/pendulums/{index}/{k}": text_of(v) for k, v in item.items() if k != "clutch"}
         elif isinstance(content, Mapping):
-            values |= {f"/base/{key}/{name}": _text(value) for name, value in content.items()}
+            values |= {f"/base/{key}/{name}": text_of(value) for name, value in content.items()}
         else:
-            values[f"/base/{key}"] = _text(content)
+            values[f"/base/{key}"] = text_of(content)
     run = spec.get("run", {})
     values["/run/until"] = TIMED if any(name in run for name in TIMED_FIELDS) else SETTLED
     for key, content in run.items():
         if key == "window":
-            values |= {f"/run/window/{index}": _text(item) for index, item in enumerate(content)}
+            values |= {f"/run/window/{index}": text_of(item) for index, item in enumerate(content)}
         else:
-            values[f"/run/{key}"] = _text(content)
-    values |= REFINE_DEFAULTS
+            values[f"/run/{key}"] = text_of(content)
+    values |= {"asks": "goal" if "goal" in spec else "axes"} | REFINE_DEFAULTS
+    values |= goal_values(spec["goal"]) if "goal" in spec else GOAL_DEFAULTS
     for key, content in spec.get("refine", {}).items():
-        values[f"/refine/{key}"] = "; ".join(content) if key == "results" else _text(content)
+        values[f"/refine/{key}"] = "; ".join(content) if key == "results" else text_of(content)
     values["axes"] = str(len(spec.get("axes", ())))
     for index, axis in enumerate(spec.get("axes", ())):
         values |= _axis_values(f"/axes/{index}", axis)
@@ -288,19 +282,15 @@ def _plain_axis(axis: Mapping[str, Any]) -> bool:
     return any(set(axis) == {"path", way} for way in WAYS)
 
 
-def _text(value: Any) -> str:
-    return value if isinstance(value, str) else re.sub(r"e([-+])0+", r"e\1", repr(value))
-
-
 def _clutch_values(pointer: str, clutch: Mapping[str, Any]) -> Values:
     if "data" not in clutch:
-        found = {f"{pointer}/kind": "law", f"{pointer}/coefficients": "; ".join(map(_text, clutch["coefficients"]))}
+        found = {f"{pointer}/kind": "law", f"{pointer}/coefficients": "; ".join(map(text_of, clutch["coefficients"]))}
         # Ticked in case measured data replace the coefficients; this is the spec's default.
         found[f"{pointer}/through_origin"] = "on"
-        return found | {f"{pointer}/windup_limit": _text(clutch[key]) for key in ("windup_limit",) if key in clutch}
+        return found | {f"{pointer}/windup_limit": text_of(clutch[key]) for key in ("windup_limit",) if key in clutch}
     rows = [f"{_si(angle, 'rad')!r}\t{_si(torque, 'N*m')!r}" for angle, torque in clutch["data"]]
     found = {f"{pointer}/kind": "data", f"{pointer}/data": "\n".join(["angle_rad\ttorque_Nm", *rows])}
-    found |= {f"{pointer}/{key}": _text(clutch[key]) for key in ("accuracy", "max_degree") if key in clutch}
+    found |= {f"{pointer}/{key}": text_of(clutch[key]) for key in ("accuracy", "max_degree") if key in clutch}
     flags = {"through_origin": clutch.get("through_origin", True)}
     flags["angles_include_backlash"] = clutch.get("angles_include_backlash", False)
     return found | {f"{pointer}/{name}": "on" for name, ticked in flags.items() if ticked}
@@ -314,9 +304,8 @@ def _si(value: Any, unit: str) -> float:
 
 
 def _axis_values(pointer: str, axis: Mapping[str, Any]) -> Values:
-    paths = axis["path"] if isinstance(axis["path"], list) else [axis["path"]]
     way = next(name for name in WAYS if name in axis)
-    found = {f"{pointer}/path": paths[0], f"{pointer}/tied": ", ".join(paths[1:]), f"{pointer}/way": way}
+    found = {**path_values(pointer, axis["path"]), f"{pointer}/way": way}
     if way == "values":
-        return found | {f"{pointer}/values": "; ".join(map(_text, axis[way]))}
-    return found | {f"{pointer}/{name}": _text(item) for name, item in zip(WAYS[way], axis[way], strict=True)}
+        return found | {f"{pointer}/values": "; ".join(map(text_of, axis[way]))}
+    return found | {f"{pointer}/{name}": text_of(item) for name, item in zip(WAYS[way], axis[way], strict=True)}

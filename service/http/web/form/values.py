@@ -8,7 +8,7 @@ from urllib.parse import parse_qsl
 from fastapi import Depends, Request
 
 from sprag.service.http.problems import ApiError
-from sprag.service.http.web.form.spec import Values
+from sprag.service.http.web.form.entries import Values
 
 _FORM_TYPE: Final = "application/x-www-form-urlencoded"
 #: Fields of a form, at most.

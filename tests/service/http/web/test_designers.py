@@ -134,7 +134,7 @@ def test_a_study_is_made_with_the_keyboard_alone(visitor: Visitor, office: Offic
     page.keyboard.press("Control+A")
     page.keyboard.type("By keyboard")
     for left in (2, 1):
-        tab_to('button[value="drop-axis 0"]')
+        tab_to('button[value="drop-axes 0"]')
         page.keyboard.press("Enter")
         expect(page.locator(".axis")).to_have_count(left)
     tab_to('[name="/axes/0/values"]')

@@ -16,8 +16,9 @@ from sprag.service.faults import Fault
 from sprag.service.http.web.figures.answers import motion_figures
 from sprag.service.http.web.figures.thinning import thin
 from sprag.service.http.web.form.check import check_form, check_text, message
+from sprag.service.http.web.form.entries import plain
 from sprag.service.http.web.form.page import EMPTY_FORM, reshape, share_clutches
-from sprag.service.http.web.form.spec import field_of, plain, spec_of, values_of, with_clutch_defaults
+from sprag.service.http.web.form.spec import field_of, spec_of, values_of, with_clutch_defaults
 from sprag.service.http.web.templates import duration, fragment, time_left
 from sprag.service.presets import preset_names, preset_text
 from sprag.service.results.wording import number, symbol, unit_text

@@ -1,0 +1,57 @@
+"""Texts of the form's fields as entries of a spec, and back."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any, Final
+
+Values = dict[str, str]
+Faults = dict[str, list[str]]
+
+_NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
+_WHOLE: Final = re.compile(r"[+-]?[0-9]{1,18}")
+#: Separator of a list: a comma counts only before a blank, so that a decimal comma is reported as a fault.
+_BETWEEN: Final = re.compile(r"[;\n]|,\s")
+
+
+def plain(text: str) -> Any:
+    """A field's text for the spec: a number where it is one, otherwise the text with its unit."""
+    text = text.strip()
+    if _WHOLE.fullmatch(text):
+        return int(text)
+    return float(text) if _NUMBER.fullmatch(text) else text
+
+
+def list_of(text: str) -> list[Any]:
+    """The entries of a list."""
+    return [plain(item) for item in _BETWEEN.split(text) if item.strip()]
+
+
+def names_of(text: str) -> list[str]:
+    """Names, such as paths and results, separated by semicolons, commas or blanks."""
+    return [name for name in re.split(r"[;,\s]+", text) if name]
+
+
+def paths_of(values: Mapping[str, str], pointer: str) -> str | list[str] | None:
+    """The path or the tied paths of what varies at ``pointer``; None where there is none."""
+    paths = [values.get(f"{pointer}/path", "").strip(), *names_of(values.get(f"{pointer}/tied", ""))]
+    paths = [path for path in paths if path]
+    return (paths[0] if len(paths) == 1 else paths) if paths else None
+
+
+def path_values(pointer: str, path: str | list[str]) -> Values:
+    """The form's values for a path or tied paths at ``pointer``."""
+    paths = path if isinstance(path, list) else [path]
+    return {f"{pointer}/path": paths[0], f"{pointer}/tied": ", ".join(paths[1:])}
+
+
+def text_of(value: Any) -> str:
+    """An entry of a spec as the text of a field."""
+    return value if isinstance(value, str) else re.sub(r"e([-+])0+", r"e\1", repr(value))
+
+
+def count_in(values: Mapping[str, str], name: str, default: int, low: int, high: int) -> int:
+    """The count in a field that the user does not see; ``default`` where it is missing or not a number."""
+    text = values.get(name, "")
+    return min(max(int(text) if _WHOLE.fullmatch(text) else default, low), high)

@@ -1,0 +1,86 @@
+"""Parts of the form that users add and remove: axes, and the variables, goals, limits and points of a search."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from sprag.service.http.web.form.entries import Values, count_in
+from sprag.service.spec.plan import goal
+from sprag.worker.limits import MAX_AXES
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A list of rows.
+
+    Attributes
+    ----------
+    pointer : JSON Pointer of the list; the fields of row 0 begin with ``{pointer}/0/``
+    most : largest number of rows
+    entries : fields of which at least one has a text in a row that is filled in
+    new : initial values of a new row
+    """
+
+    pointer: str
+    most: int
+    entries: tuple[str, ...]
+    new: Values = field(default_factory=dict)
+
+
+#: By the name of the field with the number of rows.
+PARTS: Final = {
+    "axes": Part("/axes", MAX_AXES, ("path", "tied", "values", "from", "to", "count", "step"), {"way": "linspace"}),
+    "vary": Part("/goal/vary", goal.VARY.high, ("path", "tied", "values", "from", "to"), {"way": "from"}),
+    "best": Part("/goal/best", goal.BEST.high, ("result",), {"toward": "max"}),
+    "subject_to": Part("/goal/subject_to", goal.SUBJECT_TO.high, ("result", "value"), {"kind": "at_most"}),
+    "at": Part("/goal/at", MAX_AXES, ("path", "values")),
+}
+
+
+def count_of(values: Mapping[str, str], name: str) -> int:
+    """Number of rows of a part."""
+    return count_in(values, name, 0, 0, PARTS[name].most)
+
+
+def filled(values: Mapping[str, str], name: str) -> list[int]:
+    """The rows of a part that are filled in."""
+    part = PARTS[name]
+    return [
+        index
+        for index in range(count_of(values, name))
+        if any(values.get(f"{part.pointer}/{index}/{entry}", "").strip() for entry in part.entries)
+    ]
+
+
+def add_row(values: Values, name: str) -> None:
+    """Add a row, unless there are as many as there may be."""
+    part, count = PARTS[name], count_of(values, name)
+    if count < part.most:
+        values |= {f"{part.pointer}/{count}/{entry}": text for entry, text in part.new.items()}
+        values[name] = str(count + 1)
+
+
+def drop_row(values: Values, name: str, index: int) -> None:
+    """Remove a row; those behind it move up."""
+    part, count = PARTS[name], count_of(values, name)
+    if index >= count:
+        return
+    for row in range(index, count):
+        drop(values, f"{part.pointer}/{row}/")
+        copy(values, f"{part.pointer}/{row + 1}/", f"{part.pointer}/{row}/")
+    values[name] = str(count - 1)
+
+
+def copy(values: Values, source: str, target: str) -> None:
+    """Copy the fields that begin with ``source``."""
+    values |= {
+        target + name.removeprefix(source): text for name, text in list(values.items()) if name.startswith(source)
+    }
+
+
+def drop(values: Values, prefix: str) -> None:
+    """Remove the fields that begin with ``prefix``."""
+    for name in [name for name in values if name.startswith(prefix)]:
+        del values[name]

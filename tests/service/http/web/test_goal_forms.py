@@ -1,0 +1,173 @@
+"""The form of a search: what goes in comes out, faults stand beside their fields, rows come and go."""
+
+from __future__ import annotations
+
+import json
+from html.parser import HTMLParser
+from typing import Any
+
+import pytest
+
+from sprag.service.http.web.form.check import check_form
+from sprag.service.http.web.form.page import EMPTY_FORM, reshape
+from sprag.service.http.web.form.spec import field_of, spec_of, values_of
+from sprag.service.presets import preset_text
+from sprag.service.spec.document import load_spec, parse_spec
+from sprag.worker.chunking import Chunking
+from tests.service.conftest import Service
+
+GOAL: dict[str, Any] = {
+    "vary": [
+        {"path": "excitation.frequency", "from": "20 Hz", "to": "35 Hz"},
+        {"path": ["excitation.amplitude_x", "excitation.amplitude_y"], "values": ["1 mm", "2 mm", 0.003]},
+    ],
+    "best": [{"result": "efficiency", "max": True}, {"result": "shaft.irregularity"}],
+    "subject_to": [
+        {"result": "torque.max", "at_most": "3 N*m"},
+        {"result": "shaft.speed.mean", "is": 8, "within": "2 %"},
+        {"result": "regime", "is": "periodic"},
+    ],
+    "at": [{"shaft.load": "0.1 N*m", "gravity": 9.81}, {"shaft.load": 0.3, "gravity": 0}],
+    "over": "mean",
+    "population": 20,
+    "generations": 5,
+    "seed": 7,
+    "polish": False,
+}
+
+
+def searching(**changes: Any) -> dict[str, Any]:
+    """The preset of a search, with another goal."""
+    spec: dict[str, Any] = load_spec(preset_text("fastest_drive")[1], "toml")  # type: ignore[assignment]
+    return {**json.loads(json.dumps(spec)), "goal": {**GOAL, **changes}}
+
+
+def test_a_search_is_cloned_with_all_that_it_asks_for() -> None:
+    for spec in (searching(), load_spec(preset_text("fastest_drive")[1], "toml")):
+        assert isinstance(spec, dict)
+        again, faults = spec_of(values_of(json.loads(json.dumps(spec))))
+        assert faults == {}
+        assert again["goal"] == spec["goal"]
+        assert parse_spec(again).study.plan == parse_spec(spec).study.plan
+    with pytest.raises(ValueError, match="form"):
+        values_of(searching(more=1))
+    with pytest.raises(ValueError, match="form"):
+        values_of(searching(best=[{"result": "efficiency", "weight": 2}]))
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("/goal/vary/0/path", "excitation.frequenc", "excitation.frequency"),
+        ("/goal/vary/0/path", "", "required"),
+        ("/goal/vary/0/from", "20 mm", "not a unit of this field"),
+        ("/goal/vary/0/to", "", "must begin with a number"),
+        ("/goal/vary/0/from", "35 Hz", "begins where it ends"),
+        ("/goal/vary/1/values", "1 mm; 2 kg", "not a unit of this field"),
+        ("/goal/vary/1/values", "", "has no values"),
+        ("/goal/best/0/result", "eficiency", "efficiency"),
+        ("/goal/best/1/result", "efficiency", "is a goal already"),
+        ("/goal/subject_to/0/value", "3 mm", "N*m"),
+        ("/goal/subject_to/0/value", "", "must begin with a number"),
+        ("/goal/subject_to/0/result", "", "is required"),
+        ("/goal/subject_to/1/within", "-1 %", "not a valid width"),
+        ("/goal/subject_to/2/value", "steady", "not a valid choice"),
+        ("/goal/at/0/values", "0.1 N*m; 3 mm", "not a unit of this field"),
+        ("/goal/at/1/values", "9.81", "as many values as the first parameter, 2; got 1"),
+        ("/goal/at/1/values", "", "is required"),
+        ("/goal/at/1/path", "", "is required"),
+        ("/goal/at/1/path", "shaft.load", "already"),
+        ("/goal/population", "2", "out of range"),
+        ("/goal/generations", "many", "whole number"),
+        ("/goal/seed", "-1", "out of range"),
+    ],
+)
+def test_each_fault_of_a_search_stands_beside_its_field(name: str, text: str, message: str) -> None:
+    checked = check_form({**values_of(searching()), name: text}, Chunking())
+    assert checked.preview is None
+    assert message in " ".join(checked.faults[name]), checked.faults
+
+
+def test_rows_that_are_not_filled_in_do_not_shift_the_faults() -> None:
+    values = {"asks": "goal", "vary": "2", "/goal/vary/0/way": "from", "/goal/vary/1/path": "shaft.load"}
+    values |= {"subject_to": "3", "/goal/subject_to/2/value": "3", "at": "2", "/goal/at/1/path": "gravity"}
+    assert field_of("/goal/vary/0/path", values) == "/goal/vary/1/path"
+    assert field_of("/goal/vary/0", values) == "/goal/vary/1/from"
+    assert field_of("/goal/subject_to/0/at_most", values) == "/goal/subject_to/2/value"
+    assert field_of("/goal/at/0/gravity", values) == "/goal/at/1/values"
+    assert [field_of(pointer, values) for pointer in ("/goal", "/goal/vary", "/goal/seed")] == [
+        "/goal", "/goal/vary", "/goal/seed",
+    ]  # fmt: skip
+
+
+def test_a_search_without_rows_says_what_it_needs() -> None:
+    values = values_of(searching()) | {"vary": "0", "best": "0", "subject_to": "0", "at": "0"}
+    faults = check_form(values, Chunking()).faults
+    assert "1 to 64 variables" in faults["/goal/vary"][0]
+    faults = check_form(values | {"vary": "1"}, Chunking()).faults
+    assert "asks for nothing" in faults["/goal"][0]
+
+
+def test_rows_are_added_and_removed() -> None:
+    values = values_of(searching())
+    reshape(values, "drop-subject_to 0")
+    reshape(values, "drop-vary 0")
+    reshape(values, "drop-best 9")
+    reshape(values, "add-at")
+    goal = spec_of(values)[0]["goal"]
+    assert (goal["subject_to"], goal["vary"]) == (GOAL["subject_to"][1:], GOAL["vary"][1:])
+    assert (values["at"], values["best"], goal["at"]) == ("3", "2", GOAL["at"])
+    for _ in range(9):
+        reshape(values, "add-best")
+    assert values["best"] == "8"
+
+
+class Controls(HTMLParser):
+    """What a browser would send of the form of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.values: dict[str, str] = {}
+        self._select = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        name, value = given.get("name") or "", given.get("value") or ""
+        if tag == "select":
+            self._select = name
+        elif tag == "option" and (self._select not in self.values or "selected" in given):
+            self.values[self._select] = value
+        elif tag == "input" and name and (given.get("type") not in {"radio", "checkbox"} or "checked" in given):
+            self.values[name] = value or "on"
+            if given.get("type") != "checkbox":
+                self.values[name] = value
+
+
+def test_the_form_is_filled_in_without_javascript(service: Service) -> None:
+    """As its controls are sent, it asks for the same; another question keeps what was entered for the first one."""
+    shown = Controls(service.http.get("/new?preset=fastest_drive").text).values
+    spec = load_spec(preset_text("fastest_drive")[1], "toml")
+    assert isinstance(spec, dict)
+    assert parse_spec(spec_of(shown)[0]).study.plan == parse_spec(spec).study.plan
+    along = Controls(service.http.post("/new", data={**shown, "asks": "axes"}).text)
+    assert "/axes/0/path" not in along.values
+    assert "goal" not in spec_of(along.values)[0]
+    more = service.http.post("/new", data={**along.values, "asks": "goal", "do": "add-subject_to"}).text
+    again = Controls(more).values
+    assert again["subject_to"] == "3"
+    assert spec_of(again)[0]["goal"] == spec_of(shown)[0]["goal"]
+    refused = service.http.post("/new", data={**again, "/goal/seed": "-1", "do": "submit"})
+    assert refused.status_code == 422
+    assert "out of range" in refused.text
+    accepted = service.http.post("/new", data={**again, "do": "submit"}, follow_redirects=False)
+    assert accepted.status_code == 303
+    study = service.store.study(accepted.headers["location"].rsplit("/", 1)[-1])
+    assert study.plan == parse_spec(spec).study.plan
+
+
+def test_an_empty_form_can_become_a_search(service: Service) -> None:
+    shown = Controls(service.http.post("/new", data={**EMPTY_FORM, "asks": "goal"}).text).values
+    assert (shown["vary"], shown["best"], shown["/goal/best/0/toward"]) == ("1", "1", "max")
+    assert (shown["/goal/population"], shown["/goal/polish"]) == ("100", "on")
+    assert shown["/axes/0/way"] == "linspace"
