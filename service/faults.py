@@ -89,6 +89,7 @@ WarningCode = Literal[
     "slow-excitation",
     "stays-upright",
     "terms-cancel",
+    "tolerance-cut",
     "too-few-rows",
     "wraps-around",
 ]

@@ -1,4 +1,4 @@
-"""What the derived parameters of a study depend on, and the values that they take."""
+"""What the derived parameters of a study depend on, and the values that they and drawn parameters take."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from sprag.worker.models.formulas import needed, sources
 from sprag.worker.models.parameters import parameter_of
+from sprag.worker.spread import DRIVE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -28,8 +29,12 @@ def involved(study: Study, paths: Iterable[str]) -> Study:
     """
     paths = tuple(paths)
     roots = sources(study.derive, study.base, paths)
+    drawn = study.spread is not None and not roots.isdisjoint(study.spread.paths)
+    if drawn:
+        roots |= {DRIVE}
     axes = tuple(axis for axis in study.axes if not roots.isdisjoint(axis.paths))
-    return replace(study, axes=axes, derive=needed(study.derive, study.base, paths))
+    spread = study.spread if drawn else None
+    return replace(study, axes=axes, derive=needed(study.derive, study.base, paths), spread=spread)
 
 
 def blocks(study: Study) -> Iterator[range]:
@@ -50,8 +55,10 @@ def refused_value(study: Study, cases: range) -> str:
 
 def distinct_values(study: Study, path: str) -> NDArray[np.float64]:
     """The distinct values (SI) of any parameter of a study, ascending."""
-    if path not in study.derive:
-        axis = study.axis_of(path)
-        return np.array([study.base[path]]) if axis is None else np.unique(study.axes[axis].array)
+    varied = study.varied(path)
+    if varied is not None:
+        return np.unique(varied[1])
+    if path not in study.column_paths:
+        return np.array([study.base[path]])
     part = involved(study, [path])
     return np.unique(np.concatenate([np.unique(part.columns(cases)[path]) for cases in blocks(part)]))

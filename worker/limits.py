@@ -8,6 +8,11 @@ MAX_AXES: Final = 16
 MAX_COLUMNS: Final = 256
 #: Derived parameters of one study.
 MAX_DERIVED: Final = 100
+#: Parameters with tolerances of one study, and its drawn drives.
+MAX_TOLERANCES: Final = 1_000
+MAX_DRIVES: Final = 100_000
+#: Correlations of one study.
+MAX_CORRELATIONS: Final = 1_000
 #: Cases of one study.
 MAX_CASES: Final = 10_000_000
 #: Values on all axes of one study together (they are stored with the study).

@@ -10,6 +10,10 @@ Chunks of such a study are ranges of *positions* in this order. For a grid only 
 pass adds form boxes, one for each axis that is the first with a new value, and a position in a box is a mixed-radix
 number, like a case number in the grid. Cases listed one by one (a zip) are sorted by the first pass that contains all
 their values; within a pass they keep their given order, which for samples covers the ranges.
+
+Of a study with tolerances the passes of the nominal drive come first. Then come the drives at all places together, in
+passes that double their number: every pass ends with complete ribbons of the first 1, 2, 4, 8, .. drives, and a number
+that is a power of two is what Sobol draws are balanced for.
 """
 
 from __future__ import annotations
@@ -97,9 +101,32 @@ def levels_of(values: NDArray[np.float64]) -> Numbers:
 def order_of(study: Study) -> Order:
     """The order of ``study``, coarse to fine."""
     if study.combine == "grid" and study.axes:
-        return GridOrder([levels_of(axis.array) for axis in study.axes])
-    own = [levels_of(axis.array) for axis in study.axes]
+        return GridOrder(_levels(study))
+    own = _levels(study)
     return ListOrder(np.max(own, axis=0) if own else np.zeros(study.cases, dtype=np.int64))
+
+
+def _levels(study: Study) -> list[Numbers]:
+    """First pass that takes each value of each axis."""
+    if study.spread is None:
+        return [levels_of(axis.array) for axis in study.axes]
+    *places, drives = study.axes
+    own = [levels_of(axis.array) for axis in places]
+    first = 1 + max((int(one.max()) for one in own), default=0)
+    return [*own, _levels_of_drives(drives.array, first)]
+
+
+def _levels_of_drives(drives: NDArray[np.float64], first: int) -> Numbers:
+    """First pass that takes each drive: 0 the nominal one, then from ``first`` the drives 1, 2, 3 to 4, 5 to 8 ..
+
+    Passes without any drive are left out.
+    """
+    numbers = drives.astype(np.int64)
+    doublings = np.frexp(np.maximum(numbers - 0.5, 0.25))[1]  # 0 for drive 1, 1 for drive 2, 2 for 3 and 4, ..
+    rank = np.unique(doublings[numbers > 0], return_inverse=True)[1].reshape(-1)
+    found = np.zeros(numbers.size, dtype=np.int64)
+    found[numbers > 0] = first + rank
+    return found
 
 
 class ListOrder:

@@ -2,7 +2,7 @@
 
 A case needs no hash of its own, because its parameters follow from the study and its number. Studies that can share
 cases have the same `kin_hash`; `shared_cases` finds the shared ones from the values of both studies' axes and of their
-derived parameters: it is the values that count, not the formulas.
+drawn and derived parameters: it is the values that count, not the formulas, and not the numbers of the drives.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 
 from sprag.worker import models
 from sprag.worker.derived import distinct_values
+from sprag.worker.spread import DRIVE
 from sprag.worker.study import Axis
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def kin_hash(study: Study, engine_version: str) -> str:
 
     It includes the structure of the machine, where the model has one.
     """
-    paths = sorted({*study.base, *study.axis_paths})
+    paths = _paths(study)
     shared: dict[str, Any] = {"engine": engine_version, "model": study.model, "run": study.run, "paths": paths}
     if study.structure is not None:
         shared["structure"] = study.structure
@@ -55,14 +56,14 @@ class Wanted:
 
     def __init__(self, study: Study) -> None:
         self.study = study
-        self._sorted: dict[int, tuple[Cases, Values]] = {}
+        self._sorted: dict[str, tuple[Cases, Values]] = {}
         self._unique: dict[int | str, Values] = {}
 
     def values(self, path: str) -> Values:
         """The distinct values (SI) of a parameter, ascending."""
-        axis = self.study.axis_of(path)
-        if axis is None and path not in self.study.derive:
+        if path not in self.study.column_paths:
             return np.array([self.study.base[path]])
+        axis = None if path in _drawn(self.study) else self.study.axis_of(path)
         key = path if axis is None else axis
         if key not in self._unique:
             self._unique[key] = distinct_values(self.study, path)
@@ -91,36 +92,39 @@ class Wanted:
         found[left] = True
         return found
 
-    def cases_with(self, wanted: Sequence[tuple[int, Values]]) -> Cases:
-        """The cases, ascending, whose value on each given axis is among those given with it (ascending)."""
+    def cases_with(self, wanted: Sequence[tuple[str, Values]]) -> Cases:
+        """The cases, ascending, whose value of each given path is among those given with it (ascending).
+
+        The value of each path depends on one axis (`Study.varied`).
+        """
         study = self.study
         if study.combine == "zip":
             return self._rows_with(wanted) if wanted else np.arange(study.cases, dtype=np.int64)
         cases = np.zeros(1, dtype=np.int64)
-        for index, axis in enumerate(study.axes):
-            kept = np.ones(len(axis), dtype=np.bool_)
-            for position, values in wanted:
-                if position == index:
-                    kept &= _places(values, axis.array) >= 0
+        kept_on = [np.ones(len(axis), dtype=np.bool_) for axis in study.axes]
+        for path, values in wanted:
+            position, array = _varied(study, path)
+            kept_on[position] &= _places(values, array) >= 0
+        for axis, kept in zip(study.axes, kept_on, strict=True):
             cases = (cases[:, None] * len(axis) + np.flatnonzero(kept)).reshape(-1)
         return cases
 
-    def _rows_with(self, wanted: Sequence[tuple[int, Values]]) -> Cases:
+    def _rows_with(self, wanted: Sequence[tuple[str, Values]]) -> Cases:
         """The same for zipped axes: only the rows selected by the most restrictive axis are examined."""
         found: list[tuple[int, Cases, Cases, Cases]] = []
-        for position, values in wanted:
-            if position not in self._sorted:
-                array = self.study.axes[position].array
+        for path, values in wanted:
+            if path not in self._sorted:
+                array = _varied(self.study, path)[1]
                 order = np.argsort(array, kind="stable")
-                self._sorted[position] = order, array[order]
-            order, ascending = self._sorted[position]
+                self._sorted[path] = order, array[order]
+            order, ascending = self._sorted[path]
             first, last = (np.searchsorted(ascending, values, side) for side in ("left", "right"))
             found.append((int((last - first).sum()), order, first, last))
         size, order, first, last = min(found, key=lambda item: item[0])
         starts = np.repeat(first - np.concatenate([[0], np.cumsum(last - first)[:-1]]), last - first)
         rows = np.sort(order[starts + np.arange(size)])
-        for position, values in wanted:
-            rows = rows[_places(values, self.study.axes[position].array[rows]) >= 0]
+        for path, values in wanted:
+            rows = rows[_places(values, _varied(self.study, path)[1][rows]) >= 0]
         return rows
 
 
@@ -133,7 +137,7 @@ def shared_cases(new: Study | Wanted, old: Study) -> tuple[Cases, Cases]:
     nothing = np.empty(0, dtype=np.int64)
     common: list[tuple[str, Values]] = []
     for path in _axis_pairs(ours.study, old):
-        if ours.study.axis_of(path) is None and old.axis_of(path) is None:
+        if ours.study.varied(path) is None and old.varied(path) is None:
             if ours.study.base[path] != old.base[path]:
                 return nothing, nothing
             continue
@@ -166,27 +170,31 @@ def span(study: Study) -> Values:
         The paths are sorted by name, which is the same order for all studies of a `kin_hash`.
     """
     spans = {path: (value, value) for path, value in study.base.items()}
-    for axis in study.axes:
+    for axis in study.axes if study.spread is None else study.axes[:-1]:
         spans.update(dict.fromkeys(axis.paths, (float(axis.array.min()), float(axis.array.max()))))
-    for path in study.derive:
+    for path in (*study.derive, *_drawn(study)):
         values = distinct_values(study, path)
         spans[path] = (float(values[0]), float(values[-1]))
     return np.array([spans[path] for path in sorted(spans)], dtype=np.float64).reshape(-1, 2).T
 
 
 def _paths(study: Study) -> list[str]:
-    return sorted({*study.base, *study.axis_paths})
+    return sorted({*study.base, *study.axis_paths} - {DRIVE})
 
 
 def _axis_pairs(new: Study, old: Study) -> list[str]:
     """One path for each pair of an axis (or the base) of one study and of the other; tied paths are compared once.
 
-    Without those that either study derives.
+    Without those that either study derives, or changes along two axes.
     """
-    found: dict[tuple[int | None, int | None, object], str] = {}
+    found: dict[tuple[object, ...], str] = {}
     ours, theirs = _axes_of(new), _axes_of(old)
+    apart = {*new.derive, *old.derive, *_crossed(new), *_crossed(old), DRIVE}
     for path in dict.fromkeys((*new.base, *new.axis_paths)):
-        if path in new.derive or path in old.derive:
+        if path in apart:
+            continue
+        if path in _drawn(new) or path in _drawn(old):
+            found[(path,)] = path
             continue
         axes = (ours.get(path), theirs.get(path))
         # Parameters constant in both studies are compared individually, as are those that vary in one study only and
@@ -197,8 +205,29 @@ def _axis_pairs(new: Study, old: Study) -> list[str]:
 
 
 def _derived(new: Study, old: Study) -> list[str]:
-    """The paths whose derived values are compared; equal formulas have equal values where all others are equal."""
-    return [] if new.derive == old.derive else sorted({*new.derive, *old.derive})
+    """The paths whose values are compared case by case: those that change along two axes, and derived ones.
+
+    Equal formulas have equal values where all others are equal.
+    """
+    derived = set() if new.derive == old.derive else {*new.derive, *old.derive}
+    return sorted({*derived, *_crossed(new), *_crossed(old)})
+
+
+def _drawn(study: Study) -> tuple[str, ...]:
+    """The paths with tolerances."""
+    return () if study.spread is None else study.spread.paths
+
+
+def _crossed(study: Study) -> list[str]:
+    """The paths whose values depend on their own axis and on the drive."""
+    return [path for path in _drawn(study) if study.varied(path) is None]
+
+
+def _varied(study: Study, path: str) -> tuple[int, Values]:
+    """Position of the axis on which a parameter depends, and its value at each place there."""
+    found = study.varied(path)
+    assert found is not None
+    return found
 
 
 def _column(study: Study, path: str, cases: Cases) -> Values:
@@ -237,16 +266,16 @@ def _places(ascending: Values, values: Values) -> Cases:
 
 
 def _cases_with(side: Wanted, common: Sequence[tuple[str, Values]]) -> Cases:
-    axes = ((side.study.axis_of(path), values) for path, values in common)
-    return side.cases_with([(axis, values) for axis, values in axes if axis is not None])
+    return side.cases_with([(path, values) for path, values in common if side.study.varied(path) is not None])
 
 
 def _coded(study: Study, path: str, common: Values, cases: Cases, codes: Cases) -> Cases:
     """The codes of cases, extended by the position of their value of ``path`` among the common ones."""
-    position = study.axis_of(path)
-    if position is None:
+    varied = study.varied(path)
+    if varied is None:
         return codes * common.size  # the only value is the common one
-    return codes * common.size + _places(common, study.axes[position].array[_positions(study, position, cases)])
+    position, array = varied
+    return codes * common.size + _places(common, array[_positions(study, position, cases)])
 
 
 def _positions(study: Study, axis: int, cases: Cases) -> Cases:

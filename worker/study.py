@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import hashlib
 import json
 import math
@@ -15,13 +14,13 @@ from numpy.typing import NDArray
 
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_COLUMNS
 from sprag.worker.models.formulas import evaluate
+from sprag.worker.packed import packed, unpacked
+from sprag.worker.spread import DRIVE, Spread
 
 Combine = Literal["grid", "zip"]
 
 #: Two numbers closer than this (relative to the larger one) count as the same value of an axis.
 SAME_VALUE = 1e-9
-#: Longer axes are stored as the bytes of their doubles: a million of them as decimals take half a second to read.
-_MOST_DECIMALS = 1000
 
 
 class Axis:
@@ -111,6 +110,9 @@ class Study:
         No axis varies such a path, and its value in `base` is that of the formula there.
     combine : "grid" or "zip"
         Grid: every combination, the first axis varies slowest. Zip: the axes side by side, all of one length.
+    spread : Spread or None
+        Tolerances and the draws of the drives. The axis with the path `DRIVE`, the last one, then says which drive a
+        case belongs to, and the base and the other axes hold nominal values.
 
     Raises
     ------
@@ -127,6 +129,7 @@ class Study:
     structure: dict[str, Any] | None = None
     plan: dict[str, Any] | None = None
     derive: dict[str, str] = field(default_factory=dict)
+    spread: Spread | None = None
 
     def __post_init__(self) -> None:
         if self.combine not in get_args(Combine):
@@ -140,9 +143,28 @@ class Study:
             raise ValueError("a derived path is on an axis, or not in the base")
         if self.combine == "zip" and len({len(axis) for axis in self.axes}) > 1:
             raise ValueError("axes that are zipped must have equal lengths")
-        most = MAX_AXES if self.combine == "grid" else MAX_COLUMNS
+        self._check_spread(paths)
+        most = (MAX_AXES if self.combine == "grid" else MAX_COLUMNS) + (self.spread is not None)
         if len(self.axes) > most or sum(map(len, self.axes)) > MAX_AXIS_VALUES or self.cases > MAX_CASES:
             raise ValueError("the study is larger than the limits allow")
+
+    def _check_spread(self, paths: list[str]) -> None:
+        if self.spread is None:
+            if DRIVE in paths:
+                raise ValueError("an axis of drives needs tolerances")
+            return
+        if not self.axes or self.axes[-1].paths != (DRIVE,):
+            raise ValueError("the last axis of a study with tolerances is that of its drives")
+        numbers = self.axes[-1].array
+        if numbers.min() < 0 or numbers.max() > self.spread.drives or (numbers != np.floor(numbers)).any():
+            raise ValueError("a drive has no draws")
+        if not set(self.spread.paths) <= {*self.base, *paths} - {DRIVE, *self.derive}:
+            raise ValueError("a tolerance is of a derived or an unknown path")
+
+    @property
+    def drives(self) -> int:
+        """Number of drawn drives; 0 without tolerances."""
+        return 0 if self.spread is None else self.spread.drives
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -163,8 +185,9 @@ class Study:
 
     @property
     def column_paths(self) -> tuple[str, ...]:
-        """Every path that `columns` gives: those on axes, then the derived ones."""
-        return (*self.axis_paths, *self.derive)
+        """Every path that `columns` gives: those on axes, those with tolerances, then the derived ones."""
+        drawn = () if self.spread is None else self.spread.paths
+        return tuple(dict.fromkeys((*self.axis_paths, *drawn, *self.derive)))
 
     def axis_of(self, path: str) -> int | None:
         """Position of the axis that varies ``path``; None when it does not vary."""
@@ -203,13 +226,15 @@ class Study:
     def columns(self, cases: Sequence[int] | range | NDArray[np.integer[Any]]) -> dict[str, NDArray[np.float64]]:
         """Values of the `column_paths` in the given cases: path -> array of shape (m,), SI.
 
-        Constant parameters are not included; the caller merges the columns over `base`. Raises IndexError as `indices`
-        does.
+        Constant parameters are not included; the caller merges the columns over `base`. A parameter with a tolerance
+        has the value of the case's drive. Raises IndexError as `indices` does.
         """
         found: dict[str, NDArray[np.float64]] = {}
         for axis, index in zip(self.axes, self.indices(cases), strict=True):
             column = axis.array[index]
             found.update(dict.fromkeys(axis.paths, column))
+        if self.spread is not None:
+            found |= self.spread.columns(self.base, found)
         return found | evaluate(self.derive, self.base, found, len(cases)) if self.derive else found
 
     def case_parameters(self, case: int) -> dict[str, float]:
@@ -230,8 +255,8 @@ class Study:
     def cases_at(self, fixed: Mapping[str, float]) -> NDArray[np.int64]:
         """Numbers of the cases in which every path in ``fixed`` has the given value (SI, within `SAME_VALUE`).
 
-        A path that does not vary matches when its base value does. Only the axes of a zip are scanned, and the cases
-        that match otherwise for a derived path.
+        A path that does not vary matches when its base value does, and one with a tolerance by its nominal value. Only
+        the axes of a zip are scanned, and the cases that match otherwise for a derived path.
 
         Returns
         -------
@@ -279,6 +304,19 @@ class Study:
         for row in range(len(cases)):
             yield {path: column[row] for path, column in columns.items()}
 
+    def varied(self, path: str) -> tuple[int, NDArray[np.float64]] | None:
+        """The one axis on which the value of a parameter depends: its position, and the value (SI) at each place on it.
+
+        None where it depends on no axis, is derived, or depends on both its own axis and the drive.
+        """
+        at = self.axis_of(path)
+        if self.spread is None or path not in self.spread.paths:
+            return None if at is None else (at, self.axes[at].array)
+        if at is not None and self.combine == "grid":
+            return None
+        nominal = self.base[path] if at is None else self.axes[at].array
+        return len(self.axes) - 1, self.spread.values(path, nominal, self.axes[-1].array)
+
     def points(self, cases: range) -> NDArray[np.float64]:
         """The values on every axis of consecutive cases, SI: shape (cases, axes)."""
         indices = self.indices(cases)
@@ -297,23 +335,28 @@ class Study:
 
     def to_json(self) -> dict[str, Any]:
         """The study as plain JSON data; `from_json` gives an equal study."""
+        axes = [{"paths": list(axis.paths), "values": axis.array.tolist()} for axis in self.axes]
+        return self._without_axes() | {"axes": axes}
+
+    def _without_axes(self) -> dict[str, Any]:
         return {
             "model": self.model,
             "name": self.name,
             "base": dict(self.base),
             "run": dict(self.run),
-            "axes": [{"paths": list(axis.paths), "values": axis.array.tolist()} for axis in self.axes],
+            "axes": [],
             "combine": self.combine,
             # Omitted where there is none, so that older studies and their hashes stay unchanged.
             **({} if self.structure is None else {"structure": self.structure}),
             **({} if self.plan is None else {"plan": self.plan}),
             **({"derive": dict(self.derive)} if self.derive else {}),
+            **({} if self.spread is None else {"spread": self.spread.to_json()}),
         }
 
     def to_text(self) -> str:
         """The study as stored JSON text; long axes are packed, so that they are read quickly."""
-        axes = [{"paths": list(axis.paths), "values": _packed(axis.array)} for axis in self.axes]
-        return json.dumps(replace(self, axes=()).to_json() | {"axes": axes}, allow_nan=False)
+        axes = [{"paths": list(axis.paths), "values": packed(axis.array)} for axis in self.axes]
+        return json.dumps(self._without_axes() | {"axes": axes}, allow_nan=False)
 
     @classmethod
     def from_text(cls, text: str) -> Study:
@@ -328,11 +371,12 @@ class Study:
             name=str(data["name"]),
             base={str(path): float(value) for path, value in data["base"].items()},
             run=dict(data["run"]),
-            axes=tuple(Axis(tuple(axis["paths"]), _unpacked(axis["values"])) for axis in data["axes"]),
+            axes=tuple(Axis(tuple(axis["paths"]), unpacked(axis["values"])) for axis in data["axes"]),
             combine=cast("Combine", data["combine"]),
             structure=data.get("structure"),
             plan=data.get("plan"),
             derive=dict(data.get("derive", {})),
+            spread=Spread.from_json(data["spread"]) if data.get("spread") else None,
         )
 
     def physics_hash(self, engine_version: str) -> str:
@@ -352,17 +396,3 @@ class Study:
 
 def _same(column: NDArray[np.float64], value: float) -> NDArray[np.bool_]:
     return np.asarray(np.isclose(column, value, rtol=SAME_VALUE, atol=0.0))
-
-
-def _packed(values: NDArray[np.float64]) -> list[float] | str:
-    """The values for a JSON text: as numbers, or many as the base64 text of their bytes (float64, little-endian)."""
-    if values.size <= _MOST_DECIMALS:
-        return cast("list[float]", values.tolist())
-    return base64.b64encode(values.astype("<f8").tobytes()).decode("ascii")
-
-
-def _unpacked(stored: Sequence[float] | str) -> Sequence[float] | NDArray[np.float64]:
-    """The values that `_packed` wrote."""
-    if not isinstance(stored, str):
-        return stored
-    return np.frombuffer(base64.b64decode(stored, validate=True), dtype="<f8")

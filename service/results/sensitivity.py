@@ -41,8 +41,8 @@ from sprag.service.results.sensitivity_indices import (
     saltelli_indices,
     sample_indices,
 )
-from sprag.service.spec.axes.sample import LEVELS, cases_of
 from sprag.service.spec.catalogue import unit_of
+from sprag.service.spec.draws.unit import LEVELS, cases_of
 from sprag.worker import models
 
 if TYPE_CHECKING:

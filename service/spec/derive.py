@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.spec.axes.sample import unit_sample
 from sprag.service.spec.axes.values import in_range
+from sprag.service.spec.draws.unit import unit_sample
 from sprag.service.spec.formulas import Formula, FormulaError, UnknownNameError, read_formula
 from sprag.service.spec.report import Report, join, quantity_text
 from sprag.worker.derived import blocks, involved

@@ -9,6 +9,7 @@ from sprag.service.spec.derive import with_values
 from sprag.service.spec.fields import WHICH_CASES
 from sprag.worker.limits import MAX_NAME_LENGTH
 from sprag.worker.models.parameters import parameter_of
+from sprag.worker.spread import DRIVE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,7 +32,7 @@ def design_spec(spec: Mapping[str, Any], study: Study, case: int, along: str | N
     along : path of a parameter that the study varies from 0, or a small value where 0 is not allowed, to twice its
         value; by default nothing varies
     """
-    values = {path: value for path, value in study.case_parameters(case).items() if path not in study.derive}
+    values = {path: value for path, value in study.case_parameters(case).items() if path not in {*study.derive, DRIVE}}
     kept = {key: value for key, value in spec.items() if key not in WHICH_CASES}
     name, suffix = spec.get("name", ""), f", design of case {case}"
     made = {

@@ -1,7 +1,7 @@
 """The study spec, version 1: turns JSON or TOML data into a study in SI numbers, or reports all its faults.
 
-Its parts are the modules beside it (`text`, `units`, `run`, `warnings`, the `report` of faults) and three packages:
-`machine` (drive, clutch, shaft), `axes` (values, points, samples, combinations), `schema`.
+Its parts are the modules beside it (`text`, `units`, `run`, `warnings`, the `report` of faults) and packages: `machine`
+(drive, clutch, shaft), `axes` (values, points, samples, combinations), `draws` (tolerances), `plan`, `schema`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.spec.axes.design import read_design
 from sprag.service.spec.derive import check_derived, layout, read_machine
-from sprag.service.spec.fields import read_object
+from sprag.service.spec.draws.tolerances import read_tolerances, with_drives
+from sprag.service.spec.fields import TOLERANCE_FIELDS, read_object
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.plan.outline import Outline, chooses, first_round, read_outline
 from sprag.service.spec.report import Report, SpecError, did_you_mean
@@ -34,7 +35,9 @@ VERSION: Final = 1
 #: Name of a study that gives none.
 UNNAMED: Final = "untitled"
 
-FIELDS: Final = ("sprag", "model", "name", "base", "derive", "run", "axes", "combine", "exclude", "refine", "goal")
+FIELDS: Final = (
+    "sprag", "model", "name", "base", "derive", "run", "axes", "combine", "exclude", "refine", "goal", *TOLERANCE_FIELDS
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -93,12 +96,17 @@ def parse_spec(data: object) -> ParsedSpec:
         axes, combine = read_design(report, found, machine)
     if machine.derive and axes is not None and not report.found:
         check_derived(report, found["derive"], machine, layout(machine, axes, combine), ranges=outline is not None)
+    spread = read_tolerances(report, found, machine, axes)
+    if outline is not None and "tolerances" in found:
+        report.fault("/tolerances", "conflict", "cannot be combined with a study that chooses its own cases")
     run = part.read_run(report, found.get("run", {}), machine, axes, combine)
     part.check(report, machine, axes or (), combine)
     report.raise_if_any()
     study = Study(model, name, _in_order(machine), run, structure=machine.structure, derive=machine.derive)
     given = replace(study, axes=axes or (), combine=combine)
     study = given if outline is None else first_round(report, study, outline)
+    if spread is not None:
+        study = with_drives(report, study, spread)
     part.warn(report, study)
     return ParsedSpec(study, tuple(report.warnings), machine.fits, dict(found))
 

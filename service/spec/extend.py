@@ -13,9 +13,10 @@ from sprag.service.faults import Fault
 from sprag.service.spec.axes.axes import axis_values
 from sprag.service.spec.derive import read_machine
 from sprag.service.spec.document import ParsedSpec, parse_spec
-from sprag.service.spec.fields import WHICH_CASES, read_object
+from sprag.service.spec.fields import TOLERANCE_FIELDS, WHICH_CASES, read_object
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.report import Report, SpecError, join, quantity_text
+from sprag.worker.spread import without_drives
 
 if TYPE_CHECKING:
     from sprag.service.spec.machine.machine import Machine
@@ -78,9 +79,11 @@ def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> di
             f"/{given[0]}", "wrong-type", "must be a list", items, allowed="1 item or more, as in the axes of a spec"
         )
         raise report.error()
-    kept = {key: value for key, value in spec.items() if key not in WHICH_CASES}
+    # The tolerances stay: every further place is run with the same drives.
+    kept = {key: value for key, value in spec.items() if key not in WHICH_CASES or key in TOLERANCE_FIELDS}
     kept["name"] = found.get("name", study.name)
-    own = [{"path": list(axis.paths), "values": list(axis.values)} for axis in study.axes]
+    places = without_drives(study)
+    own: list[dict[str, Any]] = [{"path": list(axis.paths), "values": list(axis.values)} for axis in places.axes]
     if given == ["cases"]:
         first = [{"combine": study.combine, "axes": own}] if own else []
         return {**kept, "combine": "union", "axes": [*first, *items]}
@@ -89,7 +92,7 @@ def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> di
         raise report.error()
     machine = read_machine(Report(), part_of(study.model), spec)
     for index, item in enumerate(items):
-        _add(report, join("/axes", index), item, study, own, machine)
+        _add(report, join("/axes", index), item, places, own, machine)
     report.raise_if_any()
     return {**kept, "combine": "grid", "axes": own}
 

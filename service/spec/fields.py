@@ -11,8 +11,10 @@ from sprag.service.spec.report import Report, did_you_mean, join
 from sprag.service.spec.units import PERIOD_NAMES, QuantityError, example, parse_exact, split_quantity, to_float
 from sprag.worker.models import Parameter
 
+#: Fields of a spec about tolerances.
+TOLERANCE_FIELDS: Final = ("tolerances", "drives", "seed", "draws", "correlations")
 #: Fields of a spec that say which cases a study has.
-WHICH_CASES: Final = frozenset({"axes", "combine", "exclude", "refine", "goal"})
+WHICH_CASES: Final = frozenset({"axes", "combine", "exclude", "refine", "goal", *TOLERANCE_FIELDS})
 
 
 def coefficient_unit(index: int) -> str:

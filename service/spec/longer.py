@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag.service.spec.axes.blocks import as_axes, chosen, first_rows
 from sprag.service.spec.fields import WHICH_CASES
 from sprag.service.spec.run import SETTLED_FIELDS, TIMED_FIELDS
 from sprag.worker.limits import MAX_NAME_LENGTH, MAX_RUN_PERIODS, MAX_SETTLED_PERIODS
 from sprag.worker.models import SETTLED, is_settled
+from sprag.worker.spread import DRIVE
+from sprag.worker.study import Axis
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -43,8 +46,7 @@ def longer_spec(
         times = (*SETTLED_FIELDS, *TIMED_FIELDS)
         run = {key: value for key, value in spec.get("run", {}).items() if key not in times}
         run |= _longer_run(study, at_most)
-    columns = study.columns(cases)
-    axes = [{"path": list(axis.paths), "values": columns[axis.paths[0]].tolist()} for axis in study.axes]
+    axes = [{"path": list(axis.paths), "values": axis.array.tolist()} for axis in _listed(study, cases)]
     return {
         **kept,
         "name": study.name[: MAX_NAME_LENGTH - len(_SUFFIX)] + _SUFFIX,
@@ -52,6 +54,15 @@ def longer_spec(
         "combine": "zip",
         "axes": axes,
     }
+
+
+def _listed(study: Study, cases: NDArray[np.int64]) -> tuple[Axis, ...]:
+    """The cases as zipped axes, each once; a parameter with a tolerance has the value of the case's drive."""
+    columns = study.columns(cases)
+    if study.spread is None:
+        return tuple(Axis(axis.paths, columns[axis.paths[0]]) for axis in study.axes)
+    own = {path: column for path, column in columns.items() if path not in {DRIVE, *study.derive}}
+    return as_axes(chosen(own, first_rows(own)))
 
 
 def _longer_run(study: Study, periods: int | None) -> dict[str, Any]:

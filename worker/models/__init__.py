@@ -46,6 +46,7 @@ from sprag.worker.models.vibration_drive import (
     kernel_source,
     run_of,
 )
+from sprag.worker.spread import DRIVE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -248,6 +249,7 @@ def shape_of(study: Study) -> KernelShape:
 def chunk_task(study: Study, first: int, count: int) -> ChunkTask:
     """The cases ``first`` .. ``first + count - 1`` of ``study``, ready for `run_task`."""
     columns: dict[str, Any] = {**study.base, **study.columns(range(first, first + count))}
+    columns.pop(DRIVE, None)
     return ChunkTask(first, count, shape_of(study), study.run, columns, study.structure)
 
 

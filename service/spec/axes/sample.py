@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -13,6 +12,7 @@ import numpy as np
 from sprag.service.spec.axes.axes import read_paths
 from sprag.service.spec.axes.blocks import Block
 from sprag.service.spec.described import Described, Listed, choice, named
+from sprag.service.spec.draws.unit import cases_of, unit_sample
 from sprag.service.spec.fields import read_number, read_object
 from sprag.service.spec.report import Report, join
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES
@@ -33,8 +33,6 @@ SAMPLE: Final = named(
     Described("seed", "", "seed of the random numbers", "whole", 0, 2**32 - 1, 0),
     Described("second_order", "", _SECOND_HELP, "flag", default=False),
 )
-#: Levels of the trajectories of a morris sample: so many that hardly any two of them share a point.
-LEVELS: Final = 4096
 MOST_TRAJECTORIES: Final = 1000
 RANGES: Final = Listed("ranges", 1, MAX_AXES)
 SCALE: Final = choice("scale", "log: even in the logarithm", "linear", "log", default="linear")
@@ -131,12 +129,6 @@ def _read_range(report: Report, pointer: str, data: object, machine: Machine) ->
     return None if scale is None else SampleRange(paths, low, high, scale)
 
 
-def cases_of(method: str, count: int, dimensions: int, *, second_order: bool = False) -> int:
-    """Number of cases of a sample."""
-    each = {"saltelli": 2 * dimensions + 2 if second_order else dimensions + 2, "morris": dimensions + 1}
-    return count * each.get(method, 1)
-
-
 def draw(
     method: str, count: int, seed: int, ranges: tuple[SampleRange, ...], *, second_order: bool = False
 ) -> dict[str, NDArray[np.float64]]:
@@ -146,40 +138,3 @@ def draw(
     for index, item in enumerate(ranges):
         found.update(dict.fromkeys(item.paths, item.place(unit[:, index])))
     return found
-
-
-def unit_sample(
-    method: str, count: int, seed: int, dimensions: int, *, second_order: bool = False
-) -> NDArray[np.float64]:
-    """Points in the unit cube, shape (cases, dimensions), as many as `cases_of` says."""
-    from scipy.stats import qmc
-
-    if method == "latin_hypercube":
-        points = qmc.LatinHypercube(dimensions, rng=np.random.default_rng(seed)).random(count)
-    elif method == "sobol":
-        points = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(count)
-    elif method == "morris":
-        points = _trajectories(count, seed, dimensions)
-    else:
-        from SALib.sample import sobol
-
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)
-            points = sobol.sample(_problem(dimensions), count, calc_second_order=second_order, seed=seed)
-    return np.asarray(points, dtype=np.float64)
-
-
-def _trajectories(count: int, seed: int, dimensions: int) -> NDArray[np.float64]:
-    """SALib's trajectories, those left out that share a point with an earlier one: no case is run twice."""
-    from SALib.sample import morris
-
-    drawn = morris.sample(_problem(dimensions), 2 * count, num_levels=LEVELS, seed=seed)
-    _, first, group = np.unique(drawn, axis=0, return_index=True, return_inverse=True)
-    new = first[group.reshape(-1)] == np.arange(len(drawn))
-    whole = new.reshape(2 * count, dimensions + 1).all(axis=1)
-    return np.asarray(drawn.reshape(2 * count, dimensions + 1, dimensions)[whole][:count].reshape(-1, dimensions))
-
-
-def _problem(dimensions: int) -> dict[str, Any]:
-    names = [str(index) for index in range(dimensions)]
-    return {"num_vars": dimensions, "names": names, "bounds": [[0, 1]] * dimensions}

@@ -1,15 +1,14 @@
-"""Readings that refinement and goals share: ends of a range, shares, results and values of them."""
+"""Readings that refinement and goals share: ends of a range, results and values of them."""
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 from sprag.service.spec.axes.axes import read_paths
 from sprag.service.spec.catalogue import result_of, unknown_result
 from sprag.service.spec.fields import read_number
 from sprag.service.spec.report import Report, join, quantity_text
-from sprag.service.spec.units import QuantityError, example, parse_quantity, split_quantity, to_float
+from sprag.service.spec.units import QuantityError, example, parse_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,41 +45,6 @@ def read_path_of(report: Report, pointer: str, data: object, machine: Machine) -
         report.fault(join(pointer, "path"), "repeated", "names the same path twice", list(paths))
         return None
     return paths
-
-
-def read_share(report: Report, pointer: str, value: object, low: float, high: float) -> float | None:
-    """A share between ``low`` and ``high``, a plain number or a text such as "1 %"; None, and a fault, for others."""
-    allowed = f'{100 * low:g} % to {100 * high:g} %, as in "1 %" or 0.01'
-    share = share_of(value)
-    if share is None:
-        report.fault(pointer, "not-a-number", "must be a share", value, allowed=allowed)
-    elif not low <= share <= high:
-        report.fault(pointer, "out-of-range", "is out of range", value, allowed=allowed)
-    else:
-        return share
-    return None
-
-
-def share_of(value: object) -> float | None:
-    """The number of "2 %", 0.02 or "0.02"; None for anything else."""
-    if isinstance(value, bool):
-        return None
-    if isinstance(value, int | float):
-        return float(value) if math.isfinite(value) else None
-    return in_percent(value, plain=True)
-
-
-def in_percent(value: object, *, plain: bool = False) -> float | None:
-    """The number of a text "2 %", also of one without a unit where ``plain``; None for anything else."""
-    if not isinstance(value, str):
-        return None
-    try:
-        number, unit = split_quantity(value)
-    except QuantityError:
-        return None
-    if unit == "%":
-        return to_float(number) / 100.0
-    return to_float(number) if plain and not unit else None
 
 
 def read_result(report: Report, pointer: str, value: object, infos: Sequence[ResultInfo]) -> ResultInfo | None:

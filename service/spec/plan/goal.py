@@ -9,14 +9,9 @@ from sprag.service.spec.axes.axes import check_paths, expand
 from sprag.service.spec.axes.values import plan_values
 from sprag.service.spec.described import Described, Listed, choice, named
 from sprag.service.spec.fields import read_number, read_object, read_one
-from sprag.service.spec.plan.fields import (
-    in_percent,
-    read_ends,
-    read_path_of,
-    read_result,
-    read_value,
-)
+from sprag.service.spec.plan.fields import read_ends, read_path_of, read_result, read_value
 from sprag.service.spec.report import Report, did_you_mean, join
+from sprag.service.spec.shares import in_percent
 from sprag.worker.limits import MAX_PLANNED_CASES
 
 if TYPE_CHECKING:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Final
 from sprag.service.spec.axes.axes import AXES, axis_values, check_paths
 from sprag.service.spec.described import Described, Listed, named
 from sprag.service.spec.fields import read_object, read_whole
-from sprag.service.spec.plan.fields import read_ends, read_path_of, read_results, read_share
+from sprag.service.spec.plan.fields import read_ends, read_path_of, read_results
 from sprag.service.spec.report import Report, join
+from sprag.service.spec.shares import read_share
 from sprag.worker.limits import MAX_PLANNED_CASES
 from sprag.worker.models import regime_info
 from sprag.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.json_text import numbers
 from sprag.service.results.figures.motion import motion_figure
+from sprag.service.spec.fields import WHICH_CASES
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -40,4 +41,4 @@ def overridden(spec: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, 
         for key in parents:
             place = place[int(key)] if isinstance(place, list) else place.setdefault(key, {})
         place[name] = value
-    return {**{key: value for key, value in spec.items() if key not in ("axes", "combine")}, "base": base}
+    return {**{key: value for key, value in spec.items() if key not in WHICH_CASES}, "base": base}

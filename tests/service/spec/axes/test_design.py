@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from sprag.service.spec.axes.sample import LEVELS, unit_sample
 from sprag.service.spec.document import parse_spec
+from sprag.service.spec.draws.unit import LEVELS, unit_sample
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.service.spec.report import SpecError
 from sprag.service.spec.schema.document import spec_schema

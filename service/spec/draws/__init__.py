@@ -1,0 +1,1 @@
+"""What is random in a spec: distributions, points of the unit cube, tolerances."""

@@ -1,0 +1,282 @@
+"""The tolerances of a spec: which parameters differ from drive to drive, and the draws of the drives."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from sprag.service.spec.draws.correlations import read_correlations
+from sprag.service.spec.draws.described import (
+    DISTRIBUTION,
+    DRAWS,
+    SHARED,
+    TOLERANCES,
+    read_measured,
+    read_plus_minus,
+)
+from sprag.service.spec.draws.distributions import Distribution
+from sprag.service.spec.draws.unit import correlated, unit_sample
+from sprag.service.spec.fields import TOLERANCE_FIELDS, read_object
+from sprag.service.spec.report import Report, join
+from sprag.worker.limits import MAX_AXIS_VALUES, MAX_CASES, MAX_TOLERANCES
+from sprag.worker.spread import DRIVE, Spread, Tolerance
+from sprag.worker.study import Axis
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from sprag.service.spec.machine.machine import Machine
+    from sprag.worker.models import Parameter
+    from sprag.worker.study import Study
+
+_ITEM: Final = ("path", "plus_minus", "distribution", "values", "shared")
+#: Probability outside the range of a parameter from which on its cut is reported.
+_CUT: Final = 1e-3
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """A tolerance with its distribution; ``pointer`` is that of its item in the spec."""
+
+    pointer: str
+    tolerance: Tolerance
+    distribution: Distribution
+
+
+@dataclass(frozen=True)
+class _Nominal:
+    """Nominal values (SI) that a parameter has in the study."""
+
+    parameter: Parameter
+    values: NDArray[np.float64]
+    varies: bool
+
+
+def read_tolerances(
+    report: Report, found: Mapping[str, Any], machine: Machine, axes: Sequence[Axis] | None
+) -> Spread | None:
+    """The tolerances of a spec and the draws of its drives; None without, or, with the faults recorded, if invalid.
+
+    ``axes`` are those of the study without drives (of a study that chooses its own cases, the ends of what it may
+    choose); None where they could not be read.
+    """
+    if "tolerances" not in found:
+        for name in TOLERANCE_FIELDS:
+            if name in found:
+                report.fault(f"/{name}", "not-used", "has no effect without `tolerances`", found[name])
+        return None
+    before = report.found
+    settings = {name: field.read(report, "", found) for name, field in DRAWS.items()}
+    items = TOLERANCES.read(report, "/tolerances", found["tolerances"])
+    drawn: list[_Drawn] = []
+    for index, item in enumerate(items or ()):
+        drawn += _read_item(report, join("/tolerances", index), item, machine, axes or ())
+    _check_once(report, drawn)
+    names = {path: k for k, one in enumerate(drawn) for path in one.tolerance.paths}
+    matrix, told = read_correlations(report, found.get("correlations", []), names, len(drawn))
+    if report.found > before or axes is None or items is None:
+        return None
+    drives = settings["drives"]
+    if len(drawn) > MAX_TOLERANCES or drives * len(drawn) > MAX_AXIS_VALUES:
+        report.fault(
+            "/drives", "too-many", f"asks for {drives:,} draws of {len(drawn):,} tolerances", drives,
+            allowed=f"at most {MAX_AXIS_VALUES:,} draws and {MAX_TOLERANCES:,} tolerances together",
+        )  # fmt: skip
+        return None
+    for one in drawn:
+        _warn_of_cut(report, one)
+    unit = correlated(unit_sample(settings["draws"], drives, settings["seed"], len(drawn)), matrix)
+    columns = [one.distribution.quantile(unit[:, k]) for k, one in enumerate(drawn)]
+    about = {"seed": settings["seed"], "draws": settings["draws"], "correlations": told}
+    return Spread([one.tolerance for one in drawn], np.stack(columns, axis=1), about)
+
+
+def with_drives(report: Report, study: Study, spread: Spread) -> Study:
+    """``study``, whose cases are listed or a grid, with each case in every drive; SpecError where it is too large."""
+    drives = np.arange(spread.drives + 1, dtype=np.float64)
+    combine, cases = study.combine if study.axes else "grid", study.cases * drives.size
+    numbers = cases * (len(study.axes) + 1)
+    if combine == "zip" and numbers > MAX_AXIS_VALUES:
+        most = MAX_AXIS_VALUES // (study.cases * (len(study.axes) + 1)) - 1
+        allowed = f"at most {most:,} drives of this table; a plain grid may have more"
+    elif cases > MAX_CASES or sum(map(len, study.axes)) + drives.size > MAX_AXIS_VALUES:
+        allowed = f"at most {MAX_CASES // study.cases - 1:,} drives"
+    elif combine == "grid":
+        return replace(study, axes=(*study.axes, Axis((DRIVE,), drives)), combine=combine, spread=spread)
+    else:
+        axes = [Axis(axis.paths, np.repeat(axis.array, drives.size)) for axis in study.axes]
+        own = Axis((DRIVE,), np.tile(drives, study.cases))
+        return replace(study, axes=(*axes, own), spread=spread)
+    message = f"asks for {cases:,} cases: {study.cases:,} with the nominal drive and {spread.drives:,} drawn ones each"
+    report.fault("/drives", "too-many", message, spread.drives, allowed=allowed)
+    raise report.error()
+
+
+def _read_item(report: Report, pointer: str, data: object, machine: Machine, axes: Sequence[Axis]) -> list[_Drawn]:
+    found = read_object(report, pointer, data, _ITEM)
+    if found is None:
+        return []
+    shared = SHARED.read(report, pointer, found)
+    kind = DISTRIBUTION.read(report, pointer, found)
+    paths = _read_paths(report, join(pointer, "path"), found.get("path"), machine)
+    if paths is None or shared is None or kind is None:
+        return []
+    groups = [tuple(paths)] if shared else [(path,) for path in paths]
+    given = found["path"] if isinstance(found["path"], str) else " = ".join(found["path"])
+    drawn = []
+    for group in groups:
+        nominal = [_nominal(path, machine, axes) for path in group]
+        name = given if len(group) > 1 else group[0]
+        if "values" in found:
+            drawn += _measured(report, pointer, found, name, group, nominal)
+        else:
+            drawn += _around(report, pointer, found, str(kind), name, group, nominal)
+    return drawn
+
+
+def expanded(pattern: str, known: Mapping[str, Any]) -> list[str]:
+    """The known paths that a path with ``*`` for numbers of pendulums or steps stands for, in their order."""
+    expression = re.compile(re.escape(pattern).replace(r"\*", "[0-9]+"))
+    return [path for path in known if expression.fullmatch(path)]
+
+
+def _read_paths(report: Report, pointer: str, data: object, machine: Machine) -> list[str] | None:
+    """The parameters of an item; None, and faults recorded, where one is unknown or derived."""
+    items = data if isinstance(data, list) else [data]
+    names = [item for item in items if isinstance(item, str)]
+    allowed = "a path such as 'pendulums.*.backlash', or a list of paths; `*` stands for every pendulum or step"
+    if not items or len(names) < len(items):
+        message = "is required" if data is None else "must be a path, as text"
+        report.fault(pointer, "required" if data is None else "wrong-type", message, data, allowed=allowed)
+        return None
+    before = report.found
+    paths: list[str] = []
+    for item in names:
+        known = expanded(item, machine.parameters)
+        paths += known
+        if not known and not machine.assumed(item):
+            report.fault(pointer, "invalid-path", machine.why_not(item), item, allowed=allowed)
+        for path in known:
+            if path in machine.derive:
+                report.fault(
+                    pointer, "conflict", f"{path} is derived from other parameters, whose tolerances it has", item,
+                    allowed="a path without a formula in `derive`",
+                )  # fmt: skip
+    return None if report.found > before else paths
+
+
+def _nominal(path: str, machine: Machine, axes: Sequence[Axis]) -> _Nominal:
+    axis = next((axis for axis in axes if path in axis.paths), None)
+    base = [machine.values[path]] if path in machine.values else []
+    values = np.array(base, dtype=np.float64) if axis is None else axis.array
+    return _Nominal(machine.parameters[path], values, axis is not None)
+
+
+def _measured(
+    report: Report, pointer: str, found: Mapping[str, Any], name: str, paths: tuple[str, ...], nominal: list[_Nominal]
+) -> list[_Drawn]:
+    """A tolerance given by measured values."""
+    for field in ("plus_minus", "distribution"):
+        if field in found:
+            report.fault(join(pointer, field), "conflict", "cannot be combined with `values`", found[field])
+    varied = [path for path, one in zip(paths, nominal, strict=True) if one.varies]
+    if varied:
+        report.fault(
+            join(pointer, "values"), "conflict", f"gives {varied[0]} its values, but an axis varies it",
+            allowed="plus_minus, which changes the values of the axis",
+        )  # fmt: skip
+    values = read_measured(report, join(pointer, "values"), found["values"], [one.parameter for one in nominal])
+    if values is None:
+        return []
+    about = {"distribution": "values", "values": len(values)}
+    return [_Drawn(pointer, Tolerance(name, paths, "value", about), Distribution("values", values=tuple(values)))]
+
+
+def _around(
+    report: Report,
+    pointer: str,
+    found: Mapping[str, Any],
+    kind: str,
+    name: str,
+    paths: tuple[str, ...],
+    nominal: list[_Nominal],
+) -> list[_Drawn]:
+    """A tolerance around the nominal values."""
+    units = list(dict.fromkeys(one.parameter.unit for one in nominal))
+    read = read_plus_minus(report, pointer, found, nominal[0].parameter)
+    if read is None:
+        return []
+    share, half = read
+    where = join(pointer, "plus_minus")
+    if not share and len(units) > 1:
+        report.fault(
+            where, "wrong-unit", f"is shared by parameters of different units: {', '.join(units)}",
+            found["plus_minus"], allowed='a share, as in "5 %"',
+        )  # fmt: skip
+        return []
+    if any(not one.values.size for one in nominal):
+        report.fault(join(pointer, "path"), "required", f"{name} has no nominal value in `base`", found["path"])
+        return []
+    values = np.unique(np.concatenate([one.values for one in nominal]))
+    if kind == "lognormal":
+        if values[0] <= 0.0 or (not share and values.size > 1):
+            report.fault(
+                join(pointer, "distribution"), "out-of-range",
+                "a lognormal distribution needs a nominal value above 0, and a share where there are several",
+                kind, allowed="another distribution",
+            )  # fmt: skip
+            return []
+        share, half = True, half if share else half / float(values[0])
+    if share and not values.any():
+        report.fault(
+            where, "out-of-range", f"is a share of the nominal value of {name}, which is 0", found["plus_minus"],
+            allowed="a quantity", unit=units[0],
+        )  # fmt: skip
+        return []
+    low, high = _range(nominal, share=share)
+    distribution = Distribution(kind, 1.0 if share else 0.0, half, low=low, high=high)  # type: ignore[arg-type]
+    about = {"distribution": kind, "plus_minus": found["plus_minus"]}
+    return [_Drawn(pointer, Tolerance(name, paths, "scale" if share else "offset", about), distribution)]
+
+
+def _range(nominal: list[_Nominal], *, share: bool) -> tuple[float, float]:
+    """The least and the largest factor or offset with which no nominal value leaves the range of its parameter."""
+    low, high = -math.inf, math.inf
+    for one in nominal:
+        least = math.nextafter(one.parameter.low, math.inf) if one.parameter.low_open else one.parameter.low
+        signs = (one.values[one.values > 0.0], one.values[one.values < 0.0]) if share else (one.values,)
+        for value in (end for part in signs if part.size for end in (float(part.min()), float(part.max()))):
+            ends = [(end / value if share else end - value) for end in (least, one.parameter.high)]
+            below, above = sorted(ends)
+            # One step inwards: the product or the sum is rounded.
+            low = max(low, below if math.isinf(below) or below == 0.0 else math.nextafter(below, math.inf))
+            high = min(high, above if math.isinf(above) else math.nextafter(above, -math.inf))
+    return low, max(high, low)
+
+
+def _check_once(report: Report, drawn: Sequence[_Drawn]) -> None:
+    counts = Counter(path for one in drawn for path in one.tolerance.paths)
+    for one in drawn:
+        again = [path for path in one.tolerance.paths if counts[path] > 1]
+        if again:
+            report.fault(
+                join(one.pointer, "path"), "repeated", "has two tolerances", again[0], allowed="each parameter once"
+            )
+
+
+def _warn_of_cut(report: Report, one: _Drawn) -> None:
+    outside = one.distribution.outside
+    if outside > _CUT:
+        report.warn(
+            "tolerance-cut",
+            f"{one.pointer} ({one.tolerance.name}): {outside:.2g} of the distribution lies outside the range of the "
+            "parameter; it is left out, and the rest is drawn",
+        )
