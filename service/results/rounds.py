@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from sprag.service.results.wording import percent
+from sprag.worker.planning.calibrate.plan import CALIBRATE
 from sprag.worker.planning.goals.plan import GOAL
 
 if TYPE_CHECKING:
@@ -39,6 +40,8 @@ def sentence(rounds: RoundProgress) -> str:
     """For people: "round 3 of at most 12, error now 2.1 %, asked 1 %", "generation 12 of 60, 240 feasible"."""
     if rounds.latest.summary.get("kind") == GOAL:
         return ", ".join(_search(rounds.latest.summary))
+    if rounds.latest.summary.get("kind") == CALIBRATE:
+        return ", ".join(_calibration(_number(rounds), rounds.latest.summary))
     told = [f"round {_number(rounds)} of at most {_most(rounds)}"]
     if not rounds.latest.cases:
         number = _number(rounds)
@@ -66,6 +69,16 @@ def _state(summary: dict[str, Any], *, ended: bool) -> list[str]:
     now = f"error not known{when}" if error is None else f"error now {percent(error)}"
     missed = ["not reached with the cases allowed"] if ended and not summary.get("passed", True) else []
     return [now, f"asked {percent(asked)}", *missed]
+
+
+def _calibration(number: int, summary: dict[str, Any]) -> list[str]:
+    """What a calibration is at: "round 5", "fit", "chi-square 21.3 of 26 degrees of freedom"."""
+    phases = {"scan": "scan", "fit": "fit", "intervals": "refits for the intervals", "curve": "fitted curve"}
+    phase = "calibrated" if summary["complete"] else "ended before all was run"
+    told = [f"{number} rounds", phase] if summary["phase"] == "ended" else [f"round {number}", phases[summary["phase"]]]
+    square = summary["chi_square"]
+    freedom = summary["freedom"]
+    return [*told, *([f"chi-square {square:.3g} for {freedom} degrees of freedom"] if square is not None else [])]
 
 
 def _search(summary: dict[str, Any]) -> list[str]:

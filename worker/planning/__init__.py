@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from sprag.worker.planning.calibrate.plan import CALIBRATE, CalibratePlan
+from sprag.worker.planning.calibrate.planner import CalibratePlanner
 from sprag.worker.planning.goals.plan import GOAL, GoalPlan
 from sprag.worker.planning.goals.planner import GoalPlanner
 from sprag.worker.planning.refine import refiner
@@ -24,8 +26,16 @@ def _searcher(plan: Mapping[str, Any]) -> Planner:
     return GoalPlanner(GoalPlan.from_json(plan))
 
 
+def _calibrator(plan: Mapping[str, Any]) -> Planner:
+    return CalibratePlanner(CalibratePlan.from_json(plan))
+
+
 #: The planners by the kind of their plan.
-PLANNERS: dict[str, Callable[[Mapping[str, Any]], Planner]] = {REFINE: _refiner, GOAL: _searcher}
+PLANNERS: dict[str, Callable[[Mapping[str, Any]], Planner]] = {
+    REFINE: _refiner,
+    GOAL: _searcher,
+    CALIBRATE: _calibrator,
+}
 
 
 def most_cases(study: Study) -> int:

@@ -1,0 +1,193 @@
+"""Calibrations of closed forms: values, intervals, losses, failures, directions, the next point, rounds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import stats
+
+from sprag.worker.planning import planner_of
+from sprag.worker.planning.calibrate import CalibratePlan, CalibratePlanner
+from sprag.worker.planning.calibrate.answer import Answer, answer
+from sprag.worker.planning.rounds import Rows
+from tests.worker.planning.calibrating import Form, calibrated, plan_of, rows_of
+
+Floats = NDArray[np.float64]
+X = np.linspace(0.2, 3.0, 15)
+TRUE = np.array([2.0, 0.8])
+WIDE = [(0.1, 10.0), (0.05, 5.0)]
+
+
+def _rise(parameters: Floats, at: Floats) -> dict[str, Floats]:
+    return {"y": parameters[:, 0] * (1.0 - np.exp(-parameters[:, 1] * at[:, 0]))}
+
+
+def _line(parameters: Floats, at: Floats) -> dict[str, Floats]:
+    return {"y": parameters[:, 0] + parameters[:, 1] * at[:, 0]}
+
+
+def _values(form: Form, true: Floats, x: Floats) -> Floats:
+    return form(np.tile(true, (len(x), 1)), x[:, None])["y"]
+
+
+def _measured(form: Form = _rise, noise: float = 0.03, seed: int = 1) -> Floats:
+    exact = _values(form, TRUE, X)
+    return exact + noise * np.random.default_rng(seed).normal(size=len(X))
+
+
+def _answer(plan: CalibratePlan, form: Form) -> Answer:
+    found = answer(calibrated(plan, form)[0])
+    assert found is not None
+    assert found.complete
+    return found
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_values_intervals_and_correlations_of_a_line_are_those_of_regression(known: bool) -> None:
+    y, sigma = _measured(_line), np.full(len(X), 0.03)
+    plan = plan_of([(-5.0, 5.0), (-5.0, 5.0)], X, {"y": y}, sigma if known else None, refits=1000)
+    found = _answer(plan, _line)
+    design = np.stack([np.ones_like(X), X], axis=1)
+    exact, squares = np.linalg.lstsq(design, y)[:2]
+    freedom = len(X) - 2
+    scale = 0.03 if known else np.sqrt(squares[0] / freedom)
+    covariance = scale**2 * np.linalg.inv(design.T @ design)
+    half = (1.96 if known else stats.t.ppf(0.975, freedom)) * np.sqrt(np.diag(covariance))
+    assert found.values == pytest.approx(exact, rel=1e-9)
+    assert found.intervals is not None
+    assert found.correlations is not None
+    # The residuals of 15 points have lighter tails than a normal distribution.
+    assert found.intervals == pytest.approx(np.stack([exact - half, exact + half], axis=1), abs=0.25 * half.min())
+    correlation = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
+    assert found.correlations[0, 1] == pytest.approx(correlation, abs=0.03)
+    assert found.chi_square == pytest.approx(squares[0] / scale**2)
+    assert found.residuals == pytest.approx((y - found.modelled) / scale)
+    assert found.leverages.sum() == pytest.approx(2.0)
+    assert not found.directions
+    assert found.curve is not None
+    assert found.others is not None
+    assert found.curve[:, 0] == pytest.approx(exact[0] + exact[1] * found.others[:, 0])
+
+
+def test_the_next_point_is_where_the_line_is_known_least() -> None:
+    found = _answer(plan_of([(-5.0, 5.0), (-5.0, 5.0)], X, {"y": _measured(_line)}), _line)
+    assert found.next is not None
+    assert found.others is not None
+    assert found.next.condition[0] == found.others.min() or found.next.condition[0] == found.others.max()
+    assert not found.next.again
+    assert max(found.next.narrower) > 0.1
+
+
+@pytest.mark.parametrize("loss", ["soft_l1", "huber", "cauchy"])
+def test_outliers_hardly_move_a_fit_with_another_loss(loss: Any) -> None:
+    y = _measured(noise=0.01)
+    y[[3, 11]] += [0.9, -0.7]
+    linear, other = (_answer(plan_of(WIDE, X, {"y": y}, refits=50, loss=one), _rise) for one in ("linear", loss))
+    off = [np.abs(found.values / TRUE - 1.0).max() for found in (linear, other)]
+    assert off[1] < 0.04 < off[0]
+    assert set(np.argsort(-np.abs(other.residuals))[:2].tolist()) == {3, 11}
+
+
+def test_failed_cases_and_jumps_do_not_break_a_fit() -> None:
+    def form(parameters: Floats, at: Floats) -> dict[str, Floats]:
+        y = _rise(parameters, at)["y"]
+        y = np.where(parameters[:, 1] > 1.5, 0.0, y)  # another regime
+        y = np.where((parameters[:, 0] > 4.0) | (at[:, 0] == X[4]), np.nan, y)
+        return {"y": y}
+
+    found = _answer(plan_of(WIDE, X, {"y": _measured()}, np.full(len(X), 0.03), refits=50), form)
+    assert found.failed.nonzero()[0].tolist() == [4]
+    assert found.freedom == len(X) - 3
+    assert found.values == pytest.approx(TRUE, rel=0.1)
+    assert found.intervals is not None
+    assert np.isfinite(found.intervals).all()
+    assert np.isnan(found.residuals[4])
+
+
+def test_what_only_acts_as_a_product_cannot_be_separated() -> None:
+    def form(parameters: Floats, at: Floats) -> dict[str, Floats]:
+        return {"y": parameters[:, 0] * parameters[:, 1] * at[:, 0] + parameters[:, 2]}
+
+    y = 1.6 * X + 0.5 + 0.01 * np.random.default_rng(1).normal(size=len(X))
+    found = _answer(plan_of([(1.0, 9.0), (0.2, 1.8), (0.0, 1.0)], X, {"y": y}, refits=100), form)
+    (direction,) = found.directions
+    assert direction.undetermined
+    assert set(direction.parameters) == {0, 1}
+    changes = dict(zip(direction.parameters, direction.changes, strict=True))
+    assert changes[0] * changes[1] < 0.0
+    assert found.values[0] * found.values[1] == pytest.approx(1.6, rel=0.01)
+    assert found.intervals is not None
+    assert np.ptp(found.intervals[2]) < 0.05
+
+
+def test_units_of_several_results_do_not_matter() -> None:
+    def form(parameters: Floats, at: Floats) -> dict[str, Floats]:
+        y = _rise(parameters, at)["y"]
+        return {"y": y, "z": 1e6 * (y - parameters[:, 1])}
+
+    y = _measured()
+    z = 1e6 * (_measured(noise=0.1, seed=2) - TRUE[1])
+    found = _answer(plan_of(WIDE, X, {"y": y, "z": z}, refits=50), form)
+    assert found.values == pytest.approx(TRUE, rel=0.1)
+    assert found.freedom == 28
+    scales = found.sigma.reshape(2, -1)[:, 0]
+    assert scales[0] == pytest.approx(0.03, rel=0.5)
+    assert scales[1] == pytest.approx(1e5, rel=0.5)
+
+
+def test_a_planner_told_the_same_rounds_asks_for_the_same_points() -> None:
+    plan = plan_of(WIDE, X, {"y": _measured()}, refits=50)
+    planner, rounds = calibrated(plan, _rise)
+    assert 5 < len(rounds) <= planner.most_rounds
+    points = np.concatenate([rows.points for rows in rounds])
+    assert len(points) <= planner.most_cases
+    assert len(np.unique(points, axis=0)) == len(points), "no case comes twice"
+    for column, (low, high) in zip(points.T, WIDE, strict=False):
+        assert low <= column.min() <= column.max() <= high
+    again = planner_of(plan.to_json())
+    assert isinstance(again, CalibratePlanner)
+    for rows in rounds:
+        assert again.ask().points.tobytes() == rows.points.tobytes()
+        again.tell(rows)
+    assert again.ask().summary == planner.ask().summary
+    assert planner.ask().summary["complete"]
+    other = CalibratePlanner(plan_of(WIDE, X, {"y": _measured()}, refits=50, seed=2)).ask().points
+    assert not np.array_equal(other, rounds[0].points)
+
+
+def test_cases_that_are_run_again_and_differ_do_not_break_a_calibration() -> None:
+    plan = plan_of(WIDE, X, {"y": _measured()}, refits=50)
+    planner, rounds = calibrated(plan, _rise)
+    again = CalibratePlanner(plan)
+    for number, rows in enumerate(rounds[:4]):
+        ok = rows.ok.copy()
+        ok[: len(ok) // 3] &= number != 1
+        again.tell(Rows(rows.points, ok, rows.values))
+    while len(points := again.ask().points):
+        again.tell(rows_of(plan, points, _rise))
+    found, expected = answer(again), answer(planner)
+    assert found is not None
+    assert expected is not None
+    assert found.values == pytest.approx(expected.values, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"loss": "square"}, "loss"),
+        ({"refits": 5000}, "refits"),
+        ({"conditions": ((1.0,), (1.0,))}, "conditions"),
+        ({"measured": ()}, "measured"),
+        ({"unknown": ()}, "unknown"),
+        ({"paths_at": ("a",)}, "unknown"),
+    ],
+)
+def test_a_plan_names_what_is_wrong(change: dict[str, Any], named: str) -> None:
+    plan = plan_of(WIDE, X, {"y": _measured()})
+    fields = {name: getattr(plan, name) for name in ("unknown", "paths_at", "conditions", "measured")}
+    with pytest.raises(ValueError, match=f"calibrate.{named}"):
+        CalibratePlan(**(fields | change))
+    assert CalibratePlan.from_json(plan.to_json()) == plan

@@ -1,0 +1,186 @@
+"""The course of a calibration: scan, fit, refits, curve, as one generator that asks for sets of cases."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sprag.worker.planning.calibrate.batches import normal, solved, total
+from sprag.worker.planning.calibrate.candidates import candidates
+from sprag.worker.planning.calibrate.data import Data, scaled_data
+from sprag.worker.planning.calibrate.fit import Lanes, fit
+from sprag.worker.planning.calibrate.plan import CURVES, STARTS, TRIALS
+from sprag.worker.planning.calibrate.refits import Refits, drawn, refit
+from sprag.worker.planning.goals.draws import Draws
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    from sprag.worker.planning.calibrate.plan import CalibratePlan
+    from sprag.worker.planning.calibrate.space import Space
+
+Floats = NDArray[np.float64]
+T = TypeVar("T")
+
+SCAN_PHASE, FIT_PHASE, REFITS_PHASE, CURVE_PHASE, ENDED = "scan", "fit", "intervals", "curve", "ended"
+#: Starts of the fit are farther from each other than this in at least one coordinate.
+_DISTINCT: Final = 0.1
+#: By how much (in squares of standard deviations) another set must be better than the fit to begin again from there.
+_BEGIN_AGAIN: Final = 0.02
+
+
+@dataclass(frozen=True)
+class Request:
+    """Sets of parameters, coordinates of shape (sets, parameters), to be run at the measured or other conditions."""
+
+    phase: str
+    places: Floats
+    others: Floats | None = None
+
+
+@dataclass
+class State:
+    """What is known so far.
+
+    Attributes
+    ----------
+    phase : str
+    round : int
+        Rounds of the phase.
+    data : Data
+        With the weights that hold now.
+    best : Lanes, optional
+        The best fit so far, alone.
+    leverage : array, shape (measured,)
+    refits : Refits, optional
+    others : array, shape (others, conditions)
+        Conditions of the curve.
+    curve, curves : arrays, shapes (others, results) and (refits, others, results)
+        Modelled results there: of the fit, and of the refits.
+    """
+
+    data: Data
+    phase: str = SCAN_PHASE
+    round: int = 0
+    best: Lanes | None = None
+    refits: Refits | None = None
+    others: Floats | None = None
+    curve: Floats | None = None
+    curves: Floats | None = None
+    library: list[tuple[Floats, Floats]] = field(default_factory=list)
+
+
+def course(plan: CalibratePlan, space: Space, state: State) -> Generator[Request, Floats, None]:
+    """Everything that a calibration runs, in order; ``state`` is kept up to date."""
+    scan = space.scan(plan.scan, Draws(plan.seed, 0))
+    modelled = yield from _run(plan, state, SCAN_PHASE, scan)
+    starts = _starts(scan, state.data.costs(modelled))
+    lanes = yield from _through(plan, state, FIT_PHASE, fit(state.data, scan[starts], modelled[starts], plan.fit_sets))
+    state.best = _least(lanes)
+    yield from _scaled(plan, state)
+    for attempt in range(2):
+        if not plan.refits:
+            break
+        yield from _refitted(plan, state, attempt)
+        places, found = (np.concatenate(parts) for parts in zip(*state.library, strict=True))
+        costs = state.data.costs(found)
+        best = int(costs.argmin())
+        if attempt or costs[best] > state.best.costs[0] - _BEGIN_AGAIN:
+            break
+        again = fit(state.data, places[best : best + 1], found[best : best + 1], plan.fit_sets)
+        state.best = _least((yield from _through(plan, state, FIT_PHASE, again)))
+        yield from _scaled(plan, state)
+    yield from _curves(plan, state)
+
+
+def _run(plan: CalibratePlan, state: State, phase: str, places: Floats) -> Generator[Request, Floats, Floats]:
+    """Modelled values of sets of parameters, shape (sets, measured)."""
+    state.phase, state.round = phase, state.round + 1 if phase == state.phase else 1
+    conditions, columns = plan.places
+    rows = yield Request(phase, places)
+    found = rows[:, conditions, columns]
+    state.library.append((places, found))
+    return found
+
+
+def _through(
+    plan: CalibratePlan, state: State, phase: str, steps: Generator[Floats, Floats, T]
+) -> Generator[Request, Floats, T]:
+    """Run what a fit asks for, to its end."""
+    try:
+        places = next(steps)
+        while True:
+            places = steps.send((yield from _run(plan, state, phase, places)))
+    except StopIteration as end:
+        result: T = end.value
+        return result
+
+
+def _starts(places: Floats, costs: Floats) -> list[int]:
+    """The best places that are not close to each other."""
+    chosen: list[int] = []
+    for index in np.argsort(costs, kind="stable").tolist():
+        if all(np.abs(places[index] - places[other]).max() > _DISTINCT for other in chosen):
+            chosen.append(index)
+        if len(chosen) == STARTS:
+            break
+    return chosen
+
+
+def _least(lanes: Lanes) -> Lanes:
+    best = int(lanes.costs.argmin())
+    one = slice(best, best + 1)
+    return Lanes(lanes.places[one], lanes.modelled[one], lanes.derivatives[one], lanes.costs[one], lanes.apart[one])
+
+
+def _scaled(plan: CalibratePlan, state: State) -> Generator[Request, Floats, None]:
+    """Take standard deviations that are not given from the residuals; where that changes the fit, fit again."""
+    assert state.best is not None
+    rounds = 0 if plan.known_sigma else 1 if len(plan.measured) == 1 and plan.loss == "linear" else 3
+    for _ in range(rounds):
+        state.data = scaled_data(plan, state.best.modelled[0])
+        if rounds > 1:
+            again = fit(state.data, state.best.places, state.best.modelled, plan.fit_sets)
+            state.best = _least((yield from _through(plan, state, FIT_PHASE, again)))
+    state.data = state.data.without(np.isnan(state.best.modelled[0]))
+    state.best.costs = state.data.costs(state.best.modelled)
+
+
+def leverages(data: Data, best: Lanes) -> Floats:
+    """Diagonal of the hat matrix of a fit, shape (measured,)."""
+    weights = data.weights
+    scaled = best.derivatives[0] * weights[:, None]
+    square = normal(best.derivatives, (weights * weights)[None, :])
+    hold = np.eye(scaled.shape[1]) * 1e-12 * np.maximum(np.diagonal(square[0]).max(), 1e-300)
+    inner = solved(np.repeat(square + hold, len(scaled), axis=0), scaled)
+    return np.clip(total(scaled * inner), 0.0, 1.0)
+
+
+def _refitted(plan: CalibratePlan, state: State, attempt: int) -> Generator[Request, Floats, None]:
+    best = state.best
+    assert best is not None
+    values = drawn(
+        state.data, np.nan_to_num(best.modelled[0]), leverages(state.data, best), plan.refits, plan.freedom,
+        plan.known_sigma, Draws(plan.seed, 1),
+    )  # fmt: skip
+    sets = tuple(np.concatenate(parts) for parts in zip(*state.library, strict=True))
+    steps = refit(state.data, values, (sets[0], sets[1]), best, TRIALS if attempt == 0 else TRIALS // 2)
+    state.refits = yield from _through(plan, state, REFITS_PHASE, steps)
+
+
+def _curves(plan: CalibratePlan, state: State) -> Generator[Request, Floats, None]:
+    """Run the fit and the refits at conditions between and around the measured ones."""
+    assert state.best is not None
+    others = candidates(plan)
+    state.others = others
+    if len(others):
+        places = state.best.places
+        if state.refits is not None:
+            places = np.concatenate([places, state.refits.places[:CURVES]])
+        state.phase, state.round = CURVE_PHASE, 1
+        rows = yield Request(CURVE_PHASE, places, others)
+        state.curve, state.curves = rows[0], rows[1:]
+    state.phase = ENDED

@@ -1,0 +1,258 @@
+"""The plan of a calibration: what is unknown, what was measured where, and how closely."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sprag.worker.limits import MAX_PLANNED_CASES
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
+
+#: Value of "kind" in the plan.
+CALIBRATE: Final = "calibrate"
+LOSSES: Final[tuple[Loss, ...]] = ("linear", "soft_l1", "huber", "cauchy")
+#: Bounds of a plan: unknown parameters, measured values, refits of the bootstrap.
+MOST_UNKNOWN, MOST_MEASURED = 12, 2000
+REFITS: Final = (0, 1000)
+#: Sets of parameters: the scan has `SCAN` for each unknown, at least `LEAST_SCAN`; starts of the fit, their
+#: iterations on average, and trials of each refit.
+SCAN, LEAST_SCAN, STARTS, ITERATIONS, TRIALS = 24, 48, 4, 40, 8
+#: Iterations of a fit at most, and those that a plan must have room for; fits one after another.
+MOST_ITERATIONS, LEAST_ITERATIONS, AGAIN = 100, 8, 8
+#: Conditions between and around the measured ones at most, for the fitted curve and the next point.
+CURVE: Final = 40
+#: Refits that are run there.
+CURVES: Final = 100
+#: Ranges that span a larger factor are searched logarithmically.
+LOGARITHMIC: Final = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """A parameter, or several tied ones, that is to be found between ``low`` and ``high``, SI."""
+
+    paths: tuple[str, ...]
+    low: float
+    high: float
+
+    @property
+    def logarithmic(self) -> bool:
+        """Whether it is searched by its logarithm."""
+        return self.low > 0.0 and self.high > LOGARITHMIC * self.low
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """Measured values of one result.
+
+    Attributes
+    ----------
+    result : str
+    at : tuple of int
+        Number of the condition of each value.
+    values : tuple of float
+        SI.
+    sigma : tuple of float
+        Standard deviation of each value, SI; none where it is not known and follows from the residuals.
+    """
+
+    result: str
+    at: tuple[int, ...]
+    values: tuple[float, ...]
+    sigma: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class CalibratePlan:
+    """A calibration, in SI.
+
+    Attributes
+    ----------
+    unknown : tuple of Unknown
+    paths_at : tuple of str
+        Parameters that the measured conditions vary; may be empty.
+    conditions : tuple of tuples of float
+        The measured conditions, each once: a value for each of ``paths_at``.
+    measured : tuple of Measured
+        Each result once.
+    loss : {"linear", "soft_l1", "huber", "cauchy"}
+    refits : int
+        Refits of the bootstrap that give the intervals; 0 for none.
+    seed : int
+
+    Raises
+    ------
+    ValueError
+        If a field is out of its range; the message names it.
+    """
+
+    unknown: tuple[Unknown, ...]
+    paths_at: tuple[str, ...]
+    conditions: tuple[tuple[float, ...], ...]
+    measured: tuple[Measured, ...]
+    loss: Loss = "linear"
+    refits: int = 200
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        _check(1 <= len(self.unknown) <= MOST_UNKNOWN, "unknown", len(self.unknown), f"1 to {MOST_UNKNOWN} parameters")
+        for i, one in enumerate(self.unknown):
+            ends = math.isfinite(one.low) and math.isfinite(one.high) and one.low < one.high
+            _check(bool(one.paths) and ends, f"unknown.{i}", (one.low, one.high), "paths, and a range")
+        _check_measured(self)
+        _check(self.loss in LOSSES, "loss", self.loss, ", ".join(LOSSES))
+        low, high = REFITS
+        _check(low <= self.refits <= high, "refits", self.refits, f"{low} to {high:,}")
+        least = STARTS * LEAST_ITERATIONS * (1 + 2 * len(self.unknown))
+        most = MAX_PLANNED_CASES // 2 // (least + self.scan)
+        _check(self.fit_sets >= least, "measured", len(self.conditions), f"at most {most} different conditions")
+        _check(0 <= self.seed < 2**63, "seed", self.seed, "an integer of at least 0")
+        seen = [path for paths in self.paths for path in paths]
+        _check(len(set(seen)) == len(seen), "unknown", seen, "each parameter once, unknown or measured")
+
+    @property
+    def paths(self) -> tuple[tuple[str, ...], ...]:
+        """What each column of the points varies: the unknown parameters, then those of the conditions."""
+        return (*(one.paths for one in self.unknown), *((path,) for path in self.paths_at))
+
+    @property
+    def results(self) -> tuple[str, ...]:
+        """Names of the measured results."""
+        return tuple(one.result for one in self.measured)
+
+    @property
+    def count(self) -> int:
+        """Measured values."""
+        return sum(len(one.values) for one in self.measured)
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom: measured values less unknown parameters."""
+        return self.count - len(self.unknown)
+
+    @property
+    def scan(self) -> int:
+        """Sets of parameters of the scan."""
+        return max(LEAST_SCAN, SCAN * len(self.unknown))
+
+    @property
+    def fit_sets(self) -> int:
+        """Sets of parameters of a fit at most: fewer of a large problem."""
+        room = MAX_PLANNED_CASES // 2 // len(self.conditions) - self.scan
+        return min(STARTS * ITERATIONS * (1 + 2 * len(self.unknown)), room)
+
+    @property
+    def most_cases(self) -> int:
+        """Cases of scan, fit, later fits, refits and curve; beyond it the refits end early."""
+        sets = self.scan + 2 * self.fit_sets + self.refits * TRIALS * 3 // 2
+        return min(sets * len(self.conditions) + (1 + CURVES) * CURVE, MAX_PLANNED_CASES)
+
+    @property
+    def most_rounds(self) -> int:
+        """Rounds of the longest course: fits that are scaled and begun again, refits twice."""
+        return 3 + AGAIN * MOST_ITERATIONS + 2 * TRIALS
+
+    @cached_property
+    def at(self) -> Floats:
+        """The measured conditions, shape (conditions, paths_at)."""
+        return np.array(self.conditions, dtype=np.float64).reshape(len(self.conditions), len(self.paths_at))
+
+    @cached_property
+    def values(self) -> Floats:
+        """All measured values, result after result, SI, shape (measured,)."""
+        return np.array([value for one in self.measured for value in one.values], dtype=np.float64)
+
+    @cached_property
+    def sigma(self) -> Floats:
+        """Their standard deviations, SI, shape (measured,); NaN where they are not known."""
+        return np.array([s for one in self.measured for s in one.sigma or (math.nan,) * len(one.values)])
+
+    @cached_property
+    def places(self) -> tuple[Ints, Ints]:
+        """Condition, and position in `results`, of each measured value."""
+        conditions = [place for one in self.measured for place in one.at]
+        columns = [column for column, one in enumerate(self.measured) for _ in one.values]
+        return np.array(conditions, dtype=np.int64), np.array(columns, dtype=np.int64)
+
+    @property
+    def known_sigma(self) -> bool:
+        """Whether the standard deviation of every value is given."""
+        return not bool(np.isnan(self.sigma).any())
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> CalibratePlan:
+        """The plan as stored with its study; ValueError as of the class, or if something is missing."""
+        try:
+            return cls(
+                unknown=tuple(
+                    Unknown(tuple(map(str, one["paths"])), float(one["low"]), float(one["high"]))
+                    for one in data["unknown"]
+                ),
+                paths_at=tuple(map(str, data["paths_at"])),
+                conditions=tuple(tuple(map(float, one)) for one in data["conditions"]),
+                measured=tuple(_measured(one) for one in data["measured"]),
+                loss=data["loss"],
+                refits=int(data["refits"]),
+                seed=int(data["seed"]),
+            )
+        except KeyError as error:
+            raise ValueError(f"calibrate: {error.args[0]} is missing") from error
+
+    def to_json(self) -> dict[str, Any]:
+        """The plan as plain JSON data, from which ``from_json`` makes an equal one."""
+        return {
+            "kind": CALIBRATE,
+            "unknown": [{"paths": list(one.paths), "low": one.low, "high": one.high} for one in self.unknown],
+            "paths_at": list(self.paths_at),
+            "conditions": [list(one) for one in self.conditions],
+            "measured": [
+                {"result": one.result, "at": list(one.at), "values": list(one.values)}
+                | ({"sigma": list(one.sigma)} if one.sigma else {})
+                for one in self.measured
+            ],
+            "loss": self.loss,
+            "refits": self.refits,
+            "seed": self.seed,
+        }
+
+
+def _measured(data: Mapping[str, Any]) -> Measured:
+    return Measured(
+        str(data["result"]),
+        tuple(map(int, data["at"])),
+        tuple(map(float, data["values"])),
+        tuple(map(float, data.get("sigma", ()))),
+    )
+
+
+def _check(holds: bool, name: str, value: object, allowed: str) -> None:
+    if not holds:
+        raise ValueError(f"calibrate.{name} is {value}; allowed: {allowed}")
+
+
+def _check_measured(plan: CalibratePlan) -> None:
+    _check(bool(plan.conditions), "conditions", [], "at least one")
+    for i, point in enumerate(plan.conditions):
+        fits = len(point) == len(plan.paths_at) and all(map(math.isfinite, point))
+        _check(fits, f"conditions.{i}", list(point), f"{len(plan.paths_at)} finite numbers")
+    _check(len(set(plan.conditions)) == len(plan.conditions), "conditions", len(plan.conditions), "each once")
+    _check(bool(plan.measured), "measured", [], "at least one result")
+    _check(len(set(plan.results)) == len(plan.results), "measured", list(plan.results), "each result once")
+    least = len(plan.unknown) + 1
+    _check(least <= plan.count <= MOST_MEASURED, "measured", plan.count, f"{least} to {MOST_MEASURED:,} values")
+    for one in plan.measured:
+        lengths = {len(one.at), len(one.values), len(one.sigma) or len(one.at)}
+        _check(len(lengths) == 1, one.result, sorted(lengths), "as many conditions, values and standard deviations")
+        inside = all(0 <= place < len(plan.conditions) for place in one.at)
+        _check(inside, one.result, "a condition that does not exist", "0 to the number of conditions less 1")
+        _check(all(map(math.isfinite, one.values)), one.result, "a value that is not finite", "finite values")
+        _check(all(0.0 < s < math.inf for s in one.sigma), f"{one.result}.sigma", "not positive", "positive numbers")
