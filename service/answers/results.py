@@ -95,7 +95,7 @@ class Jump(TypedDict):
 
     low: Annotated[float, Doc("its ends, values of x, SI")]
     high: float
-    why: Annotated[str, Doc("failed, irregular, regime, order, no_value or steep")]
+    why: Annotated[str, Doc("failed, irregular, regime, order, no_value, steep or sensitive")]
     results: Annotated[list[str], Doc("the results that are not interpolated there, of those with a requested error")]
 
 

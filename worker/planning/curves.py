@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag.worker.planning.transients import ROUGH, roughness, sensitive, weak
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -37,6 +39,7 @@ class Why(Enum):
     ORDER = "order"
     NO_VALUE = "no_value"
     STEEP = "steep"
+    SENSITIVE = "sensitive"
 
     @property
     def sentence(self) -> str:
@@ -46,11 +49,12 @@ class Why(Enum):
 
 _SENTENCES: Final = {
     Why.FAILED: "Cases failed.",
-    Why.IRREGULAR: "The motion is irregular, and results scatter by more than the error.",
+    Why.IRREGULAR: "The motion is irregular, and results scatter.",
     Why.REGIME: "The regime changes, and results jump.",
     Why.ORDER: "The order of the motion changes, and results jump.",
     Why.NO_VALUE: "Cases do not have the result.",
     Why.STEEP: "Results jump, or are too steep for the finest grid.",
+    Why.SENSITIVE: "The motion depends finely on the parameter: others may lie between the points.",
 }
 #: The reasons by the numbers in `Intervals.why`.
 REASONS: Final = tuple(Why)
@@ -112,18 +116,24 @@ def intervals(samples: Samples) -> Intervals:
     raw, worst = _of_ancestor(triples, curve, low, 2 * width)
     _, before = _of_ancestor(triples, curve, low, 4 * width)
     most = max(1, plan.finest // (plan.start - 1) // _DIVIDED)
-    narrow, error = width <= most, plan.error
-    passed = narrow & (worst <= error) & ((worst <= error / _SHRINKS) | (before <= error * _SHRINKS))
+    error = plan.error
+    # The rows do not show whether motions of a given time have settled. Where they have not, results are jagged.
+    tolerance = error if plan.regime else error / _SHRINKS
+    passed = (worst <= tolerance) & ((worst <= tolerance / _SHRINKS) | (before <= tolerance * _SHRINKS))
+    passed &= width <= most
     resolved = passed | (width == 1)
     jumps, bends = _jumps(samples, ranges, curve, low, width, passed)
     errors = np.where(width[:, None] == 1, np.where(np.isnan(bends), raw, bends), raw)
     both = samples.irregular[curve, low] & samples.irregular[curve, low + width]
     # What passed only because it scatters.
-    scatter = passed[:, None] & (errors > error)
-    jumps = _through_zones(curve, low, width, both, jumps | scatter)
-    jumps = _without_gaps(curve * 2 * (plan.finest + most) + low, width, jumps, most)
+    scattered = passed[:, None] & (errors > error)
+    own = _through_zones(curve, low, width, both, jumps | scattered | (both[:, None] & ~samples.has_width))
+    told = _without_gaps(curve * 2 * (plan.finest + most) + low, width, own, most)
+    told |= (sensitive(samples, curve, low, width) & (~passed | (width == 1)))[:, None]
+    told = _with_beside(told, weak(samples, curve, low, width)[:, None], (curve[1:] == curve[:-1])[:, None])
+    why = _reasons(samples, curve, low, width, both, np.asarray(jumps.any(axis=1)))
     worth = np.where(width > plan.finest // (plan.start - 1), 2.0 * width, np.minimum(worst, 1.0))
-    return Intervals(curve, low, width, resolved, errors, jumps, _reasons(samples, curve, low, width, both), worth)
+    return Intervals(curve, low, width, resolved, errors, told, why, worth)
 
 
 def _all_triples(samples: Samples, ranges: Floats) -> dict[int, _Triples]:
@@ -156,8 +166,22 @@ def _triples(samples: Samples, ranges: Floats, length: int) -> _Triples:
     nowhere = ~np.isfinite(left) & ~np.isfinite(middle) & ~np.isfinite(right)
     differences = np.where(nowhere, 0.0, np.where(np.isfinite(differences), differences, np.inf))
     a, b, c = three(codes)
-    worst = np.where(known & (a == b) & (b == c), differences.max(axis=2), np.inf)
-    return _Triples(raw, worst)
+    # A settling time that is as rough as it may be counts as a difference of the error.
+    settling = roughness(*three(samples.settling)) * error / ROUGH
+    worst = np.where(known & (a == b) & (b == c), np.maximum(differences.max(axis=2), settling), np.inf)
+    return _Triples(raw, worst if samples.plan.regime else _with_neighbours(worst, known))
+
+
+def _with_neighbours(worst: Floats, known: Bools) -> Floats:
+    """The largest differences, at least those of the neighbours two levels of halving later.
+
+    A jagged curve agrees with a straight line by chance in one interval, but seldom in those beside it, too.
+    """
+    near = np.where(known, worst, 0.0) / _SHRINKS**2
+    wider = worst.copy()
+    wider[:, 1:] = np.maximum(wider[:, 1:], near[:, :-1])
+    wider[:, :-1] = np.maximum(wider[:, :-1], near[:, 1:])
+    return wider
 
 
 def _of_ancestor(triples: dict[int, _Triples], curve: Ints, low: Ints, length: Ints) -> tuple[Floats, Floats]:
@@ -198,15 +222,16 @@ def _jumps(
     change = codes[curve, low] != codes[curve, low + width]
     jump |= change[:, None] & (np.abs(rise) > error)
     jump &= ~passed[:, None]
-    jump = _with_slopes(jump, (np.abs(rise) > 2.0 * error) & ~passed[:, None], neighbours)
+    # A jump's foot may reach into the next interval.
+    jump = _with_beside(jump, (np.abs(rise) > 2.0 * error) & ~passed[:, None], neighbours)
     return jump | missing | wide, bends
 
 
-def _with_slopes(jump: Bools, steep: Bools, neighbours: Bools) -> Bools:
-    """Jumps with the steep intervals right beside them: a jump's foot may reach into the next interval."""
+def _with_beside(jump: Bools, beside: Bools, neighbours: Bools) -> Bools:
+    """Jumps, and the intervals right beside them that ``beside`` names."""
     wider = jump.copy()
-    wider[1:] |= jump[:-1] & steep[1:] & neighbours
-    wider[:-1] |= jump[1:] & steep[:-1] & neighbours
+    wider[1:] |= jump[:-1] & beside[1:] & neighbours
+    wider[:-1] |= jump[1:] & beside[:-1] & neighbours
     return wider
 
 
@@ -230,16 +255,18 @@ def _without_gaps(start: Ints, width: Ints, jump: Bools, narrow: int) -> Bools:
     return np.asarray(after - before <= narrow)
 
 
-def _reasons(samples: Samples, curve: Ints, low: Ints, width: Ints, irregular: Bools) -> Ints:
+def _reasons(samples: Samples, curve: Ints, low: Ints, width: Ints, irregular: Bools, steep: Bools) -> Ints:
+    """Indices into `REASONS`; ``steep`` (intervals,) are those in which a result itself jumps or is too steep."""
     high = low + width
     missing = ~np.isfinite(samples.values[curve, low]) | ~np.isfinite(samples.values[curve, high])
     regimes, orders = samples.regimes, samples.orders
     tests = {
         Why.FAILED: ~samples.ok[curve, low] | ~samples.ok[curve, high],
         Why.IRREGULAR: irregular,
-        Why.REGIME: regimes[curve, low] != regimes[curve, high],
-        Why.ORDER: orders[curve, low] != orders[curve, high],
+        Why.REGIME: steep & (regimes[curve, low] != regimes[curve, high]),
+        Why.ORDER: steep & (orders[curve, low] != orders[curve, high]),
         Why.NO_VALUE: missing.any(axis=1),
+        Why.STEEP: steep,
     }
-    fallback = REASONS.index(Why.STEEP)
+    fallback = REASONS.index(Why.SENSITIVE)
     return np.select(list(tests.values()), [REASONS.index(why) for why in tests], fallback).astype(np.int64)

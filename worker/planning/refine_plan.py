@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
 #: Value of "kind" in the plan.
 REFINE: Final = "refine"
-#: Results of settled studies that tell regimes apart.
+#: Results of settled studies that tell regimes apart, and how a motion settles.
 REGIME, ORDER = "regime", "regime.order"
+MULTIPLIER, SETTLED_AFTER = "regime.multiplier", "regime.settled_after"
 _HALF_WIDTH: Final = ".half_width"
 _MAX_FINEST: Final = 65_536
 #: Numbers that a planner holds at most: results at every point of the finest grids.
@@ -164,7 +165,7 @@ class RefinePlan:
     @property
     def needed(self) -> tuple[str, ...]:
         """Every result that the planner must be told."""
-        own = (REGIME, ORDER) if self.regime else ()
+        own = (REGIME, ORDER, MULTIPLIER, SETTLED_AFTER) if self.regime else ()
         widths = (name + _HALF_WIDTH for name in self.half_widths)
         return tuple(dict.fromkeys((*self.results, *own, *widths)))
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int64]
 
 #: Numbers of the reasons that are named by the first of them where they are neighbours.
-_CHANGES: Final = tuple(REASONS.index(why) for why in (Why.REGIME, Why.ORDER, Why.STEEP))
+_CHANGES: Final = tuple(REASONS.index(why) for why in (Why.REGIME, Why.ORDER, Why.STEEP, Why.SENSITIVE))
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.worker.models.settled import IRREGULAR
-from sprag.worker.planning.refine_plan import ORDER, REGIME, half_width
+from sprag.worker.planning.refine_plan import MULTIPLIER, ORDER, REGIME, SETTLED_AFTER, half_width
+from sprag.worker.planning.transients import settling
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -39,6 +40,10 @@ class Samples:
         Results (NaN where there is none) and their half widths (0 where there is none).
     regimes, orders : float64 arrays, shape (combinations, places...)
         Regime, or `FAILED`, and order; 0 in studies that are not settled.
+    settling : float64 array, shape (combinations, places...)
+        As of `sprag.worker.planning.transients.settling`; NaN where nothing settles.
+    multipliers : float64 array, shape (combinations, places...)
+        Those of the settled motions; 0 where nothing settles.
     has_width : bool array, shape (results,)
         Whether irregular motions have a half width of the result.
     """
@@ -53,6 +58,8 @@ class Samples:
         self.widths = np.zeros((*shape, len(plan.results)))
         self.regimes = np.zeros(shape)
         self.orders = np.zeros(shape)
+        self.multipliers = np.zeros(shape)
+        self.settling = np.full(shape, np.nan)
         self.has_width = np.array([name in plan.half_widths for name in plan.results])
 
     def add(self, rows: Rows) -> None:
@@ -73,6 +80,9 @@ class Samples:
         if self.plan.regime:
             self.regimes[at] = np.nan_to_num(values[REGIME])
             self.orders[at] = np.nan_to_num(values[ORDER])
+            self.multipliers[at] = np.where(ok, np.nan_to_num(values[MULTIPLIER]), 0.0)
+            own = settling(values[SETTLED_AFTER], values[MULTIPLIER], values[ORDER])
+            self.settling[at] = np.where(ok, own, np.nan)
         self.regimes[at] = np.where(ok, self.regimes[at], FAILED)
         self.orders[at] = np.where(ok, self.orders[at], 0.0)
         self.irregular[at] = ok & (self.regimes[at] == IRREGULAR) if self.plan.regime else False

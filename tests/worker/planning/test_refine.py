@@ -84,7 +84,7 @@ def test_a_smooth_curve_is_right_to_the_error_from_few_points() -> None:
     assert not curve.jumps
     assert curve.error is not None
     assert worst <= curve.error <= PLAN.error
-    assert len(curve.x) < 100
+    assert len(curve.x) < 110
     assert curve.joined["a"].all()
 
 
@@ -276,14 +276,60 @@ def test_a_zone_of_irregular_motion_is_told_where_a_result_scatters_in_a_part_of
     assert (zone.low, zone.high) == pytest.approx((0.5, 0.9), abs=1.6 / 128)
 
 
-def test_a_mean_with_a_wide_interval_is_told_however_smooth_it_is() -> None:
+def test_irregular_motion_is_reported_however_smooth_it_is() -> None:
     def function(points: Floats) -> dict[str, Floats]:
         x = points[:, -1]
         own = settled(x, x, x**2)
         return own | {"regime": np.full(len(x), IRREGULAR), "mean.half_width": np.full(len(x), 0.02)}
 
+    wide = curve_of(SETTLED, function)
+    assert [(jump.low, jump.high, jump.results) for jump in wide.jumps] == [(0.0, 1.6, ("mean", "max"))]
+    # Of a mean the half width says how far it scatters, of an extreme nothing does.
+    narrow = curve_of(replace(SETTLED, error=0.05), function)
+    assert [(jump.low, jump.high, jump.results) for jump in narrow.jumps] == [(0.0, 1.6, ("max",))]
+
+
+def settling(x: Floats, periods: Floats, multiplier: Floats) -> dict[str, Floats]:
+    """A straight curve of periodic motion that takes ``periods`` to settle."""
+    return settled(x, x, 2.0 - x, **{"regime.settled_after": periods, "regime.multiplier": multiplier})
+
+
+def test_where_settling_times_scatter_another_motion_may_lie_between_the_points() -> None:
+    def function(points: Floats) -> dict[str, Floats]:
+        x = points[:, -1]
+        scatters = np.where((x > 0.7) & (x < 0.9), 1.0 + 0.3 * noise(x), 1.0)
+        own = settling(x, 60.0 * scatters, np.full(len(x), 0.7))
+        # An island narrower than the finest interval, which no point meets.
+        return own | {"mean": np.where(np.abs(x - 0.8 - 0.5 * LEAF) < 0.25 * LEAF, 0.0, own["mean"])}
+
     curve = curve_of(SETTLED, function)
-    assert [(jump.low, jump.high, jump.results) for jump in curve.jumps] == [(0.0, 1.6, ("mean",))]
+    assert curve.passed
+    assert {(jump.why, jump.results) for jump in curve.jumps} == {(Why.SENSITIVE, ("mean", "max"))}
+    assert any(jump.low <= 0.8 and jump.high >= 0.8 + LEAF for jump in curve.jumps)
+    assert all(jump.low > 0.7 - 4 * LEAF and jump.high < 0.9 + 4 * LEAF for jump in curve.jumps)
+    assert not errors_outside(curve, "mean", function).max() > 0.01
+
+
+def test_a_settling_time_that_grows_near_a_bifurcation_is_no_scatter() -> None:
+    def function(points: Floats) -> dict[str, Floats]:
+        x = points[:, -1]
+        rate = 1e-3 + np.abs(x - 0.8013)
+        return settling(x, 20.0 / rate, np.exp(-rate))
+
+    curve = curve_of(SETTLED, function)
+    assert not curve.jumps
+    assert len(curve.x) == 65
+
+
+def test_a_jagged_curve_of_a_given_time_is_not_drawn_where_it_agrees_by_chance() -> None:
+    def function(points: Floats) -> dict[str, Floats]:
+        x = points[:, -1]
+        by_chance = (x > 0.6) & (x < 0.65) & (np.abs(x * 40.0 - np.rint(x * 40.0)) < 1e-9)
+        return {"a": x + np.where((x > 0.4) & (x < 1.0) & ~by_chance, 0.1 * noise(x), 0.0)}
+
+    curve = curve_of(PLAN, function)
+    inner = curve.x[(curve.x > 0.45) & (curve.x < 0.95)]
+    assert np.diff(inner) == pytest.approx(LEAF)
 
 
 def test_scatter_takes_all_points_of_the_finest_grid_and_no_more() -> None:

@@ -15,7 +15,15 @@ from tests.worker.planning.test_refine import LOAD, MANY, PLAN
 def test_a_plan_is_the_same_after_json() -> None:
     plan = replace(MANY, most=500)
     assert RefinePlan.from_json(plan.to_json()) == plan
-    assert plan.needed == ("mean", "max", "regime", "regime.order", "mean.half_width")
+    assert plan.needed == (
+        "mean",
+        "max",
+        "regime",
+        "regime.order",
+        "regime.multiplier",
+        "regime.settled_after",
+        "mean.half_width",
+    )
     assert half_widths_of(("mean", "max"), ("mean", "max", "mean.half_width")) == ("mean",)
 
 
