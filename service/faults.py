@@ -70,6 +70,7 @@ WarningCode = Literal[
     "falls-over",
     "implausible-value",
     "impossible-inertia",
+    "invalid-drives",
     "late",
     "law-ends-falling",
     "law-falls",

@@ -29,6 +29,7 @@ ENDING_CODES: Final[dict[str, int]] = {
     "crashed": 100,
     "timed_out": 101,
     "cancelled": 102,
+    "invalid_parameters": 103,
 }
 
 #: Number of each regime of settled motion; "none" for a case without one.

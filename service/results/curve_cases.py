@@ -28,6 +28,7 @@ from sprag.service.results.selection import (
     numeric_results,
     refused,
     require_axis,
+    with_nominal,
 )
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker.codes import PENDING
@@ -43,7 +44,10 @@ if TYPE_CHECKING:
 
 
 def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Selection:
-    """Select the cases of the curves of ``query``; of refined curves, a fixed axis without a role is one of ``by``.
+    """Select the cases of the curves of ``query``.
+
+    Of refined curves, a fixed axis without a role is one of ``by``. Curves are those of the nominal drive, unless the
+    query gives the drives another role.
 
     Raises
     ------
@@ -61,6 +65,7 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
         if axis not in {x_axis, *by_axes.values(), *fixed}:
             by_axes[path] = axis
     _no_axis_twice({query.x: x_axis}, "by", by_axes, fixed)
+    fixed = with_nominal(study, fixed, {x_axis, *by_axes.values()})
     chooser = _zip_lines if study.combine == "zip" else _grid_lines
     x_values, lines = chooser(study, x_axis, by_axes, fixed, len(results))
     made = tuple(lines)
@@ -111,6 +116,7 @@ def draw_map(
     x_axis, y_axis = require_axis(study, "x", x), require_axis(study, "y", y)
     fixed = locate_axes(study, at)
     _no_axis_twice({x: x_axis}, "y", {y: y_axis}, fixed)
+    fixed = with_nominal(study, fixed, {x_axis, y_axis})
     x_values, lines = _grid_lines(study, x_axis, {y: y_axis}, fixed, 1, way_out="give")
     rows = list(lines)
     cases = np.stack([row.cases for row in rows])

@@ -14,6 +14,7 @@ from sprag.service.results.refined_maps import map_plan, squares
 from sprag.service.results.selection import axis_name, held_text, refused
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
+from sprag.worker.spread import DRIVE
 
 if TYPE_CHECKING:
     from sprag.worker.models import ResultInfo
@@ -28,13 +29,13 @@ _MOST_MAIN: Final = 10
 def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
     """What to draw for ``study``; None when nothing varies.
 
-    Axes that are not drawn are held at the base's value where they contain it, otherwise at their middle value. Refined
-    curves are drawn with every result whose error was asked for, all of them.
+    Axes that are not drawn are held at the base's value where they contain it, otherwise at their middle value, and the
+    drives at the nominal one. Refined curves are drawn with every result whose error was asked for, all of them.
     """
     plan = curve_plan(study)
     if plan is not None:
         return CurveQuery(plan.adaptive[0].paths[0], plan.results, tuple(families(plan)))
-    varying = [axis for axis in study.axes if len(axis) > 1]
+    varying = varying_axes(study)
     if not varying:
         return None
     shown = models.presentation_of(study)
@@ -86,9 +87,17 @@ def main_results(study: Study, infos: Sequence[ResultInfo]) -> tuple[str, ...]:
     return tuple(name for name in main if name in names) or tuple(names[:_MOST_MAIN])
 
 
+def varying_axes(study: Study) -> list[Axis]:
+    """The axes with more than one value; that of the drives is not among them."""
+    return [axis for axis in study.axes if len(axis) > 1 and axis.paths != (DRIVE,)]
+
+
 def usual_value(study: Study, axis: Axis) -> float:
-    """The value at which an undrawn axis is held: the base's where the axis contains it, otherwise its middle one."""
-    base = study.base.get(axis.paths[0])
+    """The value at which an undrawn axis is held: the base's where the axis contains it, otherwise its middle one.
+
+    Of the drives it is the nominal one.
+    """
+    base = 0.0 if axis.paths == (DRIVE,) else study.base.get(axis.paths[0])
     index = None if base is None else axis.index_of(base)
     return float(np.sort(axis.array)[len(axis) // 2]) if index is None else axis.value(index)
 

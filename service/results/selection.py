@@ -13,6 +13,7 @@ from sprag.service.spec.catalogue import result_of, unit_of, unknown_result
 from sprag.service.spec.report import did_you_mean, quantity_text
 from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
 from sprag.worker import models
+from sprag.worker.spread import DRIVE
 from sprag.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
@@ -87,6 +88,20 @@ def require_axis(study: Study, parameter: str, path: str) -> int:
         else "not an axis of this study"
     ) + did_you_mean(path, study.axis_paths)
     raise refused(parameter, "not-an-axis", message, path, allowed=listed(study.axis_paths) or "no axis at all")
+
+
+def own_paths(study: Study) -> list[str]:
+    """A path for each number that cases have for themselves: one of each axis, drawn and derived ones."""
+    drawn = () if study.spread is None else study.spread.paths
+    return list(dict.fromkeys([*(axis.paths[0] for axis in study.axes), *drawn, *study.derive]))
+
+
+def with_nominal(study: Study, fixed: Fixed, roles: Iterable[int]) -> Fixed:
+    """The fixed axes with that of the drives at the nominal one, where the drives have no other role."""
+    position = study.axis_of(DRIVE)
+    if position is None or position in {*fixed, *roles}:
+        return fixed
+    return {**fixed, position: (DRIVE, int(np.argmin(study.axes[position].array)))}
 
 
 def axis_name(study: Study, path: str) -> str:

@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.spec.axes.values import in_range
 from sprag.service.spec.draws.unit import unit_sample
 from sprag.service.spec.formulas import Formula, FormulaError, UnknownNameError, read_formula
 from sprag.service.spec.report import Report, join, quantity_text
 from sprag.worker.derived import blocks, involved
 from sprag.worker.limits import MAX_DERIVED
 from sprag.worker.models.formulas import MAX_LENGTH, CircularError, evaluate, evaluation_order
-from sprag.worker.models.parameters import model_parameter
+from sprag.worker.models.parameters import in_range, model_parameter
 from sprag.worker.study import Axis, Combine, Study
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.spec.axes.design import read_design
 from sprag.service.spec.derive import check_derived, layout, read_machine
-from sprag.service.spec.draws.tolerances import read_tolerances, with_drives
+from sprag.service.spec.draws.tolerances import read_tolerances, warn_of_invalid_drives, with_drives
 from sprag.service.spec.fields import TOLERANCE_FIELDS, read_object
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.plan.outline import Outline, chooses, first_round, read_outline
@@ -107,6 +107,7 @@ def parse_spec(data: object) -> ParsedSpec:
     study = given if outline is None else first_round(report, study, outline)
     if spread is not None:
         study = with_drives(report, study, spread)
+        warn_of_invalid_drives(report, study)
     part.warn(report, study)
     return ParsedSpec(study, tuple(report.warnings), machine.fits, dict(found))
 

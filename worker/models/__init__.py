@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import platform
 from contextlib import suppress
+from dataclasses import replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
@@ -34,8 +35,9 @@ from sprag.engine.vibration_drive.parameters import (
 )
 from sprag.engine.warning_text import WarningText
 from sprag.worker.models import machine_shaft, vibration_drive
-from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
+from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, run_accepted
 from sprag.worker.models.model import Model, all_models, model_names, model_of, register, unregister
+from sprag.worker.models.parameters import refused_cases
 from sprag.worker.models.presentation import Panel, Presentation
 from sprag.worker.models.settled import REGIME_SENTENCES, SETTLED, is_settled, motion_sentence, settled_study
 from sprag.worker.models.vibration_drive import (
@@ -153,11 +155,12 @@ OK = Ending.OK.value
 
 
 class WorkerEnding(StrEnum):
-    """Endings given by the worker to cases from which the engine did not return."""
+    """Endings given by the worker to cases that the engine did not run, or from which it did not return."""
 
     CRASHED = "crashed"
     TIMED_OUT = "timed_out"
     CANCELLED = "cancelled"
+    INVALID = "invalid_parameters"
 
 
 #: Every ending of a case, stored by its key, and its description for users.
@@ -168,6 +171,10 @@ ENDING_SENTENCES: dict[str, str] = {
     ),
     WorkerEnding.TIMED_OUT.value: "The case, run alone, exceeded its time limit twice.",
     WorkerEnding.CANCELLED.value: "The study was cancelled before this case was run.",
+    WorkerEnding.INVALID.value: (
+        "The parameters drawn for this drive do not describe a machine: a derived parameter is out of its range, or "
+        "the torque of a clutch is negative somewhere. The case was not run."
+    ),
 }
 
 
@@ -250,7 +257,11 @@ def chunk_task(study: Study, first: int, count: int) -> ChunkTask:
     """The cases ``first`` .. ``first + count - 1`` of ``study``, ready for `run_task`."""
     columns: dict[str, Any] = {**study.base, **study.columns(range(first, first + count))}
     columns.pop(DRIVE, None)
-    return ChunkTask(first, count, shape_of(study), study.run, columns, study.structure)
+    task = ChunkTask(first, count, shape_of(study), study.run, columns, study.structure)
+    if study.spread is None:
+        return task
+    refused = refused_cases(study, columns, count) | model_of(study.model).invalid(study, columns, count)
+    return replace(task, refused=refused, results=len(study_results(study))) if refused.any() else task
 
 
 def run_task(task: ChunkTask) -> ChunkResult:
@@ -261,7 +272,8 @@ def run_task(task: ChunkTask) -> ChunkResult:
     from sprag.engine.faults import inject
 
     inject(task.columns, task.count)
-    return model_of(task.shape.model).run(task)
+    model = model_of(task.shape.model)
+    return model.run(task) if task.refused is None else run_accepted(task, model.run, WorkerEnding.INVALID)
 
 
 def run_chunk(study: Study, first: int, count: int) -> ChunkResult:

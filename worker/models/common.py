@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +10,8 @@ import numpy as np
 from sprag.engine.endings import ENDINGS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
 
@@ -60,7 +62,8 @@ class ChunkTask:
     """Consecutive cases as sent to a process: only their own columns, however large the study is.
 
     ``columns`` maps flat spec paths to SI numbers, or to arrays of shape (count,) where they vary. ``run`` and
-    ``structure`` are those of the study.
+    ``structure`` are those of the study. ``refused``, shape (count,), marks cases that are not to be run; then
+    ``results`` is the number of their results.
     """
 
     first: int
@@ -69,6 +72,25 @@ class ChunkTask:
     run: dict[str, Any]
     columns: dict[str, float | NDArray[np.float64]]
     structure: dict[str, Any] | None = None
+    refused: NDArray[np.bool_] | None = None
+    results: int = 0
+
+
+def run_accepted(task: ChunkTask, run: Callable[[ChunkTask], ChunkResult], ending: str) -> ChunkResult:
+    """Run the cases of a task that are not refused; the others have that ending and no results."""
+    assert task.refused is not None
+    rows = np.flatnonzero(~task.refused)
+    endings, flags = [ending] * task.count, [""] * task.count
+    values = np.full((task.count, task.results), np.nan)
+    if rows.size:
+        columns = {
+            path: column[rows] if isinstance(column, np.ndarray) else column for path, column in task.columns.items()
+        }
+        found = run(replace(task, first=0, count=rows.size, columns=columns, refused=None))
+        values[rows] = found.values
+        for row, one, flag in zip(rows.tolist(), found.endings, found.flags, strict=True):
+            endings[row], flags[row] = one, flag
+    return ChunkResult(task.first, endings, flags, values)
 
 
 @dataclass(frozen=True, slots=True)

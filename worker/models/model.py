@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
 
 from sprag.worker.models.presentation import Presentation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from numpy.typing import NDArray
 
     from sprag.engine import Ending
     from sprag.engine.catalogue import Parameter, ResultInfo
@@ -69,6 +73,13 @@ class Model(Protocol):
     def shape_of(self, study: Study) -> KernelShape:
         """The compiled kernel that the cases of the study need."""
         ...
+
+    def invalid(self, study: Study, columns: Mapping[str, Any], count: int) -> NDArray[np.bool_]:
+        """Which of some cases, shape (count,), are no machine although each of their numbers is in its range.
+
+        It is asked for studies with tolerances only: the axes of other studies are checked with their spec.
+        """
+        return np.zeros(count, dtype=np.bool_)
 
     def run(self, task: ChunkTask) -> ChunkResult:
         """Run the cases of a task; a physical failure is an ending in the result, never an exception."""

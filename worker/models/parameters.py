@@ -1,13 +1,19 @@
-"""The parameter at a flat path of a spec, from the catalogue of its model."""
+"""The parameter at a flat path of a spec, from the catalogue of its model, and which values it allows."""
 
 from __future__ import annotations
 
 import re
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from sprag.worker.models.model import model_of
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike, NDArray
+
     from sprag.engine.catalogue import Parameter
     from sprag.worker.study import Study
 
@@ -31,3 +37,19 @@ def parameter_of(study: Study, path: str) -> Parameter | None:
     """The parameter at a flat path of a spec, for the machine of ``study``; None when there is none."""
     own = model_of(study.model).parameters_of(study)
     return own.get(path) if own else model_parameter(study.model, path)
+
+
+def in_range(values: NDArray[np.float64], parameter: Parameter) -> NDArray[np.bool_]:
+    """Which values (SI) are finite and in the range of ``parameter``; the vector form of `Parameter.accepts`."""
+    above = values > parameter.low if parameter.low_open else values >= parameter.low
+    return np.isfinite(values) & above & (values <= parameter.high)
+
+
+def refused_cases(study: Study, columns: Mapping[str, ArrayLike], count: int) -> NDArray[np.bool_]:
+    """Which of ``count`` cases have a derived value that its parameter does not allow; ``columns`` has the values."""
+    refused = np.zeros(count, dtype=np.bool_)
+    for path in study.derive:
+        entry = parameter_of(study, path)
+        if entry is not None:
+            refused |= ~in_range(np.asarray(columns[path], dtype=np.float64), entry)
+    return refused

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 
 from sprag.engine import Ending, Run, Span
+from sprag.engine.vibration_drive.clutch import ClutchLawError, check_law
 from sprag.engine.vibration_drive.parameters import (
     CLUTCH_COEFFICIENT,
     CLUTCH_WINDUP_LIMIT,
@@ -182,6 +183,16 @@ class VibrationDrive(Model):
     def shape_of(self, study: Study) -> KernelShape:
         return KernelShape(MODEL, DriveKey(pendulums(study), coefficients(study), run_of(study.run).tolerance))
 
+    def invalid(self, study: Study, columns: Mapping[str, Any], count: int) -> NDArray[np.bool_]:
+        """The cases with a clutch whose torque is negative somewhere in its range, or zero everywhere."""
+        found = np.zeros(count, dtype=np.bool_)
+        paths = [path for path in columns if ".coefficients." in f".{path}"]
+        for prefix in dict.fromkeys(path.partition("coefficients.")[0] for path in paths):
+            limit = columns.get(f"{prefix}windup_limit", np.inf)
+            law = [columns[f"{prefix}coefficients.{k}"] for k in range(sum(path.startswith(prefix) for path in paths))]
+            found |= _not_laws(np.column_stack([np.broadcast_to(part, count) for part in (limit, *law)]))
+        return found
+
     def run(self, task: ChunkTask) -> ChunkResult:
         from sprag.engine.vibration_drive.settle import settle
         from sprag.engine.vibration_drive.transients import simulate_judged
@@ -253,6 +264,24 @@ class VibrationDrive(Model):
         from sprag.engine.vibration_drive.simulate import warm_up
 
         warm_up(*_key_of(shape))
+
+
+def _not_laws(laws: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which laws, rows of a windup limit and its coefficients, no clutch can have."""
+    # The torque rises with each coefficient, and a wider range only adds windups: where the worst of all is a law, all
+    # are.
+    if _is_law(np.array([laws[:, 0].max(), *laws[:, 1:].min(axis=0)])):
+        return np.zeros(len(laws), dtype=np.bool_)
+    different, member = np.unique(laws, axis=0, return_inverse=True)
+    return np.array([not _is_law(law) for law in different])[member.reshape(-1)]
+
+
+def _is_law(law: NDArray[np.float64]) -> bool:
+    try:
+        check_law(law[1:].tolist(), float(law[0]))
+    except ClutchLawError:
+        return False
+    return True
 
 
 def _key_of(shape: KernelShape) -> DriveKey:

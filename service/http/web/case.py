@@ -21,7 +21,7 @@ from sprag.service.results.defaults import main_results
 from sprag.service.results.pictures.curves import draw_motion
 from sprag.service.results.portraits import require_strobes
 from sprag.service.results.regimes import ORDER
-from sprag.service.results.selection import axis_name
+from sprag.service.results.selection import axis_name, own_paths
 from sprag.service.results.wording import number
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
@@ -67,8 +67,10 @@ def _motion(row: CaseRow) -> str:
 def _parameters(study: Study, case: int) -> list[tuple[str, float, str, str]]:
     """Name, value, unit and (of a derived one) formula of each parameter that a case has for itself."""
     values = study.case_parameters(case)
-    paths = [*(axis.paths[0] for axis in study.axes), *study.derive]
-    return [(axis_name(study, path), values[path], unit_of(study, path), study.derive.get(path, "")) for path in paths]
+    return [
+        (axis_name(study, path), values[path], unit_of(study, path), study.derive.get(path, ""))
+        for path in own_paths(study)
+    ]
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}")

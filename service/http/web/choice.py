@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sprag.service.results.curves import CurveQuery
-from sprag.service.results.defaults import main_query, main_results, usual_value
+from sprag.service.results.defaults import main_query, main_results, usual_value, varying_axes
 from sprag.service.results.refined import curve_plan, families, plan_along
 from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.selection import refused
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from starlette.datastructures import QueryParams
 
     from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Axis, Study
+    from sprag.worker.study import Study
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ def map_query(study: Study, infos: Sequence[ResultInfo], given: QueryParams) -> 
             x, y = y, x
         x, y, z = given.get("x") or x, given.get("y") or y, given.get("z") or plan.results[0]
         return MapQuery(x, y, z, held(study, given.getlist("at"), (x, y)))
-    varying = [axis for axis in study.axes if len(axis) > 1]
+    varying = varying_axes(study)
     main = main_query(study, infos)
     if main is None or study.combine != "grid" or len(varying) < 2:
         return None
@@ -104,11 +104,6 @@ def pairs_of(query: CurveQuery | MapQuery) -> list[tuple[str, str]]:
     if isinstance(query, MapQuery):
         return [("x", query.x), ("y", query.y), ("z", query.z), *at]
     return [("x", query.x), *(("y", name) for name in query.y), *(("by", path) for path in query.by), *at]
-
-
-def varying_axes(study: Study) -> list[Axis]:
-    """The axes with more than one value."""
-    return [axis for axis in study.axes if len(axis) > 1]
 
 
 def _same_axis(study: Study, first: str, second: str) -> bool:

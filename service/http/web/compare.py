@@ -14,14 +14,14 @@ from sprag.service.http import views
 from sprag.service.http.context import Context, Ctx
 from sprag.service.http.drawing import Drawing, picture, tag_of, unless_known
 from sprag.service.http.respond import json_response
-from sprag.service.http.web.choice import held, varying_axes
+from sprag.service.http.web.choice import held
 from sprag.service.http.web.figures.plotly import plotly_figure
 from sprag.service.http.web.study import fixed_choices
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended, Work
 from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.curves import CurveQuery, Curves
-from sprag.service.results.defaults import main_query
+from sprag.service.results.defaults import main_query, varying_axes
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.pictures.curves import draw_compare
 from sprag.service.results.selection import SelectionError, refused

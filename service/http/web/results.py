@@ -12,13 +12,14 @@ from sprag.service.http import views
 from sprag.service.http.context import Ctx, StudyId
 from sprag.service.http.drawing import Drawing, conditional, placed
 from sprag.service.http.respond import JSON, json_response
-from sprag.service.http.web.choice import MapQuery, curve_query, map_query, pairs_of, varying_axes
+from sprag.service.http.web.choice import MapQuery, curve_query, map_query, pairs_of
 from sprag.service.http.web.figures import answers
 from sprag.service.http.web.study import fixed_choices, orders_address, study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.results.curve_cases import select
 from sprag.service.results.curves import CurveQuery
+from sprag.service.results.defaults import varying_axes
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.selection import SelectionError

@@ -25,7 +25,7 @@ from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import timestamp
 from sprag.service.results.curve_cases import select
-from sprag.service.results.defaults import caption, drawn_numbers
+from sprag.service.results.defaults import caption, drawn_numbers, varying_axes
 from sprag.service.results.exports.inputs import inputs as every_input
 from sprag.service.results.exports.inputs import run_inputs
 from sprag.service.results.pictures import curves as pictures
@@ -65,13 +65,13 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
     (record, progress), study = context.store.look(study_id), context.store.study(study_id)
     # Counting kinds takes time in proportion to the rows, so only the page that shows them does it.
     shown = views.detail(record, progress, study, context.store.spec(study_id), Kinds({}, {}))
-    varies = any(len(axis) > 1 for axis in study.axes)
-    grid = study.combine == "grid" and sum(len(axis) > 1 for axis in study.axes) > 1
+    varying = len(varying_axes(study))
+    grid = study.combine == "grid" and varying > 1
     mapped = grid or map_plan(study) is not None
     tabs = [
         ("", "Overview"),
         *([("/front", "Designs")] if _has_goal(study) else []),
-        *([("/curves", "Curves")] if varies else []),
+        *([("/curves", "Curves")] if varying else []),
         *([("/map", "Map")] if mapped else []),
     ]
     return {

@@ -14,7 +14,7 @@ from sprag.service.faults import FaultError, choice_of
 from sprag.service.http.context import Context, Ctx, StudyId
 from sprag.service.http.web.study import fixed_choices, study_frame
 from sprag.service.http.web.templates import page
-from sprag.service.results.selection import locate_axes, refused
+from sprag.service.results.selection import locate_axes, own_paths, refused
 from sprag.service.spec.catalogue import result_of, unit_of
 from sprag.worker import models
 
@@ -88,7 +88,7 @@ def cases_page(
         rows=[(row, study.case_parameters(row.case)) for row in found.rows],
         found=found,
         faults=faults,
-        paths=[*(axis.paths[0] for axis in study.axes), *study.derive],
+        paths=own_paths(study),
         shown=[info for name in names if (info := result_of(infos, name))],
         results=infos,
         fixed=fixed_choices(study, (), at),

@@ -12,20 +12,21 @@ from typing import TYPE_CHECKING, Any, Literal
 from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.machine.registry import part_of
 from sprag.worker.models.parameters import parameter_of
+from sprag.worker.spread import DRIVE
 
 if TYPE_CHECKING:
     from sprag.worker.study import Study
 
 #: Origin of the value of an input; "" where the user's spec is unknown.
-Origin = Literal["given", "default", "fitted", "axes", "derived", ""]
+Origin = Literal["given", "default", "fitted", "axes", "derived", "tolerance", ""]
 
 
 @dataclass(frozen=True, slots=True)
 class Input:
     """One parameter of the machine or setting of its run, for a table of inputs.
 
-    ``value`` is a number in SI, the text of a choice, the formula (in SI numbers) of a derived parameter, or None where
-    the axes change it.
+    ``value`` is a number in SI (of a parameter with a tolerance the nominal one), the text of a choice, the formula (in
+    SI numbers) of a derived parameter, or None where the axes change it.
     """
 
     path: str
@@ -42,6 +43,8 @@ class Input:
 
 def description_of(study: Study, path: str) -> str:
     """A short description of a flat path of a spec; "" where the catalogue does not contain it."""
+    if path == DRIVE:
+        return "number of the drive; 0 is the nominal one"
     entry = parameter_of(study, path)
     return "" if entry is None else entry.help
 
@@ -58,13 +61,20 @@ def inputs(study: Study, spec: Mapping[str, Any]) -> tuple[Input, ...]:
     ``spec`` is the user's own, which shows what was given.
     """
     varying = study.axis_paths
+    drawn = () if study.spread is None else study.spread.paths
     numbers = [
         Input(
             path,
             None if path in varying else study.derive.get(path, study.base.get(path)),
             unit_of(study, path),
             description_of(study, path),
-            "axes" if path in varying else "derived" if path in study.derive else _origin(spec, path),
+            "axes"
+            if path in varying
+            else "derived"
+            if path in study.derive
+            else "tolerance"
+            if path in drawn
+            else _origin(spec, path),
         )
         for path in dict.fromkeys((*varying, *study.derive, *study.base))
     ]

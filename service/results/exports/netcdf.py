@@ -68,7 +68,8 @@ class _Grid:
     ----------
     dims : names of the dimensions: the first path of each axis of a grid; ``case`` where axes are zipped
     shape : their lengths
-    labels : coordinates that are not dimensions: the case number in a grid, further paths of tied axes, derived paths
+    labels : coordinates that are not dimensions: the case number in a grid, further paths of tied axes, drawn and
+        derived paths
     """
 
     def __init__(self, study: Study) -> None:
@@ -78,7 +79,9 @@ class _Grid:
         self.shape = study.shape or ((1,) if self._together else ())
         self._orders = [slice(None)] if self._together else [_order(axis) for axis in study.axes]
         paths = study.axis_paths if self._together else [path for axis in study.axes for path in axis.paths[1:]]
-        self.labels = [*([] if self._together else [_CASE]), *paths, *study.derive]
+        drawn = [] if study.spread is None else [path for path in study.spread.paths if path not in study.axis_paths]
+        self._drawn = drawn
+        self.labels = [*([] if self._together else [_CASE]), *paths, *drawn, *study.derive]
 
     def place(self, column: NDArray[Any]) -> NDArray[Any]:
         """A column in the order of cases as an array over the dimensions."""
@@ -95,7 +98,10 @@ class _Grid:
         return xr.Variable(self.dims, self.place(column), attributes, encoding)
 
     def coordinates(self) -> dict[str, Any]:
-        """Values of every axis path along its dimension, those of derived paths, and the number of every case."""
+        """Values of every axis path along its dimension, drawn and derived ones, and the number of every case.
+
+        Those of an axis are nominal.
+        """
         import xarray as xr
 
         study = self._study
@@ -106,6 +112,11 @@ class _Grid:
             for path in axis.paths:
                 attributes = {"units": unit_of(study, path), "long_name": description_of(study, path) or path}
                 found[path] = xr.Variable(self.dims[dimension], axis.array[order], attributes, unfilled)
+        for path in self._drawn:
+            position, values = study.varied(path) or (0, np.empty(0))
+            dimension, order = (0, slice(None)) if self._together else (position, self._orders[position])
+            attributes = {"units": unit_of(study, path), "long_name": description_of(study, path) or path}
+            found[path] = xr.Variable(self.dims[dimension], values[order], attributes, unfilled)
         for path, column in self._derived().items():
             found[path] = self.variable(
                 column, {"units": unit_of(study, path), "long_name": column_description(study, path) or path}

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.results.exports.inputs import choices, defaults
+from sprag.service.spec.fields import TOLERANCE_FIELDS
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 #: Parts of a spec that describe the machine and its run; the rows themselves contain the axes.
-_GIVEN: Final = ("base", "derive", "run")
+_GIVEN: Final = ("base", "derive", "run", *TOLERANCE_FIELDS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +46,8 @@ def machine(source: Source) -> dict[str, Any]:
     """The machine and its run for programs, plain JSON data.
 
     ``base`` and ``run`` in SI numbers, ``derive`` (formulas of derived parameters in SI numbers), ``choices``
-    (non-numeric fields), ``defaults`` (paths that were left out), and ``given``, base, formulas and run as the user
-    wrote them.
+    (non-numeric fields), ``defaults`` (paths that were left out), and ``given``, base, formulas, run and
+    tolerances as the user wrote them.
     """
     study, spec = source.study, source.spec
     return {
@@ -61,8 +62,8 @@ def machine(source: Source) -> dict[str, Any]:
 
 
 def given(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """The machine, its formulas and its run as the user wrote them, with their units: plain JSON data."""
-    return {name: spec[name] for name in _GIVEN if spec.get(name)}
+    """The machine, its formulas, its run and its tolerances as the user wrote them, with their units: JSON data."""
+    return {name: spec[name] for name in _GIVEN if spec.get(name) not in (None, {}, [])}
 
 
 def given_texts(spec: Mapping[str, Any]) -> dict[str, str]:

@@ -15,6 +15,7 @@ from sprag.service.spec.report import Report, join
 from sprag.service.spec.units import QuantityError, parse_exact, to_float
 from sprag.worker.limits import MAX_AXIS_VALUES
 from sprag.worker.models import Parameter
+from sprag.worker.models.parameters import in_range
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -65,12 +66,6 @@ def plan_values(report: Report, pointer: str, data: object, parameter: Parameter
     if len(known) < len(numbers):
         return None
     return Plan(pointer, len(known), lambda: np.array(known), listed=True)
-
-
-def in_range(values: Values, parameter: Parameter) -> NDArray[np.bool_]:
-    """Which values (SI) are finite and in the range of ``parameter``; the vector form of `Parameter.accepts`."""
-    above = values > parameter.low if parameter.low_open else values >= parameter.low
-    return np.isfinite(values) & above & (values <= parameter.high)
 
 
 def _plain_numbers(data: list[Any]) -> Values | None:

@@ -24,7 +24,9 @@ from sprag.service.spec.draws.distributions import Distribution
 from sprag.service.spec.draws.unit import correlated, unit_sample
 from sprag.service.spec.fields import TOLERANCE_FIELDS, read_object
 from sprag.service.spec.report import Report, join
+from sprag.worker.derived import blocks, involved
 from sprag.worker.limits import MAX_AXIS_VALUES, MAX_CASES, MAX_TOLERANCES
+from sprag.worker.models.parameters import in_range, parameter_of
 from sprag.worker.spread import DRIVE, Spread, Tolerance
 from sprag.worker.study import Axis
 
@@ -118,6 +120,22 @@ def with_drives(report: Report, study: Study, spread: Spread) -> Study:
     message = f"asks for {cases:,} cases: {study.cases:,} with the nominal drive and {spread.drives:,} drawn ones each"
     report.fault("/drives", "too-many", message, spread.drives, allowed=allowed)
     raise report.error()
+
+
+def warn_of_invalid_drives(report: Report, study: Study) -> None:
+    """Warn of derived parameters that are out of range in some drives: those drives fail."""
+    for path in study.derive if study.spread is not None else ():
+        part, entry = involved(study, [path]), parameter_of(study, path)
+        if entry is None or part.spread is None:
+            continue
+        wrong = sum(int((~in_range(part.columns(cases)[path], entry)).sum()) for cases in blocks(part))
+        if wrong:
+            each = study.cases // part.cases
+            report.warn(
+                "invalid-drives",
+                f"/tolerances: {path} is out of its range ({entry.range_text()}) in {wrong * each:,} of "
+                f"{study.cases:,} cases: these drives fail",
+            )
 
 
 def _read_item(report: Report, pointer: str, data: object, machine: Machine, axes: Sequence[Axis]) -> list[_Drawn]:
