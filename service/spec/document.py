@@ -36,7 +36,8 @@ VERSION: Final = 1
 UNNAMED: Final = "untitled"
 
 FIELDS: Final = (
-    "sprag", "model", "name", "base", "derive", "run", "axes", "combine", "exclude", "refine", "goal", *TOLERANCE_FIELDS
+    "sprag", "model", "name", "base", "derive", "run", "axes", "combine", "exclude", "refine", "goal", "calibrate",
+    *TOLERANCE_FIELDS,
 )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from sprag.worker.models import Parameter
 #: Fields of a spec about tolerances.
 TOLERANCE_FIELDS: Final = ("tolerances", "drives", "seed", "draws", "correlations")
 #: Fields of a spec that say which cases a study has.
-WHICH_CASES: Final = frozenset({"axes", "combine", "exclude", "refine", "goal", *TOLERANCE_FIELDS})
+WHICH_CASES: Final = frozenset({"axes", "combine", "exclude", "refine", "goal", "calibrate", *TOLERANCE_FIELDS})
 
 
 def coefficient_unit(index: int) -> str:

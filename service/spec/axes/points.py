@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 FIELDS: Final = ("points",)
 #: "shaft.load", "shaft.load [N*mm]", "shaft.load (N*mm)"
-_HEADING: Final = re.compile(r"\s*([^\s\[\(]+)\s*(?:[\[\(]\s*([^\]\)]+?)\s*[\]\)])?\s*")
+HEADING: Final = re.compile(r"\s*([^\s\[\(]+)\s*(?:[\[\(]\s*([^\]\)]+?)\s*[\]\)])?\s*")
 
 
 def read_points(report: Report, pointer: str, data: Mapping[str, Any], machine: Machine) -> Block | None:
@@ -38,7 +38,7 @@ def read_points(report: Report, pointer: str, data: Mapping[str, Any], machine: 
         report.fault(where, "wrong-type", "must be the text of a CSV file", text, allowed=allowed)
         return None
     try:
-        rows = _rows(text.removeprefix("\ufeff"))
+        rows = csv_rows(text.removeprefix("\ufeff"))
     except csv.Error as error:
         report.fault(where, "unreadable", f"is not CSV: {error}")
         return None
@@ -64,7 +64,7 @@ def read_points(report: Report, pointer: str, data: Mapping[str, Any], machine: 
     return Block(pointer, paths, len(lines), lambda: dict(zip(paths, values, strict=True)), lines)
 
 
-class _Row(NamedTuple):
+class CsvRow(NamedTuple):
     """The cells of a row, and the number of the line in which it ends, from 1."""
 
     line: int
@@ -81,7 +81,7 @@ class _Heading(NamedTuple):
         return self.parameter.path + (f" [{self.unit}]" if self.unit else "")
 
 
-def _rows(text: str) -> list[_Row]:
+def csv_rows(text: str) -> list[CsvRow]:
     """The non-empty rows. The header's separator (comma, semicolon or tab) applies to the whole text.
 
     Lines may end with LF, CRLF or CR.
@@ -90,11 +90,11 @@ def _rows(text: str) -> list[_Row]:
     header = text.lstrip().partition("\n")[0]
     delimiter = next((sign for sign in ",;\t" if sign in header), ",")
     reader = csv.reader(io.StringIO(text), delimiter=delimiter, strict=True)
-    return [_Row(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
+    return [CsvRow(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
 
 
 def _read_heading(report: Report, where: str, cell: str, machine: Machine) -> _Heading | None:
-    match = _HEADING.fullmatch(cell)
+    match = HEADING.fullmatch(cell)
     if match is None:
         report.fault(
             where, "invalid-path", "has a heading that names no parameter", cell, allowed="a path, its unit in brackets"
@@ -105,7 +105,7 @@ def _read_heading(report: Report, where: str, cell: str, machine: Machine) -> _H
 
 
 def _read_cells(
-    report: Report, where: str, rows: list[_Row], headings: list[_Heading]
+    report: Report, where: str, rows: list[CsvRow], headings: list[_Heading]
 ) -> list[NDArray[np.float64]] | None:
     columns = [np.empty(len(rows)) for _ in headings]
     before = report.found

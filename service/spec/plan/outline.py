@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag.service.spec.fields import read_object
-from sprag.service.spec.plan import goal, refine
+from sprag.service.spec.plan import calibrate, goal, refine
 from sprag.service.spec.report import Report
 from sprag.worker import models
 from sprag.worker.planning import planner_of
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from sprag.worker.models import ResultInfo
 
 #: Fields of a spec by which a study chooses its own cases.
-FIELDS: Final = ("refine", "goal")
+FIELDS: Final = ("refine", "goal", "calibrate")
 
 
 @dataclass(frozen=True)
@@ -46,15 +46,16 @@ def chooses(found: Mapping[str, Any]) -> bool:
 
 def read_outline(report: Report, found: Mapping[str, Any], machine: Machine) -> Outline | None:
     """The outline of a study that `chooses` its cases; None, and the faults recorded, where it is invalid."""
-    kind = "goal" if "goal" in found and "refine" not in found else "refine"
+    kind = next((name for name in FIELDS if name in found), "refine")
     before = report.found
-    for name in ("exclude", "combine", *(FIELDS if kind == "refine" else ("axes",))):
+    for name in ("exclude", "combine", *FIELDS, *(() if kind == "refine" else ("axes",))):
         if name == kind or name not in found or (name == "combine" and found[name] == "grid"):
             continue
         report.fault(
             f"/{name}", "conflict", f"cannot be combined with `{kind}`", found[name], allowed=f"without `{name}`"
         )
-    outline = _goal(report, found, machine) if kind == "goal" else _refine(report, found, machine)
+    read = {"refine": _refine, "goal": _goal, "calibrate": _calibrate}[kind]
+    outline = read(report, found, machine)
     return None if report.found > before else outline
 
 
@@ -83,6 +84,18 @@ def _goal(report: Report, found: Mapping[str, Any], machine: Machine) -> Outline
     ends = [(tuple(v["paths"]), v.get("values") or (v["low"], v["high"])) for v in variables]
     ends += [((path,), [point[path] for point in points]) for path in (points[0] if points else ())]
     return Outline(_zipped(ends), partial(goal.read_goal, data=data, variables=variables, points=points))
+
+
+def _calibrate(report: Report, found: Mapping[str, Any], machine: Machine) -> Outline | None:
+    calibration = calibrate.read_calibration(report, found["calibrate"], machine)
+    if calibration is None:
+        return None
+    table = calibration.table
+    ends: list[tuple[tuple[str, ...], Sequence[float]]] = [
+        (one.paths, (one.low, one.high)) for one in calibration.unknown
+    ]
+    ends += [((path,), column) for path, column in zip(table.paths, zip(*table.conditions, strict=True), strict=True)]
+    return Outline(_zipped(ends), partial(calibrate.read_plan, calibration=calibration))
 
 
 def _zipped(ends: Sequence[tuple[tuple[str, ...], Sequence[float]]]) -> tuple[Axis, ...]:

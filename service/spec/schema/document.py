@@ -12,7 +12,7 @@ from sprag.service.spec.document import UNNAMED, VERSION
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.schema.axes import axes_schema, exclude_schema, path_schema
 from sprag.service.spec.schema.draws import tolerances_schema
-from sprag.service.spec.schema.plan import goal_schema, refine_schema
+from sprag.service.spec.schema.plan import calibrate_schema, goal_schema, refine_schema
 from sprag.service.spec.schema.quantity import Schema, object_schema, without_numbers
 from sprag.worker import models
 from sprag.worker.limits import MAX_NAME_LENGTH
@@ -38,6 +38,7 @@ def spec_schema() -> Schema:
             "exclude": exclude_schema(),
             "refine": refine_schema(),
             "goal": goal_schema(path_schema()),
+            "calibrate": calibrate_schema(path_schema()),
             "derive": derive_schema(),
             **tolerances_schema(),
         },

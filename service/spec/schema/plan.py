@@ -1,10 +1,11 @@
-"""The part of the spec's JSON Schema about studies that choose their own cases: adaptive axes, refinement, goals."""
+"""The part of the spec's JSON Schema about studies that choose their own cases: refinement, goals, calibration."""
 
 from __future__ import annotations
 
 from typing import Final
 
 from sprag.service.spec.described import Listed
+from sprag.service.spec.plan.calibrate import CSV_HELP, OTHER, UNKNOWN
 from sprag.service.spec.plan.goal import AT, BEST, MAX, SEARCH, SUBJECT_TO, VARY, WITHIN
 from sprag.service.spec.plan.refine import ERROR, FINEST, MOST, RESULTS, START
 from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema
@@ -72,4 +73,20 @@ def goal_schema(path: Schema) -> Schema:
         },
         required=("vary",),
         description="what a design should reach, and what may vary for it",
+    )
+
+
+def calibrate_schema(path: Schema) -> Schema:
+    """Schema of `calibrate`; ``path`` is that of the path of what is unknown."""
+    fields: Schema = {"path": path, "from": QUANTITY, "to": QUANTITY}
+    unknown = object_schema(fields, required=tuple(fields))
+    measured = object_schema({"csv": {"type": "string", "description": CSV_HELP}}, required=("csv",))
+    return object_schema(
+        {
+            "unknown": UNKNOWN.schema(unknown),
+            "measured": measured,
+            **{name: field.schema() for name, field in OTHER.items()},
+        },
+        required=("unknown", "measured"),
+        description="measured points, and the parameters that they are to determine",
     )

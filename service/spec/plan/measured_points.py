@@ -1,0 +1,264 @@
+"""Measured points as the text of a CSV file: parameters that were set, results that were measured, their scatter."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from sprag.service.spec.axes.points import HEADING, CsvRow, csv_rows
+from sprag.service.spec.catalogue import result_of
+from sprag.service.spec.fields import exact
+from sprag.service.spec.numbers import parse_number
+from sprag.service.spec.report import Report, did_you_mean, shorten_text
+from sprag.service.spec.units import QuantityError, parse_quantity, to_float
+from sprag.worker.planning.calibrate.plan import MOST_MEASURED, Measured
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sprag.service.spec.machine.machine import Machine
+    from sprag.worker.models import ResultInfo
+
+#: Heading of a column of standard deviations.
+SIGMA: Final = "sigma"
+#: Columns at most.
+MOST_COLUMNS: Final = 32
+_PERCENT: Final = "%"
+_COMMA: Final = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
+_EXAMPLE: Final = "as in shaft.load [N*m],shaft.speed.mean [rad/s],sigma"
+
+
+class Column(NamedTuple):
+    """A column: its name, its unit ("" where it gives none) and its position."""
+
+    name: str
+    unit: str
+    place: int
+
+    def __str__(self) -> str:
+        return self.name + (f" [{self.unit}]" if self.unit else "")
+
+
+@dataclass(frozen=True)
+class MeasuredTable:
+    """A table whose conditions are read; its results are read when they are known.
+
+    Attributes
+    ----------
+    paths : tuple of str
+        The parameters that were set.
+    conditions : tuple of tuples of float
+        Their values, SI, each condition once.
+    at : tuple of int
+        The condition of each row.
+    rows : tuple of CsvRow
+    results : tuple of (Column, Column or None)
+        Columns of results, each with that of its standard deviation.
+    """
+
+    paths: tuple[str, ...]
+    conditions: tuple[tuple[float, ...], ...]
+    at: tuple[int, ...]
+    rows: tuple[CsvRow, ...]
+    results: tuple[tuple[Column, Column | None], ...]
+
+
+def read_table(report: Report, where: str, text: object, machine: Machine) -> MeasuredTable | None:
+    """Read headings and conditions; None, and the faults recorded, where they are invalid."""
+    rows = _read_rows(report, where, text)
+    if rows is None:
+        return None
+    before = report.found
+    columns = _read_headings(report, where, rows[0])
+    paths = [column for column in columns if column.name in machine.parameters]
+    others = [column for column in columns if column.name not in machine.parameters]
+    for column in paths:
+        if column.name in machine.derive:
+            report.fault(
+                where, "conflict", "has a column of a derived parameter", column.name, allowed="no formula in `derive`"
+            )
+    results = _paired(report, where, others)
+    if report.found > before:
+        return None
+    values = [_conditions(report, where, rows[1:], column, machine) for column in paths]
+    if report.found > before:
+        return None
+    points = list(zip(*values, strict=True)) if values else [()] * (len(rows) - 1)
+    conditions = tuple(dict.fromkeys(points))
+    place = {point: index for index, point in enumerate(conditions)}
+    return MeasuredTable(
+        tuple(column.name for column in paths),
+        conditions,
+        tuple(place[point] for point in points),
+        tuple(rows[1:]),
+        results,
+    )
+
+
+def _read_rows(report: Report, where: str, text: object) -> list[CsvRow] | None:
+    """Rows of equal lengths, the headings first; None, and the faults recorded, where they are invalid."""
+    if not isinstance(text, str):
+        message = "is required" if text is None else "must be the text of a CSV file"
+        report.fault(
+            where, "required" if text is None else "wrong-type", message, text,
+            allowed=f"headings, then a line for each point, {_EXAMPLE}",
+        )  # fmt: skip
+        return None
+    try:
+        rows = csv_rows(text.removeprefix("\ufeff"))
+    except csv.Error as error:
+        report.fault(where, "unreadable", f"is not CSV: {error}")
+        return None
+    columns = len(rows[0].cells) if rows else 0
+    if not 2 <= len(rows) <= MOST_MEASURED + 1 or not 1 <= columns <= MOST_COLUMNS:
+        report.fault(
+            where, "out-of-range", f"has {max(len(rows) - 1, 0)} lines of {columns} columns under its headings",
+            allowed=f"1 to {MOST_MEASURED:,} lines of 1 to {MOST_COLUMNS} columns",
+        )  # fmt: skip
+        return None
+    before = report.found
+    for row in rows[1:]:
+        if len(row.cells) != columns:
+            hint = "; with decimal commas, columns are separated by semicolons" if len(row.cells) > columns else ""
+            report.fault(
+                where,
+                "unequal-lengths",
+                f"line {row.line} has {len(row.cells)} cells",
+                allowed=f"{columns} cells{hint}",
+            )
+        if report.full:
+            break
+    return None if report.found > before else rows
+
+
+def _read_headings(report: Report, where: str, row: CsvRow) -> list[Column]:
+    columns: list[Column] = []
+    for place, cell in enumerate(row.cells):
+        match = HEADING.fullmatch(cell)
+        if match is None:
+            report.fault(where, "invalid-path", "has a heading without a name", cell, allowed=_EXAMPLE)
+            continue
+        column = Column(match[1], match[2] or "", place)
+        if column.name != SIGMA and any(other.name == column.name for other in columns):
+            report.fault(where, "repeated", "names the same column twice", column.name, allowed="each once")
+        columns.append(column)
+    return columns
+
+
+def _paired(report: Report, where: str, columns: Sequence[Column]) -> tuple[tuple[Column, Column | None], ...]:
+    """Columns of results with those of their deviations: each holds for the results before it that have none yet."""
+    pairs: list[tuple[Column, Column | None]] = []
+    for column in columns:
+        if column.name != SIGMA:
+            pairs.append((column, None))
+        elif any(own is None for _, own in pairs):
+            pairs = [(result, own or column) for result, own in pairs]
+        else:
+            report.fault(
+                where, "not-used", "has a column sigma with no result before it", str(column),
+                allowed="a column of a result, then that of its standard deviation",
+            )  # fmt: skip
+    if not pairs:
+        report.fault(where, "required", "has no column of a result", allowed=_EXAMPLE)
+    return tuple(pairs)
+
+
+def _conditions(report: Report, where: str, rows: Sequence[CsvRow], column: Column, machine: Machine) -> list[float]:
+    """The values of a parameter; NaN, and a fault recorded, for those that are invalid."""
+    entry = machine.parameters[column.name]
+    values = []
+    for row in rows:
+        cell = _plain(row.cells[column.place])
+        try:
+            values.append(to_float(exact(_quantity(cell, column.unit), entry)) + 0.0)
+        except QuantityError as error:
+            _fault(report, where, row, column, error, entry.range_text(), entry.unit)
+            values.append(math.nan)
+        if report.full:
+            break
+    return values
+
+
+def read_results(
+    report: Report, where: str, table: MeasuredTable, infos: Sequence[ResultInfo]
+) -> tuple[Measured, ...] | None:
+    """The measured results in SI; None, and the faults recorded, where they are invalid.
+
+    Empty cells of a result were not measured.
+    """
+    before = report.found
+    measured: list[Measured] = []
+    for column, sigma in table.results:
+        info = result_of(infos, column.name)
+        if info is None or info.kind == "category":
+            known = did_you_mean(column.name, [*(one.name for one in infos), SIGMA])
+            message = f"has a column that is neither a parameter nor a result{known}"
+            if info is None:
+                report.fault(where, "unknown-name", message, column.name, allowed=_EXAMPLE)
+            else:
+                report.fault(where, "not-numeric", "has a column of a category", column.name, allowed="a number")
+            continue
+        rows = [(row, at) for row, at in zip(table.rows, table.at, strict=True) if row.cells[column.place].strip()]
+        values = [_value(report, where, row, column, info.unit) for row, _ in rows]
+        if not rows:
+            report.fault(where, "empty", f"has no value in the column {column}", allowed="a number")
+        deviations: list[float] = []
+        if sigma is not None:
+            pairs = zip(rows, values, strict=True)
+            deviations = [_deviation(report, where, row, sigma, value, info.unit) for (row, _), value in pairs]
+        measured.append(Measured(info.name, tuple(at for _, at in rows), tuple(values), tuple(deviations)))
+    return None if report.found > before else tuple(measured)
+
+
+def _value(report: Report, where: str, row: CsvRow, column: Column, unit: str) -> float:
+    try:
+        return parse_quantity(_quantity(_plain(row.cells[column.place]), column.unit), unit) + 0.0
+    except QuantityError as error:
+        _fault(report, where, row, column, error, f"a number of {unit}", unit)
+        return math.nan
+
+
+def _deviation(report: Report, where: str, row: CsvRow, column: Column, value: float, unit: str) -> float:
+    """The standard deviation of a value: a number of its unit, or a share of the value."""
+    cell = _plain(row.cells[column.place])
+    share = re.fullmatch(r"(.*?)\s*%", f"{cell} {column.unit}" if parse_number(cell) is not None else cell)
+    try:
+        if share is not None:
+            number = parse_number(share[1])
+            if number is None:
+                raise QuantityError("not-a-number", "is not a number")
+            deviation = abs(value) * number / 100.0
+        else:
+            deviation = parse_quantity(_quantity(cell, column.unit), unit)
+        if not 0.0 < deviation < math.inf and math.isfinite(value):
+            raise QuantityError("out-of-range", "is not a standard deviation greater than 0")
+        return deviation
+    except QuantityError as error:
+        _fault(report, where, row, column, error, f"greater than 0, in {unit}, or as a share [%] of the value", unit)
+        return math.nan
+
+
+def _plain(cell: str) -> str:
+    """A cell with a decimal point; commas can only be decimal ones, as they do not separate columns then."""
+    cell = cell.strip()
+    return cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell
+
+
+def _quantity(cell: str, unit: str) -> str | float:
+    """A cell as a quantity: a number in the unit of its column (SI where there is none), or a text with its own."""
+    if not cell:
+        raise QuantityError("empty", "is empty")
+    number = parse_number(cell)
+    return cell if number is None else f"{cell} {unit}" if unit else number
+
+
+def _fault(
+    report: Report, where: str, row: CsvRow, column: Column, error: QuantityError, allowed: str, unit: str
+) -> None:
+    cell = row.cells[column.place].strip()
+    written = f"{cell} {column.unit}" if column.unit and parse_number(_plain(cell)) is not None else cell
+    message = f"line {row.line}, column {shorten_text(str(column))}: {error}"
+    report.fault(where, error.code, message, written, allowed=allowed, unit=unit)

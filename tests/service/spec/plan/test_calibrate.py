@@ -1,0 +1,176 @@
+"""The part of a spec that describes a calibration, and its measured points."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import pytest
+
+from sprag.service.jobs.preview import preview_json
+from sprag.service.spec.document import ParsedSpec, SpecError, parse_spec
+from sprag.service.spec.schema.document import spec_schema
+from sprag.worker.chunking import Chunking
+from tests.service.spec_sample import SPEC
+
+CSV = """shaft.load [N*mm],excitation.frequency [Hz],shaft.speed.mean [rpm],sigma
+100,25,210.0,2
+200,25,180.0,2
+100,25,212.0,2
+"""
+CALIBRATE: dict[str, Any] = {
+    "unknown": [
+        {"path": "pendulums.*.damping", "from": 0.05, "to": "0.002 N*m*s/rad"},
+        {"path": "shaft.inertia", "from": "1e-3 kg*m^2", "to": "4e-3 kg*m^2"},
+    ],
+    "measured": {"csv": CSV},
+}
+
+
+def spec_of(changes: dict[str, Any] | None = None, **fields: Any) -> dict[str, Any]:
+    """A spec with that calibration; ``changes`` are fields of it, ``...`` takes a field away."""
+    spec = {name: value for name, value in copy.deepcopy(SPEC).items() if name not in {"axes", "combine", "run"}}
+    merged = {**copy.deepcopy(CALIBRATE), **(changes or {})}
+    return {**spec, "calibrate": {name: value for name, value in merged.items() if value is not ...}, **fields}
+
+
+def read(text: str, **changes: Any) -> ParsedSpec:
+    """The study of a calibration with these measured points."""
+    return parse_spec(spec_of({"measured": {"csv": text}, **changes}))
+
+
+def test_a_calibration_is_read_in_si_and_its_study_is_settled() -> None:
+    spec = spec_of()
+    spec["base"]["pendulums"] *= 2
+    parsed = parse_spec(spec)
+    assert parsed.study.run["until"] == "settled"
+    assert parsed.study.plan == {
+        "kind": "calibrate",
+        "unknown": [
+            {"paths": ["pendulums.0.damping", "pendulums.1.damping"], "low": 0.002, "high": 0.05},
+            {"paths": ["shaft.inertia"], "low": 0.001, "high": 0.004},
+        ],
+        "paths_at": ["shaft.load", "excitation.frequency"],
+        "conditions": [[0.1, 25.0], [0.2, 25.0]],
+        "measured": [
+            {
+                "result": "shaft.speed.mean",
+                "at": [0, 1, 0],
+                "values": pytest.approx([21.991148575, 18.849555922, 22.200588085]),
+                "sigma": [2.0, 2.0, 2.0],
+            }
+        ],
+        "loss": "linear",
+        "refits": 200,
+        "seed": 1,
+    }
+    assert next(axis.paths for axis in parsed.study.axes) == ("pendulums.0.damping", "pendulums.1.damping")
+    assert parsed.study.cases == 48 * 2, "the scan, at each measured condition"
+    preview = preview_json(parsed, Chunking(0, 1, 60.0))
+    assert preview["cases"] < preview["most_cases"] <= 100_000
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "shaft.load;shaft.speed.mean;sigma [%]\n0,1;20,5;2\n0,2;18;2\n0,3;15;2\n",
+        "shaft.load\tshaft.speed.mean [rad/s]\tsigma\n0,1\t20,5\t0,41\n0.2\t18\t2 %\n300 N*mm\t15\t0.3 rad/s\n",
+        "\ufeffshaft.load,shaft.speed.mean,sigma\r\n0.1,20.5,0.41\r\n0.2,18,0.36\r\n\r\n0.3,15,2%\r\n",
+    ],
+)
+def test_separators_decimal_commas_and_shares(text: str) -> None:
+    plan = read(text).study.plan
+    assert plan is not None
+    assert plan["conditions"] == [[0.1], [0.2], [0.3]]
+    (one,) = plan["measured"]
+    assert one["values"] == [20.5, 18.0, 15.0]
+    assert one["sigma"] == pytest.approx([0.41, 0.36, 0.3])
+
+
+def test_a_column_sigma_holds_for_the_results_before_it_and_empty_cells_were_not_measured() -> None:
+    text = "shaft.speed.mean,efficiency,sigma [%],torque.max,shaft.load\n20,0.3,2,4,0.1\n18,,2,5,0.2\n15,0.1,2,,0.3\n"
+    plan = read(text).study.plan
+    assert plan is not None
+    assert plan["measured"] == [
+        {"result": "shaft.speed.mean", "at": [0, 1, 2], "values": [20.0, 18.0, 15.0], "sigma": [0.4, 0.36, 0.3]},
+        {"result": "efficiency", "at": [0, 2], "values": [0.3, 0.1], "sigma": pytest.approx([0.006, 0.002])},
+        {"result": "torque.max", "at": [0, 1], "values": [4.0, 5.0]},
+    ]
+
+
+_HEAD = "shaft.load,shaft.speed.mean,sigma\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "words"),
+    [
+        (_HEAD + "0.1,20,1\n0.2,x,1\n", "not-a-number", "line 3, column shaft.speed.mean"),
+        (_HEAD + "0.1,20,1\n0.2,19\n", "unequal-lengths", "line 3"),
+        (_HEAD + "0.1,20,0\n", "out-of-range", "line 2, column sigma"),
+        (_HEAD + "-0.1,20,1\n", "out-of-range", "line 2, column shaft.load"),
+        (_HEAD + "0.1,20,1\n", "out-of-range", "1 measured values"),
+        (_HEAD, "out-of-range", "0 lines"),
+        ("shaft.load [N],shaft.speed.mean\n0.1,20\n", "wrong-unit", "line 2, column shaft.load [N]"),
+        ("shaft.load,shaft.speed.mean [N]\n0.1,20\n", "wrong-unit", "line 2, column shaft.speed.mean [N]"),
+        ("shaft.load,shaft.speed.meen\n0.1,20\n", "unknown-name", "shaft.speed.mean"),
+        ("shaft.load,regime\n0.1,1\n", "not-numeric", "category"),
+        ("shaft.load\n0.1\n", "required", "no column of a result"),
+        ("shaft.load,sigma,efficiency\n0.1,1,1\n", "not-used", "sigma"),
+        ("shaft.load,shaft.load,efficiency\n0.1,1,1\n", "repeated", "twice"),
+        ("shaft.inertia,shaft.speed.mean\n0.001,20\n", "conflict", "column of the measured points"),
+        ("shaft.load,shaft.speed.mean\n0,1,20,5\n", "unequal-lengths", "semicolons"),
+        (None, "required", "is required"),
+        (5, "wrong-type", "CSV"),
+    ],
+)
+def test_a_fault_of_the_measured_points_names_its_line(text: Any, code: str, words: str) -> None:
+    with pytest.raises(SpecError) as error:
+        read(text)
+    fault = error.value.faults[0]
+    assert fault.code == code
+    assert words in str(fault)
+    assert fault.where.startswith("/calibrate/")
+
+
+@pytest.mark.parametrize(
+    ("changes", "pointer", "code"),
+    [
+        ({"unknown": ...}, "/calibrate/unknown", "required"),
+        ({"unknown": [{"path": "shaft.inertia", "from": 1e-3}]}, "/calibrate/unknown/0/to", "wrong-type"),
+        (
+            {"unknown": [{"path": "pendulums.*.dumping", "from": 0, "to": 1}]},
+            "/calibrate/unknown/0/path",
+            "invalid-path",
+        ),
+        ({"unknown": [CALIBRATE["unknown"][0]] * 2}, "/calibrate/unknown/1/path", "repeated"),
+        ({"loss": "square"}, "/calibrate/loss", "invalid-choice"),
+        ({"refits": 2000}, "/calibrate/refits", "out-of-range"),
+        ({"measured": ...}, "/calibrate/measured", "required"),
+        ({"sigma": 1}, "/calibrate/sigma", "unknown-field"),
+    ],
+)
+def test_other_faults_of_a_calibration(changes: dict[str, Any], pointer: str, code: str) -> None:
+    with pytest.raises(SpecError) as error:
+        parse_spec(spec_of(changes))
+    assert (pointer, code) in [(fault.where, fault.code) for fault in error.value.faults]
+
+
+@pytest.mark.parametrize("name", ["axes", "goal", "refine", "tolerances"])
+def test_a_calibration_stands_alone(name: str) -> None:
+    with pytest.raises(SpecError) as error:
+        parse_spec(spec_of(**{name: SPEC["axes"] if name == "axes" else {}}))
+    faults = {(fault.where, fault.code) for fault in error.value.faults}
+    assert faults & {(f"/{name}", "conflict"), ("/calibrate", "conflict")}
+
+
+def test_too_many_points_are_refused() -> None:
+    lines = "".join(f"{0.01 + 0.0001 * k:.5f},20,1\n" for k in range(400))
+    with pytest.raises(SpecError) as error:
+        read(_HEAD + lines)
+    assert [fault.code for fault in error.value.faults] == ["too-many"]
+
+
+def test_the_schema_has_the_calibration() -> None:
+    schema = spec_schema()["properties"]["calibrate"]
+    assert set(schema["properties"]) == {"unknown", "measured", "loss", "refits", "seed"}
+    assert schema["required"] == ["unknown", "measured"]
