@@ -1,4 +1,6 @@
-"""Points drawn over ranges of parameters: Latin hypercube, Sobol sequence, and the design for Sobol indices; seeded."""
+"""Points drawn over ranges and from distributions of parameters: Latin hypercube, Sobol sequence, independent points,
+and designs for sensitivities; seeded.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +13,10 @@ import numpy as np
 
 from sprag.service.spec.axes.axes import read_paths
 from sprag.service.spec.axes.blocks import Block
+from sprag.service.spec.axes.drawn import SampleDistribution, is_distribution, read_distribution
 from sprag.service.spec.described import Described, Listed, choice, named
-from sprag.service.spec.draws.unit import cases_of, unit_sample
+from sprag.service.spec.draws.correlations import read_correlations
+from sprag.service.spec.draws.unit import cases_of, correlated, unit_sample
 from sprag.service.spec.fields import read_number, read_object
 from sprag.service.spec.report import Report, join
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES
@@ -23,12 +27,12 @@ if TYPE_CHECKING:
     from sprag.service.spec.machine.machine import Machine
 
 _METHOD_HELP: Final = (
-    "latin_hypercube and sobol fill the ranges evenly; saltelli is the design for Sobol indices, of "
-    "count * (ranges + 2) cases; morris are count trajectories of ranges + 1 cases, for elementary effects"
+    "latin_hypercube and sobol fill the ranges evenly, random points are independent; saltelli is the design for Sobol "
+    "indices, of count * (ranges + 2) cases; morris are count trajectories of ranges + 1 cases, for elementary effects"
 )
 _SECOND_HELP: Final = "of a saltelli sample: indices of pairs too, by count * (2 * ranges + 2) cases"
 SAMPLE: Final = named(
-    choice("sample", _METHOD_HELP, "latin_hypercube", "sobol", "saltelli", "morris"),
+    choice("sample", _METHOD_HELP, "latin_hypercube", "sobol", "random", "saltelli", "morris"),
     Described("count", "", "points; sobol and saltelli take a power of 2", "whole", 1, MAX_AXIS_VALUES),
     Described("seed", "", "seed of the random numbers", "whole", 0, 2**32 - 1, 0),
     Described("second_order", "", _SECOND_HELP, "flag", default=False),
@@ -56,15 +60,18 @@ class SampleRange:
         return np.asarray(np.clip(values, min(self.low, self.high), max(self.low, self.high)), dtype=np.float64)
 
 
+Part = SampleRange | SampleDistribution
+
+
 def read_sample(report: Report, pointer: str, data: Mapping[str, Any], machine: Machine) -> Block | None:
     """Read the block of a sample; None, with the faults recorded, when it is invalid."""
     before = report.found
-    found = read_object(report, pointer, data, (*SAMPLE, "ranges")) or {}
+    found = read_object(report, pointer, data, (*SAMPLE, "ranges", "correlations")) or {}
     method, count, seed, second_order = (field.read(report, pointer, found) for field in SAMPLE.values())
     items = RANGES.read(report, join(pointer, "ranges"), found.get("ranges"))
     if items is None:
         return None
-    ranges = [_read_range(report, join(pointer, "ranges", index), item, machine) for index, item in enumerate(items)]
+    ranges = [_read_part(report, join(pointer, "ranges", index), item, machine) for index, item in enumerate(items)]
     if count is not None and method in {"sobol", "saltelli"} and count & (count - 1):
         report.fault(
             join(pointer, "count"),
@@ -81,23 +88,49 @@ def read_sample(report: Report, pointer: str, data: Mapping[str, Any], machine: 
         report.fault(join(pointer, "ranges"), "out-of-range", "two parameters interact by what total exceeds first "
                      "order by; indices of pairs are for more", len(items), allowed="at least 3 ranges")  # fmt: skip
     if method == "morris":
-        _check_trajectories(report, pointer, count, len(items))
+        _check_trajectories(report, pointer, count, items)
     if report.found > before or method is None or count is None or seed is None:
         return None
     known = tuple(item for item in ranges if item is not None)
+    matrix = _read_correlations(report, pointer, found, method, known)
+    if report.found > before:
+        return None
     cases = cases_of(method, count, len(known), second_order=second_order)
-    make = partial(draw, method, count, seed, known, second_order=second_order)
+    make = partial(draw, method, count, seed, known, matrix, second_order=second_order)
     return Block(pointer, tuple(path for item in known for path in item.paths), cases, make)
 
 
-def _check_trajectories(report: Report, pointer: str, count: int | None, ranges: int) -> None:
-    """Refuse a single range, which needs no screening, and so many trajectories that some share points."""
-    if ranges < 2:
-        report.fault(join(pointer, "ranges"), "out-of-range", "a morris sample compares parameters", ranges,
+def _check_trajectories(report: Report, pointer: str, count: int | None, items: list[Any]) -> None:
+    """Refuse a single range, which needs no screening, distributions, and trajectories that share points."""
+    for index, item in enumerate(items):
+        if is_distribution(item):
+            report.fault(join(pointer, "ranges", index), "conflict", "a morris sample steps over ranges",
+                         allowed="from and to")  # fmt: skip
+    if len(items) < 2:
+        report.fault(join(pointer, "ranges"), "out-of-range", "a morris sample compares parameters", len(items),
                      allowed="at least 2 ranges")  # fmt: skip
     if count is not None and count > MOST_TRAJECTORIES:
         report.fault(join(pointer, "count"), "out-of-range", "is more than elementary effects need", count,
                      allowed=f"at most {MOST_TRAJECTORIES:,} trajectories")  # fmt: skip
+
+
+def _read_part(report: Report, pointer: str, item: object, machine: Machine) -> Part | None:
+    read = read_distribution if is_distribution(item) else _read_range
+    return read(report, pointer, item, machine)
+
+
+def _read_correlations(
+    report: Report, pointer: str, found: Mapping[str, Any], method: str, parts: tuple[Part, ...]
+) -> NDArray[np.float64] | None:
+    """The correlations of a sample; None without."""
+    where = join(pointer, "correlations")
+    if "correlations" not in found:
+        return None
+    if method in {"saltelli", "morris"}:
+        report.fault(where, "conflict", f"a {method} sample needs independent parameters", allowed="another sample")
+        return None
+    columns = {path: index for index, part in enumerate(parts) for path in part.paths}
+    return read_correlations(report, found["correlations"], columns, len(parts), where)[0]
 
 
 def _read_range(report: Report, pointer: str, data: object, machine: Machine) -> SampleRange | None:
@@ -130,10 +163,18 @@ def _read_range(report: Report, pointer: str, data: object, machine: Machine) ->
 
 
 def draw(
-    method: str, count: int, seed: int, ranges: tuple[SampleRange, ...], *, second_order: bool = False
+    method: str,
+    count: int,
+    seed: int,
+    ranges: tuple[Part, ...],
+    correlation: NDArray[np.float64] | None = None,
+    *,
+    second_order: bool = False,
 ) -> dict[str, NDArray[np.float64]]:
-    """Draw the sample; equal arguments give equal samples on every machine."""
+    """Draw the sample; equal arguments give equal samples with one version of scipy, and the study stores them."""
     unit = unit_sample(method, count, seed, len(ranges), second_order=second_order)
+    if correlation is not None:
+        unit = correlated(unit, correlation)
     found: dict[str, NDArray[np.float64]] = {}
     for index, item in enumerate(ranges):
         found.update(dict.fromkeys(item.paths, item.place(unit[:, index])))

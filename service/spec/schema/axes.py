@@ -7,6 +7,7 @@ from sprag.service.spec.axes.design import COMBINE, GROUPED
 from sprag.service.spec.axes.exclude import FIELDS as EXCLUDE_FIELDS
 from sprag.service.spec.axes.sample import RANGES, SAMPLE, SCALE
 from sprag.service.spec.described import Listed, schemas
+from sprag.service.spec.schema.draws import correlations_schema, distribution_schema
 from sprag.service.spec.schema.plan import adaptive_schema
 from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema, one_of
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_TIED_PATHS
@@ -32,11 +33,15 @@ def axis_schema() -> Schema:
 def sample_schema() -> Schema:
     """Schema of points drawn over ranges."""
     fields = {"path": path_schema(), "from": QUANTITY, "to": QUANTITY}
-    ranges = RANGES.schema(object_schema({**fields, "scale": SCALE.schema()}, required=fields))
+    part = object_schema({**fields, "scale": SCALE.schema()}, required=fields)
+    nominal = {**QUANTITY, "description": "the value in the middle; by default that of `base`"}
+    drawn = object_schema({"path": path_schema(), "nominal": nominal, **distribution_schema()}, required=("path",))
+    drawn["anyOf"] = [{"required": ["plus_minus"]}, {"required": ["values"]}]
+    ranges = RANGES.schema({"anyOf": [part, drawn]})
     return object_schema(
-        {**schemas(SAMPLE), "ranges": ranges},
+        {**schemas(SAMPLE), "ranges": ranges, "correlations": correlations_schema()},
         required=("sample", "count", "ranges"),
-        description="points drawn over ranges of parameters",
+        description="points drawn over ranges and from distributions of parameters",
     )
 
 
