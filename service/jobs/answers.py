@@ -14,7 +14,7 @@ from sprag.service.json_text import numbers, to_bytes
 from sprag.service.results import exports
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.figures.front import front_figure, history_figure
-from sprag.service.results.fronts import designs_of, front_csv, front_json
+from sprag.service.results.fronts import front_csv, front_json
 from sprag.service.results.pictures import curves as pictures
 from sprag.service.results.pictures.maps import draw_map as draw_map_picture
 from sprag.service.results.refined import not_joined
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from sprag.service.jobs.checks import Library
     from sprag.service.results.curves import Curve, CurveQuery, Curves, Map
-    from sprag.service.results.fronts import Designs
 
 #: Numbers of curves or a map that are read and written in about ten milliseconds.
 FEW: Final = 20_000
@@ -121,22 +120,14 @@ def map_picture(library: Library, study_id: str, query: CurveQuery, title: str, 
     return draw_map_picture(map_of(library, study_id, query), title, form)
 
 
-def front_of(library: Library, study_id: str, exact: bool) -> Designs:
-    """The designs of a study; raises StudyNotFoundError, and FaultError for a study without a goal."""
-    store = library.store
-    return designs_of(
-        store.study(study_id), store.rounds(study_id), partial(store.rows_for_cases, study_id), exact=exact
-    )
-
-
 def front_as_json(library: Library, study_id: str, exact: bool, limit: int) -> bytes:
     """The designs as JSON text."""
-    return to_bytes(front_json(study_id, front_of(library, study_id, exact), limit))
+    return to_bytes(front_json(study_id, library.fronts.of(study_id, exact=exact), limit))
 
 
 def front_as_csv(library: Library, study_id: str, exact: bool, limit: int) -> bytes:
     """The designs as a table."""
-    return front_csv(front_of(library, study_id, exact), limit)
+    return front_csv(library.fronts.of(study_id, exact=exact), limit)
 
 
 def front_picture(
@@ -148,11 +139,11 @@ def front_picture(
     form: pictures.Picture,
 ) -> bytes:
     """The designs over two quantities as a picture."""
-    found = front_of(library, study_id, exact)
+    found = library.fronts.of(study_id, exact=exact)
     pictures.check_size("designs", len(found.numbers), pictures.MAX_PICTURE_POINTS)
     return pictures.draw_figure(front_figure(found, *axes), title, form)
 
 
 def search_picture(library: Library, study_id: str, title: str, form: pictures.Picture) -> bytes:
     """How a search has come to its designs as a picture."""
-    return pictures.draw_figure(history_figure(front_of(library, study_id, exact=False)), title, form)
+    return pictures.draw_figure(history_figure(library.fronts.of(study_id, exact=False)), title, form)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from sprag.service.jobs.fronts import Fronts
 from sprag.service.jobs.preview import preview_json
 from sprag.service.jobs.submission import Submission, hash_of, submission
 from sprag.service.json_text import to_bytes
@@ -50,6 +51,7 @@ class Library:
 
     def __init__(self, store: Store) -> None:
         self.store = store
+        self.fronts = Fronts(store)
 
     def __reduce__(self) -> tuple[Callable[[str, Chunking], Library], tuple[str, Chunking]]:
         return _library, (self.store.session.url.render_as_string(hide_password=False), self.store.chunking)

@@ -53,6 +53,10 @@ class Cells:
     def __len__(self) -> int:
         return len(self.map)
 
+    def bounds(self) -> Ints:
+        """Low x, low y, high x and high y of each, shape (cells, 4)."""
+        return np.stack([self.low_x, self.low_y, self.low_x + self.width, self.low_y + self.height], axis=1)
+
     def corners(self) -> tuple[tuple[Ints, Ints, Ints], ...]:
         """Places of the corners: low, low; high, low; low, high; high, high."""
         x, y = (self.low_x, self.low_x + self.width), (self.low_y, self.low_y + self.height)

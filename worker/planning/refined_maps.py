@@ -6,6 +6,7 @@ As on curves (`refined_curves`), all maps of a study advance together, and the r
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -17,7 +18,7 @@ from sprag.worker.planning.samples import Samples
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.planning.refine_plan import AdaptiveAxis, RefinePlan
+    from sprag.worker.planning.refine_plan import RefinePlan
     from sprag.worker.planning.refiner import Places
     from sprag.worker.planning.rounds import Rows
 
@@ -56,18 +57,29 @@ class Map(Described):
     passed: bool
     cells: Floats
     jumps: dict[str, Bools]
-    #: Values at three times three places of each cell, shape (cells, 3, 3, results); the first axis is x.
-    _stencils: Floats
-    #: Cell that holds each square of the finest grid, shape (finest, finest); -1 where there is none.
-    _owners: Ints
-    _axes: tuple[AdaptiveAxis, ...]
+    _own: Cells
+    _samples: Samples
+
+    @cached_property
+    def _stencils(self) -> Floats:
+        """Values at three times three places of each cell, shape (cells, 3, 3, results); the first axis is x."""
+        return _stencils(self._samples, self._own)
+
+    @cached_property
+    def _owners(self) -> Ints:
+        """Cell that holds each square of the finest grid, shape (finest, finest); -1 where there is none."""
+        finest = self._samples.plan.finest
+        owners = np.full((finest, finest), -1, dtype=np.int64)
+        for number, (left, lower, right, upper) in enumerate(self._own.bounds().tolist()):
+            owners[left:right, lower:upper] = number
+        return owners
 
     def at(self, name: str, x: Floats, y: Floats) -> Floats:
         """The interpolated result at places (SI, of one shape); NaN in jumps and where there are no cells yet."""
         finest = len(self._owners)
         steps = [
             np.clip((own - axis.low) / (axis.high - axis.low) * finest, 0.0, finest)
-            for own, axis in zip((x, y), self._axes, strict=True)
+            for own, axis in zip((x, y), self._samples.plan.adaptive, strict=True)
         ]
         i, j = (np.minimum(step.astype(np.int64), finest - 1) for step in steps)
         owner = self._owners[i, j]
@@ -87,7 +99,7 @@ class Map(Described):
     def told(self) -> dict[str, float]:
         """Share of the map's area that is not interpolated, by result."""
         size = np.prod(self.cells[:, 2:] - self.cells[:, :2], axis=1)
-        whole = float(np.prod([axis.high - axis.low for axis in self._axes]))
+        whole = float(np.prod([axis.high - axis.low for axis in self._samples.plan.adaptive]))
         return {name: float(size[jumps].sum()) / whole for name, jumps in self.jumps.items()}
 
     def to_json(self) -> dict[str, Any]:
@@ -188,10 +200,9 @@ def _map(samples: Samples, index: int, cells: Cells, errors: Floats, jumps: Bool
     values = samples.values[index][places]
     x, y = (axis.at(own, plan.finest) for axis, own in zip(plan.adaptive, places, strict=True))
     present = np.isfinite(values).any(axis=0)
-    owners = np.full((plan.finest, plan.finest), -1, dtype=np.int64)
-    bounds = np.stack([cells.low_x, cells.low_y, cells.low_x + cells.width, cells.low_y + cells.height], axis=1)
-    for number, (left, lower, right, upper) in enumerate(bounds.tolist()):
-        owners[left:right, lower:upper] = number
+    bounds = cells.bounds()
+    # Cells do not overlap.
+    whole = int((cells.width * cells.height).sum()) == plan.finest**2
     edges = [plan.adaptive[n % 2].at(bounds[:, n], plan.finest) for n in range(4)]
     return Map(
         fixed=plan.fixed_values(index),
@@ -203,12 +214,11 @@ def _map(samples: Samples, index: int, cells: Cells, errors: Floats, jumps: Bool
             name: _largest_of(errors[~jumps[:, k], k]) if present[k] and len(cells) else None
             for k, name in enumerate(plan.results)
         },
-        passed=len(cells) > 0 and resolved and bool((owners >= 0).all()),
+        passed=resolved and whole,
         cells=np.stack(edges, axis=1),
         jumps={name: jumps[:, k] for k, name in enumerate(plan.results)},
-        _stencils=_stencils(samples, cells),
-        _owners=owners,
-        _axes=plan.adaptive,
+        _own=cells,
+        _samples=samples,
     )
 
 

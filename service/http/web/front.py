@@ -2,37 +2,32 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from sprag.service.http import views
-from sprag.service.http.context import Ctx, StudyId
+from sprag.service.http.context import Context, StudyId
 from sprag.service.http.drawing import Drawing, conditional, picture
 from sprag.service.http.respond import JSON
 from sprag.service.http.web.figures import answers as figures
+from sprag.service.http.web.front_view import FrontView, front_view
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended, Work
 from sprag.service.jobs import answers
-from sprag.service.results.figures.front import chosen, quantities
-from sprag.service.results.fronts import Designs, design_json, front_json
 from sprag.service.results.pictures import curves as pictures
-from sprag.service.results.selection import SelectionError
-from sprag.worker import models
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from sprag.service.storage.records import StudyRecord
-    from sprag.worker.study import Study
 
 router = APIRouter(include_in_schema=False)
 
-#: Designs in the table.
-ROWS: Final = 100
 #: Designs that are linked with each other: in parallel coordinates and by the filter.
 _LINKED: Final = 1000
 
@@ -41,53 +36,37 @@ Exact = Annotated[str, Query(max_length=5)]
 
 
 @router.get("/studies/{study_id:study}/front")
-def front_page(context: Ctx, study_id: StudyId, x: X = "", y: X = "", exact: Exact = "") -> Response:
+async def front_page(work: Attended, study_id: StudyId, x: X = "", y: X = "", exact: Exact = "") -> Response:
     """The best designs of a search; the user chooses what is drawn over what."""
-    found = answers.front_of(context.library, study_id, bool(exact))
-    faults: tuple[Any, ...] = ()
-    try:
-        axes = chosen(found, x or None, y or None)
-    except SelectionError as error:
-        faults, axes = error.faults, chosen(found, None, None)
-    asked = {"x": axes[0], "y": axes[1], **({"exact": "true"} if exact else {})}
+    context = work.context
+    asked = (context.library, study_id, bool(exact), x or None, y or None)
+    many = await run_in_threadpool(_many, context, study_id)
+    view = await (work.check(front_view, *asked) if many else run_in_threadpool(front_view, *asked))
+    return await run_in_threadpool(_front_page, context, study_id, view, exact=bool(exact))
+
+
+def _many(context: Context, study_id: str) -> bool:
+    """Whether ranking the designs takes so long that another process does it."""
+    return context.store.study(study_id).cases > answers.FEW // 10
+
+
+def _front_page(context: Context, study_id: str, view: FrontView, *, exact: bool) -> Response:
+    drawn = {"x": view.axes[0], "y": view.axes[1]}
+    only = {"exact": "true"} if exact else {}
     address = f"{views.study_address(study_id)}/front"
     return page(
         "front.html",
-        status=422 if faults else 200,
+        status=422 if view.faults else 200,
         **study_frame(context, study_id),
         tab="/front",
-        faults=faults,
-        axes=axes,
-        exact=bool(exact),
-        choices={name: unit for name, (unit, _) in quantities(found).items()},
-        report=front_json(study_id, found, 0),
-        designs=[design_json(found, int(position)) for position in found.order[:ROWS]],
-        limited=_limited(found),
-        along=_along(found.study, found),
-        figure=f"/studies/{study_id}/figures/front?{urlencode(asked)}",
+        exact=exact,
+        **vars(view),
+        figure=f"/studies/{study_id}/figures/front?{urlencode(drawn | only)}",
         history=f"/studies/{study_id}/figures/search",
-        data=f"{address}?{urlencode({'limit': _LINKED, **({'exact': 'true'} if exact else {})})}",
-        files=f"{address}?{urlencode(asked)}",
-        pictured=len(found.numbers) <= pictures.MAX_PICTURE_POINTS,
+        data=f"{address}?{urlencode({'limit': _LINKED} | only)}",
+        files=f"{address}?{urlencode(drawn | only)}",
+        pictured=view.report["counts"]["known"] <= pictures.MAX_PICTURE_POINTS,
     )
-
-
-def _limited(found: Designs) -> Mapping[str, str]:
-    """Results of limits with their units that no column of goals shows."""
-    goals = {goal.result for goal in found.plan.best} if len(found.plan.at) == 1 else set()
-    return {
-        limit.result: found.infos[limit.result].unit for limit in found.plan.subject_to if limit.result not in goals
-    }
-
-
-def _along(study: Study, found: Designs) -> str | None:
-    """The parameter over which a design has its characteristic: the model's own, unless it is 0 or derived."""
-    for path in models.presentation_of(study).along[:1]:
-        column = study.axis_of(path)
-        values = [study.base.get(path, 0.0)] if column is None else [point.get(path, 1.0) for point in found.plan.at]
-        if path in study.base and path not in study.derive and min(values) > 0.0:
-            return path
-    return None
 
 
 @router.get("/studies/{study_id:study}/figures/front")
@@ -106,7 +85,7 @@ async def search_of(work: Attended, study_id: StudyId) -> Response:
 async def _figure(work: Work, study_id: str, draw: Callable[..., bytes], *shown: object) -> Response:
     def make(_record: StudyRecord) -> Response | Drawing:
         drawing = Drawing(draw, (work.context.library, study_id, *shown), JSON)
-        return drawing if work.context.store.study(study_id).cases > answers.FEW // 10 else drawing.here()
+        return drawing if _many(work.context, study_id) else drawing.here()
 
     return await conditional(work, study_id, "figure", make)
 

@@ -193,6 +193,14 @@ def test_a_bound_of_cases_holds_and_what_is_open_is_told() -> None:
     assert np.isnan(surface[np.abs(x - 0.43) < 0.005]).all()
 
 
+def test_summaries_need_no_tables_for_drawing() -> None:
+    rounds, last = refined(MANY, cliff)
+    found = describe_maps(MANY, joined(rounds))
+    assert [one.to_json() for one in found] == last.summary["maps"]
+    assert not {"_owners", "_stencils"} & vars(found[0]).keys()
+    assert np.isfinite(found[0].at("a", found[0].x, found[0].y)).any()
+
+
 @pytest.mark.parametrize("most", [1, 10, 80])
 def test_a_first_round_that_is_cut_is_no_map(most: int) -> None:
     found, step = map_of(replace(PLAN, most=most), ridge)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.service.http.web.figures.maps import map_figure
 from sprag.service.http.web.figures.plotly import Data, plotly_figure
-from sprag.service.jobs.answers import curves_of, front_of, map_of
+from sprag.service.jobs.answers import curves_of, map_of
 from sprag.service.json_text import to_bytes
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.front import front_figure, history_figure
@@ -36,13 +36,13 @@ def map_json(library: Library, study_id: str, query: CurveQuery, contours: bool)
 
 def front_json(library: Library, study_id: str, exact: bool, axes: tuple[str | None, str | None]) -> bytes:
     """The figure of the designs of a search, as JSON text; dragging selects designs."""
-    figure = plotly_figure(front_figure(front_of(library, study_id, exact), *axes))
+    figure = plotly_figure(front_figure(library.fronts.of(study_id, exact=exact), *axes))
     return to_bytes({**figure, "layout": {**figure["layout"], "dragmode": "select"}})
 
 
 def search_json(library: Library, study_id: str) -> bytes:
     """The figure of how a search has come to its designs, as JSON text."""
-    return to_bytes(plotly_figure(history_figure(front_of(library, study_id, exact=False))))
+    return to_bytes(plotly_figure(history_figure(library.fronts.of(study_id, exact=False))))
 
 
 def motion_figures(study: Study, case: int, start: float, end: float) -> dict[str, Data]:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 from typing import Any
 from xml.etree import ElementTree
 
+import pytest
+
+from sprag.service.http.web.front_view import front_view
+from sprag.service.results.fronts import Designs, designs_of
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import parse_spec
 from tests.service.conftest import API, Service
-from tests.service.searching import search
+from tests.service.searching import run_round, search
 
 
 def test_the_page_shows_the_best_designs_with_their_links(service: Service) -> None:
@@ -90,3 +95,39 @@ def test_a_design_becomes_a_study_of_its_own(service: Service) -> None:
     assert f'name="/base/shaft/inertia" value="{inertia!r} kg*m^2"' in form
     assert 'value="search, design of case 5"' in form
     assert service.http.get(f"/new?clone={study_id}&case=99").status_code == 404
+
+
+def test_designs_are_ranked_once_for_all_that_shows_them(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
+    ranked: list[bool] = []
+
+    def rank(*args: Any, exact: bool) -> Designs:
+        ranked.append(exact)
+        return designs_of(*args, exact=exact)
+
+    monkeypatch.setattr("sprag.service.jobs.fronts.designs_of", rank)
+    study_id = search(service, rounds=1)
+    pages = [
+        f"/studies/{study_id}{page}" for page in ("/front", "/figures/front", "/figures/search", "/front/search.svg")
+    ]
+    pages += [f"{API}{pages[0]}", f"{API}{pages[0]}?format=csv"]
+    assert {service.http.get(page).status_code for page in pages} == {200}
+    assert ranked == [False]
+    before = service.http.get(pages[0]).text.count("data-design=")
+    record = service.store.get_study(study_id)
+    run_round(service.store, record.number, service.store.take_over("test"))
+    assert service.http.get(pages[0]).text.count("data-design=") > before
+    assert {service.http.get(f"{page}?exact=true").status_code for page in pages[:2]} == {200}
+    assert ranked == [False, False, True]
+
+
+def test_many_designs_are_ranked_by_another_process(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
+    study_id = search(service)
+    text = service.http.get(f"/studies/{study_id}/front").text
+    service.checker.calls.clear()
+    monkeypatch.setattr("sprag.service.jobs.answers.FEW", 100)
+    assert service.http.get(f"/studies/{study_id}/front").text == text
+    assert [function.__name__ for function, *_ in service.checker.calls] == ["front_view"]
+    assert pickle.loads(pickle.dumps(front_view(*service.checker.calls[0][1:]))).axes == (
+        "efficiency",
+        "shaft.irregularity",
+    )
