@@ -13,6 +13,7 @@ from typing import Annotated, cast
 import typer
 
 from sprag.service.cli import (
+    batches,
     cases,
     database,
     demo,
@@ -96,7 +97,9 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "export": remote.export,
         "front": fronts.front,
         "map": pictures.draw_map,
+        "ribbon": batches.ribbon,
         "sensitivity": pictures.sensitivity,
+        "yield": batches.yields,
     },
 }
 for _title, _commands in _COMMANDS.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -40,7 +40,7 @@ def file_format(file: str, allowed: tuple[str, ...], what: str) -> str:
     return form
 
 
-def _answer(
+def answer(
     client: ServiceClient,
     study_id: str,
     part: Drawn,
@@ -48,18 +48,20 @@ def _answer(
     file: str | None,
     show: Callable[[dict[str, Any]], None],
     as_json: bool,
+    formats: tuple[str, ...] = _PICTURES,
+    drawing: Sequence[tuple[str, str]] = (),
 ) -> None:
-    """Show what the service draws of a study, and write it as a picture where a file is named."""
-    form = None if file is None else file_format(file, _PICTURES, "picture")
+    """Show what the service draws of a study, and write it where a file is named; ``drawing`` is said for it only."""
+    form = None if file is None else file_format(file, formats, "picture")
     found = client.drawn(study_id, part, query)
     if file is not None and form is not None:
-        write_pieces(file, client.picture(study_id, part, query, form))
+        write_pieces(file, client.picture(study_id, part, [*query, *drawing], form))
     if as_json:
         write_json(found)
     else:
         show(found)
     if file is not None:
-        say(f"picture: {file}")
+        say(f"{'table' if form == 'csv' else 'picture'}: {file}")
 
 
 def curve(
@@ -86,7 +88,7 @@ def curve(
     query += [("by", path) for path in by or ()]
     query += [("at", item) for item in at or ()]
     with connection(server, token) as client:
-        _answer(client, study_id, "curves", query, file, show_curves, as_json)
+        answer(client, study_id, "curves", query, file, show_curves, as_json)
 
 
 def draw_map(
@@ -103,12 +105,12 @@ def draw_map(
     """Show one result over two axes as a table, and write it as a picture."""
     query = [("x", x), ("y", y), ("z", z), *(("at", item) for item in at or ())]
     with connection(server, token) as client:
-        _answer(client, study_id, "map", query, file, show_map, as_json)
+        answer(client, study_id, "map", query, file, show_map, as_json)
 
 
 def show_map(found: dict[str, Any]) -> None:
     """A line for each value of y, a column for each of x; of a refined map a line for each case."""
-    held = _held(found["at"], found["units"])
+    held = held_text(found["at"], found["units"])
     title = heading(found["z"]["name"], found["z"]["unit"]) + (f"; {held}" if held else "")
     if "points" in found:
         _show_points(found, title)
@@ -142,7 +144,7 @@ def sensitivity(
 ) -> None:
     """Show what results depend on: the share of their variance for every axis, and the range of its main effect."""
     with connection(server, token) as client:
-        _answer(client, study_id, "sensitivity", [("y", name) for name in y], file, _show_sensitivity, as_json)
+        answer(client, study_id, "sensitivity", [("y", name) for name in y], file, _show_sensitivity, as_json)
 
 
 def _show_sensitivity(found: dict[str, Any]) -> None:
@@ -179,7 +181,7 @@ def show_curves(found: dict[str, Any]) -> None:
     settled = all("regime" in drawn for drawn in found["curves"])
     columns += [("regime", False)] * settled + [("ending", False)]
     for drawn in found["curves"]:
-        title = _held({**drawn["by"], **drawn["at"]}, found["units"])
+        title = held_text({**drawn["by"], **drawn["at"]}, found["units"])
         regimes = [drawn["regime"]] if settled else []
         rows = zip(drawn["x"], *drawn["y"].values(), *regimes, drawn["endings"], strict=True)
         show_table(title, columns, [(*row[:-1], "" if row[-1] == OK else row[-1]) for row in rows])
@@ -197,7 +199,7 @@ def _refined(drawn: dict[str, Any], asked: float, unit: str) -> Iterator[str]:
         yield f"jump at {ends} ({jump['why'].replace('_', ' ')}): {', '.join(jump['results'])} not interpolated"
 
 
-def _held(values: Mapping[str, float], units: Mapping[str, str]) -> str:
+def held_text(values: Mapping[str, float], units: Mapping[str, str]) -> str:
     """The held parameters with their values and units."""
     texts = ((path, cell_text(value), units.get(path, "1")) for path, value in values.items())
     return ", ".join(f"{path} = {value}" + ("" if unit == "1" else f" {unit}") for path, value, unit in texts)

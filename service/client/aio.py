@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import httpx
 
+from sprag.service.client.batches import Ribbon, Yield
 from sprag.service.client.errors import ServiceError, UnreachableError
 from sprag.service.client.frames import Curves, grid_of, table_of
 from sprag.service.client.queries import (
@@ -26,7 +27,9 @@ from sprag.service.client.queries import (
     longer_query,
     reporting,
     result_query,
+    ribbon_query,
     spec_of,
+    yield_query,
 )
 from sprag.service.client.study import DEFAULT_SERVER
 from sprag.service.client.waiting import Waiting
@@ -227,6 +230,30 @@ class AsyncStudy:
     async def sensitivity(self, y: str | Sequence[str]) -> dict[str, Any]:
         """Main effects of every axis on results, and shares of their variance."""
         return await self._get("/sensitivity", result_query(y))
+
+    async def ribbon(
+        self,
+        x: str | None = None,
+        y: str | Sequence[str] = (),
+        *,
+        by: str | Sequence[str] = (),
+        at: Mapping[str, Value] | None = None,
+        quantiles: Sequence[float] = (),
+    ) -> Ribbon:
+        """Quantiles of results over the drives along an axis, as `Study.ribbon` gives them."""
+        return Ribbon(cast("Any", await self._get("/ribbon", ribbon_query(x, y, by, at, quantiles))))
+
+    async def yields(
+        self,
+        conditions: str | Sequence[str],
+        x: str | None = None,
+        *,
+        by: str | Sequence[str] = (),
+        at: Mapping[str, Value] | None = None,
+        worst: int | None = None,
+    ) -> Yield:
+        """The share of drives that reach all ``conditions``, as `Study.yields` gives it."""
+        return Yield(cast("Any", await self._get("/yield", yield_query(conditions, x, by, at, worst))))
 
     async def front(self, limit: int | None = None, *, exact: bool = False) -> FrontReport:
         """The designs of a study with a goal, as `Study.front` gives them."""

@@ -112,7 +112,7 @@ class ServiceClient:
         return self._json("POST", f"{study_path(study_id)}:{verb}", params=list(query))
 
     def drawn(self, study_id: str, part: Drawn, query: Query) -> dict[str, Any]:
-        """Curves of results against one axis, a map of one result over two, or what results depend on."""
+        """Curves of results against one axis, a map over two, what results depend on, a ribbon or a yield."""
         return self._json("GET", f"{study_path(study_id)}/{part}", params=list(query))
 
     def front(self, study_id: str, query: Query = ()) -> dict[str, Any]:

@@ -60,6 +60,29 @@ def curve_query(
     return query + [("at", f"{path}={value}") for path, value in (at or {}).items()]
 
 
+def ribbon_query(
+    x: str | None,
+    y: str | Sequence[str],
+    by: str | Sequence[str],
+    at: Mapping[str, Value] | None,
+    quantiles: Sequence[float],
+) -> list[tuple[str, str]]:
+    """Query of a ribbon: as of curves, and probabilities of quantiles (none leaves them to the service)."""
+    return [*curve_query(x, y, by, at), *(("quantile", repr(float(value))) for value in quantiles)]
+
+
+def yield_query(
+    conditions: str | Sequence[str],
+    x: str | None,
+    by: str | Sequence[str],
+    at: Mapping[str, Value] | None,
+    worst: int | None,
+) -> list[tuple[str, str]]:
+    """Query of a yield; None leaves the number of worst drives to the service."""
+    more = [] if worst is None else [("worst", str(worst))]
+    return [*(("condition", text) for text in _listed(conditions)), *curve_query(x, (), by, at), *more]
+
+
 def case_query(ending: str | None, regime: str | None, flag: str | None) -> list[tuple[str, str]]:
     """Query of the cases with an ending, a regime and a flag; None leaves that open."""
     given = (("ending", ending), ("regime", regime), ("flag", flag))

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from sprag.service.client.batches import Ribbon, Yield
 from sprag.service.client.frames import Curves, grid_of, table_of
 from sprag.service.client.plain import ServiceClient
 from sprag.service.client.queries import (
@@ -20,7 +21,9 @@ from sprag.service.client.queries import (
     front_query,
     reporting,
     result_query,
+    ribbon_query,
     spec_of,
+    yield_query,
 )
 from sprag.service.client.waiting import Waiting, wait_for
 
@@ -156,6 +159,37 @@ class Study:
     def sensitivity(self, y: str | Sequence[str]) -> dict[str, Any]:
         """Main effects of every axis on results, and shares of their variance."""
         return self._client.plain.drawn(self.id, "sensitivity", result_query(y))
+
+    def ribbon(
+        self,
+        x: str | None = None,
+        y: str | Sequence[str] = (),
+        *,
+        by: str | Sequence[str] = (),
+        at: Mapping[str, Value] | None = None,
+        quantiles: Sequence[float] = (),
+    ) -> Ribbon:
+        """Quantiles of results over the drives of a study with tolerances, along axis ``x``, as `curves` takes them.
+
+        ``quantiles`` are probabilities, by default 0.05, 0.5 and 0.95.
+        """
+        return Ribbon(cast("Any", self._client.plain.drawn(self.id, "ribbon", ribbon_query(x, y, by, at, quantiles))))
+
+    def yields(
+        self,
+        conditions: str | Sequence[str],
+        x: str | None = None,
+        *,
+        by: str | Sequence[str] = (),
+        at: Mapping[str, Value] | None = None,
+        worst: int | None = None,
+    ) -> Yield:
+        """The share of drives that reach all ``conditions``, such as "shaft.speed.mean >= 90 % of nominal".
+
+        At each place along axis ``x`` and at all of them, with the tolerances that it is owed to and the ``worst``
+        drives (by default 10).
+        """
+        return Yield(cast("Any", self._client.plain.drawn(self.id, "yield", yield_query(conditions, x, by, at, worst))))
 
     def front(self, limit: int | None = None, *, exact: bool = False) -> FrontReport:
         """The designs of a study with a goal, the best first, and the history of the search.

@@ -24,7 +24,7 @@ EVENTS_TIMEOUT: Final = httpx.Timeout(SILENCE, connect=10.0)
 
 Query = Sequence[tuple[str, str]]
 #: Parts of a study that the service draws, as numbers and as a picture.
-Drawn = Literal["curves", "map", "sensitivity"]
+Drawn = Literal["curves", "map", "sensitivity", "ribbon", "yield"]
 
 
 def connection_options(server: str, token: str | None) -> dict[str, Any]:

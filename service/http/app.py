@@ -18,6 +18,7 @@ from starlette.types import ASGIApp
 from sprag.service.http import handlers
 from sprag.service.http.access import Access
 from sprag.service.http.api import (
+    batches,
     case_tables,
     cases,
     catalogues,
@@ -199,6 +200,7 @@ def _routes() -> APIRouter:
         events,
         curves,
         sensitivity,
+        batches,
         fronts,
         cases,
         case_tables,

@@ -41,6 +41,7 @@ from sprag.service.results.sensitivity_indices import (
     saltelli_indices,
     sample_indices,
 )
+from sprag.service.results.tolerances.nominal import nominal_only
 from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.draws.unit import LEVELS, cases_of
 from sprag.worker import models
@@ -113,9 +114,11 @@ class Sensitivity:
 def sensitivity(study: Study, spec: Mapping[str, Any], names: Sequence[str], fetch: Fetch) -> list[Sensitivity]:
     """Effects of the axes of ``study`` on the results ``names``.
 
-    ``spec`` is the user's own: it shows whether the cases are a Saltelli design. Raises SelectionError for an unknown
-    result, a study in which nothing varies, or one that is too large.
+    Of a study with tolerances those of the nominal drive. ``spec`` is the user's own: it shows whether the cases are a
+    design for indices. Raises SelectionError for an unknown result, a study in which nothing varies, or one that is too
+    large.
     """
+    study, fetch = nominal_only(study, fetch)
     infos = models.study_results(study)
     results = numeric_results(infos, "y", names)
     varying = [axis for axis in study.axes if np.any(axis.array != axis.array[0])]
@@ -207,21 +210,23 @@ def _of_result(
     if mean is not None and variance is not None and variance <= (1e-13 * mean) ** 2:
         notes.append("the result is the same in every case")
         indices, pairs = nothing(len(varying))
+    drawn = sample is not None
     effects = tuple(
-        Effect(axis.paths, unit_of(study, axis.paths[0]), *_main_effect(axis, column[known], values), own)
+        Effect(axis.paths, unit_of(study, axis.paths[0]), *_main_effect(axis, column[known], values, drawn=drawn), own)
         for axis, column, own in zip(varying, columns.T, indices, strict=True)
     )
     told = (*kinds, *notes)
     return Sensitivity(info, method, cases, missing, mean, variance, effects, tuple(pairs), told)
 
 
-def _main_effect(axis: Axis, column: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:
+def _main_effect(axis: Axis, column: Numbers, y: Numbers, *, drawn: bool) -> tuple[Numbers, Numbers]:
     """Mean of the result at each value of the axis, or over groups of about equally many values where it has many.
 
-    The cases of one value stay together: a group with only some of them would also reflect other axes.
+    Values that were ``drawn`` are always grouped. The cases of one value stay together: a group with only some of them
+    would also reflect other axes.
     """
     values = np.unique(axis.array)
-    if values.size > 2 * BINS and column.size < 4 * values.size:
+    if values.size > 2 * BINS and (drawn or column.size < 4 * values.size):
         there, count = np.unique(column, return_counts=True)
         ends = np.cumsum(count)
         bounds = [int(ends[part[-1]]) for part in np.array_split(np.arange(there.size), BINS) if part.size]

@@ -12,6 +12,7 @@ import numpy as np
 from cachetools import LRUCache, cachedmethod
 
 from sprag.service.results.curves import Fetch
+from sprag.service.results.tolerances.nominal import nominal_only
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ _KEPT: Final = 256
 
 def unaffected(study: Study, fetch: Fetch) -> tuple[str, ...]:
     """A sentence for each axis that changes no result in any of the many cases compared."""
+    study, fetch = nominal_only(study, fetch)
     infos = models.study_results(study)
     names = [info.name for info in infos if info.name.split(".")[0] not in _CHECKS]
     found = []

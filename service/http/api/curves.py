@@ -92,7 +92,7 @@ async def get_curves(
     """
 
     def chosen(study: Study) -> CurveQuery:
-        return completed(study, models.study_results(study), x, tuple(y or ()), tuple(by or ()), _pairs(at))
+        return completed(study, models.study_results(study), x, tuple(y or ()), tuple(by or ()), pairs(at))
 
     return await _drawn(work, study_id, form, "curves", chosen)
 
@@ -116,7 +116,7 @@ async def get_map(
     form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """One result over two axes."""
-    query = CurveQuery(x, (z,), (y,), _pairs(at))
+    query = CurveQuery(x, (z,), (y,), pairs(at))
     return await _drawn(work, study_id, form, "map", lambda _study: query)
 
 
@@ -192,7 +192,8 @@ async def get_report(
     return await conditional(work, study_id, chosen, make)
 
 
-def _pairs(at: list[str] | None) -> tuple[tuple[str, str], ...]:
+def pairs(at: list[str] | None) -> tuple[tuple[str, str], ...]:
+    """The fixed values of the parameter ``at``; raises a fault for a text without a path or a value."""
     pairs = []
     for item in at or ():
         path, separator, value = item.partition("=")

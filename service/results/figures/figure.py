@@ -81,11 +81,24 @@ class Band:
 
 
 @dataclass(frozen=True, slots=True)
+class Fill:
+    """The area between two lines over the same x, behind all lines; arrays of shape (m,), NaN is a gap."""
+
+    name: str
+    x: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    colour: str
+    key: str = ""
+    listed: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class Panel:
     """One plot. ``styles`` explains the dashes where they distinguish results.
 
     ``x`` is the quantity of its own x axis; without one, the panel has the x axis of the figure.
-    ``bands`` are the jumps of its curves.
+    ``bands`` are the jumps of its curves, ``fills`` areas between two lines.
     """
 
     y: Quantity
@@ -94,6 +107,7 @@ class Panel:
     styles: tuple[str, ...] = ()
     x: Quantity | None = None
     bands: tuple[Band, ...] = ()
+    fills: tuple[Fill, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

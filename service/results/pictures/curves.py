@@ -158,6 +158,8 @@ def _paint_panel(figure: Figure, axes: Axes, panel: Panel, drawn: Described) -> 
     for band in panel.bands:
         # The edges show a jump that is narrower than a pixel.
         axes.axvspan(band.low, band.high, facecolor=band.colour, edgecolor=band.colour, alpha=0.25, linewidth=0.6)
+    for fill in panel.fills:
+        axes.fill_between(fill.x, fill.low, fill.high, color=fill.colour, alpha=0.2, linewidth=0.0)
     for line in panel.lines:
         if line.shades is not None and line.x.size:
             marker = STYLES[line.style % len(STYLES)][1]

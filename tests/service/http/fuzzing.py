@@ -52,6 +52,8 @@ FURTHER_RULES: Final = (
     "get_curves",
     "get_front",
     "get_map",
+    "get_ribbon",
+    "get_yield",
     "get_sensitivity",
     "get_trajectory",
 )

@@ -17,7 +17,7 @@ from sprag.service.results.wording import unit_text, words
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.results.figures.figure import Band, Figure, Line, Marks, Panel, Quantity
+    from sprag.service.results.figures.figure import Band, Figure, Fill, Line, Marks, Panel, Quantity
 
 Data = dict[str, Any]
 
@@ -90,6 +90,7 @@ def plotly_figure(figure: Figure) -> Data:
         if not strip:
             layout[f"xaxis{suffix}"] = _x_axis(figure, index, axes["yaxis"])
         headings: set[str] = set()
+        traces += [trace | axes for fill in panel.fills for trace in _fill(fill, named=named)]
         for line in panel.lines:
             trace = _line_trace(line, panel, figure, headings) | axes
             if line.shades is not None:
@@ -269,6 +270,18 @@ def marks_trace(marks: Marks, y: Quantity, *, listed: bool) -> Data:
         "marker": {"color": MARKS[marks.regime].colour, "symbol": MARKS[marks.regime].symbol, "size": 8},
         "hovertemplate": _hover(y, marks.regime),
     }
+
+
+def _fill(fill: Fill, *, named: bool) -> tuple[Data, Data]:
+    """The area between two lines: its lower edge, and the upper one, which is filled down to it."""
+    x = fill.x.tolist()
+    edge: Data = {
+        "type": "scatter", "mode": "lines", "x": x, "line": {"width": 0, "color": fill.colour}, "hoverinfo": "skip",
+        "legendgroup": fill.key, "showlegend": False, "connectgaps": False,
+    }  # fmt: skip
+    red, green, blue = (int(fill.colour[at : at + 2], 16) for at in (1, 3, 5))
+    upper = {"y": numbers(fill.high), "fill": "tonexty", "fillcolor": f"rgba({red}, {green}, {blue}, 0.2)"}
+    return edge | {"y": numbers(fill.low)}, edge | upper | {"name": fill.name, "showlegend": fill.listed and named}
 
 
 def _band(band: Band) -> Data:

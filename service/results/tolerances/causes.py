@@ -1,0 +1,89 @@
+"""Which tolerances the spread of a result or the yield is owed to."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sprag.service.results.tolerances.shares import LEAST_DRIVES, Share, shares
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sprag.worker.study import Study
+
+    Numbers = NDArray[np.float64]
+
+#: Places of a line over which the shares are taken, evenly divided, and drives of it.
+_MOST_PLACES: Final = 33
+_MOST_DRIVES: Final = 20_000
+
+
+@dataclass(frozen=True, slots=True)
+class Causes:
+    """The share of each tolerance, in their order; None where it is not known, and a note then says why.
+
+    ``rest`` is the share of what tolerances do together, which no single one of them has.
+    """
+
+    shares: tuple[Share | None, ...]
+    rest: float | None
+    note: str
+
+
+class Matrix:
+    """The results of drives at some places of a line, for their shares: bounded, whatever the size of the study."""
+
+    def __init__(self, places: int, drives: int) -> None:
+        wanted = np.unique(np.linspace(0, places - 1, min(places, _MOST_PLACES)).round().astype(np.int64))
+        self._column = np.full(places, -1, dtype=np.int64)
+        self._column[wanted] = np.arange(wanted.size)
+        self.values = np.full((min(drives, _MOST_DRIVES), wanted.size), np.nan)
+
+    def take(self, at: slice, values: Numbers) -> None:
+        """The results at some neighbouring places, shape (places, drives)."""
+        columns = self._column[at]
+        kept = columns >= 0
+        self.values[:, columns[kept]] = values[kept, : len(self.values)].T
+
+
+def causes_of(study: Study, matrix: Matrix) -> Causes:
+    """The shares of the variance of a result over the drives that have it at every place of the matrix."""
+    return variance_causes(study, matrix.values)
+
+
+def variance_causes(study: Study, values: Numbers) -> Causes:
+    """The same of ``values``, shape (drives, columns), of the first drives of the study; NaN for missing ones."""
+    spread = study.spread
+    if spread is None:
+        raise ValueError("the study has no tolerances")
+    tied = correlated(study)
+    known = np.isfinite(values).all(axis=1)
+    missing = int((~known).sum())
+    found = shares(spread.array[: len(values)][known], values[known])
+    nothing: tuple[None, ...] = (None,) * len(spread.tolerances)
+    if found is None:
+        few = int(known.sum()) < LEAST_DRIVES
+        note = f"shares need {LEAST_DRIVES} drives with results, {int(known.sum())} have them" if few else "no variance"
+        return Causes(nothing, None, note)
+    own = tuple(None if name in tied else share for name, share in zip(spread.names, found, strict=True))
+    notes = []
+    if tied:
+        notes.append(f"{', '.join(sorted(tied))} are correlated: they have no shares of their own")
+    if missing:
+        notes.append(f"{missing} drives without results are left out of the shares")
+    rest = None if tied else 1.0 - sum(share.value for share in found)
+    return Causes(own, rest, "; ".join(notes))
+
+
+def correlated(study: Study) -> set[str]:
+    """Names of the tolerances that are drawn together with others."""
+    if study.spread is None:
+        return set()
+    told = {path for item in study.spread.about.get("correlations", ()) for path in item["between"]}
+    among = re.compile("|".join(re.escape(path).replace(r"\*", r"[^.]+") for path in told) or "(?!)")
+    every = study.spread.tolerances
+    return {one.name for one in every if any(among.fullmatch(path) for path in (one.name, *one.paths))}

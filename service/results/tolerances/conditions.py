@@ -1,0 +1,110 @@
+"""Conditions on results that a drive reaches or not: ``shaft.speed.mean >= 90 % of nominal``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from sprag.service.results.selection import listed, numeric_results, refused
+from sprag.service.spec.catalogue import result_of
+from sprag.service.spec.units import QuantityError, parse_quantity, plain_signs, split_quantity, to_float
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sprag.worker.models import ResultInfo
+
+    Numbers = NDArray[np.float64]
+
+#: What a condition may look like.
+EXAMPLES: Final = "for instance shaft.speed.mean >= 7 rad/s, torque.max <= 110 % of nominal or regime = periodic"
+#: Most conditions of a yield.
+MOST: Final = 16
+
+_FORM: Final = re.compile(r"\s*([A-Za-z][\w.]*)\s*(>=|<=|=|≥|≤)\s*(.+?)\s*")
+_SIGNS: Final = {">=": "at_least", "≥": "at_least", "<=": "at_most", "≤": "at_most", "=": "is"}
+_SHOWN: Final = {"at_least": "≥", "at_most": "≤", "is": "="}
+_PART: Final = re.compile(r"(.+?)\s*%\s*of\s+nominal")
+
+Kind = Literal["at_least", "at_most", "is"]
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A condition on one result.
+
+    Attributes
+    ----------
+    info : the result
+    limit : SI, the code of a category, or a part of the nominal drive's value
+    of_nominal : whether ``limit`` is such a part
+    text : the condition for people
+    """
+
+    info: ResultInfo
+    kind: Kind
+    limit: float
+    of_nominal: bool
+    text: str
+
+    def margins(self, values: Numbers, nominal: Numbers) -> Numbers:
+        """How far results are within the limit, relative to it: negative outside, -inf without a result.
+
+        ``values`` has the shape (places, drives), ``nominal`` (places,). Equalities have 0 and -1.
+        """
+        limit = np.broadcast_to(self.limit * nominal if self.of_nominal else np.float64(self.limit), nominal.shape)
+        bound = limit[:, None]
+        if self.kind == "is":
+            found = np.where(values == bound, 0.0, -1.0)
+        else:
+            scale = np.where(bound == 0.0, 1.0, np.abs(bound))
+            found = (values - bound if self.kind == "at_least" else bound - values) / scale
+        return np.where(np.isfinite(values) & np.isfinite(bound), found, -np.inf)
+
+
+def read_conditions(infos: Sequence[ResultInfo], texts: Sequence[str]) -> tuple[Condition, ...]:
+    """The conditions of these texts; raises SelectionError about the parameter ``condition``."""
+    texts = tuple(dict.fromkeys(texts))
+    if not texts:
+        raise refused("condition", "required", "is required", allowed=EXAMPLES)
+    if len(texts) > MOST:
+        raise refused("condition", "too-many", f"{len(texts)} conditions are given", allowed=f"at most {MOST}")
+    return tuple(_read(infos, text) for text in texts)
+
+
+def _read(infos: Sequence[ResultInfo], text: str) -> Condition:
+    parts = _FORM.fullmatch(plain_signs(text))
+    if parts is None:
+        raise refused("condition", "invalid-text", "is not a condition", text, allowed=f"RESULT >= VALUE, {EXAMPLES}")
+    name, sign, value = parts.groups()
+    kind: Kind = _SIGNS[sign]  # type: ignore[assignment]
+    info = result_of(infos, name)
+    if info is not None and info.kind == "category":
+        return _category(info, kind, value, text)
+    (info,) = numeric_results(infos, "condition", (name,))
+    if kind == "is" and info.kind != "count":
+        message = f"{name} is a real number, which equals no value exactly"
+        raise refused("condition", "invalid-choice", message, text, allowed=">= and <=")
+    share = _PART.fullmatch(value)
+    try:
+        if share is not None:
+            part = to_float(split_quantity(share[1])[0]) / 100.0
+            shown = f"{info.name} {_SHOWN[kind]} {100.0 * part:g} % of nominal"
+            return Condition(info, kind, part, True, shown)
+        number, unit = split_quantity(value)
+        limit = parse_quantity(value, info.unit) if unit else to_float(number)
+    except QuantityError as error:
+        raise refused("condition", error.code, f"{name} {error}", text, unit=info.unit) from error
+    shown = f"{info.name} {_SHOWN[kind]} {limit:.6g}" + ("" if info.unit == "1" else f" {info.unit}")
+    return Condition(info, kind, limit, False, shown)
+
+
+def _category(info: ResultInfo, kind: Kind, value: str, text: str) -> Condition:
+    if kind != "is" or value not in info.categories:
+        allowed = f"{info.name} = one of {listed(info.categories)}"
+        raise refused("condition", "invalid-choice", "is not a category of this result", text, allowed=allowed)
+    return Condition(info, kind, float(info.categories.index(value)), False, f"{info.name} = {value}")

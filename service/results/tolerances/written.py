@@ -1,0 +1,222 @@
+"""Ribbons and yields as JSON data and as tables."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from sprag.service.answers import filled
+from sprag.service.answers.results import ResultMeaning
+from sprag.service.json_text import numbers
+from sprag.service.results import exports
+from sprag.service.spec.catalogue import unit_of
+
+if TYPE_CHECKING:
+    from sprag.service.answers.tolerances import (
+        CausesInfo,
+        ConditionInfo,
+        PlacesAxis,
+        ResultRibbon,
+        RibbonReport,
+        ToleranceInfo,
+        WorstDrive,
+        YieldReport,
+        YieldShare,
+    )
+    from sprag.service.results.tolerances.batch import Places
+    from sprag.service.results.tolerances.causes import Causes
+    from sprag.service.results.tolerances.conditions import Condition
+    from sprag.service.results.tolerances.quantiles import Proportion
+    from sprag.service.results.tolerances.ribbons import Ribbon, RibbonLine
+    from sprag.service.results.tolerances.ribbons import Spread as ResultSpread
+    from sprag.service.results.tolerances.yields import WorstDrive as Worst
+    from sprag.service.results.tolerances.yields import Yield, YieldLine
+    from sprag.worker.study import Study
+
+
+def tolerances_json(study: Study) -> list[ToleranceInfo]:
+    """The tolerances of a study."""
+    spread = () if study.spread is None else study.spread.tolerances
+    return [{"name": one.name, "change": one.change, "unit": unit_of(study, one.paths[0])} for one in spread]
+
+
+def _axis(places: Places) -> PlacesAxis | None:
+    return None if places.x is None else {"path": places.x, "unit": places.units[places.x]}
+
+
+def ribbon_json(study_id: str, found: Ribbon) -> RibbonReport:
+    """The answer with the ribbons of a study."""
+    places = found.places
+    return {
+        "study": study_id,
+        "drives": places.study.drives,
+        "tolerances": tolerances_json(places.study),
+        "x": _axis(places),
+        "units": places.units,
+        "quantiles": list(found.probabilities),
+        "results": {info.name: filled(ResultMeaning, info) for info in found.results},
+        "lines": [
+            {
+                "by": one.line.by,
+                "at": one.line.at,
+                "x": list(one.line.x),
+                "cases": one.line.cases.tolist(),
+                "failed": one.failed.tolist(),
+                "pending": one.pending.tolist(),
+                "results": {name: _result(places.study, spread) for name, spread in one.spreads.items()},
+            }
+            for one in found.lines
+        ],
+    }
+
+
+def _result(study: Study, spread: ResultSpread) -> ResultRibbon:
+    parts = spread.quantiles
+    return {
+        "nominal": numbers(spread.nominal),
+        "drives": parts.drives.tolist(),
+        "values": [numbers(row) for row in parts.values],
+        "low": [numbers(row) for row in parts.low],
+        "high": [numbers(row) for row in parts.high],
+        "causes": causes_json(study, spread.causes),
+        "lowest": [{"drive": one.drive, "value": one.value, "case": one.case} for one in spread.lowest],
+        "highest": [{"drive": one.drive, "value": one.value, "case": one.case} for one in spread.highest],
+    }
+
+
+def causes_json(study: Study, causes: Causes) -> CausesInfo:
+    """The causes of a spread."""
+    names = () if study.spread is None else study.spread.names
+    return {
+        "shares": [
+            {
+                "tolerance": name,
+                "share": None if share is None else share.value,
+                "error": None if share is None else share.error,
+            }
+            for name, share in zip(names, causes.shares, strict=True)
+        ],
+        "rest": causes.rest,
+        "note": causes.note,
+    }
+
+
+def percent(probability: float) -> str:
+    """A probability for people: ``5 %``."""
+    return f"{100.0 * probability:.6g} %"
+
+
+def ribbon_csv(found: Ribbon) -> bytes:
+    """A row for each place: parameters, the nominal case and its results, quantiles with their intervals, counts."""
+    columns: dict[str, list[Any]] = {}
+    for one in found.lines:
+        parts = _place_columns(found.places, one)
+        for name, spread in one.spreads.items():
+            parts[f"{name} nominal"] = numbers(spread.nominal)
+            parts[f"{name} drives"] = spread.quantiles.drives.tolist()
+            for index, probability in enumerate(found.probabilities):
+                heading = f"{name} {percent(probability)}"
+                parts[heading] = numbers(spread.quantiles.values[index])
+                parts[f"{heading} low"] = numbers(spread.quantiles.low[index])
+                parts[f"{heading} high"] = numbers(spread.quantiles.high[index])
+        for name, part in parts.items():
+            columns.setdefault(name, []).extend(part)
+    return exports.table_csv(list(columns), list(columns.values()))
+
+
+def _place_columns(places: Places, one: RibbonLine | YieldLine) -> dict[str, list[Any]]:
+    count = one.line.cases.size
+    return {
+        **{path: [value] * count for path, value in {**one.line.by, **one.line.at}.items()},
+        **({} if places.x is None else {places.x: list(one.line.x)}),
+        "case": one.line.cases.tolist(),
+        "failed": one.failed.tolist(),
+        "pending": one.pending.tolist(),
+    }
+
+
+def yield_json(study_id: str, found: Yield) -> YieldReport:
+    """The answer with the yields of a study."""
+    places = found.places
+    return {
+        "study": study_id,
+        "drives": places.study.drives,
+        "tolerances": tolerances_json(places.study),
+        "conditions": [condition_json(condition) for condition in found.conditions],
+        "x": _axis(places),
+        "units": places.units,
+        "lines": [
+            {
+                "by": one.line.by,
+                "at": one.line.at,
+                "x": list(one.line.x),
+                "cases": one.line.cases.tolist(),
+                "each": [_share(one.each, place) for place in range(one.line.cases.size)],
+                "all": _share(one.whole, ()),
+                "nominal": one.nominal.tolist(),
+                "failed": one.failed.tolist(),
+                "pending": one.pending.tolist(),
+                "causes": causes_json(places.study, one.causes),
+                "worst": [_worst(one, worst) for worst in one.worst],
+            }
+            for one in found.lines
+        ],
+    }
+
+
+def condition_json(condition: Condition) -> ConditionInfo:
+    """One condition."""
+    info, limit = condition.info, condition.limit
+    told = str(info.cell(limit)) if info.kind == "category" else limit
+    return {
+        "text": condition.text,
+        "result": info.name,
+        "unit": info.unit,
+        "kind": condition.kind,
+        "limit": told,
+        "of_nominal": condition.of_nominal,
+    }
+
+
+def _share(found: Proportion, place: int | tuple[()]) -> YieldShare:
+    return {
+        "reached": int(found.reached[place]),
+        "drives": int(found.drives[place]),
+        "value": _finite(float(found.value[place])),
+        "low": _finite(float(found.low[place])),
+        "high": _finite(float(found.high[place])),
+    }
+
+
+def _worst(one: YieldLine, worst: Worst) -> WorstDrive:
+    made: WorstDrive = {
+        "drive": worst.drive,
+        "case": worst.case,
+        "margin": _finite(worst.margin),
+        "results": {name: _finite(value) for name, value in worst.values.items()},
+        "draws": worst.draws,
+    }
+    return {**made, "x": one.line.x[worst.place]} if one.line.x else made
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def yield_csv(found: Yield) -> bytes:
+    """A row for each place with its yield; of each line a last row, without a case, for all its places together."""
+    columns: dict[str, list[Any]] = {}
+    for one in found.lines:
+        parts = _place_columns(found.places, one)
+        rows = [*range(one.line.cases.size)]
+        for name in ("reached", "drives", "value", "low", "high"):
+            values = getattr(one.each, name)
+            whole = getattr(one.whole, name).item()
+            parts["yield" if name == "value" else name] = [*numbers(values[rows]), whole]
+        parts["nominal"] = [*one.nominal.tolist(), bool(one.nominal.all())]
+        fixed = {**one.line.by, **one.line.at}
+        for name, part in parts.items():
+            if len(part) == len(rows):
+                part.append(fixed.get(name))
+            columns.setdefault(name, []).extend(part)
+    return exports.table_csv(list(columns), list(columns.values()))

@@ -1,0 +1,57 @@
+"""Shares of the variance by tolerance, against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import norm, qmc
+
+from sprag.service.results.tolerances.shares import LEAST_DRIVES, shares
+
+
+def test_shares_of_a_linear_function_are_those_of_its_slopes() -> None:
+    draws = norm.ppf(qmc.Sobol(3, rng=1).random(2048))
+    found = shares(draws, draws @ np.array([[3.0], [2.0], [0.0]])) or []
+    assert [share.value for share in found] == pytest.approx([9 / 13, 4 / 13, 0.0], abs=0.01)
+    assert all(0.0 < share.error < 0.05 for share in found)
+
+
+def test_shares_of_the_ishigami_function_are_those_of_the_closed_form() -> None:
+    x = -np.pi + 2.0 * np.pi * qmc.Sobol(3, rng=2).random(4096)
+    y = np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
+    found = shares(x, y[:, None]) or []
+    assert [share.value for share in found] == pytest.approx([0.3139, 0.4424, 0.0], abs=0.02)
+
+
+def test_intervals_of_shares_hold_over_seeds() -> None:
+    held = np.zeros(3)
+    for seed in range(200):
+        draws = np.random.default_rng(seed).normal(size=(400, 3))
+        found = shares(draws, draws @ np.array([[3.0], [2.0], [0.0]])) or []
+        exact = (9 / 13, 4 / 13, 0.0)
+        held += [abs(share.value - value) <= share.error for share, value in zip(found, exact, strict=True)]
+    assert (held / 200 >= 0.91).all(), held
+
+
+def test_several_columns_share_the_sum_of_their_variances() -> None:
+    draws = np.random.default_rng(3).normal(size=(4000, 2))
+    found = shares(draws, draws * np.array([3.0, 1.0])) or []
+    assert [share.value for share in found] == pytest.approx([0.9, 0.1], abs=0.03)
+
+
+def test_values_of_a_list_are_groups() -> None:
+    rng = np.random.default_rng(4)
+    draws = np.column_stack([rng.choice([1.0, 2.0, 5.0], 3000), rng.normal(size=3000)])
+    # The mean jumps between groups: variance 2/9 of (0, 1, 0), and 1 of the noise.
+    y = (draws[:, 0] == 2.0) + draws[:, 1]
+    found = shares(draws, y[:, None].astype(float)) or []
+    assert found[0].value == pytest.approx(2 / 11, abs=0.03)
+    same = shares(np.ones((100, 1)), rng.normal(size=(100, 1))) or []
+    assert [(share.value, share.error) for share in same] == [(0.0, 0.0)]
+
+
+def test_too_few_drives_and_results_that_do_not_vary_have_no_shares() -> None:
+    draws = np.random.default_rng(5).normal(size=(LEAST_DRIVES, 2))
+    assert shares(draws[:-1], draws[:-1, :1]) is None
+    assert shares(draws, np.full((LEAST_DRIVES, 1), 5.0)) is None
+    assert shares(draws, draws[:, :1]) is not None
