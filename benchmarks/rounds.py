@@ -1,6 +1,6 @@
 """What rounds cost beyond their cases: a refined study through SQLite and the dispatcher, and the engine alone.
 
-    python -m benchmarks.rounds [REPETITIONS]
+    python -m benchmarks.rounds [REPETITIONS [CURVES]]
 
 Both run in this process, one after the other, on the same plan and in the same chunks; times are processor times, the
 least of the repetitions. The engine alone is told the same rounds by a planner without a store. What a round costs is
@@ -36,11 +36,11 @@ from sprag.worker.study import Study
 _RESULTS = ("shaft.speed.mean", "efficiency", "torque.max", "shaft.irregularity")
 
 
-def spec() -> dict[str, Any]:
-    """Eight curves over the load, four results right to 1 %."""
+def spec(curves: int) -> dict[str, Any]:
+    """Curves over the load, four results right to 1 %."""
     made: dict[str, Any] = json.loads(preset_text("one_pendulum")[1])
     made["axes"] = [
-        {"path": "excitation.frequency", "linspace": ["18 Hz", "32 Hz", 8]},
+        {"path": "excitation.frequency", "linspace": ["18 Hz", "32 Hz", curves]},
         {"path": "shaft.load", "adaptive": [0.05, 1.2]},
     ]
     made["refine"] = {"results": list(_RESULTS), "error": "1 %"}
@@ -95,7 +95,8 @@ def measured() -> list[float]:
 def main() -> None:
     """Print the processor times and what a round costs."""
     repetitions = int(sys.argv[1]) if len(sys.argv) > 1 else 5
-    parsed = parse_spec(load_spec(json.dumps(spec()), "json"))
+    curves = int(sys.argv[2]) if len(sys.argv) > 2 else 8
+    parsed = parse_spec(load_spec(json.dumps(spec(curves)), "json"))
     models.warm_up(parsed.study)
     alone(parsed.study)
     with tempfile.TemporaryDirectory() as folder:
@@ -109,7 +110,10 @@ def main() -> None:
             cases = store.list_studies().studies[0].cases
     rounds = pairs[0][0][1]
     engine, whole = min(pair[0][0] for pair in pairs), min(pair[1] for pair in pairs)
-    print(f"{cases} cases in {rounds} rounds: engine alone {engine:.2f} s, through the store {whole:.2f} s")
+    print(
+        f"{cases} cases in {rounds} rounds: engine alone {engine:.2f} s, through the store {whole:.2f} s "
+        f"({whole / engine:.3f} times)"
+    )
     milliseconds = 1e3 * np.array(taken)
     print(f"a round: {np.median(milliseconds):.0f} ms (median), {milliseconds.max():.0f} ms (most)")
 

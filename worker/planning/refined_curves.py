@@ -132,17 +132,20 @@ def describe(plan: RefinePlan, rows: Rows) -> list[Curve]:
 
 
 def _curves(samples: Samples, own: Intervals) -> list[Curve]:
-    bounds = np.searchsorted(own.curve, np.arange(len(samples.known) + 1))
-    return [_curve(samples, own, index, slice(bounds[index], bounds[index + 1])) for index in range(len(bounds) - 1)]
+    values, known = samples.values, samples.known
+    bounds = np.searchsorted(own.curve, np.arange(len(known) + 1))
+    present = (np.isfinite(values) & known[:, :, None]).any(axis=1)
+    # A result that the whole curve lacks has no jumps beside those of the others.
+    jumps = own.jumps & (present | ~present.any(axis=1, keepdims=True))[own.curve]
+    merged = _merged(samples.plan, own, jumps)
+    parts = (slice(bounds[index], bounds[index + 1]) for index in range(len(known)))
+    return [_curve(samples, own, index, part, jumps[part], merged[index]) for index, part in enumerate(parts)]
 
 
-def _curve(samples: Samples, own: Intervals, index: int, part: slice) -> Curve:
+def _curve(samples: Samples, own: Intervals, index: int, part: slice, jumps: Bools, merged: list[Jump]) -> Curve:
     plan = samples.plan
     places = np.flatnonzero(samples.known[index])
-    values = samples.values[index, places]
-    present = np.isfinite(values).any(axis=0)
-    # A result that the whole curve lacks has no jumps beside those of the others.
-    jumps, errors = own.jumps[part] & (present | ~present.any()), own.errors[part]
+    values, errors = samples.values[index, places], own.errors[part]
     passed = len(places) > 1 and bool(own.resolved[part].all())
     return Curve(
         fixed=plan.fixed_values(index),
@@ -151,7 +154,7 @@ def _curve(samples: Samples, own: Intervals, index: int, part: slice) -> Curve:
         values={name: values[:, k] for k, name in enumerate(plan.results)},
         joined={name: ~own.jumps[part][:, k] for k, name in enumerate(plan.results)},
         errors={name: _largest_of(errors[~jumps[:, k], k], passed) for k, name in enumerate(plan.results)},
-        jumps=tuple(_merged(plan, own.low[part], own.width[part], own.why[part], jumps)),
+        jumps=tuple(merged),
         passed=passed,
     )
 
@@ -163,18 +166,23 @@ def _largest_of(errors: Floats, passed: bool) -> float | None:
     return float(errors.max(initial=0.0))
 
 
-def _merged(plan: RefinePlan, low: Ints, width: Ints, why: Ints, jumps: Bools) -> list[Jump]:
-    """Jumps of one curve; neighbouring intervals are one, except where the reasons are of different kinds."""
+def _merged(plan: RefinePlan, own: Intervals, jumps: Bools) -> list[list[Jump]]:
+    """Jumps of every curve; neighbouring intervals are one, except where the reasons are of different kinds."""
+    merged: list[list[Jump]] = [[] for _ in range(plan.combinations)]
     told = np.flatnonzero(jumps.any(axis=1))
     if not len(told):
-        return []
-    kind = np.where(np.isin(why[told], _CHANGES), _CHANGES[0], why[told])
-    new = (np.diff(told, prepend=told[0] - 2) > 1) | (np.diff(kind, prepend=-1) != 0)
+        return merged
+    curve, why = own.curve[told], own.why[told]
+    kind = np.where(np.isin(why, _CHANGES), _CHANGES[0], why)
+    new = np.append(True, (np.diff(told) > 1) | (np.diff(curve) != 0) | (np.diff(kind) != 0))
     first, last = told[new], told[np.append(new[1:], True)]
     axis = plan.adaptive[0]
-    lows, highs = axis.at(low[first], plan.finest), axis.at(low[last] + width[last], plan.finest)
+    lows, highs = axis.at(own.low[first], plan.finest), axis.at(own.low[last] + own.width[last], plan.finest)
     starts = np.flatnonzero(new)
     concerned = np.logical_or.reduceat(jumps[told], starts, axis=0).tolist()
-    names = [tuple(name for name, one in zip(plan.results, row, strict=True) if one) for row in concerned]
-    reasons = (REASONS[number] for number in np.minimum.reduceat(why[told], starts).tolist())
-    return [Jump(*part) for part in zip(lows.tolist(), highs.tolist(), reasons, names, strict=True)]
+    reasons = np.minimum.reduceat(why, starts).tolist()
+    every = zip(curve[new].tolist(), lows.tolist(), highs.tolist(), reasons, concerned, strict=True)
+    for index, low, high, reason, row in every:
+        names = tuple(name for name, one in zip(plan.results, row, strict=True) if one)
+        merged[index].append(Jump(low, high, REASONS[reason], names))
+    return merged
