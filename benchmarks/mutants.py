@@ -172,6 +172,13 @@ MUTANTS = (
         "AWAY = math.inf",
         (f"{_CERTIFICATE}test_an_orbit_far_from_the_run_does_not_count",),
     ),
+    Mutant(
+        "orbits that the run does not come nearer to count as settled",
+        "engine/vibration_drive/orbits.py",
+        "        found[case] = third > 0 and late < early * exponential(rate * third)",
+        "        found[case] = third > 0",
+        ("tests/engine/test_slow_orbits.py",),
+    ),
 )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine.compile.jit import compiled, part
-from sprag.engine.taylor.elementary import logarithm
+from sprag.engine.taylor.elementary import exponential, logarithm
 from sprag.engine.vibration_drive.automaton import Clutch, Shaft
 from sprag.engine.vibration_drive.strobes import (
     ANGLE,
@@ -26,11 +26,14 @@ from sprag.engine.vibration_drive.strobes import (
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 _FREE, _LOCKED = float(Clutch.FREE), float(Clutch.LOCKED)
 _ROTATING = float(Shaft.ROTATING)
 #: Scaled distance at which rounding decides whether strobes come nearer.
 _ARRIVED = 1e-9
+#: A longer order is tried instead of a shorter one if it repeats strobes this much better.
+_BETTER = 0.03
 
 
 @part
@@ -150,27 +153,70 @@ def find_candidates(
     max_order: int,
     found: Ints,
 ) -> None:
-    """Write the least order of an orbit that each case seems to approach, or 0.
+    """Write the order of an orbit that each case seems to approach, or 0.
 
     A run approaches an orbit of order q if its last strobes (q of them, at least ``window``) are within ``near`` and
     ``shared``/q of those q periods before, and nearer than the strobes before them were: a run that leaves an unstable
-    orbit moves ever faster. ``strobes``, ``cases`` and ``count`` are as of `find_units`.
+    orbit moves ever faster. The least such order counts, unless strobes come much nearer after a longer one: beside an
+    orbit whose period has doubled, strobes also nearly repeat after half of it. ``strobes``, ``cases`` and ``count``
+    are as of `find_units`.
     """
     last = strobes.shape[1] - 1
     for case in range(cases.shape[0]):
         found[case] = 0
         own = strobes[cases[case]]
+        best = math.inf
         for order in range(1, max_order + 1):
             length = max(order, window)
             if count < 2 * length + order:
                 break
-            enough = min(near, shared / order)
+            enough = min(near, shared / order, best)
             now = _apart(own, last, length, order, units[case], enough)
             if now > enough:
                 continue
             if now < _apart(own, last - length, length, order, units[case], now) or now < _ARRIVED:
                 found[case] = order
-                break
+                best = _BETTER * now
+
+
+@compiled
+def find_approaching(
+    strobes: Floats,
+    cases: Ints,
+    count: int,
+    turns: Floats,
+    orders: Ints,
+    units: Floats,
+    multipliers: Floats,
+    found: Flags,
+) -> None:
+    """Write whether runs come nearer to their orbits, at no less than half the rate of the orbits' multipliers.
+
+    The largest distances among the first and the last third of the kept strobes are compared, whatever the states:
+    events may come close to the strobes.
+
+    Parameters
+    ----------
+    strobes, cases, count :
+        As of `find_units`.
+    turns : array, shape (cases, periods, columns)
+        Strobes of the turn that begins at the orbit's point nearest to the newest strobe.
+    orders, multipliers : array, shape (cases,)
+    units : array, shape (cases, columns)
+    found : array, shape (cases,)
+    """
+    last = strobes.shape[1] - 1
+    third = count // 3
+    for case in range(cases.shape[0]):
+        own, order = strobes[cases[case]], orders[case]
+        early = late = 0.0
+        for k in range(third):
+            newer = _spread(own[last - k], turns[case, (order - 1 - k) % order], units[case])
+            before = k + 2 * third
+            older = _spread(own[last - before], turns[case, (order - 1 - before) % order], units[case])
+            early, late = max(early, older), max(late, newer)
+        rate = logarithm(multipliers[case]) / order if multipliers[case] > 0.0 else -math.inf
+        found[case] = third > 0 and late < early * exponential(rate * third)
 
 
 @part

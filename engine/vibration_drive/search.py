@@ -4,7 +4,7 @@ Every decision about a case follows from that case alone, so its numbers do not 
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,9 @@ _SHARED = 0.05
 WINDOW = 6
 #: Distance of an orbit from the run beyond which the run need not approach it.
 AWAY = 0.005
+#: The same for runs whose kept strobes demonstrably come nearer to the orbit, and the periods before such a run counts.
+SLOWLY_AWAY = 0.05
+SLOWLY_FROM = 300
 #: Scaled disturbance for the finite differences of the derivative, and the accepted residual of an orbit.
 DISTURBANCE = 1e-7
 RESIDUAL = 1e-10
@@ -57,6 +60,13 @@ _STEPS = 8
 _ENOUGH_STEPS = 5
 #: After an unsuccessful search a case is continued by this factor before the next one.
 _BACK = 1.25
+#: Above this multiplier an orbit's point is off by many times the error of a turn: it takes further steps with finer
+#: integration: at most so many, until one is smaller than this.
+_SENSITIVE = 0.95
+_FINE_STEPS = 3
+_EXACT = 1e-12
+#: Tolerance of what is reported, as a share of the run's: over a single turn smaller steps cost next to nothing.
+_FINER, _FINEST = 0.01, 1e-14
 #: Parts of an orbit closer than this are equal, so that its order is smaller.
 _SAME = 1e-7
 #: Where in the period strobes are moved to when no orbit was found with those at its end; exact in binary, so that
@@ -127,6 +137,12 @@ class Search:
         """Accuracy and budgets."""
         return self.settings.run
 
+    @property
+    def fine(self) -> Run:
+        """The same with a smaller tolerance."""
+        run = self.settings.run
+        return replace(run, tolerance=max(_FINER * run.tolerance, min(_FINEST, run.tolerance)))
+
     def units(self, active: Ints) -> Floats:
         """Scales of the strobes' columns."""
         units = np.empty((len(active), self.history.shape[2]))
@@ -179,32 +195,32 @@ class Search:
         # The longest runs first, because the last ones leave lanes idle.
         rows = rows[np.argsort(-found[rows], kind="stable")]
         certified = self.certify(active[rows], self.starts[active[rows]], found[rows], units[rows])
-        return self._of_least_order(certified)
+        return self._refined(self._of_least_order(certified))
 
     def certify(self, cases: Ints, points: Floats, orders: Ints, units: Floats) -> Orbits:
-        """Newton's method from points near orbits of those orders; the stable ones that are near the points."""
+        """Newton's method from points near orbits of those orders; the stable ones that the runs are near."""
         begun = points
         certified: list[Orbits] = []
-        for step in range(_STEPS):
+        for number in range(_STEPS):
             if not len(cases):
                 break
-            disturbed, first, done = self._disturbed_runs(cases, points, orders, units)
-            ends = np.ascontiguousarray(done.strobes[np.arange(len(disturbed)), orders[disturbed] - 1])
-            tied = self._tied(cases, points, orders, done.sums[first[:-1]])
-            moved, told = np.empty_like(points), np.empty((len(cases), 4))
-            newton.step(points, ends, first, units, DISTURBANCE, self.steady_shaft, tied, moved, told)
+            moved, told, turns = self._step(cases, points, orders, units, self.run)
             away = np.empty(len(cases))
             orbits.distances(moved, begun, units, away)
             residual, size, multiplier = told[:, newton.RESIDUAL], told[:, newton.STEP], told[:, newton.MULTIPLIER]
-            converged = (residual < RESIDUAL) & ((size < RESIDUAL) | (step >= _ENOUGH_STEPS))
-            accepted = converged & (multiplier < STABLE) & (away < AWAY)
+            close = away < np.where(self.periods[cases] < SLOWLY_FROM, AWAY, SLOWLY_AWAY)
+            converged = (residual < RESIDUAL) & ((size < RESIDUAL) | (number >= _ENOUGH_STEPS))
+            accepted = converged & (multiplier < STABLE) & close
+            slow = np.flatnonzero(accepted & (away >= AWAY))
+            if len(slow):
+                accepted[slow] = self._approaches(cases[slow], turns[slow], orders[slow], units[slow], multiplier[slow])
             if np.any(accepted):
                 least = np.empty(len(cases), dtype=np.int64)
-                orbits.find_least(points, done.strobes[first[:-1]], orders, units, _SAME, least)
+                orbits.find_least(points, turns, orders, units, _SAME, least)
                 # The last step brings the orbit closer still, unless it is mere rounding.
                 better = np.where((size < RESIDUAL)[:, None], moved, points)
                 certified.append(Orbits(cases, better, orders, multiplier, residual, least).take(accepted))
-            fails = converged | (told[:, newton.AGREES] == 0.0) | ~(size < 1.0) | ~(away < AWAY)
+            fails = converged | (told[:, newton.AGREES] == 0.0) | ~(size < 1.0) | ~close
             fails |= (residual < _TELLING) & (multiplier >= STABLE)
             self._failed(cases[fails & ~accepted])
             left = np.flatnonzero(~(fails | accepted))
@@ -213,8 +229,40 @@ class Search:
         self._failed(cases)
         return _joined(certified, self)
 
+    def _approaches(self, cases: Ints, turns: Floats, orders: Ints, units: Floats, multipliers: Floats) -> Flags:
+        """Whether the strobes of cases come nearer to orbits, given by the strobes of a turn from their points on."""
+        found = np.zeros(len(cases), dtype=np.bool_)
+        orbits.find_approaching(self.history, cases, self.count, turns, orders, units, multipliers, found)
+        return found
+
+    def _step(
+        self, cases: Ints, points: Floats, orders: Ints, units: Floats, run: Run
+    ) -> tuple[Floats, Floats, Floats]:
+        """A step of Newton's method: the points after it, its report, and the strobes of the turn before it."""
+        disturbed, first, done = self._disturbed_runs(cases, points, orders, units, run)
+        ends = np.ascontiguousarray(done.strobes[np.arange(len(disturbed)), orders[disturbed] - 1])
+        tied = self._tied(cases, points, orders, done.sums[first[:-1]])
+        moved, told = np.empty_like(points), np.empty((len(cases), 4))
+        newton.step(points, ends, first, units, DISTURBANCE, self.steady_shaft, tied, moved, told)
+        return moved, told, done.strobes[first[:-1]]
+
+    def _refined(self, found: Orbits) -> Orbits:
+        """The same orbits, the sensitive ones of them after further steps with finer integration."""
+        rows = np.flatnonzero(found.multipliers > _SENSITIVE)
+        for _ in range(_FINE_STEPS):
+            if not len(rows):
+                break
+            some = found.take(rows)
+            moved, told, _ = self._step(some.cases, some.points, some.orders, self.units(some.cases), self.fine)
+            good = (told[:, newton.RESIDUAL] < RESIDUAL) & (told[:, newton.MULTIPLIER] < STABLE)
+            rows, moved, told = rows[good], moved[good], told[good]
+            found.points[rows] = moved
+            found.residuals[rows], found.multipliers[rows] = told[:, newton.RESIDUAL], told[:, newton.MULTIPLIER]
+            rows = rows[told[:, newton.STEP] >= _EXACT]
+        return found
+
     def _disturbed_runs(
-        self, cases: Ints, points: Floats, orders: Ints, units: Floats
+        self, cases: Ints, points: Floats, orders: Ints, units: Floats, run: Run
     ) -> tuple[Ints, Ints, Integration]:
         """Run the points, and those disturbed in each free column, once around: whose run, first runs, the runs."""
         rows = np.empty((len(cases) * (2 + 3 * self.kernel.LAYOUT.n), points.shape[1]))
@@ -228,7 +276,7 @@ class Search:
         matrix = with_lengths(
             self.matrix[cases[of_row]], points[of_row, BEGIN], orders[of_row].astype(float), windowed=windowed
         )
-        done = integrate(self.kernel, matrix, self.run, starts=rows[:count], strobes=int(orders.max()))
+        done = integrate(self.kernel, matrix, run, starts=rows[:count], strobes=int(orders.max()))
         return of_row, first, done
 
     def _tied(self, cases: Ints, points: Floats, orders: Ints, sums: Floats) -> Flags:
@@ -246,7 +294,7 @@ class Search:
         """Characteristics of orbits over one turn of each, shape (orbits, results)."""
         cases = found.cases
         matrix = with_lengths(self.matrix[cases], found.points[:, BEGIN], found.orders.astype(float), windowed=True)
-        sums = integrate(self.kernel, matrix, self.run, starts=found.points).sums
+        sums = integrate(self.kernel, matrix, self.fine, starts=found.points).sums
         self.spent[cases] += found.orders
         self.steps[cases] += sums[:, OUT_STEPS]
         self.events[cases] += sums[:, OUT_EVENTS]

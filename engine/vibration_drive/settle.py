@@ -18,7 +18,7 @@ from sprag.engine.vibration_drive.orbits import distances, settling_periods
 from sprag.engine.vibration_drive.regimes import Regime, means, settled_infos
 from sprag.engine.vibration_drive.results import STEADY_SHAFT, result_infos
 from sprag.engine.vibration_drive.search import ROUND, Orbits, Search, transient_rounds
-from sprag.engine.vibration_drive.strobes import SHAFT_SPEED
+from sprag.engine.vibration_drive.strobes import ANGLE, FRACTION, PENDULUM_WIDTH, SHAFT_SPEED, SHAFT_WIDTH, SPEED
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -29,6 +29,9 @@ _MOVE_AFTER = 140
 _OUT_OF_REACH = 1e6
 #: Periods in which the speed of an unloaded shaft must not change.
 _UNCHANGED = 40
+#: How far (relative) below the limit speed a shaft may be that still rises to it, and how far (scaled) its pendulums
+#: may be from their contact-free orbit.
+_CREEPS, _FREELY = 0.01, 0.01
 _OK = ENDINGS.index(Ending.OK)
 
 
@@ -235,7 +238,25 @@ def _unloaded(module: Kernel, search: Search, cases: Ints, results: _Results) ->
             speed = limit_of(apart, row, own.points[row], order)
             results.regimes[case] = Regime.HELD if math.isnan(speed) else Regime.COASTING
             speed = 0.0 if math.isnan(speed) else speed
+            if _rises_to(speed, search, case, apart.history[row, -order:]):
+                results.values[case, results.column("shaft.speed.from_rest")] = speed
         _steady_shaft(search, case, speed, results)
+
+
+def _rises_to(limit: float, search: Search, case: int, orbit: Floats) -> bool:
+    """Whether an unloaded shaft still rises at the end of its search, towards the limit speed.
+
+    Near it every engagement is weaker than the one before: the speed misses the limit by A/k^2 after k periods, and
+    no search ever sees the end. ``orbit`` has the strobes of the contact-free orbit, shape (order, columns).
+    """
+    own = search.history[case, -_UNCHANGED:]
+    speed = own[-1, SHAFT_SPEED]
+    if np.all(own[:, SHAFT_SPEED] == speed) or not 0.0 < limit - speed < _CREEPS * limit:
+        return False
+    apart = np.abs(orbit - own[-1]) / search.units(np.array([case]))
+    columns = [SHAFT_WIDTH + i * PENDULUM_WIDTH + k for i in range(search.kernel.LAYOUT.n) for k in (ANGLE, SPEED)]
+    same_phase = orbit[0, FRACTION] == own[-1, FRACTION]
+    return bool(same_phase and np.any(np.all(apart[:, columns] < _FREELY, axis=1)))
 
 
 def _steady_shaft(search: Search, case: int, speed: float, results: _Results) -> None:
@@ -253,8 +274,8 @@ def _steady_shaft(search: Search, case: int, speed: float, results: _Results) ->
 
 
 def _speed_from_rest(search: Search, cases: Ints) -> Floats:
-    """Speed that the unloaded shaft reaches from the case's own start; it never falls, and is final once no clutch
-    drives.
+    """Speed of the unloaded shaft at the end of the search, from the case's own start; it never falls, and is final
+    once no clutch drives.
     """
     active = cases
     while len(active):
