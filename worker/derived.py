@@ -12,7 +12,7 @@ from sprag.worker.models.parameters import parameter_of
 from sprag.worker.spread import DRIVE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -43,14 +43,21 @@ def blocks(study: Study) -> Iterator[range]:
 
 
 def refused_value(study: Study, cases: range) -> str:
-    """A sentence about the first derived value of these cases that its parameter does not allow; "" if none."""
+    """A sentence about the first derived value of these cases that its parameter does not allow; "" if none.
+
+    Only nominal drives count: drawn ones may fail.
+    """
     values = study.columns(cases) if study.derive else {}
     for path in study.derive:
         entry = parameter_of(study, path)
-        for case, value in zip(cases, values[path].tolist(), strict=True):
-            if entry is not None and not entry.accepts(value):
+        for case, value, drive in zip(cases, values[path].tolist(), _drives(values, len(cases)), strict=True):
+            if drive == 0.0 and entry is not None and not entry.accepts(value):
                 return f"case {case} would derive {path} = {value:.6g}, allowed is {entry.range_text()}"
     return ""
+
+
+def _drives(values: Mapping[str, NDArray[np.float64]], count: int) -> list[float]:
+    return values[DRIVE].tolist() if DRIVE in values else [0.0] * count
 
 
 def distinct_values(study: Study, path: str) -> NDArray[np.float64]:

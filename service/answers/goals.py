@@ -21,9 +21,9 @@ class DesignVariable(TypedDict):
 
 
 class DesignGoal(TypedDict):
-    """A result that is to be as small or as large as possible."""
+    """What is to be as small or as large as possible."""
 
-    result: str
+    result: Annotated[str, Doc("a result, its quantile over the drives, or a yield; the name in `goals` and `results`")]
     unit: str
     description: str
     max: Annotated[bool, Doc("whether the largest value is the best")]
@@ -48,13 +48,14 @@ class Design(TypedDict):
     """One design: a value of every variable, run at every operating point."""
 
     design: Annotated[int, Doc("its number, from 0, in order of the cases")]
-    cases: Annotated[list[int], Doc("its cases, one for each operating point")]
+    cases: Annotated[list[int], Doc("its cases of the nominal drive, one for each operating point")]
     round: Annotated[int, Doc("number of the round that it belongs to, from 1")]
     phase: Annotated[Literal["search", "polish"], Doc("whether a generation or the polish of equalities asked for it")]
     variables: Annotated[dict[str, float], Doc("value of each variable by its name, SI")]
     goals: Annotated[dict[str, Number], Doc("each goal over the operating points, SI; null where it is missing")]
     results: Annotated[
-        dict[str, list[Number | str]], Doc("results of goals and limits at each operating point; null where missing")
+        dict[str, list[Number | str]],
+        Doc("what goals and limits are about, at each operating point; null where missing"),
     ]
     feasible: Annotated[bool, Doc("whether it is within every limit")]
     failed: Annotated[bool, Doc("whether one of its cases has failed, or a goal is missing")]

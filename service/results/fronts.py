@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -18,6 +18,7 @@ from sprag.worker.models import WorkerEnding
 from sprag.worker.planning.goals import GoalPlan, front
 from sprag.worker.planning.goals.plan import GOAL
 from sprag.worker.planning.goals.polish import MET
+from sprag.worker.planning.goals.robust import Table
 from sprag.worker.planning.rounds import Rows
 
 if TYPE_CHECKING:
@@ -49,8 +50,10 @@ class Designs:
         Aligned with ``numbers``; its ``cases`` are those of the study.
     exact : bool array, shape (designs,)
         Feasible, and equalities of real numbers met to 1e-6.
+    infos : dict
+        What goals and limits are about, by name: a result, its quantile over the drives, a yield.
     values : dict of float64 arrays, each shape (designs, operating points)
-        Results of goals and limits, SI or the code of a category.
+        The same of each design, SI or the code of a category.
     order : int64 array, shape (designs,)
         Positions of the designs: the best rank first, within a rank the best first goal.
     rounds : list of RoundRecord
@@ -109,31 +112,47 @@ def designs_of(study: Study, rounds: list[RoundRecord], fetch: Fetch, *, exact: 
         For a study without a goal.
     """
     plan = goal_of(study)
-    points = len(plan.at)
-    whole = range(study.cases - study.cases % points)
+    each, drives = plan.cases_each, 1 + plan.drives
+    whole = range(study.cases - study.cases % each)
     columns = fetch(np.arange(whole.stop, dtype=np.int64), list(plan.results))
     endings = np.array([ending or WorkerEnding.CANCELLED for ending in columns.endings], dtype=object)
-    known = (endings != WorkerEnding.CANCELLED).reshape(-1, points).all(axis=1)
-    kept = np.repeat(known, points)
+    known = (endings != WorkerEnding.CANCELLED).reshape(-1, each).all(axis=1)
+    kept = np.repeat(known, each)
     values = {name: column[kept] for name, column in columns.values.items()}
     rows = Rows(study.points(whole)[kept], endings[kept] == models.OK, values)
     found = front(plan, rows, equality=MET if exact else None)
     numbers_ = np.flatnonzero(known)
-    found.cases[:] = numbers_[:, None] * points + np.arange(points)
+    found.cases[:] = numbers_[:, None] * each + np.arange(0, each, drives)
+    table = Table(plan, rows)
     goal = found.goals[:, 0] * (-1.0 if plan.best[0].max else 1.0) if plan.best else found.violation
     return Designs(
         study=study,
         plan=plan,
-        infos={info.name: info for info in models.study_results(study) if info.name in plan.results},
+        infos=_infos(study, plan),
         numbers=numbers_,
         front=found,
         exact=found.feasible & (found.miss <= MET),
-        values={name: column.reshape(-1, points) for name, column in values.items()},
+        values={item.name: table.values(item) for item in plan.items},
         order=np.lexsort((numbers_, goal, found.rank)),
         rounds=rounds,
         round=np.searchsorted([record.cases.start for record in rounds], found.cases[:, 0], side="right") - 1,
         pending=int(np.count_nonzero(~known)),
     )
+
+
+def _infos(study: Study, plan: GoalPlan) -> dict[str, ResultInfo]:
+    known = {info.name: info for info in models.study_results(study)}
+    found: dict[str, ResultInfo] = {}
+    for item in plan.items:
+        if item.conditions:
+            found[item.name] = models.ResultInfo(item.name, "1", "share of the drawn drives that meet the conditions")
+        elif item.quantile is not None:
+            info = known[item.result]
+            text = f"{info.description}; {100.0 * item.quantile:.10g} % quantile over the drawn drives"
+            found[item.name] = replace(info, name=item.name, kind="real", description=text)
+        else:
+            found[item.name] = known[item.result]
+    return found
 
 
 def front_json(study_id: str, found: Designs, limit: int = DESIGNS) -> FrontReport:
@@ -144,14 +163,14 @@ def front_json(study_id: str, found: Designs, limit: int = DESIGNS) -> FrontRepo
         "variables": _variables(found),
         "best": [
             DesignGoal(
-                result=goal.result,
-                unit=infos[goal.result].unit,
-                description=infos[goal.result].description,
+                result=goal.name,
+                unit=infos[goal.name].unit,
+                description=infos[goal.name].description,
                 max=goal.max,
             )
             for goal in plan.best
         ],
-        "subject_to": [_limit(limit_, infos[limit_.result]) for limit_ in plan.subject_to],
+        "subject_to": [_limit(limit_, infos[limit_.name]) for limit_ in plan.subject_to],
         "at": [dict(point) for point in plan.at],
         "over": plan.over,
         "generations": plan.generations,
@@ -191,9 +210,7 @@ def design_json(found: Designs, position: int) -> Design:
         "round": record.round + 1,
         "phase": "polish" if record.summary.get("phase") == "polish" else "search",
         "variables": dict(zip(names, ranked.variables[position].tolist(), strict=True)),
-        "goals": dict(
-            zip((goal.result for goal in found.plan.best), numbers(ranked.goals[position] + 0.0), strict=True)
-        ),
+        "goals": dict(zip((goal.name for goal in found.plan.best), numbers(ranked.goals[position] + 0.0), strict=True)),
         "results": {
             name: [found.infos[name].cell(value) for value in column[position].tolist()]
             for name, column in found.values.items()
@@ -226,7 +243,7 @@ def front_csv(found: Designs, limit: int = DESIGNS) -> bytes:
     plan, points = found.plan, range(1, len(found.plan.at) + 1)
     told = ("round", "phase", "rank", "feasible", "failed", "exact", "violation", "miss")
     header = ["design", "case", *told, *(one.paths[0] for one in plan.vary)]
-    header += [f"{plan.over}.{goal.result}" for goal in plan.best if len(points) > 1]
+    header += [f"{plan.over}.{goal.name}" for goal in plan.best if len(points) > 1]
     header += [name if len(points) == 1 else f"{name}.{number}" for name in found.values for number in points]
     rows: list[list[Any]] = []
     for position in found.order[:limit].tolist():

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.derive import with_values
-from sprag.service.spec.fields import WHICH_CASES
+from sprag.service.spec.fields import TOLERANCE_FIELDS, WHICH_CASES
 from sprag.worker.limits import MAX_NAME_LENGTH
 from sprag.worker.models.parameters import parameter_of
 from sprag.worker.spread import DRIVE
@@ -33,7 +33,11 @@ def design_spec(spec: Mapping[str, Any], study: Study, case: int, along: str | N
         value; by default nothing varies
     """
     values = {path: value for path, value in study.case_parameters(case).items() if path not in {*study.derive, DRIVE}}
-    kept = {key: value for key, value in spec.items() if key not in WHICH_CASES}
+    # The nominal drive of a design keeps its tolerances; a drawn drive has its own values in the base.
+    nominal = not study.case_parameters(case).get(DRIVE)
+    kept = {
+        key: value for key, value in spec.items() if key not in WHICH_CASES or (nominal and key in TOLERANCE_FIELDS)
+    }
     name, suffix = spec.get("name", ""), f", design of case {case}"
     made = {
         **kept,

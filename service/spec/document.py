@@ -98,15 +98,20 @@ def parse_spec(data: object) -> ParsedSpec:
     if machine.derive and axes is not None and not report.found:
         check_derived(report, found["derive"], machine, layout(machine, axes, combine), ranges=outline is not None)
     spread = read_tolerances(report, found, machine, axes)
-    if outline is not None and "tolerances" in found:
-        report.fault("/tolerances", "conflict", "cannot be combined with a study that chooses its own cases")
+    if outline is not None and outline.with_drives is None and "tolerances" in found:
+        report.fault(
+            "/tolerances",
+            "conflict",
+            "cannot be combined with `refine` or `calibrate`",
+            allowed="`goal`, or plain axes",
+        )
     run = part.read_run(report, found.get("run", {}), machine, axes, combine)
     part.check(report, machine, axes or (), combine)
     report.raise_if_any()
     study = Study(model, name, _in_order(machine), run, structure=machine.structure, derive=machine.derive)
     given = replace(study, axes=axes or (), combine=combine)
-    study = given if outline is None else first_round(report, study, outline)
-    if spread is not None:
+    study = given if outline is None else first_round(report, study, outline, spread)
+    if spread is not None and outline is None:
         study = with_drives(report, study, spread)
         warn_of_invalid_drives(report, study)
     part.warn(report, study)

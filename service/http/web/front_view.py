@@ -66,10 +66,8 @@ def front_view(library: Library, study_id: str, exact: bool, x: str | None, y: s
 
 
 def _limited(found: Designs) -> Mapping[str, str]:
-    goals = {goal.result for goal in found.plan.best} if len(found.plan.at) == 1 else set()
-    return {
-        limit.result: found.infos[limit.result].unit for limit in found.plan.subject_to if limit.result not in goals
-    }
+    goals = {goal.name for goal in found.plan.best} if len(found.plan.at) == 1 else set()
+    return {limit.name: found.infos[limit.name].unit for limit in found.plan.subject_to if limit.name not in goals}
 
 
 def _along(study: Study, found: Designs) -> str | None:

@@ -27,12 +27,12 @@ _NOTHING: Final = "No design has its results yet."
 
 def quantities(found: Designs) -> dict[str, tuple[str, NDArray[np.float64]]]:
     """What a design can be drawn over, by name: unit and values; goals first, then variables, results of limits."""
-    names = [goal.result for goal in found.plan.best]
+    names = [goal.name for goal in found.plan.best]
     shown = {name: (found.infos[name].unit, found.front.goals[:, index]) for index, name in enumerate(names)}
     for index, one in enumerate(found.plan.vary):
         shown[one.paths[0]] = (unit_of(found.study, one.paths[0]), found.front.variables[:, index])
     for limit in found.plan.subject_to:
-        info = found.infos[limit.result]
+        info = found.infos[limit.name]
         if info.kind != "category" and info.name not in shown:
             values = found.values[info.name]
             worst = np.where(np.isnan(values), -np.inf, np.abs(values - limit.value)).argmax(axis=1)
@@ -43,7 +43,7 @@ def quantities(found: Designs) -> dict[str, tuple[str, NDArray[np.float64]]]:
 def chosen(found: Designs, x: str | None, y: str | None) -> tuple[str, str]:
     """Names of the two quantities; by default the first two goals. Raises SelectionError for an unknown name."""
     names = list(quantities(found))
-    goals = [goal.result for goal in found.plan.best]
+    goals = [goal.name for goal in found.plan.best]
     first, second = [*goals, NUMBER, names[0]][:2] if len(goals) != 1 else (NUMBER, goals[0])
     for parameter, name in (("x", x), ("y", y)):
         if name is not None and name not in names:
@@ -96,7 +96,7 @@ def history_figure(found: Designs, columns: int = 2) -> Figure:
     rows = [last[int(generation)] for generation in at]
     across = Quantity("generation", "1")
     drawn: list[tuple[str, str, list[float | None]]] = [
-        (f"best {goal.result}", found.infos[goal.result].unit, [row["best"][index] for row in rows])
+        (f"best {goal.name}", found.infos[goal.name].unit, [row["best"][index] for row in rows])
         for index, goal in enumerate(found.plan.best)
     ]
     if any(row["hypervolume"] is not None for row in rows):

@@ -10,8 +10,9 @@ from sprag.service.spec.axes.values import plan_values
 from sprag.service.spec.described import Described, Listed, choice, named
 from sprag.service.spec.fields import read_number, read_object, read_one
 from sprag.service.spec.plan.fields import read_ends, read_path_of, read_result, read_value
+from sprag.service.spec.plan.robust import ROBUST, YIELD, check_drives, read_quantile, refuse_beside_yield
 from sprag.service.spec.report import Report, did_you_mean, join
-from sprag.service.spec.shares import in_percent
+from sprag.service.spec.shares import in_percent, read_share
 from sprag.worker.limits import MAX_PLANNED_CASES
 
 if TYPE_CHECKING:
@@ -121,6 +122,7 @@ def read_goal(
     data: Mapping[str, Any],
     variables: Variables,
     points: list[dict[str, float]],
+    drives: int = 0,
 ) -> dict[str, Any] | None:
     """The plan of a study with a goal as plain JSON data; None, and the faults recorded, where it is invalid.
 
@@ -129,6 +131,7 @@ def read_goal(
     infos : the results of the study
     data : the field `goal` of the spec
     variables, points : as `read_variables` and `read_points` give them
+    drives : number of drawn drives; 0 without tolerances
     """
     before = report.found
     best = _read_best(report, data.get("best", []), infos)
@@ -136,68 +139,117 @@ def read_goal(
     search = {name: field.read(report, "/goal", data) for name, field in SEARCH.items()}
     if not report.found > before and not best and not constraints:
         report.fault("/goal", "empty", "asks for nothing", allowed="`best` or `subject_to`, or both")
+    if report.found == before:
+        check_drives(report, best, constraints, drives)
     if report.found > before:
         return None
-    most = search["population"] * search["generations"] * max(len(points), 1)
+    most = search["population"] * search["generations"] * max(len(points), 1) * (1 + drives)
     if most > MAX_PLANNED_CASES:
+        each = f", with {drives:,} drawn drives of each design and the nominal one" if drives else ""
         report.fault(
-            "/goal/generations", "too-many", f"the generations have {most:,} cases together", search["generations"],
-            allowed=f"at most {MAX_PLANNED_CASES:,} cases",
+            "/goal/generations", "too-many", f"the generations have {most:,} cases together{each}",
+            search["generations"], allowed=f"at most {MAX_PLANNED_CASES:,} cases",
         )  # fmt: skip
         return None
-    return {"kind": "goal", "vary": variables, "best": best, "subject_to": constraints, "at": points, **search}
+    plan = {"kind": "goal", "vary": variables, "best": best, "subject_to": constraints, "at": points, **search}
+    return plan | ({"drives": drives} if drives else {})
 
 
 def _read_best(report: Report, data: object, infos: Sequence[ResultInfo]) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = []
     for index, item in enumerate(BEST.read(report, "/goal/best", data) or ()):
         where = join("/goal/best", index)
-        fields = read_object(report, where, item, ("result", "max"))
+        fields = read_object(report, where, item, ("result", "max", *ROBUST))
         if fields is None:
+            continue
+        if "yield" in fields:
+            found += _read_yield_goal(report, where, fields, infos)
             continue
         info = read_result(report, join(where, "result"), fields.get("result"), infos)
         largest = MAX.read(report, where, fields)
-        if info is None or largest is None:
+        quantile = read_quantile(report, where, fields)
+        if info is None or largest is None or quantile is None:
             continue
         if info.kind == "category":
             report.fault(
                 join(where, "result"), "not-numeric", "is a category, not a number", info.name,
                 allowed="a result with a number",
             )  # fmt: skip
-        elif any(goal["result"] == info.name for goal in found):
+        elif any((goal.get("result"), goal.get("quantile")) == (info.name, quantile.get("quantile")) for goal in found):
             report.fault(join(where, "result"), "repeated", "is a goal already", info.name, allowed="each result once")
         else:
-            found.append({"result": info.name, "max": largest})
+            found.append({"result": info.name, **quantile, "max": largest})
     return found
+
+
+def _read_yield_goal(
+    report: Report, where: str, fields: Mapping[str, Any], infos: Sequence[ResultInfo]
+) -> list[dict[str, Any]]:
+    """The goal of a large yield; nothing, and faults recorded, where it is invalid."""
+    refuse_beside_yield(report, where, fields, ("result", "quantile"))
+    if fields.get("max", True) is not True:
+        report.fault(join(where, "max"), "conflict", "a yield is to be large", fields["max"], allowed="true")
+        return []
+    conditions = _read_conditions(report, where, fields, infos)
+    return [{"yield": conditions, "max": True}] if conditions else []
+
+
+def _read_conditions(
+    report: Report, where: str, fields: Mapping[str, Any], infos: Sequence[ResultInfo]
+) -> list[dict[str, Any]]:
+    """The conditions of a yield; nothing, and faults recorded, where one is invalid."""
+    pointer, before = join(where, "yield"), report.found
+    items = YIELD.read(report, pointer, fields["yield"]) or ()
+    read = [_read_constraint(report, join(pointer, index), item, infos) for index, item in enumerate(items)]
+    return [] if report.found > before else [condition for condition in read if condition]
 
 
 def _read_constraints(report: Report, data: object, infos: Sequence[ResultInfo]) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = []
-    for index, item in enumerate(SUBJECT_TO.read(report, "/goal/subject_to", data) or ()):
-        where = join("/goal/subject_to", index)
-        fields = read_object(report, where, item, ("result", *_KINDS, "within"))
-        if fields is None:
-            continue
-        info = read_result(report, join(where, "result"), fields.get("result"), infos)
-        kind = read_one(report, where, {name: 0 for name in fields if name in _KINDS}, _KINDS)
-        if info is None or kind is None:
-            continue
-        if info.kind == "category" and kind != "is":
-            report.fault(
-                join(where, kind), "not-numeric", "compares a category", fields[kind], allowed="`is` for a category"
-            )
-            continue
-        value = read_value(report, join(where, kind), fields[kind], info)
-        if value is not None and kind == "is" and info.kind == "count" and not value.is_integer():
-            report.fault(
-                join(where, kind), "not-a-number", "must be a whole number", fields[kind],
-                allowed="a whole number, or at_least and at_most",
-            )  # fmt: skip
-            continue
-        within = _read_within(report, where, fields, info, kind, value)
-        if value is not None and within is not None:
-            found.append({"result": info.name, kind: value, **({"within": within} if within else {})})
-    return found
+    items = SUBJECT_TO.read(report, "/goal/subject_to", data) or ()
+    read = [
+        _read_constraint(report, join("/goal/subject_to", index), item, infos, robust=True)
+        for index, item in enumerate(items)
+    ]
+    return [constraint for constraint in read if constraint]
+
+
+def _read_constraint(
+    report: Report, where: str, item: object, infos: Sequence[ResultInfo], *, robust: bool = False
+) -> dict[str, Any] | None:
+    """One constraint; None, and the faults recorded, where it is invalid. ``robust``: of a quantile or a yield, too."""
+    fields = read_object(report, where, item, ("result", *_KINDS, "within", *(ROBUST if robust else ())))
+    if fields is None:
+        return None
+    if robust and "yield" in fields:
+        refuse_beside_yield(report, where, fields, ("result", "quantile", "is", "at_most", "within"))
+        conditions = _read_conditions(report, where, fields, infos)
+        least = read_share(report, join(where, "at_least"), fields.get("at_least"), 0.0, 1.0)
+        return None if least is None or not conditions else {"yield": conditions, "at_least": least}
+    info = read_result(report, join(where, "result"), fields.get("result"), infos)
+    kind = read_one(report, where, {name: 0 for name in fields if name in _KINDS}, _KINDS)
+    quantile = read_quantile(report, where, fields)
+    if info is None or kind is None or quantile is None:
+        return None
+    if quantile and kind == "is":
+        report.fault(join(where, "quantile"), "conflict", "cannot be combined with `is`", fields["quantile"],
+                     allowed="at_least or at_most")  # fmt: skip
+        return None
+    if info.kind == "category" and kind != "is":
+        report.fault(
+            join(where, kind), "not-numeric", "compares a category", fields[kind], allowed="`is` for a category"
+        )
+        return None
+    value = read_value(report, join(where, kind), fields[kind], info)
+    if value is not None and kind == "is" and info.kind == "count" and not value.is_integer():
+        report.fault(
+            join(where, kind), "not-a-number", "must be a whole number", fields[kind],
+            allowed="a whole number, or at_least and at_most",
+        )  # fmt: skip
+        return None
+    within = _read_within(report, where, fields, info, kind, value)
+    if value is None or within is None:
+        return None
+    return {"result": info.name, **quantile, kind: value, **({"within": within} if within else {})}
 
 
 def _read_within(

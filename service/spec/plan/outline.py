@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from sprag.service.spec.machine.machine import Machine
     from sprag.worker.models import ResultInfo
+    from sprag.worker.spread import Spread
 
 #: Fields of a spec by which a study chooses its own cases.
 FIELDS: Final = ("refine", "goal", "calibrate")
@@ -30,11 +31,13 @@ FIELDS: Final = ("refine", "goal", "calibrate")
 class Outline:
     """What a study can vary, as zipped axes with the ends of each range, and how its plan is read.
 
-    The plan needs the results of the study, which are only known with its machine and its run.
+    The plan needs the results of the study, which are only known with its machine and its run. ``with_drives`` gives
+    the outline with that many drawn drives of each case; None where cases have none.
     """
 
     axes: tuple[Axis, ...]
     plan: Callable[[Report, Sequence[ResultInfo]], dict[str, Any] | None]
+    with_drives: Callable[[int], Outline] | None = None
 
 
 def chooses(found: Mapping[str, Any]) -> bool:
@@ -83,7 +86,9 @@ def _goal(report: Report, found: Mapping[str, Any], machine: Machine) -> Outline
         return None
     ends = [(tuple(v["paths"]), v.get("values") or (v["low"], v["high"])) for v in variables]
     ends += [((path,), [point[path] for point in points]) for path in (points[0] if points else ())]
-    return Outline(_zipped(ends), partial(goal.read_goal, data=data, variables=variables, points=points))
+    plan = partial(goal.read_goal, data=data, variables=variables, points=points)
+    outline = Outline(_zipped(ends), plan)
+    return replace(outline, with_drives=lambda drives: replace(outline, plan=partial(plan, drives=drives)))
 
 
 def _calibrate(report: Report, found: Mapping[str, Any], machine: Machine) -> Outline | None:
@@ -104,12 +109,14 @@ def _zipped(ends: Sequence[tuple[tuple[str, ...], Sequence[float]]]) -> tuple[Ax
     return tuple(Axis(paths, np.resize(np.asarray(values, dtype=np.float64), length)) for paths, values in ends)
 
 
-def first_round(report: Report, study: Study, outline: Outline) -> Study:
-    """``study`` with its plan and the cases of its first round; SpecError where the plan is invalid."""
+def first_round(report: Report, study: Study, outline: Outline, spread: Spread | None = None) -> Study:
+    """``study`` with its plan, its tolerances and the cases of its first round; SpecError where the plan is invalid."""
+    if spread is not None and outline.with_drives is not None:
+        outline = outline.with_drives(spread.drives)
     plan = outline.plan(report, models.study_results(study))
     report.raise_if_any()
     assert plan is not None
     planner = planner_of(plan)
     points = planner.ask().points
     axes = tuple(Axis(paths, column) for paths, column in zip(planner.paths, points.T, strict=True))
-    return replace(study, axes=axes, combine="zip", plan=plan)
+    return replace(study, axes=axes, combine="zip", plan=plan, spread=spread)

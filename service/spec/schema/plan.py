@@ -8,6 +8,7 @@ from sprag.service.spec.described import Listed
 from sprag.service.spec.plan.calibrate import CSV_HELP, OTHER, UNKNOWN
 from sprag.service.spec.plan.goal import AT, BEST, MAX, SEARCH, SUBJECT_TO, VARY, WITHIN
 from sprag.service.spec.plan.refine import ERROR, FINEST, MOST, RESULTS, START
+from sprag.service.spec.plan.robust import QUANTILE, YIELD
 from sprag.service.spec.schema.quantity import QUANTITY, Schema, object_schema
 
 _RESULT: Final[Schema] = {"type": "string", "examples": ["shaft.speed.mean", "efficiency", "torque.max"]}
@@ -51,17 +52,28 @@ def goal_schema(path: Schema) -> Schema:
         },
         required=("path",),
     )
-    best = object_schema({"result": _RESULT, "max": MAX.schema()}, required=("result",))
-    constraint = object_schema(
-        {
-            "result": _RESULT,
-            "is": {**QUANTITY, "description": "value that the result must have"},
-            "within": WITHIN.schema(),
-            "at_least": QUANTITY,
-            "at_most": QUANTITY,
-        },
-        required=("result",),
-    )
+    limits: dict[str, Schema] = {
+        "result": _RESULT,
+        "is": {**QUANTITY, "description": "value that the result must have"},
+        "within": WITHIN.schema(),
+        "at_least": QUANTITY,
+        "at_most": QUANTITY,
+    }
+    quantile = {"type": ["number", "string"], "description": f"{QUANTILE.help}: {QUANTILE.limits}"}
+    conditions = YIELD.schema(object_schema(limits, required=("result",)))
+    share = {"type": ["number", "string"], "description": 'a share, as in "90 %"'}
+    best = {
+        "anyOf": [
+            object_schema({"result": _RESULT, "max": MAX.schema(), "quantile": quantile}, required=("result",)),
+            object_schema({"yield": conditions, "max": {"const": True}}, required=("yield",)),
+        ]
+    }
+    constraint = {
+        "anyOf": [
+            object_schema({**limits, "quantile": quantile}, required=("result",)),
+            object_schema({"yield": conditions, "at_least": share}, required=("yield", "at_least")),
+        ]
+    }
     point = {"type": "object", "minProperties": 1, "additionalProperties": QUANTITY}
     return object_schema(
         {

@@ -36,7 +36,7 @@ class Front:
     miss : float64 array, shape (designs,)
         Largest relative distance from the value of an equality of real numbers; 0 without one, NaN where missing.
     cases : int64 array, shape (designs, operating points)
-        Numbers of the rows.
+        Numbers of the rows, with drives those of the nominal one.
     """
 
     variables: NDArray[np.float64]
@@ -66,18 +66,18 @@ def front(plan: GoalPlan, rows: Rows, *, equality: float | None = None) -> Front
     ValueError
         If the last design lacks rows.
     """
-    points = len(plan.at)
-    if len(rows.points) % points:
-        raise ValueError(f"{len(rows.points)} rows are not those of whole designs, which have {points} each")
+    each = plan.cases_each
+    if len(rows.points) % each:
+        raise ValueError(f"{len(rows.points)} rows are not those of whole designs, which have {each} each")
     outputs = outputs_of(plan, rows)
     scores = judge(plan, outputs, equality=equality)
     return Front(
-        variables=rows.points[::points, : len(plan.vary)],
+        variables=rows.points[::each, : len(plan.vary)],
         goals=scores.goals * signs(plan),
         violation=scores.violation,
         feasible=scores.feasible,
         failed=scores.failed,
         rank=ranks(scores),
         miss=misses(plan, outputs),
-        cases=np.arange(len(rows.points), dtype=np.int64).reshape(-1, points),
+        cases=np.arange(len(rows.points), dtype=np.int64).reshape(-1, each)[:, :: 1 + plan.drives],
     )

@@ -7,6 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
+from sprag.worker.limits import MAX_DRIVES
+from sprag.worker.spread import DRIVE
+
 #: Value of "kind" in the plan.
 GOAL: Final = "goal"
 #: Bounds of a plan: designs of one generation, generations, designs in all.
@@ -37,12 +43,48 @@ class Variable:
     values: tuple[float, ...] = ()
 
 
+def name_of(item: Goal | Limit) -> str:
+    """What a goal or a limit is about: "torque.max", "torque.max (95 % quantile)", "yield (torque.max at most 3)"."""
+    if not item.conditions:
+        return item.result + ("" if item.quantile is None else f" ({100.0 * item.quantile:.10g} % quantile)")
+    words = {"is": "is", "at_least": "at least", "at_most": "at most"}
+    return f"yield ({' and '.join(f'{one.result} {words[one.kind]} {one.value:.6g}' for one in item.conditions)})"
+
+
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A result that is to be as large (``max``) or as small as possible."""
+    """A result that is to be as large (``max``) or as small as possible.
+
+    Attributes
+    ----------
+    result : str
+        "" for a yield.
+    max : bool
+    quantile : float, optional
+        A quantile of the result over the drawn drives, 0 to 1; by default the result of the nominal drive.
+    conditions : tuple of Limit
+        The goal is the yield instead: the share of the drawn drives that meet them all at every operating point.
+    """
 
     result: str
     max: bool
+    quantile: float | None = None
+    conditions: tuple[Limit, ...] = ()
+
+    @property
+    def robust(self) -> bool:
+        """Whether it is about the drawn drives."""
+        return self.quantile is not None or bool(self.conditions)
+
+    @property
+    def upwards(self) -> bool:
+        """Whether larger values are better."""
+        return self.max
+
+    @property
+    def name(self) -> str:
+        """The name of what it is about: that of its result, with its quantile, or the yield with its conditions."""
+        return name_of(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,12 +98,38 @@ class Limit:
     value : float
     within : float
         Half width of the band around ``value`` of an equality; 0 for a category or a count, which must be equal.
+    quantile, conditions : as of `Goal`; neither goes with "is"
     """
 
     result: str
     kind: Kind
     value: float
     within: float = 0.0
+    quantile: float | None = None
+    conditions: tuple[Limit, ...] = ()
+
+    @property
+    def robust(self) -> bool:
+        """Whether it is about the drawn drives."""
+        return self.quantile is not None or bool(self.conditions)
+
+    @property
+    def upwards(self) -> bool:
+        """Whether larger values are better."""
+        return self.kind == "at_least"
+
+    @property
+    def name(self) -> str:
+        """The name of what it is about: that of its result, with its quantile, or the yield with its conditions."""
+        return name_of(self)
+
+    def holds(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Where values meet it; a missing one (NaN) does not."""
+        if self.kind == "at_least":
+            return values >= self.value
+        if self.kind == "at_most":
+            return values <= self.value
+        return np.abs(values - self.value) <= self.within
 
     @property
     def polished(self) -> bool:
@@ -91,6 +159,8 @@ class GoalPlan:
     population, generations, seed : int
     polish : bool
         Whether equalities are met to 1e-6 by further rounds after the last generation.
+    drives : int
+        Drawn drives of each design at each operating point, beside the nominal one; 0 without tolerances.
 
     Raises
     ------
@@ -107,6 +177,7 @@ class GoalPlan:
     generations: int = 60
     seed: int = 1
     polish: bool = True
+    drives: int = 0
 
     def __post_init__(self) -> None:
         _check_variables(self)
@@ -114,12 +185,14 @@ class GoalPlan:
             _check(math.isfinite(limit.value), f"subject_to.{i}.{limit.kind}", limit.value, "a finite number")
             within = f"subject_to.{i}.within"
             _check(0.0 <= limit.within < math.inf, within, limit.within, "a finite number of at least 0")
+        _check_robust(self)
         _check(bool(self.best or self.subject_to), "best", [], "at least one goal, or a limit in subject_to")
         _check(self.over in {"worst", "mean"}, "over", self.over, "worst or mean")
         for name, value, (low, high) in (
             ("population", self.population, POPULATION),
             ("generations", self.generations, GENERATIONS),
             ("seed", self.seed, (0, 2**63 - 1)),
+            ("drives", self.drives, (0, MAX_DRIVES)),
         ):
             _check(low <= value <= high, name, value, f"an integer from {low:,} to {high:,}")
         designs = self.population * self.generations
@@ -132,14 +205,25 @@ class GoalPlan:
 
     @property
     def paths(self) -> tuple[tuple[str, ...], ...]:
-        """What each column of the points varies: the variables in their order, then the paths of ``at``."""
-        return (*(one.paths for one in self.vary), *((path,) for path in self.at_paths))
+        """What each column of the points varies: the variables in their order, the paths of ``at``, the drive."""
+        drive = ((DRIVE,),) if self.drives else ()
+        return (*(one.paths for one in self.vary), *((path,) for path in self.at_paths), *drive)
+
+    @property
+    def cases_each(self) -> int:
+        """Cases of each design: one for each operating point and drive, the drive varying fastest."""
+        return len(self.at) * (1 + self.drives)
 
     @property
     def results(self) -> tuple[str, ...]:
         """Names of the results of goals and limits, each once."""
-        names = [goal.result for goal in self.best] + [limit.result for limit in self.subject_to]
-        return tuple(dict.fromkeys(names))
+        inner = (condition for item in self.items for condition in item.conditions)
+        return tuple(dict.fromkeys(item.result for item in (*self.items, *inner) if item.result))
+
+    @property
+    def items(self) -> tuple[Goal | Limit, ...]:
+        """Goals, then limits."""
+        return (*self.best, *self.subject_to)
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> GoalPlan:
@@ -153,7 +237,7 @@ class GoalPlan:
         try:
             return cls(
                 vary=tuple(_variable(one) for one in data["vary"]),
-                best=tuple(Goal(str(one["result"]), bool(one["max"])) for one in data.get("best", ())),
+                best=tuple(_goal(one) for one in data.get("best", ())),
                 subject_to=tuple(_limit(i, one) for i, one in enumerate(data.get("subject_to", ()))),
                 at=tuple(_point(one) for one in data.get("at") or [{}]),
                 over=data.get("over", "worst"),
@@ -161,6 +245,7 @@ class GoalPlan:
                 generations=int(data["generations"]),
                 seed=int(data["seed"]),
                 polish=bool(data.get("polish", True)),
+                drives=int(data.get("drives", 0)),
             )
         except KeyError as error:
             raise ValueError(f"goal: {error.args[0]} is missing") from error
@@ -173,27 +258,46 @@ class GoalPlan:
             else {"paths": list(one.paths), "low": one.low, "high": one.high}
             for one in self.vary
         ]
-        limits = [
-            {"result": one.result, one.kind: one.value} | ({"within": one.within} if one.within else {})
-            for one in self.subject_to
-        ]
         return {
             "kind": GOAL,
             "vary": vary,
-            "best": [{"result": one.result, "max": one.max} for one in self.best],
-            "subject_to": limits,
+            "best": [{**_about(one), "max": one.max} for one in self.best],
+            "subject_to": [_limit_json(one) for one in self.subject_to],
             "at": [dict(one) for one in self.at],
             "over": self.over,
             "population": self.population,
             "generations": self.generations,
             "seed": self.seed,
             "polish": self.polish,
+            **({"drives": self.drives} if self.drives else {}),
         }
 
 
 def _check(holds: bool, name: str, value: object, allowed: str) -> None:
     if not holds:
         raise ValueError(f"goal.{name} is {value}; allowed: {allowed}")
+
+
+def _check_robust(plan: GoalPlan) -> None:
+    for i, one in enumerate(plan.items):
+        first = len(plan.best)
+        name = f"best.{i}" if i < first else f"subject_to.{i - first}"
+        _check(plan.drives > 0 or not one.robust, name, one.name, "a result, without drawn drives")
+        quantile = one.quantile
+        _check(quantile is None or 0.0 <= quantile <= 1.0, f"{name}.quantile", quantile, "0 to 1")
+        _check(bool(one.result) != bool(one.conditions), name, one.result, "a result, or a yield")
+        _check(not (one.robust and isinstance(one, Limit) and one.kind == "is"), name, "is", "at_least or at_most")
+
+
+def _about(one: Goal | Limit) -> dict[str, Any]:
+    """What a goal or a limit is about, as plain JSON data."""
+    if one.conditions:
+        return {"yield": [_limit_json(condition) for condition in one.conditions]}
+    return {"result": one.result, **({} if one.quantile is None else {"quantile": one.quantile})}
+
+
+def _limit_json(one: Limit) -> dict[str, Any]:
+    return {**_about(one), one.kind: one.value, **({"within": one.within} if one.within else {})}
 
 
 def _check_variables(plan: GoalPlan) -> None:
@@ -236,4 +340,17 @@ def _point(data: Mapping[str, Any]) -> dict[str, float]:
 def _limit(i: int, data: Mapping[str, Any]) -> Limit:
     kinds = [kind for kind in _KINDS if kind in data]
     _check(len(kinds) == 1, f"subject_to.{i}", sorted(data), "one of is, at_least and at_most")
-    return Limit(str(data["result"]), kinds[0], float(data[kinds[0]]), float(data.get("within", 0.0)))
+    within, (result, quantile, conditions) = float(data.get("within", 0.0)), _read_about(data)
+    return Limit(result, kinds[0], float(data[kinds[0]]), within, quantile, conditions)
+
+
+def _goal(data: Mapping[str, Any]) -> Goal:
+    result, quantile, conditions = _read_about(data)
+    return Goal(result, bool(data["max"]), quantile, conditions)
+
+
+def _read_about(data: Mapping[str, Any]) -> tuple[str, float | None, tuple[Limit, ...]]:
+    if "yield" in data:
+        return "", None, tuple(_limit(i, one) for i, one in enumerate(data["yield"]))
+    quantile = data.get("quantile")
+    return str(data["result"]), None if quantile is None else float(quantile), ()

@@ -45,8 +45,8 @@ class GoalPlanner:
     One goal is searched for by CMA-ES, several or none by NSGA-II; then equalities are polished.
 
     A round is a generation, without the designs that were evaluated before, or a step of the polish. Columns of the
-    points are the variables of the plan in their order, then the paths of its operating points; the cases of a design,
-    one for each operating point, are stored next to each other.
+    points are the variables of the plan in their order, then the paths of its operating points, then the drive; the
+    cases of a design, one for each operating point and drive, are stored next to each other.
     """
 
     def __init__(self, plan: GoalPlan) -> None:
@@ -81,7 +81,7 @@ class GoalPlanner:
     @property
     def most_cases(self) -> int:
         """Cases of a search in which no design comes twice, with the longest polish."""
-        return (self.plan.population * self.plan.generations + polish_designs(self.plan)) * len(self.plan.at)
+        return (self.plan.population * self.plan.generations + polish_designs(self.plan)) * self.plan.cases_each
 
     @property
     def most_rounds(self) -> int:
@@ -164,7 +164,7 @@ class GoalPlanner:
                 return
             else:
                 self._propose(self._polish_begun().propose())
-            if self._cases + len(self._asked) * len(self.plan.at) > self.most_cases:
+            if self._cases + len(self._asked) * self.plan.cases_each > self.most_cases:
                 self._propose(self._proposed[:0])
                 return
             if len(self._asked):

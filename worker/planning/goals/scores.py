@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.worker.planning.goals.linear import weighted_sum
+from sprag.worker.planning.goals.robust import Table
 
 if TYPE_CHECKING:
     from sprag.worker.planning.goals.plan import GoalPlan, Limit
@@ -69,19 +70,13 @@ def joined(first: Scores, second: Scores) -> Scores:
 def outputs_of(plan: GoalPlan, rows: Rows) -> Floats:
     """What designs are judged by, shape (designs, limits x points + goals + 1).
 
-    The columns are the result of each limit at each operating point, the goals taken over the operating points, and
-    1 where a case has failed, otherwise 0. Values that are missing or not finite are NaN.
+    The columns are what each limit is about at each operating point, the goals taken over the operating points, and 1
+    where a case has failed (of drawn drives: all of them), otherwise 0. Values that are missing or not finite are NaN.
     """
-    points = len(plan.at)
-    designs = len(rows.points) // points
-    by_name = {
-        name: np.where(np.isfinite(values), values, np.nan).reshape(designs, points)
-        for name, values in ((name, rows.values[name]) for name in plan.results)
-    }
-    goals = [_over_points(plan.over, by_name[goal.result], goal.max) for goal in plan.best]
-    failed = ~rows.ok.reshape(designs, points).all(axis=1)
-    columns = [by_name[limit.result] for limit in plan.subject_to]
-    columns += [one.reshape(designs, 1) for one in (*goals, failed.astype(np.float64))]
+    table = Table(plan, rows)
+    goals = [_over_points(plan.over, table.values(goal), goal.max) for goal in plan.best]
+    columns = [table.values(limit) for limit in plan.subject_to]
+    columns += [one[:, None] for one in (*goals, table.failed.astype(np.float64))]
     return np.hstack(columns)
 
 

@@ -33,7 +33,7 @@ class Space:
         self._vary = plan.vary
         self._low = np.array([one.low for one in plan.vary])
         self._high = np.array([one.high for one in plan.vary])
-        self._at = np.array([[point[path] for path in plan.at_paths] for point in plan.at])
+        self._at = _cases_of_a_design(plan)
         self.dimensions = len(plan.vary)
         self.counts = np.array([len(one.values) for one in plan.vary], dtype=np.int64)
         self.size = math.prod(self.counts.tolist()) if self.counts.all() else None
@@ -59,7 +59,7 @@ class Space:
         return middle
 
     def cases(self, designs: Floats) -> Floats:
-        """The cases of designs: those of a design are next to each other, one for each operating point."""
+        """The cases of designs: those of a design are next to each other, one for each operating point and drive."""
         points = len(self._at)
         rows = np.repeat(designs, points, axis=0)
         return np.hstack([rows, np.tile(self._at.reshape(points, -1), (len(designs), 1))])
@@ -86,6 +86,15 @@ class Space:
             value = designs[~inside[:, i], i][0]
             raise ValueError(f"{self._vary[i].paths[0]}: {value} is not a value of this search")
         return designs, coordinates
+
+
+def _cases_of_a_design(plan: GoalPlan) -> Floats:
+    """Operating point and drive of each case of a design, shape (cases, paths)."""
+    points = np.array([[point[path] for path in plan.at_paths] for point in plan.at]).reshape(len(plan.at), -1)
+    if not plan.drives:
+        return points
+    drives = np.arange(1.0 + plan.drives)
+    return np.column_stack([np.repeat(points, drives.size, axis=0), np.tile(drives, len(points))])
 
 
 def keys(designs: Floats) -> list[bytes]:

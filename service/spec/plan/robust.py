@@ -1,0 +1,59 @@
+"""Goals about the drives of a design: quantiles of results, and the yield."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+from sprag.service.spec.described import Described, Listed
+from sprag.service.spec.report import Report, join
+from sprag.service.spec.shares import read_share
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+#: Fields of a goal or a constraint about the drives.
+ROBUST: Final = ("quantile", "yield")
+QUANTILE: Final = Described(
+    "quantile", "", "the quantile of the result over the drawn drives instead of that of the nominal drive", "text",
+    limits='a share, as in "5 %"',
+)  # fmt: skip
+YIELD: Final = Listed(
+    "conditions", 1, 32, "the share of the drawn drives that meet all these conditions at every operating point"
+)
+
+
+def read_quantile(report: Report, where: str, fields: Mapping[str, Any]) -> dict[str, float] | None:
+    """The quantile of a goal or a constraint, by name; empty without one, None, and a fault recorded, if invalid."""
+    if "quantile" not in fields:
+        return {}
+    share = read_share(report, join(where, "quantile"), fields["quantile"], 0.0, 1.0)
+    return None if share is None else {"quantile": share}
+
+
+def refuse_beside_yield(report: Report, where: str, fields: Mapping[str, Any], names: Iterable[str]) -> None:
+    """Record each of the fields ``names`` that is given beside `yield`."""
+    for name in names:
+        if name in fields:
+            report.fault(join(where, name), "conflict", "cannot be combined with `yield`", fields[name])
+
+
+def check_drives(
+    report: Report, best: Sequence[Mapping[str, Any]], constraints: Sequence[Mapping[str, Any]], drives: int
+) -> None:
+    """Record goals about drives in a study without tolerances, and tolerances without such a goal."""
+    about = [
+        (join(f"/goal/{part}", index), name)
+        for part, items in (("best", best), ("subject_to", constraints))
+        for index, item in enumerate(items)
+        for name in ROBUST
+        if name in item
+    ]
+    if drives and not about:
+        report.fault(
+            "/tolerances", "not-used", "have no effect on this goal", allowed="goals or constraints with `quantile` or "
+            "`yield`; a study of a design afterwards shows what tolerances make of it",
+        )  # fmt: skip
+    for where, name in about if not drives else ():
+        report.fault(join(where, name), "conflict", "is about the drives, of which there is one only",
+                     allowed="`tolerances` in the spec")  # fmt: skip

@@ -1,0 +1,143 @@
+"""Studies that search for designs whose drives differ: spec, rounds without an engine, answers and pages."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+from sprag.service.results.fronts import designs_of
+from sprag.service.spec.design import design_spec
+from sprag.service.spec.document import SpecError, parse_spec
+from sprag.service.spec.schema.document import spec_schema
+from sprag.worker.rounds import Rounds
+from sprag.worker.spread import DRIVE
+from tests.service.searching import run_round, spec_of
+
+if TYPE_CHECKING:
+    from tests.service.conftest import Service
+
+SPEED = {"result": "shaft.speed.mean", "quantile": "25 %", "at_least": "6 rad/s"}
+YIELD = {"yield": [{"result": "shaft.speed.mean", "at_least": "6 rad/s"}], "at_least": "75 %"}
+DRIVES = 8
+
+
+def robust(**fields: Any) -> dict[str, Any]:
+    """A search for the best efficiency of a quarter of the drives; the amplitude, with a tolerance, sets the speed."""
+    spec = spec_of(
+        best=[{"result": "efficiency", "max": True, "quantile": "25 %"}], subject_to=[SPEED, YIELD], **fields
+    )
+    amplitudes = ["excitation.amplitude_x", "excitation.amplitude_y"]
+    tolerances = [
+        {"path": amplitudes, "plus_minus": "30 %", "shared": True},
+        {"path": "shaft.load", "plus_minus": "10 %"},
+    ]
+    return {**spec, "tolerances": tolerances, "drives": DRIVES}
+
+
+def test_each_design_is_run_with_every_drive_at_every_operating_point() -> None:
+    spec = robust()
+    jsonschema.validate(spec, spec_schema())
+    study = parse_spec(spec).study
+    assert study.plan is not None
+    assert (study.plan["drives"], study.plan["best"]) == (8, [{"result": "efficiency", "quantile": 0.25, "max": True}])
+    assert study.cases == 8 * 2 * (DRIVES + 1)
+    columns = study.columns(range(study.cases))
+    np.testing.assert_array_equal(columns[DRIVE], np.tile(np.arange(DRIVES + 1.0), 16))
+    loads = columns["shaft.load"].reshape(8, 2, DRIVES + 1)
+    assert (loads[:, :, 0] == [0.2, 0.3]).all()
+    np.testing.assert_allclose(loads / loads[:, :, :1], np.broadcast_to(loads[0, 0] / 0.2, loads.shape), rtol=1e-12)
+    without = {name: value for name, value in spec.items() if name not in {"tolerances", "drives"}}
+    without["goal"] = {**spec["goal"], "best": [{"result": "efficiency", "max": True}], "subject_to": []}
+    plain = parse_spec(without).study
+    assert plain.plan is not None
+    assert "drives" not in plain.plan
+
+
+@pytest.fixture
+def ended(service: Service) -> tuple[Service, str]:
+    """Such a study after all its rounds."""
+    study_id = service.submit(robust())
+    store = service.store
+    number, epoch, planner = store.get_study(study_id).number, store.take_over("test"), Rounds(store)
+    for _ in range(9):
+        run_round(store, number, epoch)
+        if planner.advance(epoch, number, store.study(study_id)) is None:
+            break
+    return service, study_id
+
+
+def test_the_designs_have_their_quantiles_and_yields(ended: tuple[Service, str]) -> None:
+    service, study_id = ended
+    found = service.get(f"/studies/{study_id}/front")
+    speed, share = (limit["result"] for limit in found["subject_to"])
+    assert speed == "shaft.speed.mean (25 % quantile)"
+    assert share == "yield (shaft.speed.mean at least 6)"
+    assert found["best"][0]["result"] == "efficiency (25 % quantile)"
+    assert found["counts"]["known"] == 16
+    study = service.store.study(study_id)
+    columns = study.columns(range(study.cases))
+    for design in found["designs"]:
+        first = design["cases"][0]
+        assert design["cases"] == [first, first + DRIVES + 1]
+        if design["failed"]:
+            continue
+        speeds = 4000.0 * columns["excitation.amplitude_x"][first + 1 : first + 1 + DRIVES]
+        assert design["results"][speed] == [pytest.approx(np.sort(speeds)[1])] * 2
+        assert design["results"][share] == [pytest.approx((speeds >= 6.0).mean())] * 2
+        assert design["feasible"] == bool(np.sort(speeds)[1] >= 6.0 and (speeds >= 6.0).mean() >= 0.75)
+    table = service.http.get(f"/api/v1/studies/{study_id}/front", params={"format": "csv"})
+    assert "efficiency (25 % quantile)" in table.text
+    for page in ("", "/front", "/cases", "/curves"):
+        assert service.http.get(f"/studies/{study_id}{page}").status_code == 200
+    assert service.http.get(f"/studies/{study_id}/figures/front").status_code == 200
+
+
+def test_a_design_is_studied_further_with_the_same_drives(ended: tuple[Service, str]) -> None:
+    service, study_id = ended
+    spec, study = service.store.spec(study_id), service.store.study(study_id)
+    own = parse_spec(design_spec(spec, study, 0)).study
+    assert own.shape == (DRIVES + 1,)
+    assert own.spread == study.spread
+    drawn = parse_spec(design_spec(spec, study, 3)).study
+    assert drawn.spread is None
+    assert drawn.base["shaft.load"] == study.case_parameters(3)["shaft.load"]
+
+
+def test_designs_of_unfinished_rounds_are_pending(service: Service) -> None:
+    study_id = service.submit(robust())
+    study = service.store.study(study_id)
+
+    def fetch(cases: Any, names: Any) -> Any:
+        return service.store.rows_for_cases(study_id, cases, names)
+
+    assert designs_of(study, [], fetch).pending == 8
+
+
+@pytest.mark.parametrize(
+    ("fields", "pointer", "code"),
+    [
+        ({"goal": {"subject_to": [], "best": [{"result": "efficiency"}]}}, "/tolerances", "not-used"),
+        ({"tolerances": ...}, "/drives", "not-used"),
+        ({"tolerances": ..., "drives": ...}, "/goal/best/0/quantile", "conflict"),
+        ({"goal": {"best": [{"result": "efficiency", "quantile": "120 %"}]}}, "/goal/best/0/quantile", "out-of-range"),
+        ({"goal": {"best": [{"yield": [], "max": True}]}}, "/goal/best/0/yield", "wrong-type"),
+        ({"goal": {"best": [{"yield": YIELD["yield"], "max": False}]}}, "/goal/best/0/max", "conflict"),
+        ({"goal": {"subject_to": [{**SPEED, "yield": YIELD["yield"]}]}}, "/goal/subject_to/0/result", "conflict"),
+        ({"goal": {"subject_to": [{"yield": YIELD["yield"]}]}}, "/goal/subject_to/0/at_least", "not-a-number"),
+        ({"goal": {"subject_to": [{"yield": [SPEED], "at_least": 0.9}]}}, "/goal/subject_to/0/yield/0/quantile",
+         "unknown-field"),
+        ({"goal": {"subject_to": [{"result": "efficiency", "is": 0.2, "quantile": "5 %"}]}},
+         "/goal/subject_to/0/quantile", "conflict"),
+        ({"goal": {"population": 100, "generations": 60}}, "/goal/generations", "too-many"),
+    ],
+)  # fmt: skip
+def test_what_is_refused_names_its_place(fields: dict[str, Any], pointer: str, code: str) -> None:
+    spec = robust()
+    changes = {**fields, "goal": {**spec["goal"], **fields.get("goal", {})}}
+    spec = {name: value for name, value in {**spec, **changes}.items() if value is not ...}
+    with pytest.raises(SpecError) as caught:
+        parse_spec(spec)
+    assert {fault.where: fault.code for fault in caught.value.faults}[pointer] == code

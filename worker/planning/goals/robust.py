@@ -1,0 +1,74 @@
+"""What a result is worth over the drives of a design: that of the nominal drive, a quantile, or the yield.
+
+Drive 0 is nominal, the others are drawn; all designs have the same draws (common random numbers), so that designs are
+compared with each other and not with chance. A drive that failed counts as one that does not reach anything: its value
+is the worst one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from sprag.worker.planning.goals.plan import Goal, GoalPlan, Limit
+    from sprag.worker.planning.rounds import Rows
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+class Table:
+    """The rows of whole designs, by design, operating point and drive.
+
+    Attributes
+    ----------
+    ok : bool array, shape (designs, points, drives + 1)
+    failed : bool array, shape (designs,)
+        Whether a case failed that must not: the nominal drive where it is judged, or all drawn drives of a point.
+    """
+
+    def __init__(self, plan: GoalPlan, rows: Rows) -> None:
+        self._plan, self._rows = plan, rows
+        self._shape = (len(rows.points) // plan.cases_each, len(plan.at), 1 + plan.drives)
+        self.ok: Flags = rows.ok.reshape(self._shape)
+        self.failed: Flags = np.zeros(self._shape[0], dtype=np.bool_)
+        if not all(item.robust for item in plan.items):
+            self.failed |= ~np.all(self.ok[:, :, 0], axis=1)
+        if plan.drives:
+            self.failed |= ~np.all(np.any(self.ok[:, :, 1:], axis=2), axis=1)
+
+    def values(self, item: Goal | Limit) -> Floats:
+        """What a goal or a limit is about, shape (designs, points); NaN where it is missing.
+
+        A yield, which concerns all operating points together, is the same at each of them.
+        """
+        if item.conditions:
+            share = np.asarray(self._held(item.conditions).sum(axis=1) / self._plan.drives)
+            return np.repeat(share[:, None], self._shape[1], axis=1)
+        results = self._results(item.result)
+        if item.quantile is None:
+            nominal: Floats = results[:, :, 0]
+            return nominal
+        worst = -math.inf if item.upwards else math.inf
+        drawn = np.where(self.ok[:, :, 1:] & ~np.isnan(results[:, :, 1:]), results[:, :, 1:], worst)
+        # The least value that at least this share of the drives does not exceed: no arithmetic, so no rounding.
+        place = max(math.ceil(item.quantile * self._plan.drives - 1e-9), 1) - 1
+        value: Floats = np.sort(drawn, axis=2)[:, :, place].copy()
+        value[~np.isfinite(value)] = np.nan
+        return value
+
+    def _results(self, name: str) -> Floats:
+        values = self._rows.values[name]
+        return np.where(np.isfinite(values), values, np.nan).reshape(self._shape)
+
+    def _held(self, conditions: tuple[Limit, ...]) -> Floats:
+        """1 for each drawn drive that meets every condition at every operating point, shape (designs, drives)."""
+        held: Flags = np.all(self.ok[:, :, 1:], axis=1)
+        for condition in conditions:
+            values = self._results(condition.result)[:, :, 1:]
+            held = held & np.all(condition.holds(values), axis=1)
+        return np.asarray(held, dtype=np.float64)
