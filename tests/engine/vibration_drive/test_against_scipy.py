@@ -19,7 +19,7 @@ from sprag.engine.vibration_drive.simulate import trajectory
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, clutch, column, drive, pendulum, periods
 from tests.engine.vibration_drive.reference_run import Accumulating, Drive
 
-DURATION, START = 6, 2
+DURATION, START = 4, 1
 NUDGE = 1e-12
 
 #: Fixed examples; shrinking a machine takes minutes and says little. ``SPRAG_TEST_EXAMPLES=20`` draws more of each.

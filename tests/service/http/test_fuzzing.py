@@ -11,7 +11,6 @@ from sprag.service.http import attempts
 from sprag.service.http.api.schedules import EXAMPLE
 from sprag.service.http.app import create_app
 from sprag.service.http.problems import ApiError
-from tests.service.http.fuzzing import CHECKS, fuzz, with_ids
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -49,6 +48,8 @@ def things(service: Service) -> dict[str, list[Any]]:
 def test_made_up_requests_are_answered_as_documented(
     service: Service, settings: Settings, connect: Callable[..., httpx.Client], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    from tests.service.http.fuzzing import CHECKS, fuzz, with_ids  # every process of tests would wait for schemathesis
+
     monkeypatch.setattr(attempts, "FIRST_SECONDS", 0.0)  # dozens of requests have an invalid token
     ids = things(service)
     service.computer.answer = not_here
