@@ -14,6 +14,7 @@ import typer
 
 from sprag.service.cli import (
     batches,
+    calibrations,
     cases,
     database,
     demo,
@@ -70,6 +71,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "validate": local.validate,
         "preview": local.preview,
         "settle": settle.settle,
+        "calibrate": calibrations.calibrate,
         "trajectory": local.trajectory,
         "engagements": engagements.engagements,
         "fit": fit.fit,
@@ -96,6 +98,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "curve": pictures.curve,
         "export": remote.export,
         "front": fronts.front,
+        "calibration": calibrations.calibration,
         "map": pictures.draw_map,
         "ribbon": batches.ribbon,
         "sensitivity": pictures.sensitivity,

@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from sprag.service.answers.calibration import CalibrationReport
     from sprag.service.answers.goals import FrontReport
     from sprag.service.answers.results import Case
     from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
@@ -254,6 +255,10 @@ class AsyncStudy:
     ) -> Yield:
         """The share of drives that reach all ``conditions``, as `Study.yields` gives it."""
         return Yield(cast("Any", await self._get("/yield", yield_query(conditions, x, by, at, worst))))
+
+    async def calibration(self) -> CalibrationReport:
+        """What a calibration has found, as `Study.calibration` gives it."""
+        return cast("CalibrationReport", await self._get("/calibration"))
 
     async def front(self, limit: int | None = None, *, exact: bool = False) -> FrontReport:
         """The designs of a study with a goal, as `Study.front` gives them."""

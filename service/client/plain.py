@@ -17,6 +17,7 @@ from sprag.service.client.wire import (
     FILE_TIMEOUT,
     Drawn,
     Query,
+    calibration_path,
     connection_options,
     document,
     engagements_path,
@@ -114,6 +115,14 @@ class ServiceClient:
     def drawn(self, study_id: str, part: Drawn, query: Query) -> dict[str, Any]:
         """Curves of results against one axis, a map over two, what results depend on, a ribbon or a yield."""
         return self._json("GET", f"{study_path(study_id)}/{part}", params=list(query))
+
+    def calibration(self, study_id: str) -> dict[str, Any]:
+        """What a calibration has found."""
+        return self._json("GET", calibration_path(study_id))
+
+    def calibration_file(self, study_id: str, form: str) -> Iterator[bytes]:
+        """The same as "csv", a row for each measured value, or as a picture: "svg", "png" or "pdf"."""
+        return self.download(calibration_path(study_id), [("format", form)])
 
     def front(self, study_id: str, query: Query = ()) -> dict[str, Any]:
         """The designs of a study with a goal."""

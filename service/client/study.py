@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from sprag.service.answers.calibration import CalibrationReport
     from sprag.service.answers.goals import FrontReport
     from sprag.service.answers.results import Case
     from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
@@ -190,6 +191,16 @@ class Study:
         drives (by default 10).
         """
         return Yield(cast("Any", self._client.plain.drawn(self.id, "yield", yield_query(conditions, x, by, at, worst))))
+
+    def calibration(self) -> CalibrationReport:
+        """What a calibration has found: values with their intervals, correlations, residuals, the next point.
+
+        Raises
+        ------
+        RefusedError
+            If the study is not a calibration.
+        """
+        return cast("CalibrationReport", self._client.plain.calibration(self.id))
 
     def front(self, limit: int | None = None, *, exact: bool = False) -> FrontReport:
         """The designs of a study with a goal, the best first, and the history of the search.

@@ -91,6 +91,11 @@ def engagements_path(study_id: str, case: int) -> str:
     return f"{study_path(study_id)}/cases/{case:d}/engagements"
 
 
+def calibration_path(study_id: str) -> str:
+    """The path of what a calibration has found."""
+    return f"{study_path(study_id)}/calibration"
+
+
 def front_path(study_id: str) -> str:
     """Address of the designs of a study with a goal."""
     return f"{study_path(study_id)}/front"

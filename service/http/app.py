@@ -19,6 +19,7 @@ from sprag.service.http import handlers
 from sprag.service.http.access import Access
 from sprag.service.http.api import (
     batches,
+    calibrations,
     case_tables,
     cases,
     catalogues,
@@ -201,6 +202,7 @@ def _routes() -> APIRouter:
         curves,
         sensitivity,
         batches,
+        calibrations,
         fronts,
         cases,
         case_tables,

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.json_text import numbers, to_bytes
 from sprag.service.results import exports
+from sprag.service.results.calibration import calibration_csv, calibration_json
 from sprag.service.results.curve_cases import draw, draw_map, select
+from sprag.service.results.figures.calibration import calibration_figure
 from sprag.service.results.figures.front import front_figure, history_figure
 from sprag.service.results.fronts import front_csv, front_json
 from sprag.service.results.pictures import curves as pictures
@@ -118,6 +120,21 @@ def map_csv(library: Library, study_id: str, query: CurveQuery) -> bytes:
 def map_picture(library: Library, study_id: str, query: CurveQuery, title: str, form: pictures.Picture) -> bytes:
     """The map as a picture."""
     return draw_map_picture(map_of(library, study_id, query), title, form)
+
+
+def calibration_as_json(library: Library, study_id: str) -> bytes:
+    """The calibration as JSON text."""
+    return to_bytes(calibration_json(study_id, library.calibrations.of(study_id)))
+
+
+def calibration_as_csv(library: Library, study_id: str) -> bytes:
+    """The measured points beside the fit as a table."""
+    return calibration_csv(library.calibrations.of(study_id))
+
+
+def calibration_picture(library: Library, study_id: str, title: str, form: pictures.Picture) -> bytes:
+    """The measured points on the fitted curves, and the residuals, as a picture."""
+    return pictures.draw_figure(calibration_figure(library.calibrations.of(study_id)), title, form)
 
 
 def front_as_json(library: Library, study_id: str, exact: bool, limit: int) -> bytes:

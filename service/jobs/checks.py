@@ -8,6 +8,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from sprag.service.jobs.calibrations import Calibrations
 from sprag.service.jobs.fronts import Fronts
 from sprag.service.jobs.preview import preview_json
 from sprag.service.jobs.submission import Submission, hash_of, submission
@@ -52,6 +53,7 @@ class Library:
     def __init__(self, store: Store) -> None:
         self.store = store
         self.fronts = Fronts(store)
+        self.calibrations = Calibrations(store)
 
     def __reduce__(self) -> tuple[Callable[[str, Chunking], Library], tuple[str, Chunking]]:
         return _library, (self.store.session.url.render_as_string(hide_password=False), self.store.chunking)

@@ -51,6 +51,7 @@ FURTHER_RULES: Final = (
     "list_studies",
     "get_curves",
     "get_front",
+    "get_calibration",
     "get_map",
     "get_ribbon",
     "get_yield",

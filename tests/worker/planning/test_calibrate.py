@@ -121,6 +121,7 @@ def test_what_only_acts_as_a_product_cannot_be_separated() -> None:
     assert found.values[0] * found.values[1] == pytest.approx(1.6, rel=0.01)
     assert found.intervals is not None
     assert np.ptp(found.intervals[2]) < 0.05
+    assert found.intervals[:2].tolist() == [[1.0, 9.0], [0.2, 1.8]], "the whole ranges"
 
 
 def test_units_of_several_results_do_not_matter() -> None:

@@ -83,7 +83,7 @@ class Answer:
         Whether fit, refits and curve are all there.
     values : float64 array, shape (p,), SI
     intervals : float64 array, shape (p, 2), or None
-        Ends of the 95 % intervals, SI.
+        Ends of the 95 % intervals, SI; the whole range of what has a part in an undetermined direction.
     at_bounds : bool array, shape (p, 2), or None
         Whether an interval touches the lower, the upper end of the range.
     deviations : float64 array, shape (p,), or None
@@ -140,11 +140,20 @@ def answer(planner: CalibratePlanner) -> Answer | None:
     enough = places is not None and len(places) >= LEAST_REFITS
     values = planner.space.values(places) if enough and places is not None else None
     squares = np.where(failed, 0.0, residuals) ** 2
+    directions = _directions(planner, state)
+    loose = sorted({place for one in directions if one.undetermined for place in one.parameters})
+    intervals = None if values is None else _ends(values)
+    at_bounds = None if places is None or values is None else _touching(_ends(places))
+    if intervals is not None and at_bounds is not None:
+        # Refits stay where they began along a direction that the data do not determine.
+        for place in loose:
+            intervals[place] = plan.unknown[place].low, plan.unknown[place].high
+            at_bounds[place] = True
     return Answer(
         complete=state.phase == ENDED,
         values=planner.space.values(best.places[0]),
-        intervals=None if values is None else _ends(values),
-        at_bounds=None if places is None or values is None else _touching(_ends(places)),
+        intervals=intervals,
+        at_bounds=at_bounds,
         deviations=None if values is None else values.std(axis=0, ddof=1),
         correlations=None if values is None else _correlations(values),
         modelled=best.modelled[0],
@@ -155,7 +164,7 @@ def answer(planner: CalibratePlanner) -> Answer | None:
         chi_square=float(squares.sum()),
         freedom=plan.freedom - int(failed.sum()),
         refits=0 if places is None else len(places),
-        directions=_directions(planner, state),
+        directions=directions,
         next=_next(planner, state, values, sigma),
         others=state.others if state.curve is not None else None,
         curve=state.curve,
@@ -254,7 +263,8 @@ def _sigma_at(planner: CalibratePlanner, others: Floats, sigma: Floats) -> Float
     """Standard deviation of a measurement at other conditions, as of the nearest measured one: (others, results)."""
     plan = planner.plan
     conditions, columns = plan.places
-    width = np.maximum(np.ptp(plan.at, axis=0), 1e-300)
+    width = np.ptp(plan.at, axis=0)
+    width = np.where(width > 0.0, width, 1.0)
     result = np.full((len(others), len(plan.measured)), np.nan)
     for column in range(len(plan.measured)):
         rows = np.flatnonzero((columns == column) & np.isfinite(sigma))

@@ -53,6 +53,6 @@ def candidates(plan: CalibratePlan) -> Floats:
         ends = [max(low - beyond, 0.5 * low) if low >= 0.0 else low - beyond, high + beyond]
         if high <= 0.0:
             ends[1] = min(ends[1], 0.5 * high)
-        line = np.array([ends[0] + (ends[1] - ends[0]) * k / (each - 1) for k in range(each)])
-        parts.append(np.insert(np.tile(values[curve], (each, 1)), x, line, axis=1))
+        line = np.unique([ends[0] + (ends[1] - ends[0]) * k / (each - 1) for k in range(each)])
+        parts.append(np.insert(np.tile(values[curve], (len(line), 1)), x, line, axis=1))
     return np.concatenate(parts) + 0.0

@@ -23,8 +23,6 @@ _MEDIAN = 0.6744897501960817
 _FAILED = 2.0
 #: Scales are not smaller than this part of the measured values: residuals of exact data are rounding.
 _LEAST = 1e-13
-#: Numbers that are compared at once.
-_BLOCK = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -56,16 +54,11 @@ class Data:
 
     def least(self, modelled: Floats, values: Floats) -> tuple[NDArray[np.int64], Floats]:
         """For each row of ``values``, shape (lanes, measured), the set of least cost, and that cost."""
-        lanes, sets = len(values), len(modelled)
-        best, costs = np.zeros(lanes, dtype=np.int64), np.zeros(lanes)
-        step = max(1, _BLOCK // max(1, sets * values.shape[1]))
-        for first in range(0, lanes, step):
-            part = values[first : first + step]
-            one = replace(self, values=np.tile(part[:, None, :], (1, sets, 1)).reshape(-1, values.shape[1]))
-            cost = one.costs(np.tile(modelled, (len(part), 1))).reshape(len(part), sets)
-            best[first : first + step] = cost.argmin(axis=1)
-            costs[first : first + step] = cost.min(axis=1)
-        return best, costs
+        costs = np.zeros((len(values), len(modelled)))
+        for k in np.flatnonzero(self.weights > 0.0).tolist():
+            residuals = (modelled[None, :, k] - values[:, None, k]) * self.weights[k]
+            costs += rho(self.loss, np.where(np.isnan(residuals), self.far, residuals))
+        return costs.argmin(axis=1), 0.5 * costs.min(axis=1)
 
     def without(self, out: Flags) -> Data:
         """The data without some of the values."""

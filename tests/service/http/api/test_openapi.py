@@ -17,6 +17,7 @@ from sprag.service.http.api.schedules import EXAMPLE
 from sprag.service.http.app import create_app
 from sprag.service.http.guard import OPEN_PATHS
 from sprag.service.http.problems import PROBLEM_TYPES
+from tests.service.calibrating import calibration
 from tests.service.searching import search
 
 if TYPE_CHECKING:
@@ -164,7 +165,8 @@ def test_every_example_works(service: Service, document: dict[str, Any]) -> None
     for path, method, operation in operations(document):
         # Only cases of settled studies are run longer, only studies with a goal have designs, and so on.
         spec = SPEC if path.endswith(":longer") else TOLERANT if path.endswith(("/ribbon", "/yield")) else None
-        study_id = search(service) if path.endswith("/front") else service.submit(spec)
+        chosen = {"front": search, "calibration": calibration}.get(path.rpartition("/")[2])
+        study_id = service.submit(spec) if chosen is None else chosen(service)
         if not path.endswith((":cancel", ":pause", ":resume", ":prioritize")):
             service.fill(study_id)
         for answer in send(service, path, method, operation, study_id):

@@ -1,0 +1,84 @@
+"""Answers about studies that calibrate: values with intervals, measured points with residuals, what to measure next."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from typing_extensions import TypedDict
+
+from sprag.service.answers import Doc, Number
+
+
+class CalibratedParameter(TypedDict):
+    """An unknown parameter."""
+
+    name: Annotated[str, Doc("the first of `paths`")]
+    paths: Annotated[list[str], Doc("the parameters that take the value together")]
+    unit: str
+    low: Annotated[float, Doc("lower end of its range, SI")]
+    high: Annotated[float, Doc("upper end of its range, SI")]
+    value: Annotated[Number, Doc("best value, SI; null before the first fit")]
+    interval: Annotated[list[float] | None, Doc("ends of the 95 % interval, SI; null without refits")]
+    deviation: Annotated[Number, Doc("standard deviation over the refits, SI; null without refits")]
+    at_low: Annotated[bool, Doc("whether the interval reaches the lower end of the range")]
+    at_high: Annotated[bool, Doc("whether the interval reaches the upper end of the range")]
+
+
+class CalibrationPoint(TypedDict):
+    """A measured value beside the fitted one."""
+
+    result: str
+    at: Annotated[dict[str, float], Doc("the measured condition, SI")]
+    measured: Annotated[float, Doc("SI")]
+    sigma: Annotated[Number, Doc("standard deviation, SI: as given, otherwise from the residuals")]
+    fitted: Annotated[Number, Doc("SI; null where the case has no result")]
+    interval: Annotated[list[float] | None, Doc("ends of the 95 % interval of `fitted`, SI; null without refits")]
+    residual: Annotated[Number, Doc("measured less fitted, in standard deviations")]
+    leverage: Annotated[
+        Number, Doc("how much the point determines the fit, 0 to 1; their sum is the number of unknowns")
+    ]
+
+
+class CalibrationDirection(TypedDict):
+    """Parameters that these points do not separate."""
+
+    parameters: Annotated[list[str], Doc("the one that changes most first")]
+    changes: Annotated[dict[str, float], Doc("their changes together that the points do not show, SI")]
+    undetermined: Annotated[bool, Doc("whether nothing is known within the ranges; otherwise little")]
+
+
+class NextMeasurement(TypedDict):
+    """The condition, among some between and around the measured ones, whose measurement would say most."""
+
+    at: Annotated[dict[str, float], Doc("SI")]
+    spread: Annotated[dict[str, float], Doc("standard deviation of each result there over the refits, SI")]
+    narrower: Annotated[dict[str, float], Doc("by how much each standard deviation would shrink, 0 to 1")]
+
+
+class CalibrationCurvePoint(TypedDict):
+    """The fit at a condition between or around the measured ones."""
+
+    at: Annotated[dict[str, float], Doc("SI")]
+    values: Annotated[dict[str, Number], Doc("each result, SI")]
+    intervals: Annotated[dict[str, list[Number]], Doc("ends of its 95 % interval, SI; empty without refits")]
+
+
+class CalibrationReport(TypedDict):
+    """What a calibration has found, as far as it has come."""
+
+    study: str
+    phase: Annotated[str, Doc("what comes next: scan, fit, intervals, curve, or ended")]
+    complete: Annotated[bool, Doc("whether fit, intervals and curve are all there")]
+    loss: str
+    seed: int
+    parameters: list[CalibratedParameter]
+    correlations: Annotated[list[list[Number]] | None, Doc("over the refits, in the order of `parameters`")]
+    chi_square: Annotated[Number, Doc("sum of the squares of the residuals")]
+    freedom: Annotated[int, Doc("degrees of freedom: measured values less unknown parameters")]
+    sigma_given: Annotated[bool, Doc("whether the standard deviations were given")]
+    refits: Annotated[int, Doc("refits that the intervals rest on")]
+    points: list[CalibrationPoint]
+    directions: list[CalibrationDirection]
+    next: NextMeasurement | None
+    curve: list[CalibrationCurvePoint]
+    sentences: Annotated[list[str], Doc("what should be known before the values are used")]

@@ -1,0 +1,149 @@
+"""``sprag calibrate`` and ``sprag calibration``: the parameters of a measured machine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import typer
+
+from sprag.service.cli.console import WrongInputError, progress_bar, say, show_table, write_json, write_text
+from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes, read_spec, spec_failure, write_pieces
+from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Processes, Server, SpecFile, StudyId, Token
+from sprag.service.cli.pictures import file_format, heading
+from sprag.service.cli.remote import connection
+from sprag.service.cli.settings import read_settings
+from sprag.service.faults import Fault
+
+if TYPE_CHECKING:
+    from sprag.service.results.calibration import Calibration
+    from sprag.service.results.pictures.curves import Picture
+    from sprag.service.spec.document import ParsedSpec
+
+_FORMS = ("csv", "svg", "png", "pdf")
+_File = Annotated[
+    str | None,
+    typer.Option("-o", "--output", metavar="FILE", help="File to write: .csv with the residuals, or .svg, .png, .pdf."),
+]
+
+
+def calibrate(
+    spec: SpecFile,
+    measured: Annotated[
+        str | None,
+        typer.Option("--measured", metavar="FILE", help="CSV file of measured points, instead of those of the spec."),
+    ] = None,
+    file: _File = None,
+    db: Annotated[
+        str | None,
+        typer.Option("--db", metavar="URL", help="Database to keep the study in; default: a temporary database."),
+    ] = None,
+    processes: Processes = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Find the parameters that explain measured points, here, without a service: values with their intervals.
+
+    The spec has `calibrate`: the unknown parameters with their ranges, and the measured points.
+    """
+    form = None if file is None else file_format(file, _FORMS, "file")
+    parsed = _read(spec, measured)
+    say(*(f"warning: {warning}" for warning in parsed.warnings))
+    found, study_id = _run(parsed, db, processes)
+    if file is not None and form is not None:
+        Path(file).write_bytes(_content(found, form, parsed.study.name))
+    _tell(_report(study_id, found), as_json)
+    if file is not None:
+        say(f"file: {file}")
+
+
+def _read(path: str, measured: str | None) -> ParsedSpec:
+    from sprag.service.spec.document import SpecError, parse_spec
+
+    data = read_spec(path)
+    if isinstance(data, Mapping) and not isinstance(data.get("calibrate"), Mapping):
+        problem = Fault("/calibrate", "required", "is required", None, "unknown parameters and measured points")
+        raise WrongInputError("invalid-spec", f"{path}: not a calibration", [problem])
+    if measured is not None and isinstance(data, Mapping):
+        text = decode(measured, read_bytes(measured, MAX_DATA_BYTES))
+        data = {**data, "calibrate": {**data["calibrate"], "measured": {"csv": text}}}
+    try:
+        return parse_spec(data)
+    except SpecError as error:
+        raise spec_failure(path, error) from error
+
+
+def _run(parsed: ParsedSpec, db: str | None, processes: int | None) -> tuple[Calibration, str]:
+    """Run the study to its end; what it has found, and its id."""
+    from sprag.service.jobs.local import pool_size, run_here
+    from sprag.service.results.calibration import calibration_of
+    from sprag.service.results.rounds import sentence
+
+    settings = read_settings(database=db, processes=processes)
+    with (
+        progress_bar(parsed.study.name or "calibration") as update,
+        run_here(
+            parsed.spec,
+            parsed.study,
+            processes=pool_size(parsed.study, settings.pool_processes, asked=processes is not None),
+            database_url=settings.database_url if db is not None else None,
+            chunk_timeout=settings.chunk_timeout,
+            warnings=parsed.warnings,
+            on_progress=lambda now: update(now.done, now.total, sentence(now.rounds) if now.rounds else ""),
+        ) as done,
+    ):
+        study_id, store = done.record.id, done.store
+        rows = partial(store.rows_for_cases, study_id)
+        return calibration_of(store.study(study_id), store.rounds(study_id), rows), study_id
+
+
+def _content(found: Calibration, form: str, title: str) -> bytes:
+    from sprag.service.results.calibration import calibration_csv
+    from sprag.service.results.figures.calibration import calibration_figure
+    from sprag.service.results.pictures.curves import draw_figure
+
+    if form == "csv":
+        return calibration_csv(found)
+    return draw_figure(calibration_figure(found), title, cast("Picture", form))
+
+
+def _report(study_id: str, found: Calibration) -> dict[str, Any]:
+    from sprag.service.results.calibration import calibration_json
+
+    return cast("dict[str, Any]", calibration_json(study_id, found))
+
+
+def calibration(
+    study_id: StudyId,
+    file: _File = None,
+    server: Server = DEFAULT_SERVER,
+    token: Token = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Show what a calibration has found: values with their intervals, what cannot be separated, the next point."""
+    form = None if file is None else file_format(file, _FORMS, "file")
+    with connection(server, token) as client:
+        found = client.calibration(study_id)
+        if file is not None and form is not None:
+            write_pieces(file, client.calibration_file(study_id, form))
+    _tell(found, as_json)
+    if file is not None:
+        say(f"file: {file}")
+
+
+def _tell(found: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        write_json(found)
+        return
+    columns = [(name, name != "parameter") for name in ("parameter", "value", "from", "to", "deviation")]
+    rows = [
+        (heading(one["name"], one["unit"]), one["value"], *(one["interval"] or (None, None)), one["deviation"])
+        for one in found["parameters"]
+    ]
+    show_table("Values and 95 % intervals", columns, rows)
+    if found["correlations"] and len(rows) > 1:
+        names = [one["name"] for one in found["parameters"]]
+        lines = [(name, *row) for name, row in zip(names, found["correlations"], strict=True)]
+        show_table("Correlations", [("", False), *((name.replace(".", ".\n"), True) for name in names)], lines)
+    write_text("".join(f"{sentence}\n" for sentence in found["sentences"]))

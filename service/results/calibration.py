@@ -1,0 +1,233 @@
+"""Calibrations as answers: values with intervals, residuals, the fitted curve, the next point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sprag.service.faults import Fault, FaultError
+from sprag.service.json_text import numbers
+from sprag.service.results import exports
+from sprag.service.results.calibration_words import sentences
+from sprag.service.spec.catalogue import unit_of
+from sprag.worker import models
+from sprag.worker.models import WorkerEnding
+from sprag.worker.planning.calibrate import CalibratePlan, CalibratePlanner
+from sprag.worker.planning.calibrate.answer import Answer, answer
+from sprag.worker.planning.calibrate.plan import CALIBRATE
+from sprag.worker.planning.rounds import Rows
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sprag.service.answers.calibration import (
+        CalibratedParameter,
+        CalibrationCurvePoint,
+        CalibrationDirection,
+        CalibrationPoint,
+        CalibrationReport,
+        NextMeasurement,
+    )
+    from sprag.service.results.curves import Fetch
+    from sprag.service.storage.records import RoundRecord
+    from sprag.worker.models import ResultInfo
+    from sprag.worker.study import Study
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """A calibration as far as it has come.
+
+    Attributes
+    ----------
+    study : Study
+    plan : CalibratePlan
+    infos : dict of ResultInfo
+        The measured results by their names.
+    answer : Answer or None
+        None before the first fit.
+    summary : dict
+        As of the planner.
+    converged : int
+        Refits that have converged.
+    """
+
+    study: Study
+    plan: CalibratePlan
+    infos: dict[str, ResultInfo]
+    answer: Answer | None
+    summary: dict[str, Any]
+    converged: int
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the unknown parameters."""
+        return [one.paths[0] for one in self.plan.unknown]
+
+
+def plan_of(study: Study) -> CalibratePlan:
+    """The calibration of a study; FaultError for a study without one."""
+    if study.plan is None or study.plan.get("kind") != CALIBRATE:
+        message = "the study is not a calibration"
+        fault = Fault(None, "conflict", message, allowed="a study whose spec has `calibrate`")
+        raise FaultError("invalid-selection", message, [fault])
+    return CalibratePlan.from_json(study.plan)
+
+
+def calibration_of(study: Study, rounds: list[RoundRecord], fetch: Fetch) -> Calibration:
+    """What the rows of whole rounds show; FaultError for a study that is not a calibration.
+
+    Parameters
+    ----------
+    rounds : list of RoundRecord
+        As `Store.rounds` gives them.
+    fetch : callable
+        Gives rows by numbers of cases and names of results.
+    """
+    plan = plan_of(study)
+    planner = CalibratePlanner(plan)
+    for record in rounds:
+        if not len(record.cases):
+            break
+        cases = np.arange(record.cases.start, record.cases.stop, dtype=np.int64)
+        columns = fetch(cases, list(plan.results))
+        endings = [ending or WorkerEnding.CANCELLED for ending in columns.endings]
+        if WorkerEnding.CANCELLED in endings:
+            break
+        ok = np.array([ending == models.OK for ending in endings])
+        planner.tell(Rows(study.points(record.cases), ok, columns.values))
+    infos = {info.name: info for info in models.study_results(study) if info.name in plan.results}
+    refits = planner.state.refits
+    converged = 0 if refits is None else int(np.count_nonzero(refits.converged))
+    return Calibration(study, plan, infos, answer(planner), planner.summary(), converged)
+
+
+def calibration_json(study_id: str, found: Calibration) -> CalibrationReport:
+    """The calibration as an answer."""
+    plan, known = found.plan, found.answer
+    return {
+        "study": study_id,
+        "phase": found.summary["phase"],
+        "complete": found.summary["complete"],
+        "loss": plan.loss,
+        "seed": plan.seed,
+        "parameters": [_parameter(found, index) for index in range(len(plan.unknown))],
+        "correlations": None if known is None or known.correlations is None else _rows(known.correlations),
+        "chi_square": None if known is None else known.chi_square,
+        "freedom": plan.freedom if known is None else known.freedom,
+        "sigma_given": plan.known_sigma,
+        "refits": 0 if known is None else known.refits,
+        "points": [_point(found, index) for index in range(plan.count)],
+        "directions": [] if known is None else [_direction(found, index) for index in range(len(known.directions))],
+        "next": _next(found),
+        "curve": _curve(found),
+        "sentences": sentences(found),
+    }
+
+
+def _rows(matrix: NDArray[np.float64]) -> list[list[float | int | None]]:
+    return [numbers(row) for row in matrix]
+
+
+def _parameter(found: Calibration, index: int) -> CalibratedParameter:
+    one, known = found.plan.unknown[index], found.answer
+    interval = None if known is None or known.intervals is None else known.intervals[index].tolist()
+    touching = (False, False) if known is None or known.at_bounds is None else known.at_bounds[index].tolist()
+    return {
+        "name": one.paths[0],
+        "paths": list(one.paths),
+        "unit": unit_of(found.study, one.paths[0]),
+        "low": one.low,
+        "high": one.high,
+        "value": None if known is None else float(known.values[index]),
+        "interval": interval,
+        "deviation": None if known is None or known.deviations is None else float(known.deviations[index]),
+        "at_low": touching[0],
+        "at_high": touching[1],
+    }
+
+
+def _point(found: Calibration, index: int) -> CalibrationPoint:
+    plan, known = found.plan, found.answer
+    conditions, columns = plan.places
+    given = plan.sigma[index]
+    ribbon = None if known is None else known.ribbon_measured
+    sigma, fitted, residual, leverage = numbers(
+        np.array([given, np.nan, np.nan, np.nan])
+        if known is None
+        else np.array([known.sigma[index], known.modelled[index], known.residuals[index], known.leverages[index]])
+    )
+    inside = ribbon is not None and bool(np.isfinite(ribbon[index]).all())
+    return {
+        "result": plan.results[columns[index]],
+        "at": _at(found, plan.at[conditions[index]]),
+        "measured": float(plan.values[index]),
+        "sigma": sigma,
+        "fitted": fitted,
+        "interval": ribbon[index].tolist() if ribbon is not None and inside else None,
+        "residual": residual,
+        "leverage": leverage,
+    }
+
+
+def _at(found: Calibration, condition: NDArray[np.float64]) -> dict[str, float]:
+    return dict(zip(found.plan.paths_at, condition.tolist(), strict=True))
+
+
+def _direction(found: Calibration, index: int) -> CalibrationDirection:
+    assert found.answer is not None
+    one = found.answer.directions[index]
+    names = [found.names[place] for place in one.parameters]
+    return {
+        "parameters": names,
+        "changes": dict(zip(names, one.changes, strict=True)),
+        "undetermined": one.undetermined,
+    }
+
+
+def _next(found: Calibration) -> NextMeasurement | None:
+    if found.answer is None or found.answer.next is None:
+        return None
+    one = found.answer.next
+    return {
+        "at": _at(found, np.array(one.condition)),
+        "spread": dict(zip(found.plan.results, one.spread, strict=True)),
+        "narrower": dict(zip(found.names, one.narrower, strict=True)),
+    }
+
+
+def _curve(found: Calibration) -> list[CalibrationCurvePoint]:
+    known = found.answer
+    if known is None or known.curve is None or known.others is None:
+        return []
+    ribbon = known.ribbon
+    return [
+        {
+            "at": _at(found, condition),
+            "values": dict(zip(found.plan.results, numbers(known.curve[index]), strict=True)),
+            "intervals": {}
+            if ribbon is None
+            else {name: numbers(ribbon[index, column]) for column, name in enumerate(found.plan.results)},
+        }
+        for index, condition in enumerate(known.others)
+    ]
+
+
+def calibration_csv(found: Calibration) -> bytes:
+    """A row for each measured value: its condition, measured and fitted value, residual; SI numbers."""
+    points = [_point(found, index) for index in range(found.plan.count)]
+    ends: list[Any] = [point["interval"] or (None, None) for point in points]
+    columns: dict[str, list[Any]] = {
+        **{path: [point["at"][path] for point in points] for path in found.plan.paths_at},
+        "result": [point["result"] for point in points],
+        "measured": [point["measured"] for point in points],
+        "sigma": [point["sigma"] for point in points],
+        "fitted": [point["fitted"] for point in points],
+        "fitted.low": [low for low, _ in ends],
+        "fitted.high": [high for _, high in ends],
+        "residual": [point["residual"] for point in points],
+        "leverage": [point["leverage"] for point in points],
+    }
+    return exports.table_csv(list(columns), list(columns.values()))

@@ -1,0 +1,88 @@
+"""Calibrations over HTTP: values with intervals, residuals, the fitted curve, as JSON, a table and a picture."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import pytest
+
+from sprag.service.answers.calibration import CalibrationReport
+from tests.service.calibrating import DAMPING, INERTIA, calibration
+from tests.service.conftest import API, Service
+from tests.service.shapes import fits
+
+
+def test_an_ended_calibration(service: Service) -> None:
+    study_id = calibration(service)
+    detail = service.get(f"/studies/{study_id}")
+    assert detail["state"] == "finished"
+    told = detail["progress"]["rounds"]["sentence"]
+    assert "calibrated" in told
+    found = service.get(f"/studies/{study_id}/calibration")
+    fits(CalibrationReport, found)
+    assert (found["phase"], found["complete"], found["refits"]) == ("ended", True, 20)
+    damping, inertia = found["parameters"]
+    assert damping["paths"] == ["pendulums.0.damping"]
+    assert inertia["unit"] == "kg*m^2"
+    for one, true in ((damping, DAMPING), (inertia, INERTIA)):
+        low, high = one["interval"]
+        assert low < true < high
+        assert one["low"] < low < one["value"] < high < one["high"]
+        assert not one["at_low"]
+    assert found["correlations"][0][0] == 1.0
+    assert found["correlations"][0][1] == found["correlations"][1][0] < 0.0
+    points = found["points"]
+    assert len(points) == 10
+    assert found["freedom"] == 8
+    assert found["chi_square"] == pytest.approx(sum(point["residual"] ** 2 for point in points))
+    for point in points:
+        assert point["residual"] == pytest.approx((point["measured"] - point["fitted"]) / point["sigma"])
+        assert point["interval"][0] < point["fitted"] < point["interval"][1]
+    loads = {point["at"]["shaft.load"] for point in found["curve"]}
+    assert {point["at"]["excitation.frequency"] for point in found["curve"]} == {24.0, 28.0}
+    assert min(loads) < 0.05 < 0.25 < max(loads)
+    assert found["next"]["at"]["shaft.load"] in {min(loads), max(loads)}
+    assert max(found["next"]["narrower"].values()) > 0.0
+    assert any("degrees of freedom" in sentence for sentence in found["sentences"])
+    assert not found["directions"]
+
+
+def test_what_cannot_be_separated_is_named(service: Service) -> None:
+    text = "shaft.load,shaft.speed.mean\n" + "".join(f"2,{-30.0 + 0.05 * k}\n" for k in range(5))
+    study_id = calibration(service, measured={"csv": text})
+    found = service.get(f"/studies/{study_id}/calibration")
+    (direction,) = found["directions"]
+    assert direction["undetermined"]
+    assert set(direction["parameters"]) == {"pendulums.0.damping", "shaft.inertia"}
+    assert any("These points cannot separate" in sentence for sentence in found["sentences"])
+    assert any("reaches" in sentence for sentence in found["sentences"])
+    assert any("follows from the residuals" in sentence for sentence in found["sentences"])
+
+
+def test_a_calibration_that_is_running_shows_what_it_knows(service: Service) -> None:
+    first = service.get(f"/studies/{calibration(service, rounds=1)}/calibration")
+    fits(CalibrationReport, first)
+    assert (first["phase"], first["parameters"][0]["value"], first["points"][0]["fitted"]) == ("fit", None, None)
+    later = service.get(f"/studies/{calibration(service, rounds=3, seed=2)}/calibration")
+    fits(CalibrationReport, later)
+    assert not later["complete"]
+
+
+def test_a_table_and_a_picture(service: Service) -> None:
+    study_id = calibration(service)
+    points = service.get(f"/studies/{study_id}/calibration")["points"]
+    answer = service.http.get(f"{API}/studies/{study_id}/calibration?format=csv")
+    assert answer.headers["content-disposition"] == f'attachment; filename="{study_id}-calibration.csv"'
+    rows = list(csv.DictReader(io.StringIO(answer.text)))
+    assert [float(row["fitted"]) for row in rows] == [point["fitted"] for point in points]
+    assert list(rows[0])[:3] == ["shaft.load", "excitation.frequency", "result"]
+    picture = service.http.get(f"{API}/studies/{study_id}/calibration?format=svg")
+    assert picture.status_code == 200
+    assert "residual" in picture.text
+
+
+def test_other_studies_are_refused(service: Service) -> None:
+    problem = service.http.get(f"{API}/studies/{service.submit()}/calibration")
+    assert problem.status_code == 422
+    assert problem.json()["type"].endswith("invalid-selection")
