@@ -135,7 +135,7 @@ def _show_causes(title: str, causes: dict[str, Any]) -> None:
     known = [item for item in causes["shares"] if item["share"] is not None]
     known.sort(key=lambda item: -item["share"])
     if known:
-        rows = [(item["tolerance"], _percent(item["share"]), _percent(item["error"])) for item in known]
+        rows = [(item["tolerance"], _percent(max(item["share"], 0.0)), _percent(item["error"])) for item in known]
         show_table(title, [("tolerance", False), ("share", True), ("+-", True)], rows)
     if causes["note"]:
         say(f"note: {causes['note']}")

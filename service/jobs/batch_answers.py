@@ -18,6 +18,7 @@ from sprag.service.results.tolerances.yields import Yield, yields
 from sprag.worker import models
 
 if TYPE_CHECKING:
+    from sprag.service.answers.tolerances import RibbonReport, YieldReport
     from sprag.service.jobs.checks import Library
     from sprag.service.results.pictures.curves import Picture
     from sprag.worker.study import Study
@@ -99,3 +100,9 @@ def yield_picture(library: Library, study_id: str, query: YieldQuery, mapped: bo
     if mapped:
         return draw_map(yield_map(found), title, form)
     return draw_figure(yield_figure(found), title, form)
+
+
+def both(library: Library, study_id: str, ribbons: RibbonQuery, wanted: YieldQuery) -> tuple[RibbonReport, YieldReport]:
+    """The answers with ribbons and yields, for a page."""
+    found = ribbon_json(study_id, ribbon_of(library, study_id, ribbons))
+    return found, yield_json(study_id, yield_of(library, study_id, wanted))

@@ -69,7 +69,7 @@ def curves_page(context: Ctx, request: Request, study_id: StudyId) -> Response:
         tab="/curves",
         query=shown,
         faults=faults,
-        axes=_axis_choices(study),
+        axes=axis_choices(study),
         results=[info for info in infos if info.kind != "category"],
         fixed=fixed_choices(study, (shown.x, *shown.by), shown.at),
         figure=f"/studies/{study_id}/figures/curves?{urlencode(pairs)}",
@@ -111,7 +111,7 @@ def map_page(
         kind=kind,
         kinds=KINDS,
         faults=faults,
-        axes=_axis_choices(study),
+        axes=axis_choices(study),
         results=_mapped_results(study, infos),
         fixed=fixed_choices(study, (shown.x, shown.y), shown.at),
         figure=f"/studies/{study_id}/figures/map?{urlencode([*pairs, ('kind', kind)])}",
@@ -126,7 +126,8 @@ def _mapped_results(study: Study, infos: Sequence[ResultInfo]) -> list[ResultInf
     return [info for info in infos if info.kind != "category" and (plan is None or info.name in plan.results)]
 
 
-def _axis_choices(study: Study) -> list[dict[str, Any]]:
+def axis_choices(study: Study) -> list[dict[str, Any]]:
+    """The axes that can be drawn over."""
     return [
         {"path": axis.paths[0], "paths": axis.paths, "unit": unit_of(study, axis.paths[0]), "values": len(axis)}
         for axis in varying_axes(study)

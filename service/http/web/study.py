@@ -71,6 +71,7 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
     tabs = [
         ("", "Overview"),
         *([("/front", "Designs")] if _has_goal(study) else []),
+        *([("/drives", "Drives")] if study.spread is not None and study.plan is None else []),
         *([("/curves", "Curves")] if varying else []),
         *([("/map", "Map")] if mapped else []),
     ]

@@ -71,7 +71,7 @@ def _legend(found: Ribbon) -> str:
     drives = f"{found.places.study.drives:,} drives"
     failed = max(int(one.failed.max(initial=0)) for one in found.lines)
     told = f"Solid: {middle} quantile of {drives}; band: {low} to {high}; dashed: the nominal drive."
-    return told + (f" At most {failed:,} drives have no result at a place." if failed else "")
+    return told + (f" At a place, up to {failed:,} drives have no result (failed or unsettled)." if failed else "")
 
 
 def _middle(found: Ribbon) -> int:

@@ -91,6 +91,8 @@ def places_of(study: Study, infos: Sequence[ResultInfo], asked: Asked) -> Places
     """
     if study.spread is None:
         raise refused("x", "not-used", "the study has no tolerances", allowed="a study with `tolerances`")
+    if study.plan is not None:
+        raise refused("x", "not-used", "the study chooses its own cases", allowed="a study whose axes are given")
     for parameter, paths in (("x", (asked.x,)), ("by", asked.by), ("at", [path for path, _ in asked.at])):
         if DRIVE in paths:
             raise refused(parameter, "not-an-axis", "every drive counts", DRIVE, allowed="another axis")

@@ -7,15 +7,18 @@ from typing import TYPE_CHECKING, Final
 from sprag.service.http.web.figures.maps import map_figure
 from sprag.service.http.web.figures.plotly import Data, plotly_figure
 from sprag.service.jobs.answers import curves_of, map_of
+from sprag.service.jobs.batch_answers import ribbon_of, yield_of
 from sprag.service.json_text import to_bytes
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.front import front_figure, history_figure
 from sprag.service.results.figures.motion import motion_figure, phase_figure
 from sprag.service.results.figures.portrait import portrait_figure
+from sprag.service.results.figures.ribbons import ribbon_figure, yield_figure
 from sprag.service.results.wording import number
 from sprag.worker import models
 
 if TYPE_CHECKING:
+    from sprag.service.jobs.batch_answers import RibbonQuery, YieldQuery
     from sprag.service.jobs.checks import Library
     from sprag.service.results.curves import CurveQuery
     from sprag.worker.study import Study
@@ -43,6 +46,16 @@ def front_json(library: Library, study_id: str, exact: bool, axes: tuple[str | N
 def search_json(library: Library, study_id: str) -> bytes:
     """The figure of how a search has come to its designs, as JSON text."""
     return to_bytes(plotly_figure(history_figure(library.fronts.of(study_id, exact=False))))
+
+
+def ribbon_json(library: Library, study_id: str, query: RibbonQuery) -> bytes:
+    """The figure of ribbons, as JSON text."""
+    return to_bytes(plotly_figure(ribbon_figure(ribbon_of(library, study_id, query))))
+
+
+def yield_json(library: Library, study_id: str, query: YieldQuery) -> bytes:
+    """The figure of yields, as JSON text."""
+    return to_bytes(plotly_figure(yield_figure(yield_of(library, study_id, query))))
 
 
 def motion_figures(study: Study, case: int, start: float, end: float) -> dict[str, Data]:

@@ -184,3 +184,32 @@ def test_curves_and_sensitivity_show_the_nominal_drive(service: Service) -> None
     (found,) = service.get(f"{own}/sensitivity", y="speed")["results"]
     assert ([effect["paths"] for effect in found["effects"]], found["cases"]) == ([["load"]], 5)
     assert service.get(own)["warnings"] == []
+
+
+def test_the_page_shows_ribbon_yield_and_the_worst_drives(service: Service) -> None:
+    axes = [*SPEC["axes"], {"path": "grade", "values": [1, 2]}]
+    study_id = finish(service, {**SPEC, "axes": axes, "drives": 128})
+    own = f"/studies/{study_id}"
+    assert f'href="{own}/drives"' in service.http.get(own).text
+    text = service.http.get(f"{own}/drives").text
+    answer = service.get(f"{own}/yield", condition="speed >= 90 % of nominal", x="load", at="grade=1")
+    (line,) = answer["lines"]
+    assert f"<strong>{100 * line['all']['value']:.1f} %</strong>" in text
+    for one in line["worst"]:
+        assert f'<a href="{own}/cases/{one["case"]}">{one["drive"]}</a>' in text
+    asked = {"x": "load", "by": "grade", "quantile": "10 %; 0.9", "condition": "speed >= 50 m\r\nspeed <= 70 m"}
+    text = service.http.get(f"{own}/drives", params=asked).text
+    assert "10 %, 90 %" in text
+    assert "Grade = 2" in text
+    ribbon = service.http.get(f"{own}/figures/ribbon", params=asked).json()
+    fills = [trace for trace in ribbon["data"] if trace.get("fill") == "tonexty"]
+    assert [len(trace["y"]) for trace in fills] == [5, 5]
+    drawn = service.http.get(f"{own}/figures/yield", params=asked).json()
+    assert [trace["name"] for trace in drawn["data"] if "customdata" in trace] == ["1", "2"]
+    for wrong in ({"quantile": "5 %, 120 %"}, {"condition": "speed > 3"}, {"x": "first"}):
+        refused = service.http.get(f"{own}/drives", params=wrong)
+        assert refused.status_code == 422, wrong
+        assert 'role="alert"' in refused.text
+        assert next(iter(wrong.values())).replace(">", "&gt;") in refused.text
+    plain = service.submit({key: value for key, value in SPEC.items() if key not in ("tolerances", "drives", "seed")})
+    assert service.http.get(f"/studies/{plain}/drives").status_code == 303

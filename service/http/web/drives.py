@@ -1,0 +1,165 @@
+"""The drives of a study with tolerances as a page: ribbons, yield, what it is owed to, the worst drives."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import RedirectResponse, Response
+
+from sprag.service.http import views
+from sprag.service.http.context import Ctx, StudyId
+from sprag.service.http.drawing import Drawing, conditional
+from sprag.service.http.respond import JSON
+from sprag.service.http.web.choice import held
+from sprag.service.http.web.figures import answers as figures
+from sprag.service.http.web.results import axis_choices
+from sprag.service.http.web.study import fixed_choices, study_frame
+from sprag.service.http.web.templates import page
+from sprag.service.http.work import Attended, Work
+from sprag.service.jobs import answers, batch_answers
+from sprag.service.jobs.batch_answers import RibbonQuery, YieldQuery
+from sprag.service.results.defaults import main_query
+from sprag.service.results.selection import SelectionError, refused
+from sprag.service.results.tolerances.batch import Asked
+from sprag.service.results.tolerances.ribbons import MOST_QUANTILES, QUANTILES
+from sprag.service.results.tolerances.written import percent
+from sprag.worker import models
+from sprag.worker.spread import DRIVE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from starlette.datastructures import QueryParams
+
+    from sprag.service.answers.tolerances import RibbonReport, YieldReport
+    from sprag.service.storage.records import StudyRecord
+    from sprag.worker.study import Study
+
+router = APIRouter(include_in_schema=False)
+
+#: Worst drives in the table.
+WORST: Final = 10
+#: The condition that is shown first.
+_FIRST_PART: Final = "90 % of nominal"
+_PROBABILITY: Final = re.compile(r"([\d.eE+-]+)\s*(%?)")
+
+
+@router.get("/studies/{study_id:study}/drives")
+async def drives_page(context: Ctx, work: Attended, request: Request, study_id: StudyId) -> Response:
+    """Ribbons and yield of one line of places; the user chooses results, places, quantiles and conditions."""
+    study = await run_in_threadpool(context.store.study, study_id)
+    if study.spread is None or study.plan is not None:
+        return RedirectResponse(f"/studies/{study_id}", status_code=303)
+    given = request.query_params
+    faults: tuple[Any, ...] = ()
+    found: tuple[RibbonReport, YieldReport] | None = None
+    try:
+        ribbon, wanted = _queries(study, given)
+        found = await work.check(batch_answers.both, context.library, study_id, ribbon, wanted)
+    except SelectionError as error:
+        faults = error.faults
+    return await run_in_threadpool(_page, context, study_id, given, found, faults)
+
+
+def _page(
+    context: Ctx,
+    study_id: str,
+    given: QueryParams,
+    found: tuple[RibbonReport, YieldReport] | None,
+    faults: tuple[Any, ...],
+) -> Response:
+    study = context.store.study(study_id)
+    shown = given if found else type(given)()
+    ribbon, wanted = _queries(study, shown)
+    own = f"/studies/{study_id}"
+    places = _place_pairs(ribbon.asked)
+    drawn = urlencode(
+        [*places, *(("y", name) for name in ribbon.y), *(("quantile", repr(p)) for p in ribbon.quantiles)]
+    )
+    reached = urlencode([*places, *(("condition", text) for text in wanted.conditions)])
+    asked = ribbon.asked
+    fixed = fixed_choices(study, tuple(path for path in (asked.x, *asked.by) if path), asked.at)
+    return page(
+        "drives.html",
+        status=422 if faults else 200,
+        **study_frame(context, study_id),
+        tab="/drives",
+        faults=faults,
+        asked=asked,
+        y=ribbon.y,
+        # What was refused stays in its field.
+        quantiles=(faults and given.get("quantile")) or ", ".join(map(percent, ribbon.quantiles)),
+        conditions=(faults and given.get("condition")) or "\n".join(wanted.conditions),
+        axes=axis_choices(study),
+        results=[info for info in models.study_results(study) if info.kind != "category"],
+        fixed=[one for one in fixed if one["path"] != DRIVE],
+        ribbon=found and found[0],
+        reached=found and found[1],
+        ribbon_figure=f"{own}/figures/ribbon?{drawn}",
+        yield_figure=f"{own}/figures/yield?{reached}",
+        ribbon_files=f"{views.study_address(study_id)}/ribbon?{drawn}",
+        yield_files=f"{views.study_address(study_id)}/yield?{reached}",
+    )
+
+
+def _place_pairs(asked: Asked) -> list[tuple[str, str]]:
+    x = [] if asked.x is None else [("x", asked.x)]
+    return [*x, *(("by", path) for path in asked.by), *(("at", f"{path}={value}") for path, value in asked.at)]
+
+
+def _queries(study: Study, given: QueryParams) -> tuple[RibbonQuery, YieldQuery]:
+    """What a URL asks for; raises SelectionError for quantiles that are none."""
+    infos = models.study_results(study)
+    main = main_query(study, infos)
+    y = tuple(name for name in given.getlist("y") if name) or batch_answers.drawn_results(study)
+    x = given.get("x") or (None if main is None else main.x)
+    by = tuple(path for path in given.getlist("by") if path and path != x)
+    drawn = tuple(path for path in (x, *by) if path)
+    at = tuple(pair for pair in held(study, given.getlist("at"), drawn) if pair[0] != DRIVE) if drawn else ()
+    asked = Asked(x, by, at)
+    texts = [line for text in given.getlist("condition") for line in text.splitlines() if line.strip()]
+    conditions = tuple(texts) or (f"{y[0]} >= {_FIRST_PART}",)
+    return RibbonQuery(y, asked, _quantiles(given.getlist("quantile"))), YieldQuery(conditions, asked, WORST)
+
+
+def _quantiles(texts: list[str]) -> tuple[float, ...]:
+    """Probabilities of texts such as ``5 %, 0.5``; without any those that are shown first."""
+    parts = [part.strip() for text in texts for part in re.split(r"[,;]", text) if part.strip()]
+    found = []
+    for part in parts:
+        number = _PROBABILITY.fullmatch(part)
+        try:
+            value = float(number[1]) / (100.0 if number[2] else 1.0) if number else -1.0
+        except ValueError:
+            value = -1.0
+        if not 0.0 < value < 1.0:
+            raise refused("quantile", "out-of-range", "is no probability", part, allowed="such as 5 % or 0.05")
+        found.append(value)
+    if len(found) > MOST_QUANTILES:
+        raise refused("quantile", "too-many", f"{len(found)} are given", allowed=f"at most {MOST_QUANTILES}")
+    return tuple(found) or QUANTILES
+
+
+@router.get("/studies/{study_id:study}/figures/ribbon")
+async def ribbon_of(work: Attended, study_id: StudyId) -> Response:
+    """The figure of the ribbons."""
+    return await _figure(work, study_id, figures.ribbon_json, 0)
+
+
+@router.get("/studies/{study_id:study}/figures/yield")
+async def yield_of(work: Attended, study_id: StudyId) -> Response:
+    """The figure of the yield."""
+    return await _figure(work, study_id, figures.yield_json, 1)
+
+
+async def _figure(work: Work, study_id: str, draw: Callable[..., bytes], which: int) -> Response:
+    def make(record: StudyRecord) -> Response | Drawing:
+        query = _queries(work.context.store.study(study_id), work.request.query_params)[which]
+        drawing = Drawing(draw, (work.context.library, study_id, query), JSON)
+        return drawing if record.cases > answers.FEW // 10 else drawing.here()
+
+    return await conditional(work, study_id, "figure", make)
