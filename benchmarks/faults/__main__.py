@@ -18,6 +18,7 @@ from benchmarks.faults.kills import kills
 from benchmarks.faults.link import link
 from benchmarks.faults.powercut import powercut
 from benchmarks.faults.rounds import rounds
+from benchmarks.faults.served_rounds import served_rounds
 from benchmarks.faults.stopped import stopped
 
 
@@ -42,6 +43,10 @@ def main() -> None:
     )
     drill("powercut", powercut, "the power goes between any two system calls of a commit", studies=12, seed=1)
     drill("rounds", rounds, "kill -9 in a study that chooses its own cases", count=50, seed=1, url="")
+    drill(
+        "servedrounds", served_rounds, "kill -9 of processes of a service in a study that chooses its own cases",
+        count=20, seed=1,
+    )  # fmt: skip
     drill("stopped", stopped, "dispatchers are stopped, replaced and woken", cases=4_000, rounds=10, seed=1)
     drill(
         "badcases", badcases, "cases that crash or never return",

@@ -47,7 +47,7 @@ def kills(
                 lambda share=share: harness.done(service.database, study) >= share * cases, "the study goes on"
             )
             time.sleep(draw.uniform(0.0, _JITTER_SECONDS))
-        killed[_kill(service, draw)] += 1
+        killed[kill(service, draw)] += 1
         if number % max(1, count // _ACCEPTED) == 0:
             key = f"small-{number}"
             accepted[key] = _submit(service, small, key)
@@ -84,7 +84,7 @@ def _count_claims(database: Path) -> None:
     connection.close()
 
 
-def _kill(service: harness.Service, draw: random.Random) -> str:
+def kill(service: harness.Service, draw: random.Random) -> str:
     """Kill the drawn target; wait until it exists."""
     target = draw.choices(list(TARGETS), list(TARGETS.values()))[0]
     if target == "service":

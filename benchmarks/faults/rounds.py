@@ -51,15 +51,15 @@ def rounds(folder: Path, *, count: int = 50, seed: int = 1, url: str = "") -> di
     killed: Counter[str] = Counter()
     studies = 0
     with Store.open(url, chunking=Chunking(cases=8)) as store:
-        undisturbed = _create(store)
+        undisturbed = create(store)
         _run(url, undisturbed, 0, killed)
         while killed.total() < count:
-            disturbed = _create(store)
+            disturbed = create(store)
             studies += 1
             while store.get_study(disturbed).state is not StudyState.FINISHED:
                 # Once there were kills enough, the last study is left alone.
                 _run(url, disturbed, 0 if killed.total() >= count else draw.randint(1, _EVENTS), killed)
-            assert _whole(store, disturbed) == _whole(store, undisturbed)
+            assert whole(store, disturbed) == whole(store, undisturbed)
         record = store.get_study(undisturbed)
     return {
         "studies": studies,
@@ -70,15 +70,21 @@ def rounds(folder: Path, *, count: int = 50, seed: int = 1, url: str = "") -> di
     }
 
 
-def _create(store: Store) -> str:
-    spec: dict[str, Any] = json.loads(preset_text("one_pendulum")[1])
-    spec["axes"] = [
+def create(store: Store) -> str:
+    """Submit the study; its id."""
+    parsed = parse_spec(load_spec(json.dumps(spec()), "json"))
+    return store.create_study(parsed.spec, parsed.study, fresh=True).id
+
+
+def spec() -> dict[str, Any]:
+    """Two refined curves."""
+    made: dict[str, Any] = json.loads(preset_text("one_pendulum")[1])
+    made["axes"] = [
         {"path": "excitation.frequency", "values": ["24 Hz", "26 Hz"]},
         {"path": "shaft.load", "adaptive": [0.05, 0.6]},
     ]
-    spec["refine"] = {"results": ["shaft.speed.mean", "efficiency"], "error": "2 %", "start": 5, "finest": "1/32"}
-    parsed = parse_spec(load_spec(json.dumps(spec), "json"))
-    return store.create_study(parsed.spec, parsed.study, fresh=True).id
+    made["refine"] = {"results": ["shaft.speed.mean", "efficiency"], "error": "2 %", "start": 5, "finest": "1/32"}
+    return made
 
 
 def _run(url: str, study: str, fatal: int, killed: Counter[str]) -> None:
@@ -92,7 +98,7 @@ def _run(url: str, study: str, fatal: int, killed: Counter[str]) -> None:
         killed[done.stdout.strip()] += 1
 
 
-def _whole(store: Store, study: str) -> tuple[Any, ...]:
+def whole(store: Store, study: str) -> tuple[Any, ...]:
     """Everything of a study that may not depend on how it was run."""
     with store.session.read() as connection:
         columns = (STUDIES.c.number, STUDIES.c.study, STUDIES.c.model, STUDIES.c.variant)

@@ -25,12 +25,14 @@ from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.dask import DaskExecutor
 from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.executors.process_pool import SPARE_CHUNKS, ProcessPoolExecutor
+from sprag.worker.planning.rounds import Rows
 from sprag.worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
 from sprag.worker.states import StudyState
 from sprag.worker.study import Study
 from tests.conftest import ROOT
 from tests.worker import fakes
 from tests.worker.executors.clusters import DEADLINE, Cluster, clusters
+from tests.worker.planning import toy
 
 
 def eventually(true: Callable[[], object]) -> None:
@@ -338,15 +340,32 @@ def test_a_cluster_of_its_own_runs_chunks() -> None:
         executor.close()
 
 
+def in_rounds(rounds: int, size: int) -> Study:
+    """The study that an undisturbed run ends with."""
+    study = toy.study(rounds, size)
+    planner = toy.Chained(study.plan or {})
+    speed = [info.name for info in models.study_results(study)].index(toy.RESULT)
+    for first in range(0, rounds * size, size):
+        points, speeds = study.points(range(first, first + size)), fakes.values(first, size)[:, speed]
+        planner.tell(Rows(points, np.ones(size, dtype=bool), {toy.RESULT: speeds}))
+        study = study.with_points(planner.ask().points)
+    return study
+
+
 def test_a_study_survives_what_happens_to_a_cluster(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """Workers are killed and join, the scheduler is killed with all it knows; no row is lost, doubled or wrong."""
-    cases = int(os.environ.get("SPRAG_TEST_CASES", "1000"))
+    """Workers are killed and join, the scheduler is killed with all it knows; no row is lost, doubled or wrong.
+
+    The study chooses its cases in five rounds, by points that depend on every bit of every row before them.
+    """
+    size = int(os.environ.get("SPRAG_TEST_CASES", "1000")) // 5
+    cases, undisturbed = 5 * size, in_rounds(5, size)
     chosen = random.Random(3)
     kills: list[str] = []
-    with clusters() as made, Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}", chunking=Chunking(cases=20)) as store:
+    store_url = f"sqlite:///{tmp_path / 'a.sqlite3'}"
+    with clusters() as made, toy.known(), Store.open(store_url, chunking=Chunking(cases=20)) as store:
         made.start_scheduler()
         made.start_worker()
-        record = store.create_study({}, fakes.study(cases))
+        record = store.create_study({}, toy.study(5, size))
         executor = DaskExecutor(made.url, 0, chunk_timeout=60.0, run=fakes.run, load=fakes.load)
         marks = sorted(chosen.sample(range(cases // 20, cases - cases // 10), 2 + cases // 1500))
 
@@ -376,4 +395,6 @@ def test_a_study_survives_what_happens_to_a_cluster(tmp_path: Path, capfd: pytes
         blocks = list(store.iter_rows(record.id))
         assert np.concatenate([block.cases for block in blocks]).tolist() == list(range(cases))
         np.testing.assert_array_equal(np.concatenate([block.values for block in blocks]), fakes.values(0, cases))
+        assert store.study(record.id) == undisturbed
+        assert len(store.rounds(record.id)) == 6  # the last is the end
     assert "Traceback" not in capfd.readouterr().err
