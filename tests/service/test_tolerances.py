@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
+from sprag.service.presets import preset_text
+from sprag.service.spec.document import parse_spec
+from sprag.service.spec.text import load_spec
 from sprag.worker import models
 from sprag.worker.models import WorkerEnding
 from sprag.worker.spread import DRIVE, Spread, Tolerance
@@ -130,6 +134,31 @@ def test_a_drive_that_is_no_machine_is_a_failed_case_and_the_others_are_run() ->
     for case in (0, int(np.flatnonzero(rates >= 0.0)[-1])):
         alone = models.run_chunk(study, case, 1)
         np.testing.assert_array_equal(alone.values[0], result.values[case])
+
+
+def test_the_motion_of_a_drive_has_its_drawn_values(filled: tuple[Service, str]) -> None:
+    service, study_id = filled
+    study = service.store.study(study_id)
+    values = study.case_parameters(7)
+    alone = replace(
+        study, base=study.base | {path: values[path] for path in (BACKLASH, "shaft.load")}, axes=(), spread=None
+    )
+    own, single = (models.run_trajectory(one, case, 0.0, 0.5, 9) for one, case in ((study, 7), (alone, 0)))
+    np.testing.assert_array_equal(own.values, single.values)
+    np.testing.assert_array_equal(models.run_chunk(study, 7, 1).values, models.run_chunk(alone, 0, 1).values)
+
+
+def test_a_machine_shaft_has_drives_too() -> None:
+    spec = load_spec(preset_text("compressor")[1], "toml")
+    assert isinstance(spec, dict)
+    path = "mechanism.slider_crank.rod"
+    spec = {name: value for name, value in spec.items() if name != "axes"}
+    spec |= {"tolerances": [{"path": path, "plus_minus": "1 %"}], "drives": 3}
+    study = parse_spec(spec).study
+    result = models.run_chunk(study, 0, 4)
+    assert set(result.endings) == {"ok"}
+    assert len(np.unique(result.values, axis=0)) == 4
+    assert models.run_trajectory(study, 3, 0.0, 1.0, 3).times.size == 3
 
 
 def test_a_drive_with_a_clutch_of_negative_torque_is_not_run() -> None:

@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sprag.engine.endings import ENDINGS
+from sprag.worker.spread import DRIVE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
+
+    from sprag.worker.study import Study
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +94,13 @@ def run_accepted(task: ChunkTask, run: Callable[[ChunkTask], ChunkResult], endin
         for row, one, flag in zip(rows.tolist(), found.endings, found.flags, strict=True):
             endings[row], flags[row] = one, flag
     return ChunkResult(task.first, endings, flags, values)
+
+
+def case_machine(study: Study, case: int) -> dict[str, float]:
+    """Every parameter of one case, SI: the base with what the case has for itself. IndexError outside the study."""
+    machine = {**study.base, **study.case_parameters(case)}
+    machine.pop(DRIVE, None)
+    return machine
 
 
 @dataclass(frozen=True, slots=True)

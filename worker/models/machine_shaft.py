@@ -26,7 +26,7 @@ from sprag.engine.machine_shaft.spec import (
     OperationChoice,
 )
 from sprag.engine.machine_shaft.tables import MAX_ROWS
-from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
+from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, case_machine, chunk_result
 from sprag.worker.models.model import Model
 from sprag.worker.models.shaft_presentation import PRESENTATION
 
@@ -187,7 +187,7 @@ class MachineShaft(Model):
         """Tables over ``points`` equally spaced angles of the shaft from ``start`` to ``end`` (rad)."""
         from sprag.engine.machine_shaft.trajectory import trajectory
 
-        columns = {**study.base, **study.case_parameters(case)}
+        columns = case_machine(study, case)
         return trajectory(spec_of(study.structure), columns, np.linspace(start, end, points))
 
     def estimate_seconds_per_case(self, study: Study) -> float:

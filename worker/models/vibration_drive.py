@@ -18,7 +18,7 @@ from sprag.engine.vibration_drive.parameters import (
 )
 from sprag.engine.vibration_drive.regimes import Regime, settled_infos
 from sprag.engine.vibration_drive.results import result_infos
-from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
+from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, case_machine, chunk_result
 from sprag.worker.models.drive_presentation import PRESENTATION
 from sprag.worker.models.model import Model
 from sprag.worker.models.settled import REGIME_FLAGS, followed_periods, is_settled, mean_periods, settings_of
@@ -120,7 +120,7 @@ def duration_seconds(study: Study, case: int) -> float:
 
 
 def _frequency(study: Study, case: int) -> float:
-    return {**study.base, **study.case_parameters(case)}["excitation.frequency"]
+    return case_machine(study, case)["excitation.frequency"]
 
 
 def _mean_periods(study: Study) -> float:
@@ -219,7 +219,7 @@ class VibrationDrive(Model):
         """Instantaneous values at ``points`` equally spaced times from ``start`` to ``end`` (s)."""
         from sprag.engine.vibration_drive.simulate import trajectory
 
-        columns = {**study.base, **study.case_parameters(case)}
+        columns = case_machine(study, case)
         return trajectory(columns, run_of(study.run), np.linspace(start, end, points))
 
     @property
@@ -230,7 +230,7 @@ class VibrationDrive(Model):
         """Those of one turn of the settled motion for a settled study, otherwise those in the window."""
         from sprag.engine.vibration_drive.engagements import engagements, settled_engagements
 
-        columns = {**study.base, **study.case_parameters(case)}
+        columns = case_machine(study, case)
         if is_settled(study.run):
             return settled_engagements(columns, settings_of(study.run))
         return engagements(columns, run_of(study.run))
@@ -242,7 +242,7 @@ class VibrationDrive(Model):
     def portrait(self, study: Study, case: int) -> Portrait:
         from sprag.engine.vibration_drive.portrait import portrait, settled_portrait
 
-        columns = {**study.base, **study.case_parameters(case)}
+        columns = case_machine(study, case)
         if is_settled(study.run):
             return settled_portrait(columns, settings_of(study.run))
         return portrait(columns, run_of(study.run))
