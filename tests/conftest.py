@@ -42,7 +42,6 @@ LONG = (
     "acceptance/test_commands.py",
     "service/http/web/test_designers.py",
     "acceptance/test_wheel.py",
-    "acceptance/test_lesser_processors.py",
     "engine/test_odd_drives.py",
     "service/http/web/test_nights.py",
     "worker/executors/test_executors.py",

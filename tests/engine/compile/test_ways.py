@@ -1,16 +1,18 @@
-"""Code compiled by plain ``numba.njit`` gives the bits of that compiled as programs.
+"""Code compiled by plain ``numba.njit``, and code for a processor that has SSE only, give the bits of the usual code.
 
-A whole kernel takes the plain way a minute: ``python -m benchmarks.compilers``.
+Whole kernels take a minute: ``python -m benchmarks.compilers`` and ``python -m benchmarks.processors``.
 """
 
 from __future__ import annotations
 
+import platform
 import subprocess
 from pathlib import Path
 
 import pytest
 
 from benchmarks.compilers import WAYS, output
+from benchmarks.processors import codes
 
 #: The lane loops of a small kernel, on numbers by chance, and the roots and peaks of polynomials by the functions that
 #: a kernel calls.
@@ -61,12 +63,25 @@ sys.stdout.write(f"{inside} {np.isfinite(values).mean() > 0.9} {values.tobytes()
 """
 
 
-def test_plain_njit_gives_the_same_bits(tmp_path: Path) -> None:
-    programs, plain = (output(_PROGRAM, SPRAG_COMPILER=way, SPRAG_KERNEL_CACHE=str(tmp_path)) for way in WAYS)
+@pytest.fixture(scope="module")
+def usual(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """What the program writes, compiled as programs for this processor."""
+    found = output(_PROGRAM, SPRAG_COMPILER="programs", SPRAG_KERNEL_CACHE=str(tmp_path_factory.mktemp("usual")))
+    assert found.startswith("['decorators', 'lowering', 'program'] True ")
+    assert len(found) > 50 * 500 * 16
+    return found.split()[-1]
+
+
+def test_plain_njit_gives_the_same_bits(usual: str, tmp_path: Path) -> None:
+    plain = output(_PROGRAM, SPRAG_COMPILER="plain", SPRAG_KERNEL_CACHE=str(tmp_path))
     assert plain.startswith("[] True ")
-    assert programs.startswith("['decorators', 'lowering', 'program'] True ")
-    assert len(plain) > 50 * 500 * 16
-    assert plain.split()[-1] == programs.split()[-1]
+    assert plain.split()[-1] == usual
+
+
+@pytest.mark.skipif(platform.machine() not in {"x86_64", "AMD64"}, reason="these are of x86-64 processors")
+def test_a_processor_with_sse_only_gives_the_same_bits(usual: str, tmp_path: Path) -> None:
+    """SSE has no fused multiply-add: a function computes it."""
+    assert output(_PROGRAM, **codes(plain=False)["SSE"], SPRAG_KERNEL_CACHE=str(tmp_path)).split()[-1] == usual
 
 
 def test_an_unknown_way_is_refused_by_name() -> None:
