@@ -41,7 +41,7 @@ ROUND = 40
 #: Strobes this close to those one orbit earlier, and approaching them, justify Newton's method.
 NEAR = 0.01
 #: The same, divided by the order: irregular motions return by chance, and trying a long orbit is expensive.
-_SHARED = 0.05
+_SHARED = 0.035
 #: Strobes over which a run must have approached the orbit.
 WINDOW = 6
 #: Distance of an orbit from the run beyond which the run need not approach it.
@@ -88,12 +88,14 @@ class Orbits:
     residuals: Floats
     #: The least period in the orbit's own strobes.
     least: Ints
+    #: Scales of the strobes' columns.
+    units: Floats
 
     def take(self, rows: Ints | Flags) -> "Orbits":
         """Some of them."""
         return Orbits(
             self.cases[rows], self.points[rows], self.orders[rows], self.multipliers[rows], self.residuals[rows],
-            self.least[rows],
+            self.least[rows], self.units[rows],
         )  # fmt: skip
 
 
@@ -195,7 +197,7 @@ class Search:
         # The longest runs first, because the last ones leave lanes idle.
         rows = rows[np.argsort(-found[rows], kind="stable")]
         certified = self.certify(active[rows], self.starts[active[rows]], found[rows], units[rows])
-        return self._refined(self._of_least_order(certified))
+        return self._of_least_order(certified)
 
     def certify(self, cases: Ints, points: Floats, orders: Ints, units: Floats) -> Orbits:
         """Newton's method from points near orbits of those orders; the stable ones that the runs are near."""
@@ -219,7 +221,7 @@ class Search:
                 orbits.find_least(points, turns, orders, units, _SAME, least)
                 # The last step brings the orbit closer still, unless it is mere rounding.
                 better = np.where((size < RESIDUAL)[:, None], moved, points)
-                certified.append(Orbits(cases, better, orders, multiplier, residual, least).take(accepted))
+                certified.append(Orbits(cases, better, orders, multiplier, residual, least, units).take(accepted))
             fails = converged | (told[:, newton.AGREES] == 0.0) | ~(size < 1.0) | ~close
             fails |= (residual < _TELLING) & (multiplier >= STABLE)
             self._failed(cases[fails & ~accepted])
@@ -227,7 +229,7 @@ class Search:
             cases, orders = cases[left], orders[left]
             points, begun, units = moved[left], begun[left], units[left]
         self._failed(cases)
-        return _joined(certified, self)
+        return joined(certified, self)
 
     def _approaches(self, cases: Ints, turns: Floats, orders: Ints, units: Floats, multipliers: Floats) -> Flags:
         """Whether the strobes of cases come nearer to orbits, given by the strobes of a turn from their points on."""
@@ -246,14 +248,14 @@ class Search:
         newton.step(points, ends, first, units, DISTURBANCE, self.steady_shaft, tied, moved, told)
         return moved, told, done.strobes[first[:-1]]
 
-    def _refined(self, found: Orbits) -> Orbits:
+    def refined(self, found: Orbits) -> Orbits:
         """The same orbits, the sensitive ones of them after further steps with finer integration."""
         rows = np.flatnonzero(found.multipliers > _SENSITIVE)
         for _ in range(_FINE_STEPS):
             if not len(rows):
                 break
             some = found.take(rows)
-            moved, told, _ = self._step(some.cases, some.points, some.orders, self.units(some.cases), self.fine)
+            moved, told, _ = self._step(some.cases, some.points, some.orders, some.units, self.fine)
             good = (told[:, newton.RESIDUAL] < RESIDUAL) & (told[:, newton.MULTIPLIER] < STABLE)
             rows, moved, told = rows[good], moved[good], told[good]
             found.points[rows] = moved
@@ -315,15 +317,16 @@ class Search:
         if not len(again):
             return found
         cases = found.cases[again]
-        better = self.certify(cases, found.points[again], found.least[again], self.units(cases))
+        better = self.certify(cases, found.points[again], found.least[again], found.units[again])
         kept = ~np.isin(found.cases, better.cases)
-        return _joined([found.take(kept), better], self)
+        return joined([found.take(kept), better], self)
 
 
-def _joined(parts: list[Orbits], search: Search) -> Orbits:
+def joined(parts: list[Orbits], search: Search) -> Orbits:
+    """The orbits of several searches."""
     if not parts:
-        none, numbers = np.empty(0), np.empty(0, dtype=np.int64)
-        return Orbits(numbers, np.empty((0, search.history.shape[2])), numbers, none, none, numbers)
+        none, numbers, rows = np.empty(0), np.empty(0, dtype=np.int64), np.empty((0, search.history.shape[2]))
+        return Orbits(numbers, rows, numbers, none, none, numbers, rows)
     return Orbits(*(np.concatenate([getattr(part, name) for part in parts]) for name in Orbits.__slots__))
 
 

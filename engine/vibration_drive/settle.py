@@ -17,7 +17,7 @@ from sprag.engine.vibration_drive.no_load import limit_of
 from sprag.engine.vibration_drive.orbits import distances, settling_periods
 from sprag.engine.vibration_drive.regimes import Regime, means, settled_infos
 from sprag.engine.vibration_drive.results import STEADY_SHAFT, result_infos
-from sprag.engine.vibration_drive.search import ROUND, Orbits, Search, transient_rounds
+from sprag.engine.vibration_drive.search import ROUND, Orbits, Search, joined, transient_rounds
 from sprag.engine.vibration_drive.strobes import ANGLE, FRACTION, PENDULUM_WIDTH, SHAFT_SPEED, SHAFT_WIDTH, SPEED
 
 Floats = NDArray[np.float64]
@@ -122,48 +122,56 @@ def settle(columns: Mapping[str, ArrayLike], settings: SettledRun, *, cases: int
 
 def _settle(search: Search, active: Ints, results: _Results) -> None:
     """Bring cases to their settled motion, and write their results."""
+    found: list[Orbits] = []
+    batches, active = _search(search, active, found, results)
+    # All together, because a few cases leave lanes idle.
+    orbits = joined(found, search)
+    if len(orbits.cases):
+        _write(search, search.refined(orbits), results)
+    if len(active):
+        irregular = batches.finish(active)
+        results.values[active, : results.plain] = irregular.values
+        results.values[active, -len(results.means) :] = irregular.half_widths
+        results.put(active, "regime.exponent", irregular.exponents)
+        results.regimes[active] = irregular.regimes
+        results.points[active] = search.starts[active]
+        _whole_run(search, active, results)
+
+
+def _search(search: Search, active: Ints, found: list[Orbits], results: _Results) -> tuple[Batches, Ints]:
+    """Add the orbits that cases come to; the batches of the other cases, and these cases."""
     settings = search.settings
     count = BATCHES
     if settings.at_most < MEANS_FROM_PERIODS:
         count = max(1, (2 * settings.at_most // 3) // ROUND)
     plan = transient_rounds(settings.at_most - count * ROUND)
-    moved = False
+    batches, moved = Batches(search, count), False
     for number, periods in enumerate(plan):
         if not len(active):
-            return
+            return batches, active
         search.advance(active, periods, windowed=False)
-        active = _take_settled(search, active, results)
+        active = _take_settled(search, active, found, results)
         # Not before the batches: their windows begin at a strobe.
         if not moved and number + 1 < len(plan) and sum(plan[: number + 1]) >= _MOVE_AFTER:
             search.move_strobes(active)
             moved = True
-    batches = Batches(search, count)
     for _ in range(count):
         if not len(active):
-            return
+            break
         batches.advance(active)
-        active = _take_settled(search, active, results)
-    if len(active):
-        found = batches.finish(active)
-        results.values[active, : results.plain] = found.values
-        results.values[active, -len(results.means) :] = found.half_widths
-        results.put(active, "regime.exponent", found.exponents)
-        results.regimes[active] = found.regimes
-        results.points[active] = search.starts[active]
-        _whole_run(search, active, results)
+        active = _take_settled(search, active, found, results)
+    return batches, active
 
 
-def _take_settled(search: Search, active: Ints, results: _Results) -> Ints:
-    """Write the results of cases that have ended or whose orbit is found; returns the others."""
+def _take_settled(search: Search, active: Ints, found: list[Orbits], results: _Results) -> Ints:
+    """Add the orbits that are found and record cases that have ended; returns the other cases."""
     ended = search.endings[active] != _OK
     results.endings[active[ended]] = search.endings[active[ended]]
     active = active[~ended]
     if not len(active):
         return active
-    found = search.look(active)
-    if len(found.cases):
-        _write(search, found, results)
-    return active[~np.isin(active, found.cases)]
+    found.append(search.look(active))
+    return active[~np.isin(active, found[-1].cases)]
 
 
 def _write(search: Search, found: Orbits, results: _Results) -> None:
@@ -183,7 +191,7 @@ def _settled_after(search: Search, found: Orbits) -> Floats:
     """Periods from the start until a run is within the settled distance of its orbit, by the orbit's multiplier."""
     cases = found.cases
     apart, periods = np.empty(len(cases)), np.empty(len(cases))
-    distances(search.starts[cases], found.points, search.units(cases), apart)
+    distances(search.starts[cases], found.points, found.units, apart)
     settling_periods(apart, found.orders, found.multipliers, search.settings.settled, periods)
     return search.periods[cases] + periods
 
