@@ -11,7 +11,7 @@ from sprag.service.faults import FaultError
 from sprag.service.jobs.preview import estimated_bytes, estimated_seconds
 from sprag.service.schedules.deadline import finish_warnings
 from sprag.service.storage.room import RESERVE_BYTES
-from sprag.service.storage.studies import study_row
+from sprag.service.storage.study_row import study_row
 from sprag.worker.limits import MAX_WAITING_STUDIES
 from sprag.worker.planning import most_cases
 
@@ -31,7 +31,7 @@ class Submission:
     Attributes
     ----------
     row : dict
-        See `sprag.service.storage.studies.study_row`.
+        See `sprag.service.storage.study_row`.
     body_hash : str
         Hash of the spec and the parameters of the request, for the idempotency key.
     bytes : int

@@ -34,6 +34,7 @@ from sprag.service.storage.progress import RECENT_CHUNKS, FinishedChunk, Running
 from sprag.service.storage.records import Progress, RoundProgress, StudyPage, StudyRecord, record_of
 from sprag.service.storage.round_table import add_round, latest_round
 from sprag.service.storage.schedules import lift_window
+from sprag.service.storage.study_row import study_row
 from sprag.service.storage.tables import (
     CHUNKS,
     DISPATCHER,
@@ -43,13 +44,10 @@ from sprag.service.storage.tables import (
     RECORD_COLUMNS,
     STUDIES,
 )
-from sprag.service.storage.warning_texts import write_warnings
 from sprag.worker import models
 from sprag.worker.chunking import Chunking, spans
 from sprag.worker.limits import MAX_AXIS_VALUES
-from sprag.worker.planning import planner_of
 from sprag.worker.ports import Chunk
-from sprag.worker.reuse import kin_hash
 from sprag.worker.states import TERMINAL, ChunkState, StudyEvent, StudyState
 from sprag.worker.study import Study
 
@@ -361,31 +359,6 @@ class Studies(Orders):
             with suppress(StudyNotFoundError, StudyBusyError):  # somebody else has deleted it or runs it again
                 self.delete_study(study_id)
         return found
-
-
-def study_row(
-    spec: Mapping[str, Any], study: Study, chunking: Chunking, warnings: Sequence[str] = ()
-) -> dict[str, Any]:
-    """The columns of a new study that follow from the study itself.
-
-    This takes about a second for a million values, so it is computed in the processes that check studies.
-    """
-    planner = None if study.plan is None else planner_of(study.plan)
-    return {
-        "name": study.name,
-        "model": study.model,
-        "variant": models.variant_of(study),
-        "cases": study.cases,
-        "chunk_cases": chunking.cases_of(study),
-        "engine_version": models.ENGINE_VERSION,
-        "physics_hash": study.physics_hash(models.ENGINE_VERSION),
-        "spec": json.dumps(spec, allow_nan=False),
-        "study": study.to_text(),
-        "warnings": write_warnings(warnings),
-        "kin_hash": kin_hash(study, models.ENGINE_VERSION),
-        "most_cases": None if planner is None else planner.most_cases,
-        "most_rounds": None if planner is None else planner.most_rounds,
-    }
 
 
 def _values(study: Study) -> int:
