@@ -85,12 +85,12 @@ def _field(entry: Parameter, path: str) -> Field:
 def run_fields() -> dict[str, Field]:
     """The fields of the run that take one text each, by name."""
     entries = [*SETTLED_RUN.values(), DURATION, *ANY_RUN.values()]
-    return {entry.name: _described(entry, "/run") for entry in entries}
+    return {entry.name: described(entry, "/run") for entry in entries}
 
 
 def degree_field(pointer: str) -> Field:
     """The highest degree of the fit of a clutch at ``pointer``."""
-    return _described(FIT["max_degree"], pointer)
+    return described(FIT["max_degree"], pointer)
 
 
 def refine_fields() -> dict[str, Field]:
@@ -99,20 +99,21 @@ def refine_fields() -> dict[str, Field]:
     meaning = f"{refine.RESULTS.help}, separated by semicolons"
     own = [
         Field("/refine/results", "Results", "", "", "", meaning, "", True, "", "shaft.speed.mean; efficiency"),
-        _described(refine.ERROR, "/refine"),
-        _described(refine.START, "/refine"),
-        _described(refine.FINEST, "/refine"),
-        replace(_described(refine.MOST, "/refine"), default="no bound"),
+        described(refine.ERROR, "/refine"),
+        described(refine.START, "/refine"),
+        described(refine.FINEST, "/refine"),
+        replace(described(refine.MOST, "/refine"), default="no bound"),
     ]
     return {field.name.rpartition("/")[2]: field for field in own}
 
 
 def search_fields() -> list[Field]:
     """The fields of a search that take one number each."""
-    return [_described(goal.SEARCH[name], "/goal") for name in ("population", "generations", "seed")]
+    return [described(goal.SEARCH[name], "/goal") for name in ("population", "generations", "seed")]
 
 
-def _described(entry: Described, pointer: str) -> Field:
+def described(entry: Described, pointer: str) -> Field:
+    """The field of a described entry of the object at ``pointer``."""
     ends = [number(int(end)) if entry.kind in ("whole", "periods") else f"{end:g}" for end in (entry.low, entry.high)]
     unit = " periods" if entry.kind == "periods" else ""
     limits = f"{ends[0]} to {ends[1]}{unit}" if entry.high else entry.limits

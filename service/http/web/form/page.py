@@ -44,6 +44,7 @@ from sprag.service.http.web.form.spec import (
     values_of,
     with_clutch_defaults,
 )
+from sprag.service.http.web.form.tolerances import OWN, distributions, drive_fields, own_name, with_batch
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.templates import fragment, page, spec_text
 from sprag.service.http.work import Attended, Work
@@ -70,6 +71,7 @@ EMPTY_FORM: Final[Values] = {
 #: Beginnings of the fields of the other question, which the page keeps though it does not show them.
 _OF_AXES: Final = ("/axes/", "/refine/", "/combine")
 _OF_SEARCH: Final = ("/goal/",)
+_OF_BATCH: Final = (OWN, "/drives", "/seed")
 
 
 @router.get("/new")
@@ -178,11 +180,13 @@ def reshape(values: Values, wanted: str) -> None:
         count = pendulums_of(values)
         if count < MAX_PENDULUMS:
             copy(values, f"/base/pendulums/{count - 1}/", f"/base/pendulums/{count}/")
+            copy(values, f"{OWN}pendulums/{count - 1}/", f"{OWN}pendulums/{count}/")
             _adapt_formulas(values, count)
         values["pendulums"] = str(min(count + 1, MAX_PENDULUMS))
     elif action == "drop-pendulum":
         count = pendulums_of(values)
         drop(values, f"/base/pendulums/{count - 1}/")
+        drop(values, f"{OWN}pendulums/{count - 1}/")
         values["pendulums"] = str(max(count - 1, 1))
     elif part in PARTS and verb == "add":
         add_row(values, part)
@@ -244,12 +248,18 @@ def form_page(request: Request, values: Values, checked: Checked | None, status:
         goals=result_choices(pendulums_of(values), numbers=True),
         limited=result_choices(pendulums_of(values)),
         degree_field=degree_field,
+        batch=with_batch(values),
+        own_name=own_name,
+        drive_fields=drive_fields(),
+        distributions=distributions(),
     )
 
 
 def _kept(values: Values) -> Values:
     """The fields of the question that the form does not ask, so that what was entered is there when it is."""
-    others = _OF_AXES if is_search(values) else _OF_SEARCH
+    others: tuple[str, ...] = _OF_AXES if is_search(values) else _OF_SEARCH
+    if not with_batch(values):
+        others = (*others, *_OF_BATCH)
     return {name: text for name, text in values.items() if name.startswith(others)}
 
 

@@ -21,6 +21,8 @@ from sprag.service.http.web.form.entries import (
 from sprag.service.http.web.form.fields import FORM_MODEL, pendulum, sections
 from sprag.service.http.web.form.goal import GOAL_DEFAULTS, field_of_goal, goal_of, goal_values
 from sprag.service.http.web.form.parts import count_of
+from sprag.service.http.web.form.tolerances import FIELDS as TOLERANT
+from sprag.service.http.web.form.tolerances import field_of_tolerance, tolerance_values, tolerances_of
 from sprag.service.spec.derive import formulas_of, with_values
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.service.spec.plan import refine
@@ -43,7 +45,9 @@ REFINE_DEFAULTS: Final[Values] = {
 }
 #: The form's choice for a run of a given time, which a spec expresses by its duration or window.
 TIMED: Final = "time"
-_FIELDS: Final = frozenset({"sprag", "model", "name", "base", "run", "axes", "combine", "derive", "refine", "goal"})
+_FIELDS: Final = frozenset(
+    {"sprag", "model", "name", "base", "run", "axes", "combine", "derive", "refine", "goal", *TOLERANT}
+)
 #: Beginning of a field with the formula of a derived parameter.
 FORMULA: Final = "="
 
@@ -92,6 +96,7 @@ def spec_of(values: Mapping[str, str]) -> tuple[dict[str, Any], Faults]:
     if derive:
         spec["derive"] = derive
     spec["run"] = _run(values)
+    spec |= tolerances_of(values)
     if is_search(values):
         return spec | {"goal": goal_of(values, faults)}, faults
     axes = [_axis(values, index) for index in range(count_of(values, "axes"))]
@@ -209,6 +214,8 @@ def field_of(pointer: str, values: Mapping[str, str]) -> str:
         return "/refine/results"
     if pointer.startswith("/goal"):
         return field_of_goal(pointer, values)
+    if pointer.startswith("/tolerances"):
+        return field_of_tolerance(pointer, values)
     match = re.fullmatch(r"/axes/(\d+)(?:/(.*))?", pointer)
     if match:
         # Axes that are not filled in are not in the spec.
@@ -266,6 +273,7 @@ def values_of(spec: Mapping[str, Any]) -> Values:
     values |= goal_values(spec["goal"]) if "goal" in spec else GOAL_DEFAULTS
     for key, content in spec.get("refine", {}).items():
         values[f"/refine/{key}"] = "; ".join(content) if key == "results" else text_of(content)
+    values |= tolerance_values(spec, int(values["pendulums"]))
     values["axes"] = str(len(spec.get("axes", ())))
     for index, axis in enumerate(spec.get("axes", ())):
         values |= _axis_values(f"/axes/{index}", axis)

@@ -1,0 +1,111 @@
+"""The fields of the form by which drives differ: "±" beside each parameter, its distribution, number of drives."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any, Final
+
+from sprag.service.http.web.form.entries import Values, count_in, names_of, plain, text_of
+from sprag.service.http.web.form.fields import Field, described, pendulum, sections
+from sprag.service.results.wording import words
+from sprag.service.spec.draws.described import DISTRIBUTION, DRAWS
+from sprag.worker.models import MAX_PENDULUMS
+
+#: Fields of a spec that this part of the form shows.
+FIELDS: Final = ("tolerances", "drives", "seed")
+#: The box by which the form has them.
+BATCH: Final = "batch"
+#: Beginning of the names of these fields.
+OWN: Final = "/tolerances/"
+#: The order of the tolerances in a spec that was cloned: another one would draw other drives.
+ORDER: Final = f"{OWN}order"
+_NORMAL: Final = DISTRIBUTION.values[0]
+
+
+def with_batch(values: Mapping[str, str]) -> bool:
+    """Whether the form asks about a batch of drives."""
+    return values.get(BATCH) == "on"
+
+
+def drive_fields() -> list[Field]:
+    """The fields for the number of drives and the seed."""
+    return [replace(described(DRAWS[name], ""), label=words(name)) for name in FIELDS[1:]]
+
+
+def distributions() -> list[tuple[str, str]]:
+    """The distributions and their labels."""
+    return [(name, words(name).lower()) for name in DISTRIBUTION.values]
+
+
+def tolerances_of(values: Mapping[str, str]) -> dict[str, Any]:
+    """The part of a spec about a batch of drives; empty where the form does not ask about one."""
+    if not with_batch(values):
+        return {}
+    items = []
+    for name, plus_minus in _filled(values):
+        path = name.removeprefix(OWN).replace("/", ".")
+        others = names_of(values.get(f"{name}/with", ""))
+        distribution = values.get(f"{name}/distribution", _NORMAL)
+        items.append(
+            {
+                "path": [path, *others] if others else path,
+                "plus_minus": plain(plus_minus),
+                **({} if distribution == _NORMAL else {"distribution": distribution}),
+                **({"shared": True} if others else {}),
+            }
+        )
+    settings = {name: plain(values[f"/{name}"]) for name in FIELDS[1:] if values.get(f"/{name}", "").strip()}
+    return {"tolerances": items, **settings}
+
+
+def _filled(values: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    """The parameters with a tolerance, in their order: name of the part, and the text of the field."""
+    pendulums = count_in(values, "pendulums", 1, 1, MAX_PENDULUMS)
+    parts = (*sections(), *(pendulum(index) for index in range(pendulums)))
+    names = [own_name(field.name) for section in parts for field in section.fields]
+    first = {name: place for place, name in enumerate(names_of(values.get(ORDER, "")))}
+    for name in sorted(names, key=lambda name: first.get(name, len(first))):
+        text = values.get(f"{name}/plus_minus", "").strip()
+        if text:
+            yield name, text
+
+
+def own_name(field: str) -> str:
+    """Beginning of the names of the fields for the tolerance of the parameter at the pointer ``field``."""
+    return OWN + field.removeprefix("/base/")
+
+
+def field_of_tolerance(pointer: str, values: Mapping[str, str]) -> str:
+    """The field for a fault at ``pointer``, which begins with ``/tolerances``."""
+    names = [name for name, _ in _filled(values)]
+    found = re.match(r"/tolerances/(\d+)", pointer)
+    return f"{names[int(found[1])]}/plus_minus" if found and int(found[1]) < len(names) else BATCH
+
+
+def tolerance_values(spec: Mapping[str, Any], pendulums: int) -> Values:
+    """The form's values for the drives of a spec; raises ValueError where the form cannot show them."""
+    if "tolerances" not in spec:
+        return {}
+    found: Values = {BATCH: "on"} | {f"/{name}": text_of(spec[name]) for name in FIELDS[1:] if name in spec}
+    shown = {field.name for section in sections() for field in section.fields}
+    shown |= {field.name for index in range(pendulums) for field in pendulum(index).fields}
+    order: list[str] = []
+    for item in spec["tolerances"]:
+        if "plus_minus" not in item:
+            raise ValueError("the form has no field for measured values")
+        given = item["path"] if isinstance(item["path"], list) else [item["path"]]
+        paths = [path.replace("*", str(index)) for path in given for index in range(pendulums if "*" in path else 1)]
+        groups = [paths] if item.get("shared") else [[path] for path in paths]
+        for first, *others in groups:
+            pointer = "/base/" + first.replace(".", "/")
+            if pointer not in shown:
+                raise ValueError(f"the form has no field for the tolerance of {first}")
+            name = own_name(pointer)
+            order.append(name)
+            found[f"{name}/plus_minus"] = text_of(item["plus_minus"])
+            found[f"{name}/distribution"] = item.get("distribution", _NORMAL)
+            if others:
+                found[f"{name}/with"] = ", ".join(others)
+    return found | {ORDER: " ".join(order)}
