@@ -29,11 +29,10 @@ def involved(study: Study, paths: Iterable[str]) -> Study:
     """
     paths = tuple(paths)
     roots = sources(study.derive, study.base, paths)
-    drawn = study.spread is not None and not roots.isdisjoint(study.spread.paths)
-    if drawn:
+    spread = None if study.spread is None else study.spread.of(roots)
+    if spread is not None:
         roots |= {DRIVE}
     axes = tuple(axis for axis in study.axes if not roots.isdisjoint(axis.paths))
-    spread = study.spread if drawn else None
     return replace(study, axes=axes, derive=needed(study.derive, study.base, paths), spread=spread)
 
 

@@ -7,7 +7,7 @@ the libraries that made them. All values of the other axes share the same draws 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
@@ -122,15 +122,21 @@ class Spread:
         draws = self.array[np.maximum(numbers, 1) - 1, column]
         return np.where(numbers == 0, nominal, self.tolerances[column].applied(nominal, draws)) + 0.0
 
+    def of(self, paths: Collection[str]) -> Spread | None:
+        """The part that concerns some parameters; None where none of them has a tolerance."""
+        kept = [k for k, one in enumerate(self.tolerances) if not set(paths).isdisjoint(one.paths)]
+        tolerances = [self.tolerances[k] for k in kept]
+        own = [replace(one, paths=tuple(path for path in one.paths if path in paths)) for one in tolerances]
+        return Spread(own, self.array[:, kept], self.about) if own else None
+
     def columns(self, base: Mapping[str, float], columns: Mapping[str, Floats]) -> dict[str, Floats]:
         """Values of all `paths` in cases: path -> array, shape (m,), SI.
 
         ``columns`` has the nominal values of those that vary, and the numbers of the drives under `DRIVE`.
         """
         drives = columns[DRIVE].astype(np.int64)
-        # A limit may be missing from the base (infinite) and from the part of the axes that is asked for.
         nominal: dict[str, Floats | float] = {**base, **columns}
-        return {path: self.values(path, nominal[path], drives) for path in self.paths if path in nominal}
+        return {path: self.values(path, nominal[path], drives) for path in self.paths}
 
     def to_json(self) -> dict[str, Any]:
         """The spread as plain JSON data; `from_json` gives an equal one."""

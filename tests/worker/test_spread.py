@@ -177,6 +177,16 @@ def test_only_the_axes_are_involved_on_which_a_value_depends() -> None:
     own = study(derive={"a": "b + 1"})
     assert [axis.paths for axis in involved(own, ["a"]).axes] == [(DRIVE,)]
     assert [axis.paths for axis in involved(own, ["load"]).axes] == [("load",), (DRIVE,)]
+    limited = replace(
+        own,
+        axes=(Axis(("limit",), [0.1, 0.2]), *own.axes),
+        spread=Spread([Tolerance("limit = b", ("limit", "b"), "scale")], DRAWS[:, :1]),
+    )
+    part = involved(limited, ["a"])
+    # The limit has no value in the base.
+    assert part.spread is not None
+    assert part.spread.paths == ("b",)
+    np.testing.assert_array_equal(part.columns([2])["a"], 0.5 * 0.9 + 1)
     free = replace(own, spread=Spread([SPREAD.tolerances[2]], DRAWS[:, 2:]))
     assert involved(free, ["a"]).axes == ()
     assert [axis.paths for axis in involved(free, ["load"]).axes] == [("load",)]

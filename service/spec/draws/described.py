@@ -46,7 +46,8 @@ DRAWS: Final = named(
 CORRELATIONS: Final = Listed("correlations", 0, MAX_CORRELATIONS, "parameters whose draws depend on each other")
 COEFFICIENT: Final = Described("coefficient", "", "correlation of the normal scores", "number", -1.0, 1.0)
 
-#: Largest share that `plus_minus` may be.
+#: Range of a share that `plus_minus` may be.
+_LEAST: Final = 1e-9
 _MOST: Final = 10.0
 
 
@@ -60,8 +61,10 @@ def read_plus_minus(
         return None
     share = in_percent(value)
     if share is not None:
-        if not 0.0 < share <= _MOST:
-            report.fault(where, "out-of-range", "is out of range", value, allowed=f"above 0 %, at most {_MOST:.0%}")
+        if not _LEAST <= share <= _MOST:
+            report.fault(
+                where, "out-of-range", "is out of range", value, allowed=f"{100 * _LEAST:g} % to {100 * _MOST:g} %"
+            )
             return None
         return True, share
     try:

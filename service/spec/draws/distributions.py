@@ -23,6 +23,8 @@ Kind = Literal["normal", "truncated_normal", "lognormal", "uniform", "triangular
 SIGMAS: Final = 3.0
 #: Numbers between 0 and 1 stay this far from both: the quantile of a normal distribution is infinite there.
 _INSIDE: Final = 2.0**-53
+#: Least standard deviation, so that nothing is divided by 0.
+_LEAST: Final = 1e-300
 
 
 @dataclass(frozen=True)
@@ -81,13 +83,14 @@ class Distribution:
         """The distribution function, that of the normal one for the truncated one."""
         from scipy.special import ndtr
 
-        if self.kind in {"normal", "truncated_normal"}:
-            return np.asarray(ndtr((values - self.centre) / self._sigma))
-        if self.kind == "lognormal":
-            with np.errstate(divide="ignore"):
+        # Bounds may be infinite, or very far away.
+        with np.errstate(divide="ignore", over="ignore"):
+            if self.kind in {"normal", "truncated_normal"}:
+                return np.asarray(ndtr((values - self.centre) / self._sigma))
+            if self.kind == "lognormal":
                 logarithm = np.log(np.maximum(values, 0.0))
-            return np.asarray(ndtr((logarithm - math.log(self.centre)) / self._sigma))
-        place = np.clip((values - self.centre) / self.half, -1.0, 1.0)
+                return np.asarray(ndtr((logarithm - math.log(self.centre)) / self._sigma))
+            place = np.clip((values - self.centre) / self.half, -1.0, 1.0)
         if self.kind == "uniform":
             return (1.0 + place) / 2.0
         return np.where(place < 0.0, (1.0 + place) ** 2 / 2.0, 1.0 - (1.0 - place) ** 2 / 2.0)
@@ -107,6 +110,5 @@ class Distribution:
 
     @property
     def _sigma(self) -> float:
-        if self.kind == "lognormal":
-            return math.log1p(self.half / self.centre) / SIGMAS
-        return self.half / SIGMAS
+        relative = math.log1p(self.half / self.centre) if self.kind == "lognormal" else self.half
+        return max(relative / SIGMAS, _LEAST)

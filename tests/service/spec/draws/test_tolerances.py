@@ -14,6 +14,7 @@ from sprag.service.spec.document import parse_spec
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.longer import longer_spec
 from sprag.service.spec.schema.document import spec_schema
+from sprag.worker.models.parameters import in_range, parameter_of
 from sprag.worker.spread import DRIVE, Spread, without_drives
 from sprag.worker.study import Study
 from tests.service.spec_sample import changed, parsed, problems
@@ -157,6 +158,24 @@ def test_no_drawn_value_leaves_the_range_of_its_parameter_and_the_cut_is_reporte
     assert not parsed(with_tolerances({"path": BACKLASH, "plus_minus": "60 %"})).warnings
 
 
+@pytest.mark.parametrize(
+    ("item", "axes"),
+    [
+        ({"path": BACKLASH, "plus_minus": 1e308}, []),
+        ({"path": BACKLASH, "plus_minus": 1e-308, "distribution": "lognormal"}, []),
+        ({"path": "shaft.load", "plus_minus": "1000 %", "distribution": "uniform"}, []),
+        ({"path": "pendulums.0.initial_angle", "plus_minus": "5 %"}, [-0.2, 0.0, 0.1]),
+        ({"path": "clutch.windup_limit", "plus_minus": "5 %", "distribution": "triangular"}, [0.1, 0.2]),
+    ],
+)
+def test_extreme_tolerances_stay_in_range_too(item: dict[str, Any], axes: list[float]) -> None:
+    varied = [{"path": item["path"], "values": axes}] if axes else []
+    study = study_of(item, axes=varied)
+    entry = parameter_of(study, item["path"])
+    assert entry is not None
+    assert in_range(study.columns(range(study.cases))[item["path"]], entry).all()
+
+
 def test_a_zero_on_an_axis_stays_zero_with_a_share() -> None:
     axes = [{"path": "shaft.load", "values": [0.0, 0.1]}]
     study = study_of({"path": "shaft.load", "plus_minus": "5 %"}, axes=axes)
@@ -202,6 +221,7 @@ FIVE = {"plus_minus": "5 %"}
 REFUSED: list[tuple[dict[str, Any], str, str]] = [
     ({"path": "pendulums.0.initial_angle", **FIVE}, "plus_minus", "out-of-range"),
     ({"path": BACKLASH, "plus_minus": "0 %"}, "plus_minus", "out-of-range"),
+    ({"path": BACKLASH, "plus_minus": "1e-300 %"}, "plus_minus", "out-of-range"),
     ({"path": BACKLASH, "plus_minus": "-1 deg"}, "plus_minus", "out-of-range"),
     ({"path": BACKLASH, "plus_minus": "1 mm"}, "plus_minus", "wrong-unit"),
     ({"path": BACKLASH}, "plus_minus", "required"),
