@@ -92,6 +92,7 @@ WarningCode = Literal[
     "terms-cancel",
     "tolerance-cut",
     "too-few-rows",
+    "wide-limit",
     "wraps-around",
 ]
 

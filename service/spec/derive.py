@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 import itertools
 import math
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
@@ -17,7 +18,7 @@ import numpy as np
 
 from sprag.service.spec.draws.unit import unit_sample
 from sprag.service.spec.formulas import Formula, FormulaError, UnknownNameError, read_formula
-from sprag.service.spec.report import Report, join, quantity_text
+from sprag.service.spec.report import Report, did_you_mean, join, quantity_text
 from sprag.worker.derived import blocks, involved
 from sprag.worker.limits import MAX_DERIVED
 from sprag.worker.models.formulas import MAX_LENGTH, CircularError, evaluate, evaluation_order
@@ -35,6 +36,8 @@ HELP: Final = (
 )
 EXAMPLE: Final = {"pendulums.*.inertia": "1.1 * pendulums.*.mass * pendulums.*.arm^2 + 2e-4 kg*m^2"}
 _CONSTANT: Final = "constants."
+#: A `*` between two parts of a path.
+_STARRED: Final = re.compile(r"[a-z_]\.\*\.[a-z]")
 _MISSING: Final = object()
 #: Points of the ranges of a study that chooses its own cases at which a formula is tried: corners, and as many others.
 _CORNERS: Final = 4096
@@ -92,12 +95,15 @@ def _read_given(report: Report, data: object, base: object) -> dict[str, tuple[s
         for path, own in _expanded(report, pointer, key, text, base):
             if path in found:
                 report.fault(pointer, "repeated", f"derives {path} a second time", text, allowed="one formula for each")
-            elif _at(base, path) is not _MISSING:
+                continue
+            given = _at(base, path)
+            if given is not _MISSING:
                 report.fault(
-                    pointer, "conflict", f"{path} is derived and cannot be given in `base` too", _at(base, path),
+                    pointer, "conflict", f"{path} is derived and cannot be given in `base` too", given,
                     allowed="either a formula in `derive`, or a number in `base`",
                 )  # fmt: skip
-            else:
+            # An axis of that path has a fault of its own, which is reported at once.
+            if not isinstance(given, Mapping | list):
                 found[path] = pointer, own
             if len(found) > MAX_DERIVED:
                 report.fault("/derive", "too-many", "derives too many parameters", allowed=allowed)
@@ -114,10 +120,20 @@ def _expanded(report: Report, pointer: str, key: str, text: str, base: object) -
     items = _at(base, prefix)
     if not isinstance(items, list) or key.split(".").count("*") > 1:
         allowed = "`*` once, for the number of a pendulum or a step, as in 'pendulums.*.inertia'"
-        report.fault(pointer, "invalid-path", f"`base` has no list at {prefix}", key, allowed=allowed)
+        hint = did_you_mean(prefix, _lists(base))
+        report.fault(pointer, "invalid-path", f"`base` has no list at {prefix}{hint}", key, allowed=allowed)
         return
     for index in range(min(len(items), MAX_DERIVED + 1)):
         yield key.replace("*", str(index)), text.replace(f"{prefix}.*.", f"{prefix}.{index}.")
+
+
+def _lists(base: object) -> Iterator[str]:
+    """The paths of the lists of objects in ``base``, or in an object of it."""
+    for key, value in base.items() if isinstance(base, Mapping) else ():
+        inner = {f"{key}.{name}": own for name, own in value.items()} if isinstance(value, Mapping) else {key: value}
+        for path, own in inner.items():
+            if isinstance(own, list) and any(isinstance(item, Mapping) for item in own):
+                yield path
 
 
 def _at(base: object, path: str) -> Any:
@@ -209,7 +225,8 @@ def _read_formulas(report: Report, machine: Machine, given: Mapping[str, tuple[s
         try:
             formula = read_formula(text, units, units[path])
         except UnknownNameError as error:
-            why = machine.why_not(error.name)
+            starred = _STARRED.search(text) is not None
+            why = "`*` in a formula needs one in its path" if starred else machine.why_not(error.name)
             report.fault(pointer, "invalid-path", f"{error}: {why}", text, allowed="paths of numbers, and functions")
             continue
         except FormulaError as error:

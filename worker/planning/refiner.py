@@ -48,7 +48,10 @@ class Refiner(ABC):
         self.paths = plan.paths
         self.results = plan.needed
         self.most_cases = plan.most_cases
-        self.most_rounds = 1 + self.rounds_per_halving * ((plan.finest // (plan.start - 1)).bit_length() - 1)
+        # Each round after the first has a case at least.
+        later = max(0, plan.most_cases - plan.combinations * plan.start**self.dimensions)
+        halvings = (plan.finest // (plan.start - 1)).bit_length() - 1
+        self.most_rounds = 1 + min(self.rounds_per_halving * halvings, later)
         self.rounds = 0
 
     @cached_property

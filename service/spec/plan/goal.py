@@ -267,6 +267,14 @@ def _read_within(
         return None
     given = fields.get("within", WITHIN.default)
     share = in_percent(given)
+    if share is not None and value == 0.0:
+        missing = "within" not in fields
+        report.fault(
+            join(where, "within"), "required" if missing else "out-of-range",
+            f"{'is required' if missing else 'must be a quantity'}: a share of 0 is no width", fields.get("within"),
+            allowed="a quantity greater than 0", unit=info.unit,
+        )  # fmt: skip
+        return None
     if share is not None:
         width: float | None = abs(value) * share
     else:
@@ -274,7 +282,10 @@ def _read_within(
     if width is not None and width <= 0.0:
         report.fault(
             join(where, "within"), "out-of-range", "is not a valid width", given,
-            allowed='greater than 0, as in "2 %" of a value other than 0, or a quantity', unit=info.unit,
+            allowed='greater than 0, as in "2 %" of the value, or a quantity', unit=info.unit,
         )  # fmt: skip
         return None
+    if width is not None and width >= abs(value) > 0.0:
+        pointer = join(where, "within")
+        report.warn("wide-limit", f"{pointer}: is at least as wide as the value, so that 0 fulfils the limit, too")
     return width

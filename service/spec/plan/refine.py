@@ -37,6 +37,8 @@ START: Final = Described(
     17,
 )
 MOST: Final = Described("most", "Cases at most", "bound of the cases of all rounds", "whole", 2, MAX_PLANNED_CASES)
+#: Items of `axes` that refined studies do not take.
+_OTHER: Final = ("sample", "points", "axes")
 OTHER: Final = named(START)
 ERROR: Final = Described(
     "error",
@@ -82,12 +84,17 @@ def read_refined_axes(
             adaptive += [axis] if axis else []
             every.append(axis.paths if axis else ())
             continue
+        if other := next((kind for kind in _OTHER if isinstance(item, Mapping) and kind in item), None):
+            report.fault(join(where, other), "conflict", "cannot be combined with `refine`", item[other],
+                         allowed="axes with a path and values, and adaptive ones")  # fmt: skip
+            every.append(())
+            continue
         read = axis_values(report, where, item, machine)
         fixed += [FixedAxis(read[0], tuple(read[1].tolist()))] if read else []
         every.append(read[0] if read else ())
     check_paths(report, every)
     count = sum(map(is_adaptive, items))
-    if count not in {1, 2}:
+    if count not in {1, 2} and not any(kind in item for item in items if isinstance(item, Mapping) for kind in _OTHER):
         told = "no axis is adaptive" if not count else f"{count} axes are adaptive"
         report.fault(
             "/axes", "exactly-one", told, allowed='one axis with "adaptive": [from, to] for curves, two for a map'

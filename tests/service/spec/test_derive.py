@@ -144,6 +144,7 @@ def test_a_clutch_law_and_a_frequency_may_be_derived() -> None:
         ("pendulums.0.mass * pendulums.0.arm^2 + 0.1", "wrong-unit"),
         ("pendulums.0.mas * pendulums.0.arm^2", "invalid-path"),
         ("pendulums.1.mass * pendulums.0.arm^2", "invalid-path"),
+        ("pendulums.*.mass * pendulums.0.arm^2", "invalid-path"),
         ("phi * 1 kg*m^2", "invalid-path"),
         ("pendulums.0.inertia + 1 kg*m^2", "circular"),
         ("clutch.windup_limit * 1 kg*m^2", "required"),
@@ -183,6 +184,22 @@ def test_a_path_that_cannot_be_derived_is_refused(changes: dict[str, Any], point
     found = problems({"/base/pendulums/0/inertia": ..., "/derive": {INERTIA: FORMULA}, **changes})
     assert found.keys() == {pointer}
     assert found[pointer].code == code
+
+
+def test_a_star_that_stands_for_nothing_is_explained() -> None:
+    found = problems({"/derive": {"pendulum.*.mass": "1 kg"}})
+    assert "did you mean 'pendulums'?" in str(found["/derive/pendulum.*.mass"])
+    found = problems({"/base/shaft/inertia": ..., "/derive": {"shaft.inertia": "pendulums.*.inertia"}})
+    assert "`*` in a formula needs one in its path" in str(found["/derive/shaft.inertia"])
+
+
+def test_a_derived_path_in_the_base_and_on_an_axis_has_both_faults() -> None:
+    changes = {"/derive": {INERTIA: FORMULA}, "/axes": [{"path": INERTIA, "values": [1e-3, 2e-3]}]}
+    found = problems({"/base/pendulums/0/inertia": 1e-3, **changes})
+    assert {pointer: fault.code for pointer, fault in found.items()} == {
+        f"/derive/{INERTIA}": "conflict",
+        "/axes/0/path": "conflict",
+    }
 
 
 def test_faults_of_the_base_are_told_as_they_are_without_formulas() -> None:

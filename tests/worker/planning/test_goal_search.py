@@ -72,6 +72,13 @@ def test_no_design_comes_twice_and_bounds_and_catalogues_are_kept(name: str) -> 
             assert set(column) == set(variable.values), "each value is tried, and no other"
 
 
+def test_a_catalogue_bounds_cases_and_rounds() -> None:
+    plan = plan_of((Variable(("a",), 1.0, 4.0, (1.0, 2.0, 4.0)), Variable(("b",), 0.2, 0.2, (0.2,))), ["f", "g"])
+    planner, rounds = searched(plan, _two)
+    assert (planner.most_cases, planner.most_rounds) == (3, 3)
+    assert sum(len(rows.points) for rows in rounds) == 3
+
+
 def test_another_seed_asks_for_other_points() -> None:
     first, second = (GoalPlanner(plan_of(3, ["f", "g"], seed=seed)).ask().points for seed in (1, 2))
     assert not np.array_equal(first, second)

@@ -81,12 +81,19 @@ class GoalPlanner:
     @property
     def most_cases(self) -> int:
         """Cases of a search in which no design comes twice, with the longest polish."""
-        return (self.plan.population * self.plan.generations + polish_designs(self.plan)) * self.plan.cases_each
+        return (self._most_searched + polish_designs(self.plan)) * self.plan.cases_each
 
     @property
     def most_rounds(self) -> int:
-        """Generations, and the rounds of the polish."""
-        return self.plan.generations + (1 + MOST_TRIALS if polish_designs(self.plan) else 0)
+        """Generations, each with a new design, and the rounds of the polish."""
+        generations = min(self.plan.generations, self._most_searched)
+        return generations + (1 + MOST_TRIALS if polish_designs(self.plan) else 0)
+
+    @property
+    def _most_searched(self) -> int:
+        """Designs of all generations at most: of a catalogue, each once."""
+        designs = self.plan.population * self.plan.generations
+        return designs if self._space.size is None else min(designs, self._space.size)
 
     def tell(self, rows: Rows) -> None:
         """Take the rows of the next round.

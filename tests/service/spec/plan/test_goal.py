@@ -92,6 +92,11 @@ def test_a_goal_is_read_in_si() -> None:
         (
             {"subject_to": [{"result": "shaft.speed.mean", "is": 0.0}]},
             "/goal/subject_to/0/within",
+            "required",
+        ),
+        (
+            {"subject_to": [{"result": "shaft.speed.mean", "is": 0.0, "within": "2 %"}]},
+            "/goal/subject_to/0/within",
             "out-of-range",
         ),
         (
@@ -113,3 +118,9 @@ def test_what_is_wrong_is_told_with_its_place(changes: dict[str, Any], pointer: 
     plan, report = read(changes)
     assert plan is None
     assert [(fault.where, fault.code) for fault in report.faults] == [(pointer, code)]
+
+
+@pytest.mark.parametrize(("within", "wide"), [("99 %", False), ("150 %", True), ("9 rad/s", True)])
+def test_an_equality_that_0_fulfils_is_warned_of(within: str, wide: bool) -> None:
+    _, report = read({"subject_to": [{"result": "shaft.speed.mean", "is": "8 rad/s", "within": within}]})
+    assert [warning.code for warning in report.warnings] == ["wide-limit"] * wide

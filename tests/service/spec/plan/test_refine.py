@@ -93,6 +93,8 @@ def test_ends_may_be_given_in_any_order_and_unit_and_fields_have_defaults() -> N
         ({"/axes/1/adaptive": [-1, 1]}, "/axes/1/adaptive/0", "out-of-range"),
         ({"/axes/0/path": "shaft.load", "/axes/0/values": [0.1]}, "/axes/1/path", "repeated"),
         ({"/axes/1": {"path": "shaft.load", "values": [0.1]}}, "/axes", "exactly-one"),
+        ({"/axes": [{"points": "shaft.load\n0.1\n0.2"}]}, "/axes/0/points", "conflict"),
+        ({"/axes/0": {"sample": {"size": 4}}}, "/axes/0/sample", "conflict"),
         ({"/combine": "zip"}, "/combine", "conflict"),
         ({"/exclude": []}, "/exclude", "conflict"),
         ({"/goal": {}}, "/goal", "conflict"),
@@ -115,6 +117,9 @@ def test_a_preview_gives_what_there_can_be_at_most() -> None:
     given = preview_json(parsed({}), Chunking())
     assert (made["cases"], made["most_cases"], made["most_rounds"]) == (10, 130, 5)
     assert (given["cases"], given["most_cases"], given["most_rounds"]) == (192, 192, 1)
+    few = preview_json(parsed(refined({"/refine/most": 12})), Chunking())
+    assert (few["cases"], few["most_cases"], few["most_rounds"]) == (10, 12, 3)
+    assert preview_json(parsed(refined({"/refine/most": 8})), Chunking())["most_rounds"] == 1
     assert made["estimated_bytes"] > 10 * preview_json(parsed({"/axes": []}), Chunking())["estimated_bytes"]
 
 
