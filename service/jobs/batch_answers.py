@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from sprag.service.json_text import to_bytes
-from sprag.service.results.defaults import main_query
+from sprag.service.results.defaults import drawn_results
 from sprag.service.results.figures.ribbons import ribbon_figure, ribbon_map, yield_figure, yield_map
 from sprag.service.results.pictures.curves import draw_figure
 from sprag.service.results.pictures.maps import draw_map
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from sprag.service.answers.tolerances import RibbonReport, YieldReport
     from sprag.service.jobs.checks import Library
     from sprag.service.results.pictures.curves import Picture
-    from sprag.worker.study import Study
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,14 +46,7 @@ def ribbon_of(library: Library, study_id: str, query: RibbonQuery) -> Ribbon:
     study = library.store.study(study_id)
     infos = models.study_results(study)
     fetch = partial(library.store.rows_for_cases, study_id)
-    return ribbon(study, infos, query.y or drawn_results(study), query.asked, query.quantiles, fetch)
-
-
-def drawn_results(study: Study) -> tuple[str, ...]:
-    """The results that are drawn unless others are asked for."""
-    infos = models.study_results(study)
-    main = main_query(study, infos)
-    return (infos[0].name,) if main is None else main.y
+    return ribbon(study, infos, query.y or drawn_results(study, infos), query.asked, query.quantiles, fetch)
 
 
 def yield_of(library: Library, study_id: str, query: YieldQuery) -> Yield:

@@ -80,6 +80,14 @@ def completed(
     )
 
 
+def drawn_results(study: Study, infos: Sequence[ResultInfo]) -> tuple[str, ...]:
+    """The results that are drawn unless others are asked for, also of a study in which nothing varies."""
+    main = main_query(study, infos)
+    names = {info.name for info in infos}
+    shown = tuple(name for name in models.presentation_of(study).drawn if name in names)
+    return main.y if main is not None else shown or (infos[0].name,)
+
+
 def main_results(study: Study, infos: Sequence[ResultInfo]) -> tuple[str, ...]:
     """The main results according to the model; the first ones where it names none."""
     names = [info.name for info in infos]

@@ -22,7 +22,7 @@ from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended, Work
 from sprag.service.jobs import answers, batch_answers
 from sprag.service.jobs.batch_answers import RibbonQuery, YieldQuery
-from sprag.service.results.defaults import main_query
+from sprag.service.results.defaults import drawn_results, main_query
 from sprag.service.results.selection import SelectionError, refused
 from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.ribbons import MOST_QUANTILES, QUANTILES
@@ -115,7 +115,7 @@ def _queries(study: Study, given: QueryParams) -> tuple[RibbonQuery, YieldQuery]
     """What a URL asks for; raises SelectionError for quantiles that are none."""
     infos = models.study_results(study)
     main = main_query(study, infos)
-    y = tuple(name for name in given.getlist("y") if name) or batch_answers.drawn_results(study)
+    y = tuple(name for name in given.getlist("y") if name) or drawn_results(study, infos)
     x = given.get("x") or (None if main is None else main.x)
     by = tuple(path for path in given.getlist("by") if path and path != x)
     drawn = tuple(path for path in (x, *by) if path)

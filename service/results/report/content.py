@@ -17,6 +17,7 @@ from sprag.service.results.exports.source import given_texts
 from sprag.service.results.pictures.curves import require_drawable
 from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.regimes import counted
+from sprag.service.results.report.drives import DrivesPart, drives_part
 from sprag.service.results.rounds import sentence
 from sprag.service.results.selection import SelectionError
 from sprag.service.spec.catalogue import axes_json
@@ -74,6 +75,7 @@ class Report:
     ranges: tuple[Range, ...]
     pictures: tuple[Curves, ...]
     note: str
+    drives: DrivesPart | None
 
 
 def report_of(store: Store, study_id: str) -> Report:
@@ -120,6 +122,7 @@ def make_report(
         ranges(infos, blocks),
         pictures,
         note,
+        drives_part(study, infos, fetch),
     )
 
 

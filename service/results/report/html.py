@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
-from sprag.service.results.pictures.curves import draw_curves
+from sprag.service.results.pictures.curves import draw_curves, draw_figure
 
 if TYPE_CHECKING:
     from sprag.service.results.curves import Curves
+    from sprag.service.results.figures.figure import Figure
     from sprag.service.results.report.content import Report
 
 
@@ -27,6 +28,7 @@ def _template() -> Template:
     environment.filters["number"] = number_text
     environment.filters["input"] = input_text
     environment.filters["picture"] = _picture
+    environment.filters["figure"] = _figure
     return environment.get_template("report.html")
 
 
@@ -42,7 +44,16 @@ def input_text(value: float | str | None) -> str:
 
 def _picture(curves: Curves) -> str:
     """The curves as an image embedded in the page."""
-    return "data:image/svg+xml;base64," + base64.b64encode(draw_curves(curves, "", "svg")).decode("ascii")
+    return _embedded(draw_curves(curves, "", "svg"))
+
+
+def _figure(figure: Figure) -> str:
+    """A described figure as an image embedded in the page."""
+    return _embedded(draw_figure(figure, "", "svg"))
+
+
+def _embedded(svg: bytes) -> str:
+    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
 
 
 def html_report(report: Report) -> bytes:

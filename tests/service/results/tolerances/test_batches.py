@@ -211,5 +211,12 @@ def test_the_page_shows_ribbon_yield_and_the_worst_drives(service: Service) -> N
         assert refused.status_code == 422, wrong
         assert 'role="alert"' in refused.text
         assert next(iter(wrong.values())).replace(">", "&gt;") in refused.text
+    report = service.http.get(f"{API}{own}/report", params={"format": "html"}).text
+    assert '<img src="data:image/svg+xml;base64,' in report.partition("<h2>Drives</h2>")[2]
+    both = service.get(f"{own}/yield", condition="speed >= 90 % of nominal")["lines"]
+    for line in both:
+        told = f"grade = {line['by']['grade']:g}: {100 * line['all']['value']:.1f} % of 128 drives"
+        assert told in report
+    assert service.http.get(f"{API}{own}/report", params={"format": "pdf"}).content.startswith(b"%PDF")
     plain = service.submit({key: value for key, value in SPEC.items() if key not in ("tolerances", "drives", "seed")})
     assert service.http.get(f"/studies/{plain}/drives").status_code == 303
