@@ -28,7 +28,7 @@ _UNDETERMINED: Final = 0.25
 #: 1980).
 _COLLINEAR, _SHARE = 30.0, 0.5
 #: Part of the largest change below which a parameter has no part in a direction.
-_PART = 0.2
+_PART = 0.05
 #: How close to an end of its range an interval has to come to touch it, in widths of the range.
 _TOUCHES = 0.005
 

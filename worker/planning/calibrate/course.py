@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from sprag.worker.planning.calibrate.batches import normal, solved, total
 from sprag.worker.planning.calibrate.candidates import candidates
-from sprag.worker.planning.calibrate.data import Data, scaled_data
-from sprag.worker.planning.calibrate.fit import Lanes, fit
-from sprag.worker.planning.calibrate.plan import CURVES, STARTS, TRIALS
+from sprag.worker.planning.calibrate.data import Data, first_data, scaled_data
+from sprag.worker.planning.calibrate.fit import Lanes, around, differences, fit, quadratic
+from sprag.worker.planning.calibrate.plan import CURVES, SEARCHES, STARTS, TRIALS
 from sprag.worker.planning.calibrate.refits import Refits, drawn, refit
-from sprag.worker.planning.goals.draws import Draws
+from sprag.worker.planning.goals.draws import Draws, exponential
+from sprag.worker.planning.goals.linear import cholesky
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -26,8 +27,13 @@ Floats = NDArray[np.float64]
 T = TypeVar("T")
 
 SCAN_PHASE, FIT_PHASE, REFITS_PHASE, CURVE_PHASE, ENDED = "scan", "fit", "intervals", "curve", "ended"
+#: Distance of the differences that refits begin with, at most, in widths of the ranges.
+_WIDE: Final = 0.05
 #: Starts of the fit are farther from each other than this in at least one coordinate.
 _DISTINCT: Final = 0.1
+#: Largest scatter of a scan around the fit, in widths of the ranges; logarithm of the factor by which it reaches beyond
+#: the scatter of the fit; places that are fitted from; standard deviations of chi-square that are improbable.
+_WIDEST, _FARTHEST, _AGAIN, _IMPROBABLE = 0.5, 3.0, 2, 3.0
 #: By how much (in squares of standard deviations) another set must be better than the fit to begin again from there.
 _BEGIN_AGAIN: Final = 0.02
 
@@ -81,9 +87,12 @@ def course(plan: CalibratePlan, space: Space, state: State) -> Generator[Request
     lanes = yield from _through(plan, state, FIT_PHASE, fit(state.data, scan[starts], modelled[starts], plan.fit_sets))
     state.best = _least(lanes)
     yield from _scaled(plan, state)
-    for attempt in range(2):
-        if not plan.refits:
+    for attempt in range(SEARCHES if plan.refits else 0):
+        before = float(state.best.costs[0])
+        yield from _searched(plan, state, Draws(plan.seed, 2 + attempt))
+        if state.best.costs[0] > before - _BEGIN_AGAIN and not _improbable(plan, state):
             break
+    for attempt in range(2 if plan.refits else 0):
         yield from _refitted(plan, state, attempt)
         places, found = (np.concatenate(parts) for parts in zip(*state.library, strict=True))
         costs = state.data.costs(found)
@@ -145,8 +154,40 @@ def _scaled(plan: CalibratePlan, state: State) -> Generator[Request, Floats, Non
         if rounds > 1:
             again = fit(state.data, state.best.places, state.best.modelled, plan.fit_sets)
             state.best = _least((yield from _through(plan, state, FIT_PHASE, again)))
-    state.data = state.data.without(np.isnan(state.best.modelled[0]))
+    data = first_data(plan) if plan.known_sigma else state.data
+    state.data = data.without(np.isnan(state.best.modelled[0]))
     state.best.costs = state.data.costs(state.best.modelled)
+
+
+def _searched(plan: CalibratePlan, state: State, draws: Draws) -> Generator[Request, Floats, None]:
+    """Scan around the fit, farthest where it is least determined, and fit again from the best two places.
+
+    On a rough surface the first fit often ends in a side valley.
+    """
+    best = state.best
+    assert best is not None
+    p = len(plan.unknown)
+    curvature = quadratic(state.data, best.modelled, best.derivatives)[1][0]
+    factor = cholesky(curvature + np.eye(p) / _WIDEST**2)
+    steps = draws.normals(plan.scan, p) * exponential(_FARTHEST * draws.uniforms(plan.scan))[:, None]
+    for j in reversed(range(p)):  # the inverse of the factor's transpose gives them the scatter of the fit
+        steps[:, j] /= factor[j, j]
+        steps[:, :j] -= steps[:, j : j + 1] * factor[j, :j]
+    places = np.clip(best.places + steps, 0.0, 1.0)
+    modelled = yield from _run(plan, state, FIT_PHASE, places)
+    chosen = np.argsort(state.data.costs(modelled), kind="stable")[:_AGAIN]
+    again = fit(state.data, places[chosen], modelled[chosen], plan.fit_sets // 4)
+    found = _least((yield from _through(plan, state, FIT_PHASE, again)))
+    if found.costs[0] < best.costs[0]:
+        state.best = found
+        yield from _scaled(plan, state)
+
+
+def _improbable(plan: CalibratePlan, state: State) -> bool:
+    """Whether the residuals are larger than given standard deviations explain."""
+    assert state.best is not None
+    freedom = max(plan.freedom, 1)
+    return plan.known_sigma and bool(2.0 * state.best.costs[0] > freedom + _IMPROBABLE * np.sqrt(2.0 * freedom))
 
 
 def leverages(data: Data, best: Lanes) -> Floats:
@@ -166,9 +207,19 @@ def _refitted(plan: CalibratePlan, state: State, attempt: int) -> Generator[Requ
         state.data, np.nan_to_num(best.modelled[0]), leverages(state.data, best), plan.refits, plan.freedom,
         plan.known_sigma, Draws(plan.seed, 1),
     )  # fmt: skip
+    wide = yield from _widely(plan, state, best)
     sets = tuple(np.concatenate(parts) for parts in zip(*state.library, strict=True))
-    steps = refit(state.data, values, (sets[0], sets[1]), best, TRIALS if attempt == 0 else TRIALS // 2)
+    steps = refit(state.data, values, (sets[0], sets[1]), wide, TRIALS if attempt == 0 else TRIALS // 2)
     state.refits = yield from _through(plan, state, REFITS_PHASE, steps)
+
+
+def _widely(plan: CalibratePlan, state: State, best: Lanes) -> Generator[Request, Floats, Lanes]:
+    """The fit with differences over the distance that the data can tell, which is how far refits go."""
+    curvature = quadratic(state.data, best.modelled, best.derivatives)[1]
+    apart = np.sqrt(1.0 / np.maximum(np.diagonal(curvature, axis1=1, axis2=2), 1e-300))
+    apart = np.minimum(np.maximum(apart, best.apart), _WIDE)
+    beside = yield from _run(plan, state, REFITS_PHASE, around(best.places, apart))
+    return replace(best, derivatives=differences(state.data, best.places, best.modelled, apart, beside)[0])
 
 
 def _curves(plan: CalibratePlan, state: State) -> Generator[Request, Floats, None]:

@@ -29,7 +29,7 @@ Ints = NDArray[np.int64]
 #: Predicted reductions of the cost (in squares of standard deviations) at which a refit ends: before a trial, and
 #: after one that was no better. A thousandth of an interval's width squared.
 _CONVERGED, _HARDLY = 2e-3, 2e-2
-_PATIENCE = 3
+_PATIENCE = 4
 _DAMPING = 1e-3
 
 
