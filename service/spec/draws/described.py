@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
@@ -49,6 +48,8 @@ COEFFICIENT: Final = Described("coefficient", "", "correlation of the normal sco
 #: Range of a share that `plus_minus` may be.
 _LEAST: Final = 1e-9
 _MOST: Final = 10.0
+#: Largest number that it may be of a parameter without bounds.
+_LARGEST: Final = 1e100
 
 
 def read_plus_minus(
@@ -72,8 +73,10 @@ def read_plus_minus(
     except QuantityError as error:
         report.fault(where, error.code, str(error), value, allowed=PLUS_MINUS.limits, unit=parameter.unit)
         return None
-    if not 0.0 < number < math.inf:
-        report.fault(where, "out-of-range", "is out of range", value, allowed="greater than 0", unit=parameter.unit)
+    most = min(parameter.high - parameter.low, _LARGEST)
+    if not 0.0 < number <= most:
+        allowed = f"above 0, at most {most:g}"
+        report.fault(where, "out-of-range", "is out of range", value, allowed=allowed, unit=parameter.unit)
         return None
     return False, number
 

@@ -161,7 +161,8 @@ def test_no_drawn_value_leaves_the_range_of_its_parameter_and_the_cut_is_reporte
 @pytest.mark.parametrize(
     ("item", "axes"),
     [
-        ({"path": BACKLASH, "plus_minus": 1e308}, []),
+        ({"path": BACKLASH, "plus_minus": 1000}, []),
+        ({"path": "shaft.load", "plus_minus": 1e9, "distribution": "lognormal"}, []),
         ({"path": BACKLASH, "plus_minus": 1e-308, "distribution": "lognormal"}, []),
         ({"path": "shaft.load", "plus_minus": "1000 %", "distribution": "uniform"}, []),
         ({"path": "pendulums.0.initial_angle", "plus_minus": "5 %"}, [-0.2, 0.0, 0.1]),
@@ -223,6 +224,7 @@ REFUSED: list[tuple[dict[str, Any], str, str]] = [
     ({"path": BACKLASH, "plus_minus": "0 %"}, "plus_minus", "out-of-range"),
     ({"path": BACKLASH, "plus_minus": "1e-300 %"}, "plus_minus", "out-of-range"),
     ({"path": BACKLASH, "plus_minus": "-1 deg"}, "plus_minus", "out-of-range"),
+    ({"path": BACKLASH, "plus_minus": 1e308}, "plus_minus", "out-of-range"),
     ({"path": BACKLASH, "plus_minus": "1 mm"}, "plus_minus", "wrong-unit"),
     ({"path": BACKLASH}, "plus_minus", "required"),
     ({"path": "pendulums.1.backlash", **FIVE}, "path", "invalid-path"),
