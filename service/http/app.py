@@ -41,7 +41,19 @@ from sprag.service.http.metrics import Metrics
 from sprag.service.http.request_log import Noted, RequestLog
 from sprag.service.http.shares import Shares
 from sprag.service.http.views import API_PREFIX
-from sprag.service.http.web import case, compare, drives, front, laboratory, login, pages, results, study, table
+from sprag.service.http.web import (
+    case,
+    compare,
+    drives,
+    effects,
+    front,
+    laboratory,
+    login,
+    pages,
+    results,
+    study,
+    table,
+)
 from sprag.service.http.web import engagements as engagement_pages
 from sprag.service.http.web import schedules as schedule_pages
 from sprag.service.http.web.form import page as form
@@ -219,6 +231,7 @@ def _routes() -> APIRouter:
         study,
         front,
         drives,
+        effects,
         results,
         table,
         case,

@@ -74,6 +74,7 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
         *([("/drives", "Drives")] if study.spread is not None and study.plan is None else []),
         *([("/curves", "Curves")] if varying else []),
         *([("/map", "Map")] if mapped else []),
+        *([("/sensitivity", "Sensitivity")] if varying and study.plan is None else []),
     ]
     return {
         "study": shown,

@@ -18,6 +18,7 @@ from sprag.service.results.curves import Fetch
 from sprag.service.results.selection import SelectionError
 from sprag.service.results.sensitivity import sensitivity
 from sprag.service.results.unaffected import unaffected
+from sprag.service.results.wording import number as number_text
 from sprag.service.spec.draws.unit import LEVELS
 from sprag.service.storage.records import CaseColumns
 from sprag.worker import models
@@ -268,6 +269,11 @@ def test_pairs_and_elementary_effects_are_in_every_form(
         assert service.http.get(f"{place}&format=svg").status_code == 200
         _show_effects(found)
         assert heading in capsys.readouterr().out
+        page = service.http.get(f"/studies/{study_id}/sensitivity?y={SPEED}").text
+        assert f'src="{API}/studies/{study_id}/sensitivity?y={SPEED}&amp;format=svg"' in page
+        for number in numbers:
+            assert f'<td class="num">{number_text(number, 3)}</td>' in page
+    assert service.http.get(f"/studies/{study_id}/sensitivity?y=shaft.speed.men").status_code == 422
 
 
 @pytest.mark.parametrize(
