@@ -69,6 +69,7 @@ def limits() -> Iterator[Row]:
     yield "axes of a study", f"{limit.MAX_AXES:,}"
     yield "columns of a table of cases", f"{limit.MAX_COLUMNS:,}"
     yield "derived parameters of a study", f"{limit.MAX_DERIVED:,}"
+    yield "tolerances of a study, drawn drives", f"{limit.MAX_TOLERANCES:,}, {limit.MAX_DRIVES:,}"
     yield "cases of a study", f"{limit.MAX_CASES:,}"
     yield "values on all axes together", f"{limit.MAX_AXIS_VALUES:,}"
     yield "size of a spec", f"{limit.MAX_BODY_BYTES:,} bytes"

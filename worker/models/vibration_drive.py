@@ -190,6 +190,8 @@ class VibrationDrive(Model):
         for prefix in dict.fromkeys(path.partition("coefficients.")[0] for path in paths):
             limit = columns.get(f"{prefix}windup_limit", np.inf)
             law = [columns[f"{prefix}coefficients.{k}"] for k in range(sum(path.startswith(prefix) for path in paths))]
+            if not any(isinstance(part, np.ndarray) for part in (limit, *law)):
+                continue  # the same in all cases, and checked with the spec
             found |= _not_laws(np.column_stack([np.broadcast_to(part, count) for part in (limit, *law)]))
         return found
 
