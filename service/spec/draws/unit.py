@@ -81,7 +81,8 @@ def correlated(unit: Floats, correlation: Floats) -> Floats:
 
     Returns
     -------
-    array, shape (points, dimensions); columns that are correlated with no other are those of ``unit``, bit for bit
+    array, shape (points, dimensions); columns that are correlated with no other are those of ``unit``, bit for bit. A
+    point depends on itself only: more points leave the first ones as they are
     """
     from scipy.special import ndtr, ndtri
 
@@ -89,5 +90,11 @@ def correlated(unit: Floats, correlation: Floats) -> Floats:
     found = unit.copy()
     if tied.size:
         scores = ndtri(np.clip(unit[:, tied], _INSIDE, 1.0 - _INSIDE))
-        found[:, tied] = ndtr(scores @ np.linalg.cholesky(correlation[np.ix_(tied, tied)]).T)
+        factor = np.linalg.cholesky(correlation[np.ix_(tied, tied)])
+        for row, column in enumerate(tied.tolist()):
+            # Not a product of matrices, whose rounding depends on the number of points.
+            mixed = np.zeros(len(unit))
+            for k in np.flatnonzero(factor[row]).tolist():
+                mixed += scores[:, k] * factor[row, k]
+            found[:, column] = ndtr(mixed)
     return found

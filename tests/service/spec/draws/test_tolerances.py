@@ -118,6 +118,15 @@ def test_draws_follow_from_seed_and_method_only() -> None:
     assert first.about == {"seed": 1, "draws": "sobol", "correlations": []}
 
 
+@pytest.mark.parametrize("draws", ["sobol", "random"])
+def test_more_drives_keep_the_first_ones(draws: str) -> None:
+    paths = (BACKLASH, "pendulums.0.mass", "shaft.inertia")
+    items = [{"path": path, "plus_minus": "20 %"} for path in paths]
+    pairs = [{"between": list(pair), "coefficient": 0.4} for pair in (paths[:2], paths[1:])]
+    few, many = (spread_of(*items, drives=drives, draws=draws, correlations=pairs) for drives in (50, 333))
+    np.testing.assert_array_equal(many.array[:50], few.array)
+
+
 def test_another_process_draws_the_same_bits() -> None:
     changes = with_tolerances(
         {"path": BACKLASH, "plus_minus": "60 %"}, {"path": "pendulums.0.mass", "plus_minus": "5 %"},
