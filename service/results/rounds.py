@@ -65,8 +65,8 @@ def _state(summary: dict[str, Any], *, ended: bool) -> list[str]:
     asked, error = summary.get("asked"), summary.get("error")
     if asked is None:
         return []
-    when = "" if ended else " yet"
-    now = f"error not known{when}" if error is None else f"error now {percent(error)}"
+    when = ("", "") if ended else (" yet", " now")
+    now = f"error not known{when[0]}" if error is None else f"error{when[1]} {percent(error)}"
     missed = ["not reached with the cases allowed"] if ended and not summary.get("passed", True) else []
     return [now, f"asked {percent(asked)}", *missed]
 

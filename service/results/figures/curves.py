@@ -63,7 +63,7 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1, *, by_u
     return Figure(
         x,
         tuple(panels),
-        columns,
+        min(columns, len(panels)),
         family,
         len(drawn),
         regimes,

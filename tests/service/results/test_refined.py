@@ -216,5 +216,7 @@ def test_a_sentence_says_when_the_bound_of_cases_ended_the_rounds() -> None:
     assert sentence(RoundProgress(record, 5, 3)) == (
         "1 round, error not known, asked 1 %, not reached with the cases allowed"
     )
+    ended = RoundRecord(1, range(3, 3), {**summary, "error": 0.004, "passed": True}, record.planned_at)
+    assert sentence(RoundProgress(ended, 5, 3)) == "1 round, error 0.4 %, asked 1 %"
     going = RoundRecord(1, range(3, 5), {**summary, "error": 0.021}, record.planned_at)
     assert sentence(RoundProgress(going, 5, 9)) == "round 2 of at most 5, error now 2.1 %, asked 1 %"

@@ -22,6 +22,8 @@
     return reached[index].length < 5 || most === least || (own !== null && own >= 2 * least - most && own <= 2 * most - least);
   });
   const designs = found.designs.filter((design) => !design.failed && near(design));
+  // Names as the page writes them: the form above lists every quantity with its unit.
+  const titles = new Map([...document.querySelectorAll("select[name=x] option")].map((option) => [option.value, option.textContent]));
   const axes = [
     ...found.variables.map((one) => ({ name: one.name, unit: one.unit, of: (design) => design.variables[one.name] })),
     ...found.best.map((goal) => ({ name: goal.result, unit: goal.unit, of: (design) => design.goals[goal.result] })),
@@ -81,8 +83,11 @@
   axes.forEach((axis, index) => {
     const x = EDGE + STEP * index;
     drawing.append(make("line", { x1: x, x2: x, y1: TOP, y2: TOP + HEIGHT, class: "axis" }));
-    const heading = axis.name.split("."), unit = axis.unit === "1" ? "" : ` (${axis.unit})`;
-    drawing.append(make("text", { x, y: 12 }, heading.slice(0, -1).join(" ")), make("text", { x, y: 26 }, heading.at(-1).replaceAll("_", " ") + unit));
+    const title = titles.get(axis.name) ?? axis.name, words = title.split(" ");
+    // Two lines of about the same length.
+    const halves = words.map((_, index) => [words.slice(0, index).join(" "), words.slice(index).join(" ")]);
+    const [above, below] = halves.reduce((best, pair) => (Math.max(...pair.map((part) => part.length)) < Math.max(...best.map((part) => part.length)) ? pair : best));
+    drawing.append(make("text", { x, y: 12 }, above), make("text", { x, y: 26 }, below));
     drawing.append(make("text", { x, y: TOP + HEIGHT + 14 }, short(axis.low)), make("text", { x: x + 8, y: TOP + 10, class: "start" }, short(axis.high)));
     axis.bar = make("rect", { x: x - 5, width: 10, y: TOP, height: 0, class: "bar" });
     const grip = make("rect", { x: x - MARGIN, width: 2 * MARGIN, y: TOP, height: HEIGHT, class: "grip" });
@@ -102,7 +107,7 @@
     });
     drawing.append(axis.bar, grip);
     const field = document.createElement("fieldset"), legend = document.createElement("legend");
-    legend.textContent = heading.join(" ").replaceAll("_", " ") + unit;
+    legend.textContent = title;
     field.append(legend);
     for (const [word, limit] of [["from", axis.low], ["to", axis.high]]) {
       const label = document.createElement("label"), input = document.createElement("input");

@@ -71,7 +71,14 @@ def test_what_is_drawn_must_be_a_quantity_of_a_design(service: Service) -> None:
 
 def test_a_search_without_any_result_has_a_page_and_other_studies_have_none(service: Service) -> None:
     study_id = search(service, rounds=0)
-    assert "No design has its results yet." in service.http.get(f"/studies/{study_id}/front").text
+    text = service.http.get(f"/studies/{study_id}/front").text
+    assert "No design has its results yet." in text
+    assert "Generation 1 of 2. 0 designs: 0 within the limits, 0 on the front, 8 still to be run." in text
+    service.store.cancel_study(study_id)
+    service.store.settle(service.store.take_over("test"), service.store.get_study(study_id).number)
+    assert "8 not run." in service.http.get(f"/studies/{study_id}/front").text
+    none = search(service, subject_to=[{"result": "shaft.speed.mean", "at_least": 1e6}])
+    assert "No design is within the limits;" in service.http.get(f"/studies/{none}/front").text
     assert service.http.get(f"/studies/{study_id}/figures/front").json()["note"]
     assert service.http.get(f"/studies/{study_id}/figures/search").json()["note"]
     other = service.submit()

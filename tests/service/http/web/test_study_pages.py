@@ -207,7 +207,7 @@ def test_ranges_select_designs_in_the_table_and_in_the_scatter(visitor: Visitor,
         item["variables"]["excitation.frequency"] for item in office.get(f"/studies/{study_id}/front")["designs"]
     ]
     inside = sum(value >= 26.0 for value in frequencies)
-    page.get_by_role("group", name="excitation frequency").get_by_label("from").fill("26")
+    page.get_by_role("group", name="Excitation frequency (Hz)").get_by_label("from").fill("26")
     expect(told).to_have_text(f"{inside} of 4 designs shown are selected.")
     assert rows.count() == 4
     assert sum(row.is_visible() for row in rows.all()) == inside

@@ -80,6 +80,13 @@ def test_strips_and_panels_of_a_page_share_their_x_axes() -> None:
         assert {f"{axis[0]}axis{axis[1:]}" for use in uses for axis in use[:2]} <= set(page["layout"])
 
 
+def test_one_panel_has_one_strip() -> None:
+    figure = curves_figure([("", curves(2, (SPEED,)))], 2)
+    assert figure.columns == 1
+    bars = {trace["xaxis"] for trace in plotly_figure(figure)["data"] if trace["type"] == "bar"}
+    assert bars == {"x"}
+
+
 def test_there_is_no_strip_without_orders_or_where_every_motion_repeats_after_one_period() -> None:
     plain = curves()
     same = tuple(replace(curve, regimes=["periodic"] * 8, orders=[1] * 8) for curve in plain.curves)
