@@ -41,7 +41,7 @@ _PIECE, _HIGHEST = 200, 64
 #: Tolerance and periods of the runs that follow the long ones of periodic cases.
 _FINE, _FINE_PERIODS = 1e-12, 2_000
 #: How much longer cases are run whose orders after the long run are others than those found.
-_LONGER = 5
+_LONGER = 20
 #: Results that depend on how the motion was come to, or are zero up to rounding.
 NOT_COMPARED = {"run.events", "run.steps", "runup.time", "balance.energy", "balance.momentum", "power.stored.mean"}
 
