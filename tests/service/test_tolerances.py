@@ -73,6 +73,23 @@ def test_curves_are_those_of_the_nominal_drive_unless_another_is_asked_for(fille
     assert len(every["curves"]) == 5
 
 
+def test_the_page_of_a_running_study_shows_the_place_of_a_drawn_case(service: Service, spec: dict[str, Any]) -> None:
+    frequencies = [20.0 + number for number in range(9)]
+    spec["axes"] = [
+        {"path": "shaft.load", "values": [0.1, 0.3]},
+        {"path": "excitation.frequency", "values": frequencies},
+    ]
+    spec |= {"tolerances": [{"path": "excitation.frequency", "plus_minus": "5 %"}], "drives": 511}
+    study_id = service.submit(spec)
+    chunks = service.store.open_chunks(service.store.get_study(study_id).number)
+    study = service.store.study(study_id)
+    first = next(chunk.first for chunk in chunks if chunk.first % 512)
+    service.fill(study_id, range(first, first + 1))
+    text = service.http.get(f"/studies/{study_id}").text
+    place = study.axes[1].value(int(study.indices([first])[1][0]))
+    assert f"excitation.frequency%3D{place!r}" in text
+
+
 def test_pages_show_the_drive_of_a_case_and_its_values(filled: tuple[Service, str]) -> None:
     service, study_id = filled
     drawn = service.store.study(study_id).case_parameters(7)

@@ -182,7 +182,9 @@ def _with_rows(context: Context, study: Study, study_id: str, query: CurveQuery 
     done = context.store.case_rows(study_id, limit=1).cases
     if not {None, models.WorkerEnding.CANCELLED}.issuperset(found.endings) or not len(done):
         return query
-    values = study.case_parameters(int(done[0]))
+    # Of a parameter with a tolerance, the axis has the nominal value.
+    places = [(study.axes[axis], index) for axis, index in enumerate(study.indices(done[:1]))]
+    values = {path: axis.value(int(index[0])) for axis, index in places for path in axis.paths}
     return replace(query, at=tuple((path, repr(values[path])) for path, _ in query.at))
 
 
