@@ -1,6 +1,6 @@
 """Refined maps against the truth and uniform grids: cases, errors, jumps.
 
-    python -m benchmarks.refine_maps [--error 0.02] [--start 17] [--finest 128]
+    python -m benchmarks.refine_maps [--error 0.02] [--start 9] [--finest 128]
 
 Truth is a grid of 129 x 129 places. A place counts where the map is not told as a jump; for the uniform grid, which
 tells none, where no jump above 5 % lies in the next place. The error is that at 99 % of the places that count, of the
@@ -113,7 +113,7 @@ def compare(problem: Problem, error: float, start: int, finest: int) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--error", type=float, default=0.02)
-    parser.add_argument("--start", type=int, default=17)
+    parser.add_argument("--start", type=int, default=9)
     parser.add_argument("--finest", type=int, default=128)
     chosen = parser.parse_args()
     for problem in maps():

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: Factor by which the difference of a smooth result shrinks under halving.
 _SHRINKS: Final = 4.0
+#: Cells longer than this part of an axis pass at half the error: a coarse grid can agree by chance.
+_DIVIDED: Final = 16
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,9 @@ def tree(samples: Samples, ranges: Floats) -> Tree:
         own, worst = _differences(samples, ranges, cells)
         cells = replace(cells, difference=own)
         largest = worst.max(axis=1)
-        passed = tested & (largest <= error) & ((largest <= error / _SHRINKS) | (cells.worst <= error * _SHRINKS))
+        wide = np.maximum(cells.width, cells.height) > samples.plan.finest // _DIVIDED
+        passed = tested & (largest <= np.where(wide, 0.5 * error, error))
+        passed &= (largest <= error / _SHRINKS) | (cells.worst <= error * _SHRINKS)
         split = tested & ~passed
         leaves.append(cells[~split])
         states.append(tested[~split])

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
 from sprag.service.spec.axes.axes import AXES, axis_values, check_paths
-from sprag.service.spec.described import Described, Listed, named
+from sprag.service.spec.described import Described, Listed
 from sprag.service.spec.fields import read_object, read_whole
 from sprag.service.spec.plan.fields import read_ends, read_path_of, read_results
 from sprag.service.spec.report import Report, join
@@ -27,19 +27,19 @@ FIELDS: Final = ("results", "error", "start", "finest", "most")
 MIN_ERROR, MAX_ERROR = 1e-4, 0.2
 MIN_FINEST, MAX_FINEST = 16, 4096
 RESULTS: Final = Listed("results", 1, 16, "the results that must be accurate to within the error")
+#: Values of each adaptive axis in the first round, unless they are given, for one adaptive axis and for two.
+STARTS: Final = {1: 17, 2: 9}
 START: Final = Described(
     "start",
     "Values at first",
-    "values of an adaptive axis in the first round: a power of 2 and 1",
+    f"values of an adaptive axis in the first round, a power of 2 and 1; by default {STARTS[1]}, of a map {STARTS[2]}",
     "whole",
     3,
     257,
-    17,
 )
 MOST: Final = Described("most", "Cases at most", "bound of the cases of all rounds", "whole", 2, MAX_PLANNED_CASES)
 #: Items of `axes` that refined studies do not take.
 _OTHER: Final = ("sample", "points", "axes")
-OTHER: Final = named(START)
 ERROR: Final = Described(
     "error",
     "Error",
@@ -137,7 +137,7 @@ def read_refine(
     results = read_results(report, "/refine/results", names, infos)
     error = read_share(report, "/refine/error", found.get("error", ERROR.default), MIN_ERROR, MAX_ERROR)
     finest = _read_finest(report, found.get("finest", FINEST.default))
-    start = START.read(report, "/refine", found)
+    start = START.read(report, "/refine", found) if "start" in found else STARTS[len(axes[1])]
     most = MOST.read(report, "/refine", found) if "most" in found else None
     if start is not None and not _power_of_two(start - 1):
         report.fault(

@@ -92,7 +92,7 @@ def test_a_smooth_map_is_right_to_the_error_from_few_points() -> None:
     assert found.passed
     assert not found.jumps["a"].any()
     assert np.nanmax(errors) <= step.summary["error"] <= PLAN.error
-    assert len(found.x) < 65 * 65 / 8
+    assert len(found.x) < 65 * 65 / 7
     # Halved along the worse axis.
     assert len(set(found.x.tolist())) > 2 * len(set(found.y.tolist()))
 

@@ -100,7 +100,7 @@ def refine_fields() -> dict[str, Field]:
     own = [
         Field("/refine/results", "Results", "", "", "", meaning, "", True, "", "shaft.speed.mean; efficiency"),
         described(refine.ERROR, "/refine"),
-        described(refine.START, "/refine"),
+        replace(described(refine.START, "/refine"), default=f"{refine.STARTS[1]}, of a map {refine.STARTS[2]}"),
         described(refine.FINEST, "/refine"),
         replace(described(refine.MOST, "/refine"), default="no bound"),
     ]

@@ -57,7 +57,7 @@ def test_settled_studies_are_refined_by_their_regimes() -> None:
 
 def test_schema_and_form_name_the_defaults_that_the_reader_takes() -> None:
     fields = refine_schema()["properties"]
-    given = {name: fields[name]["default"] for name in ("error", "start", "finest")}
+    given = {name: fields[name]["default"] for name in ("error", "finest")}
     plan = parsed(refined({"/refine": {"results": ["efficiency"]}})).study.plan
     assert parsed(refined({"/refine": {"results": ["efficiency"], **given}})).study.plan == plan
     assert {name: field.default for name, field in refine_fields().items() if name in given} == {
@@ -71,6 +71,10 @@ def test_ends_may_be_given_in_any_order_and_unit_and_fields_have_defaults() -> N
     assert study.plan is not None
     assert study.plan["adaptive"] == [{"paths": ["shaft.load"], "low": 0.0, "high": 1.6}]
     assert (study.plan["error"], study.plan["start"], study.plan["finest"]) == (0.01, 17, 256)
+    turned[0] = {"path": "excitation.frequency", "adaptive": ["20 Hz", "30 Hz"]}
+    plan = parsed(refined({"/axes": turned, "/refine": {"results": ["efficiency"]}})).study.plan
+    assert plan is not None
+    assert plan["start"] == 9
 
 
 @pytest.mark.parametrize(
