@@ -81,6 +81,9 @@ def require_axis(study: Study, parameter: str, path: str) -> int:
     if path in study.derive:
         message = "not an axis: it is derived from other parameters"
         raise refused(parameter, "not-an-axis", message, path, allowed=listed(study.axis_paths) or "no axis at all")
+    if study.spread is not None and path in study.spread.paths:
+        message = "not an axis: it differs from drive to drive"
+        raise refused(parameter, "not-an-axis", message, path, allowed=listed(study.axis_paths))
     fixed = path in study.base
     message = (
         f"not an axis: it is {quantity_text(study.base[path], unit_of(study, path))} in every case"
@@ -121,7 +124,16 @@ def held_texts(study: Study, at: Mapping[str, float]) -> tuple[str, ...]:
     """The fixed axes, then the constant parameters of the operating point."""
     point, varying = models.presentation_of(study).operating_point, study.axis_paths
     always = [path for path in point if path in study.base and path not in varying]
-    fixed = [*at.items(), *((path, study.base[path]) for path in always)]
+    values = study.base
+    if study.spread is not None and DRIVE in at:
+        drive = np.array([at[DRIVE]])
+        drawn = {
+            path: float(study.spread.values(path, values[path], drive)[0])
+            for path in always
+            if path in study.spread.paths
+        }
+        values = {**values, **drawn}
+    fixed = [*at.items(), *((path, values[path]) for path in always)]
     return tuple(held_text(study, path, value) for path, value in fixed)
 
 

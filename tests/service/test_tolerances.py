@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from sprag.service.presets import preset_text
+from sprag.service.results.selection import held_texts
 from sprag.service.spec.document import parse_spec
 from sprag.service.spec.text import load_spec
 from sprag.worker import models
@@ -69,6 +70,8 @@ def test_curves_are_those_of_the_nominal_drive_unless_another_is_asked_for(fille
     assert [curve["cases"] for curve in first["curves"]] == [[0, 5]]
     third = service.get(f"/studies/{study_id}/curves", x="shaft.load", y="shaft.speed.mean", at=f"{DRIVE}=3")
     assert [curve["cases"] for curve in third["curves"]] == [[3, 8]]
+    refused = service.http.get(f"/api/v1/studies/{study_id}/curves", params={"x": BACKLASH, "y": "shaft.speed.mean"})
+    assert "differs from drive to drive" in refused.text
     every = service.get(f"/studies/{study_id}/curves", x="shaft.load", y="shaft.speed.mean", by=DRIVE)
     assert len(every["curves"]) == 5
 
@@ -88,6 +91,14 @@ def test_the_page_of_a_running_study_shows_the_place_of_a_drawn_case(service: Se
     text = service.http.get(f"/studies/{study_id}").text
     place = study.axes[1].value(int(study.indices([first])[1][0]))
     assert f"excitation.frequency%3D{place!r}" in text
+
+
+def test_a_caption_has_the_values_of_the_drive() -> None:
+    items = [{"path": "excitation.frequency", "plus_minus": "5 %"}]
+    study = parsed({"/axes": [{"path": "shaft.load", "values": [0.1, 0.2]}], "/tolerances": items, "/drives": 3}).study
+    frequency = study.columns([2])["excitation.frequency"][0]
+    assert "excitation.frequency = 25 Hz" in held_texts(study, {DRIVE: 0.0})
+    assert f"excitation.frequency = {frequency:.6g} Hz" in held_texts(study, {DRIVE: 2.0})
 
 
 def test_pages_show_the_drive_of_a_case_and_its_values(filled: tuple[Service, str]) -> None:
