@@ -42,6 +42,8 @@ from sprag.service.http.request_log import Noted, RequestLog
 from sprag.service.http.shares import Shares
 from sprag.service.http.views import API_PREFIX
 from sprag.service.http.web import (
+    calibrate,
+    calibration,
     case,
     compare,
     drives,
@@ -230,6 +232,8 @@ def _routes() -> APIRouter:
         form,
         study,
         front,
+        calibration,
+        calibrate,
         drives,
         effects,
         results,

@@ -37,6 +37,7 @@ from sprag.service.spec.numbers import parse_number
 from sprag.service.storage.records import Kinds
 from sprag.worker import models
 from sprag.worker.models.parameters import parameter_of
+from sprag.worker.planning.calibrate.plan import CALIBRATE
 from sprag.worker.planning.goals.plan import GOAL
 from sprag.worker.states import TRANSITIONS, StudyEvent, StudyState
 
@@ -71,6 +72,7 @@ def study_frame(context: Context, study_id: str) -> dict[str, Any]:
     tabs = [
         ("", "Overview"),
         *([("/front", "Designs")] if _has_goal(study) else []),
+        *([("/calibration", "Calibration")] if _calibrates(study) else []),
         *([("/drives", "Drives")] if study.spread is not None and study.plan is None else []),
         *([("/curves", "Curves")] if varying else []),
         *([("/map", "Map")] if mapped else []),
@@ -132,6 +134,10 @@ def _has_goal(study: Study) -> bool:
     return study.plan is not None and study.plan["kind"] == GOAL
 
 
+def _calibrates(study: Study) -> bool:
+    return study.plan is not None and study.plan["kind"] == CALIBRATE
+
+
 def _drawable(points: int) -> bool:
     """Whether a picture can show so many points."""
     return points <= pictures.MAX_PICTURE_POINTS
@@ -147,6 +153,15 @@ def _main_figure(study: Study, study_id: str, query: CurveQuery | None) -> dict[
             "others": f"/studies/{study_id}/front",
             "kind": "Designs",
             "caption": "Every design of the search; grey ones are outside the limits",
+        }
+    if _calibrates(study):
+        return {
+            "heading": "Calibration",
+            "figure": f"/studies/{study_id}/figures/calibration",
+            "picture": f"{views.study_address(study_id)}/calibration?format=svg",
+            "others": f"/studies/{study_id}/calibration",
+            "kind": "Calibration",
+            "caption": "Measured points on the fitted curve, and the residuals",
         }
     if query is None:
         return {"heading": "", "figure": None, "picture": None, "others": None, "kind": "", "caption": None}

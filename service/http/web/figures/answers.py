@@ -9,6 +9,7 @@ from sprag.service.http.web.figures.plotly import Data, plotly_figure
 from sprag.service.jobs.answers import curves_of, map_of
 from sprag.service.jobs.batch_answers import ribbon_of, yield_of
 from sprag.service.json_text import to_bytes
+from sprag.service.results.figures.calibration import calibration_figure
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.figures.front import front_figure, history_figure
 from sprag.service.results.figures.motion import motion_figure, phase_figure
@@ -41,6 +42,11 @@ def front_json(library: Library, study_id: str, exact: bool, axes: tuple[str | N
     """The figure of the designs of a search, as JSON text; dragging selects designs."""
     figure = plotly_figure(front_figure(library.fronts.of(study_id, exact=exact), *axes))
     return to_bytes({**figure, "layout": {**figure["layout"], "dragmode": "select"}})
+
+
+def calibration_json(library: Library, study_id: str) -> bytes:
+    """The figure of a calibration, as JSON text."""
+    return to_bytes(plotly_figure(calibration_figure(library.calibrations.of(study_id))))
 
 
 def search_json(library: Library, study_id: str) -> bytes:

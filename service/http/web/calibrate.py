@@ -1,0 +1,102 @@
+"""The page on which measured points are pasted: they calibrate the machine of a study."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+from fastapi import APIRouter, Query
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import RedirectResponse, Response
+
+from sprag.service.faults import Fault, FaultError
+from sprag.service.http.context import Context, Ctx
+from sprag.service.http.problems import api_error
+from sprag.service.http.web.form.entries import plain
+from sprag.service.http.web.form.values import Form
+from sprag.service.http.web.templates import page
+from sprag.service.http.work import Attended
+from sprag.service.jobs import checks
+from sprag.service.jobs.submission import take_in
+from sprag.service.results.wording import words
+from sprag.service.spec.catalogue import unit_of
+from sprag.service.spec.fields import WHICH_CASES
+from sprag.worker import models
+from sprag.worker.limits import MAX_NAME_LENGTH
+from sprag.worker.planning.calibrate.plan import LOSSES
+
+if TYPE_CHECKING:
+    from sprag.service.jobs.submission import Submission
+
+router = APIRouter(include_in_schema=False)
+
+#: Rows for unknown parameters.
+ROWS: Final = 6
+_SUFFIX: Final = ", calibrated"
+
+
+@router.get("/calibrate")
+def calibrate_page(context: Ctx, study: Annotated[str, Query(max_length=64)]) -> Response:
+    """The empty page for the machine of a study."""
+    return _page(context, study, {}, ())
+
+
+@router.post("/calibrate")
+async def send_points(context: Ctx, work: Attended, values: Form) -> Response:
+    """Submit the calibration, or show what is wrong with it."""
+    study_id = values.get("study", "")
+    spec = await run_in_threadpool(context.store.spec, study_id)
+    content = json.dumps(calibration_spec(spec, values)).encode()
+    try:
+        made = await work.check(
+            checks.new_study, context.library, content, "json", False, None, context.store.clock.now(), {}
+        )
+        return await run_in_threadpool(_submit, context, made)
+    except FaultError as error:
+        faults = error.faults or (Fault(None, "conflict", error.detail),)
+        return await run_in_threadpool(_page, context, study_id, values, faults, api_error(error).type.status)
+
+
+def _submit(context: Context, made: Submission) -> Response:
+    return RedirectResponse(f"/studies/{take_in(context.store, made).id}", status_code=303)
+
+
+def calibration_spec(spec: Mapping[str, Any], values: Mapping[str, str]) -> dict[str, Any]:
+    """The spec of a calibration of the machine of ``spec``, with the fields of the page."""
+    kept = {key: value for key, value in spec.items() if key not in WHICH_CASES}
+    unknown = [
+        {"path": path, **{name: plain(values.get(f"{name}{row}", "")) for name in ("from", "to")}}
+        for row in range(ROWS)
+        if (path := values.get(f"path{row}", "").strip())
+    ]
+    name = str(spec.get("name", ""))[: MAX_NAME_LENGTH - len(_SUFFIX)] + _SUFFIX
+    measured = {"csv": values.get("measured", "")}
+    return {
+        **kept,
+        "name": name,
+        "calibrate": {"unknown": unknown, "measured": measured, "loss": values.get("loss", LOSSES[0])},
+    }
+
+
+def _page(
+    context: Context, study_id: str, values: Mapping[str, str], faults: tuple[Fault, ...], status: int = 200
+) -> Response:
+    study, record = context.store.study(study_id), context.store.get_study(study_id)
+    paths = [path for path in study.base if path not in study.derive]
+    infos = [info for info in models.study_results(study) if info.kind != "category"]
+    first = models.presentation_of(study).along[:1]
+    example = [f"{path} [{unit_of(study, path)}]" for path in first] + [f"{infos[0].name} [{infos[0].unit}]", "sigma"]
+    return page(
+        "calibrate.html",
+        status=status,
+        study_id=study_id,
+        study_name=record.name or study_id,
+        values=values,
+        faults=faults,
+        rows=range(ROWS),
+        paths=[(path, words(path), unit_of(study, path), study.base[path]) for path in paths],
+        results=[(info.name, info.unit) for info in infos],
+        losses=LOSSES,
+        example=",".join(example),
+    )
