@@ -112,9 +112,8 @@ def test_pages_show_the_drive_of_a_case_and_its_values(filled: tuple[Service, st
     assert "varies from drive to drive" in own
     for page in ("cases", "curves"):
         assert service.http.get(f"/studies/{study_id}/{page}").status_code == 200
-    report = service.http.get(f"/api/v1/studies/{study_id}/report", params={"format": "html"})
-    assert report.status_code == 200
-    assert "60 %" in report.text
+    file = service.http.get(f"/api/v1/studies/{study_id}/results", params={"format": "json"}).json()
+    assert file["given"]["tolerances"][0] == {"path": BACKLASH, "plus_minus": "60 %"}
 
 
 def test_a_clone_has_the_same_cases_and_another_seed_only_the_nominal_ones(filled: tuple[Service, str]) -> None:
