@@ -321,11 +321,26 @@ def test_a_settling_time_that_grows_near_a_bifurcation_is_no_scatter() -> None:
     assert len(curve.x) == 65
 
 
+def test_a_motion_that_is_about_to_be_lost_is_reported_one_interval_further() -> None:
+    def jump_of(multiplier: float) -> tuple[float, float]:
+        def function(points: Floats) -> dict[str, Floats]:
+            x = points[:, -1]
+            rate = -np.log(np.where(x < 0.8013, multiplier, 0.5))
+            own = settling(x, 20.0 / rate, np.exp(-rate))
+            return own | {"mean": x - np.where(x > 0.8013, 1.0, 0.0)}
+
+        (jump,) = curve_of(SETTLED, function).jumps
+        return jump.low, jump.high
+
+    assert jump_of(0.9) == pytest.approx((0.8, 0.8 + LEAF))
+    assert jump_of(0.97) == pytest.approx((0.8 - 4.0 * LEAF, 0.8 + LEAF))
+
+
 def test_a_jagged_curve_of_a_given_time_is_not_drawn_where_it_agrees_by_chance() -> None:
     def function(points: Floats) -> dict[str, Floats]:
         x = points[:, -1]
-        by_chance = (x > 0.6) & (x < 0.65) & (np.abs(x * 40.0 - np.rint(x * 40.0)) < 1e-9)
-        return {"a": x + np.where((x > 0.4) & (x < 1.0) & ~by_chance, 0.1 * noise(x), 0.0)}
+        by_chance = (x > 0.599) & (x < 0.651) & (np.abs(x * 40.0 - np.rint(x * 40.0)) < 1e-9)
+        return {"a": x + np.where((x > 0.4) & (x < 1.0) & ~by_chance, 0.3 * noise(x), 0.0)}
 
     curve = curve_of(PLAN, function)
     inner = curve.x[(curve.x > 0.45) & (curve.x < 0.95)]
