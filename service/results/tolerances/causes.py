@@ -75,7 +75,8 @@ def variance_causes(study: Study, values: Numbers) -> Causes:
         notes.append(f"{', '.join(sorted(tied))} are correlated: they have no shares of their own")
     if missing:
         notes.append(f"{missing} drives without results are left out of the shares")
-    rest = None if tied else 1.0 - sum(share.value for share in found)
+    # Estimates of shares that are 0 scatter around it; added up they would count as interactions.
+    rest = None if tied else max(1.0 - sum(max(share.value, 0.0) for share in found), 0.0)
     return Causes(own, rest, "; ".join(notes))
 
 

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import norm, qmc
 
-from sprag.service.results.tolerances.shares import LEAST_DRIVES, shares
+from sprag.service.results.tolerances import causes
+from sprag.service.results.tolerances.shares import LEAST_DRIVES, Share, shares
+from sprag.service.spec.document import parse_spec
+from tests.service.results.tolerances.conftest import SPEC
 
 
 def test_shares_of_a_linear_function_are_those_of_its_slopes() -> None:
@@ -55,3 +58,12 @@ def test_too_few_drives_and_results_that_do_not_vary_have_no_shares() -> None:
     assert shares(draws[:-1], draws[:-1, :1]) is None
     assert shares(draws, np.full((LEAST_DRIVES, 1), 5.0)) is None
     assert shares(draws, draws[:, :1]) is not None
+
+
+def test_what_scatters_around_no_share_is_no_interaction(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = parse_spec(SPEC).study
+    estimates = [Share(0.97, 0.01), Share(-0.1, 0.12), Share(-0.08, 0.12)]
+    monkeypatch.setattr(causes, "shares", lambda _draws, _y: estimates)
+    found = causes.variance_causes(study, np.zeros((512, 1)))
+    assert found.rest == pytest.approx(0.03)
+    assert [share and share.value for share in found.shares] == [0.97, -0.1, -0.08]
