@@ -3,75 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from sprag.worker.models.settled import IRREGULAR
 from sprag.worker.planning.curves import Why
-from sprag.worker.planning.refine import CurveRefiner, describe, refiner
+from sprag.worker.planning.refine import CurveRefiner, describe
 from sprag.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan
-from sprag.worker.planning.rounds import Rows, Step
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from sprag.worker.planning.refine import Curve
-
-    Floats = NDArray[np.float64]
-    Function = Callable[[Floats], dict[str, Floats]]
-
-PERIODIC = 1.0
-LOAD = AdaptiveAxis(("shaft.load",), 0.0, 1.6)
-PLAN = RefinePlan(("a",), error=0.01, start=17, finest=256, adaptive=(LOAD,))
-SETTLED = replace(PLAN, results=("mean", "max"), regime=True, half_widths=("mean",))
-
-
-def rows_of(plan: RefinePlan, points: Floats, function: Function) -> Rows:
-    """Rows of a function of the points; "ok" is among its values where cases fail."""
-    values = function(points)
-    ok = values.pop("ok", np.ones(len(points))) > 0.0
-    return Rows(points, ok, {name: values.get(name, np.full(len(points), np.nan)) for name in plan.needed})
-
-
-def refined(plan: RefinePlan, function: Function) -> tuple[list[Rows], Step]:
-    """The rows of all rounds, and the last step."""
-    planner, rounds = refiner(plan), []
-    while len((step := planner.ask()).points):
-        rounds.append(rows_of(plan, step.points, function))
-        planner.tell(rounds[-1])
-        assert len(rounds) <= planner.most_rounds
-    assert sum(len(rows.points) for rows in rounds) <= planner.most_cases
-    return rounds, step
-
-
-def joined(rounds: list[Rows]) -> Rows:
-    """The rows of all rounds as those of one."""
-    names = rounds[0].values
-    points, ok = np.vstack([rows.points for rows in rounds]), np.concatenate([rows.ok for rows in rounds])
-    return Rows(points, ok, {name: np.concatenate([rows.values[name] for rows in rounds]) for name in names})
-
-
-def curve_of(plan: RefinePlan, function: Function) -> Curve:
-    """The only curve of a plan."""
-    rounds, step = refined(plan, function)
-    (curve,) = describe(plan, joined(rounds))
-    assert step.summary["curves"] == [curve.to_json()]
-    return curve
-
-
-def errors_outside(curve: Curve, name: str, function: Function, places: int = 1025) -> Floats:
-    """Errors of straight lines at equally spaced places outside the jumps, relative to the range."""
-    x = np.linspace(curve.x[0], curve.x[-1], places)
-    true = function(x[:, None])[name]
-    inside = np.zeros(places, dtype=bool)
-    for jump in curve.jumps:
-        inside |= (x >= jump.low) & (x <= jump.high)
-    found = np.interp(x, curve.x, curve.values[name])
-    return np.asarray(np.abs(found - true)[~inside] / (true.max() - true.min()))
+from sprag.worker.planning.rounds import Rows
+from tests.worker.planning.refining import (
+    LEAF,
+    PLAN,
+    SETTLED,
+    Floats,
+    curve_of,
+    errors_outside,
+    irregular_zone,
+    joined,
+    noise,
+    refined,
+    rows_of,
+)
 
 
 def test_a_smooth_curve_is_right_to_the_error_from_few_points() -> None:
@@ -175,165 +127,6 @@ def test_all_jumps_of_random_curves_are_told(seed: int) -> None:
             assert any(jump.low <= place <= jump.high for jump in curve.jumps), place
     assert np.quantile(errors_outside(curve, "a", function), 0.99) <= PLAN.error
     assert sum(jump.high - jump.low for jump in curve.jumps) <= 3 * len(places) * 1.6 / 256
-
-
-def settled(x: Floats, mean: Floats, most: Floats, **more: Floats) -> dict[str, Floats]:
-    """Rows of settled motions: periodic of order 1 unless more is given."""
-    own = {"regime": np.full(len(x), PERIODIC), "regime.order": np.ones(len(x))}
-    return own | {"mean": mean, "max": most, "mean.half_width": np.full(len(x), np.nan)} | more
-
-
-def test_a_change_of_regime_is_told_only_where_a_result_jumps() -> None:
-    def function(points: Floats) -> dict[str, Floats]:
-        x = points[:, -1]
-        high = x + np.where(x > 1.21, 0.5, 0.0)
-        return settled(x, x**2, high, **{"regime.order": np.where(x > 0.41, 2.0, 1.0) + 2.0 * (x > 1.21)})
-
-    curve = curve_of(SETTLED, function)
-    (jump,) = curve.jumps
-    assert jump.low <= 1.21 <= jump.high
-    assert (jump.why, jump.results) == (Why.ORDER, ("max",))
-    # The change at 0.41 was looked at as closely.
-    assert np.diff(curve.x)[np.searchsorted(curve.x, 0.41) - 1] == pytest.approx(1.6 / 256)
-
-
-LEAF = 1.6 / 256
-
-
-def ramp(x: Floats, at: float, step: float) -> Floats:
-    """A step, and from there 25 finest intervals that rise by 3 % of the range each."""
-    slope = 0.03 / LEAF * np.clip(x - at, 0.0, 25.0 * LEAF)
-    return np.asarray(slope + np.where(x > at, step, 0.0) - 0.2 * (x > 1.5))
-
-
-def test_a_change_of_order_with_a_step_is_told_where_a_steep_part_follows() -> None:
-    at = 0.8 + 0.5 * LEAF
-
-    def function(points: Floats) -> dict[str, Floats]:
-        x = points[:, -1]
-        return settled(x, ramp(x, at, 0.02), x, **{"regime.order": np.where(x > at, 2.0, 1.0)})
-
-    curve = curve_of(SETTLED, function)
-    assert any(jump.low <= at <= jump.high and "mean" in jump.results for jump in curve.jumps)
-
-
-def test_the_steep_foot_of_a_jump_is_told_with_it() -> None:
-    at = 0.8 + 0.5 * LEAF
-    curve = curve_of(PLAN, lambda points: {"a": ramp(points[:, -1], at, 0.3)})
-    jump = next(jump for jump in curve.jumps if jump.low <= at <= jump.high)
-    assert (jump.low, jump.high) == pytest.approx((0.8, 0.8 + 2.0 * LEAF))
-
-
-def test_a_jump_of_a_few_errors_is_told() -> None:
-    curve = curve_of(PLAN, lambda points: {"a": np.sin(points[:, -1]) + np.where(points[:, -1] > 0.8013, 0.035, 0.0)})
-    assert any(jump.low <= 0.8013 <= jump.high for jump in curve.jumps)
-
-
-def noise(x: Floats) -> Floats:
-    """Numbers between -1 and 1 that differ at any two points."""
-    return np.asarray(np.sin(1e6 * x))
-
-
-def irregular_zone(points: Floats) -> dict[str, Floats]:
-    """Irregular motion from 0.5 to 0.9: the mean is known to 0.4 % of its range, the extreme scatters by 10 %."""
-    x = points[:, -1]
-    inside = (x > 0.5) & (x < 0.9)
-    mean, most = x + np.where(inside, 0.002 * noise(x), 0.0), 2.0 - x + np.where(inside, 0.15 * noise(x), 0.0)
-    more = {
-        "regime": np.where(inside, IRREGULAR, PERIODIC),
-        "regime.order": np.where(inside, np.nan, 1.0),
-        "mean.half_width": np.where(inside, 0.006, np.nan),
-    }
-    return settled(x, mean, most, **more)
-
-
-def test_irregular_motion_is_told_as_a_zone_and_not_refined_to_the_finest() -> None:
-    curve = curve_of(SETTLED, irregular_zone)
-    zone = next(jump for jump in curve.jumps if jump.why is Why.IRREGULAR)
-    assert zone.results == ("max",)
-    assert zone.low == pytest.approx(0.5, abs=1.6 / 64)
-    assert zone.high == pytest.approx(0.9, abs=1.6 / 64)
-    inner = curve.x[(curve.x > 0.55) & (curve.x < 0.85)]
-    assert len(inner) < 0.3 / (1.6 / 256) / 2
-    assert curve.joined["mean"].all()
-    assert not curve.joined["max"][(curve.x[:-1] >= zone.low) & (curve.x[:-1] < zone.high)].any()
-
-
-def test_a_mean_that_is_not_known_to_the_error_is_told() -> None:
-    curve = curve_of(replace(SETTLED, error=0.002), irregular_zone)
-    assert any(set(jump.results) == {"mean", "max"} for jump in curve.jumps if jump.why is Why.IRREGULAR)
-
-
-def test_a_zone_of_irregular_motion_is_told_where_a_result_scatters_in_a_part_of_it() -> None:
-    def function(points: Floats) -> dict[str, Floats]:
-        x = points[:, -1]
-        own = irregular_zone(points)
-        return own | {"max": 2.0 - x + np.where((x > 0.65) & (x < 0.75), 0.15 * noise(x), 0.0)}
-
-    curve = curve_of(SETTLED, function)
-    (zone,) = curve.jumps
-    assert (zone.why, zone.results) == (Why.IRREGULAR, ("max",))
-    assert (zone.low, zone.high) == pytest.approx((0.5, 0.9), abs=1.6 / 128)
-
-
-def test_irregular_motion_is_reported_however_smooth_it_is() -> None:
-    def function(points: Floats) -> dict[str, Floats]:
-        x = points[:, -1]
-        own = settled(x, x, x**2)
-        return own | {"regime": np.full(len(x), IRREGULAR), "mean.half_width": np.full(len(x), 0.02)}
-
-    wide = curve_of(SETTLED, function)
-    assert [(jump.low, jump.high, jump.results) for jump in wide.jumps] == [(0.0, 1.6, ("mean", "max"))]
-    # Of a mean the half width says how far it scatters, of an extreme nothing does.
-    narrow = curve_of(replace(SETTLED, error=0.05), function)
-    assert [(jump.low, jump.high, jump.results) for jump in narrow.jumps] == [(0.0, 1.6, ("max",))]
-
-
-def settling(x: Floats, periods: Floats, multiplier: Floats) -> dict[str, Floats]:
-    """A straight curve of periodic motion that takes ``periods`` to settle."""
-    return settled(x, x, 2.0 - x, **{"regime.settled_after": periods, "regime.multiplier": multiplier})
-
-
-def test_where_settling_times_scatter_another_motion_may_lie_between_the_points() -> None:
-    def function(points: Floats) -> dict[str, Floats]:
-        x = points[:, -1]
-        scatters = np.where((x > 0.7) & (x < 0.9), 1.0 + 0.3 * noise(x), 1.0)
-        own = settling(x, 60.0 * scatters, np.full(len(x), 0.7))
-        # An island narrower than the finest interval, which no point meets.
-        return own | {"mean": np.where(np.abs(x - 0.8 - 0.5 * LEAF) < 0.25 * LEAF, 0.0, own["mean"])}
-
-    curve = curve_of(SETTLED, function)
-    assert curve.passed
-    assert {(jump.why, jump.results) for jump in curve.jumps} == {(Why.SENSITIVE, ("mean", "max"))}
-    assert any(jump.low <= 0.8 and jump.high >= 0.8 + LEAF for jump in curve.jumps)
-    assert all(jump.low > 0.7 - 4 * LEAF and jump.high < 0.9 + 4 * LEAF for jump in curve.jumps)
-    assert not errors_outside(curve, "mean", function).max() > 0.01
-
-
-def test_a_settling_time_that_grows_near_a_bifurcation_is_no_scatter() -> None:
-    def function(points: Floats) -> dict[str, Floats]:
-        x = points[:, -1]
-        rate = 1e-3 + np.abs(x - 0.8013)
-        return settling(x, 20.0 / rate, np.exp(-rate))
-
-    curve = curve_of(SETTLED, function)
-    assert not curve.jumps
-    assert len(curve.x) == 65
-
-
-def test_a_motion_that_is_about_to_be_lost_is_reported_one_interval_further() -> None:
-    def jump_of(multiplier: float) -> tuple[float, float]:
-        def function(points: Floats) -> dict[str, Floats]:
-            x = points[:, -1]
-            rate = -np.log(np.where(x < 0.8013, multiplier, 0.5))
-            own = settling(x, 20.0 / rate, np.exp(-rate))
-            return own | {"mean": x - np.where(x > 0.8013, 1.0, 0.0)}
-
-        (jump,) = curve_of(SETTLED, function).jumps
-        return jump.low, jump.high
-
-    assert jump_of(0.9) == pytest.approx((0.8, 0.8 + LEAF))
-    assert jump_of(0.97) == pytest.approx((0.8 - 4.0 * LEAF, 0.8 + LEAF))
 
 
 def test_a_jagged_curve_of_a_given_time_is_not_drawn_where_it_agrees_by_chance() -> None:
