@@ -62,6 +62,11 @@ class Calibration:
     converged: int
 
     @property
+    def sentences(self) -> list[str]:
+        """What should be known before the values are used."""
+        return sentences(self)
+
+    @property
     def names(self) -> list[str]:
         """Names of the unknown parameters."""
         return [one.paths[0] for one in self.plan.unknown]
@@ -123,7 +128,7 @@ def calibration_json(study_id: str, found: Calibration) -> CalibrationReport:
         "directions": [] if known is None else [_direction(found, index) for index in range(len(known.directions))],
         "next": _next(found),
         "curve": _curve(found),
-        "sentences": sentences(found),
+        "sentences": found.sentences,
     }
 
 

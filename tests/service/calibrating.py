@@ -76,13 +76,19 @@ def run_round(store: Store, number: int, epoch: int) -> None:
         assert store.commit(epoch, chunk, rows_of(study, range(chunk.first, chunk.first + chunk.count)))
 
 
-def calibration(service: Service, rounds: int = 999, **fields: Any) -> str:
-    """The id of a calibration that has had at most so many rounds; it has ended where there are no more."""
+def calibration(service: Service, rounds: int = 999, *, kills: bool = False, **fields: Any) -> str:
+    """The id of a calibration that has had at most so many rounds; it has ended where there are no more.
+
+    With ``kills`` the process ends after every third round, with a chunk that it claimed and did not return.
+    """
     store = service.store
     store.chunking = Chunking(100_000, 1, 60.0)  # one transaction a round
     study_id = service.submit(spec_of(**fields))
     number, epoch, planner = store.get_study(study_id).number, store.take_over("test"), Rounds(store)
-    for _ in range(rounds):
+    for turn in range(rounds):
+        if kills and turn % 3 == 2:
+            store.claim(epoch, store.open_chunks(number))
+            epoch, planner = store.take_over("test"), Rounds(store)
         run_round(store, number, epoch)
         if planner.advance(epoch, number, store.study(study_id)) is None:
             break

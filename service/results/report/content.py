@@ -17,6 +17,7 @@ from sprag.service.results.exports.source import given_texts
 from sprag.service.results.pictures.curves import require_drawable
 from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.regimes import counted
+from sprag.service.results.report.calibration import calibration_part
 from sprag.service.results.report.drives import DrivesPart, drives_part
 from sprag.service.results.rounds import sentence
 from sprag.service.results.selection import SelectionError
@@ -76,6 +77,7 @@ class Report:
     pictures: tuple[Curves, ...]
     note: str
     drives: DrivesPart | None
+    calibration: DrivesPart | None = None
 
 
 def report_of(store: Store, study_id: str) -> Report:
@@ -92,7 +94,12 @@ def report_of(store: Store, study_id: str) -> Report:
     )
     if progress.rounds is None:
         return report
-    return replace(report, facts=(*report.facts, ("rounds", sentence(progress.rounds))))
+    study, rows = store.study(study_id), partial(store.rows_for_cases, study_id)
+    return replace(
+        report,
+        facts=(*report.facts, ("rounds", sentence(progress.rounds))),
+        calibration=calibration_part(study, store.rounds(study_id), rows),
+    )
 
 
 def make_report(

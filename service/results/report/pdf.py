@@ -40,10 +40,11 @@ def pdf_report(report: Report) -> bytes:
             figure = _figure()
             paint_figure(figure, curves_figure([("", curves)], by_unit=True), "")
             pages.savefig(figure)
-        if report.drives is not None and report.drives.figure is not None:
-            figure = _figure()
-            paint_figure(figure, report.drives.figure, "")
-            pages.savefig(figure)
+        for part in (report.drives, report.calibration):
+            if part is not None and part.figure is not None:
+                figure = _figure()
+                paint_figure(figure, part.figure, "")
+                pages.savefig(figure)
     return buffer.getvalue()
 
 
@@ -78,6 +79,7 @@ def _lines(report: Report) -> Iterator[str]:
             for axis in report.axes
         ],
     )
+    yield from _section("Calibration", () if report.calibration is None else report.calibration.sentences)
     yield from _section("Drives", () if report.drives is None else report.drives.sentences)
     yield from _section("Run", [f"{item.path:20} {item.value}{_mark(item)}" for item in report.run])
     head = f"{'':34} {'unit':12} {'least':>12} {'mean':>12} {'largest':>12} {'cases':>9}"

@@ -8,6 +8,8 @@ import io
 import pytest
 
 from sprag.service.answers.calibration import CalibrationReport
+from sprag.service.results.report.content import report_of
+from sprag.service.results.report.html import html_report
 from tests.service.calibrating import DAMPING, INERTIA, calibration
 from tests.service.conftest import API, Service
 from tests.service.shapes import fits
@@ -81,6 +83,24 @@ def test_a_table_and_a_picture(service: Service) -> None:
     picture = service.http.get(f"{API}/studies/{study_id}/calibration?format=svg")
     assert picture.status_code == 200
     assert "residual" in picture.text
+
+
+def test_the_report_has_the_calibration(service: Service) -> None:
+    study_id = calibration(service)
+    report = report_of(service.store, study_id)
+    assert report.calibration is not None
+    assert report.calibration.figure is not None
+    sentences = service.get(f"/studies/{study_id}/calibration")["sentences"]
+    assert set(sentences) < set(report.calibration.sentences)
+    assert "pendulums.0.damping = " in report.calibration.sentences[0]
+    assert "<h2>Calibration</h2>" in html_report(report).decode()
+    assert report_of(service.store, service.submit()).calibration is None
+
+
+def test_a_calibration_that_was_killed_ends_as_an_undisturbed_one(service: Service) -> None:
+    whole, killed = (service.store.study(calibration(service, kills=kills)) for kills in (False, True))
+    assert whole.cases == killed.cases
+    assert whole.points(range(whole.cases)).tobytes() == killed.points(range(killed.cases)).tobytes()
 
 
 def test_other_studies_are_refused(service: Service) -> None:
