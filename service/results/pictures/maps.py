@@ -35,39 +35,40 @@ _REFINED_POINTS: Final = 5_000
 def draw_map(drawn: Map, title: str, picture: Picture) -> bytes:
     """A map as a picture: colours over two axes, cases without a result left blank; SelectionError when too large."""
     check_size("points", drawn.values.size, MAX_PICTURE_POINTS)
+    return render(lambda figure: paint_map(figure, drawn, title), picture, (8.0, 6.0))
+
+
+def paint_map(figure: Figure, drawn: Map, title: str) -> None:
+    """Paint the map of `draw_map`."""
     drawn = drawn.run()
     x, y, z = map_quantities(drawn)
     orders = order_map(drawn)
-
-    def paint(figure: Figure) -> None:
-        axes = figure.subplots()
-        borders = map_edges(drawn)
-        if orders is None:
-            mesh = axes.pcolormesh(*borders, np.ma.masked_invalid(drawn.values), cmap="viridis")
-            figure.colorbar(mesh, label=quantity_label(z))
-        else:
-            _paint_orders(axes, borders, orders)
-        axes.grid(visible=False)
-        axes.set_facecolor("0.85")
-        if drawn.values.size <= _MARKED_POINTS:
-            points = np.meshgrid(drawn.x_values, drawn.y_values)
-            axes.plot(*(part.reshape(-1) for part in points), ".", color="0.3", markersize=2.5, clip_on=False)
-        if drawn.refined is not None and drawn.refined.x.size <= _REFINED_POINTS:
-            axes.plot(drawn.refined.x, drawn.refined.y, ".", color="0.3", markersize=1.5, clip_on=False)
-        for axis, values in ((axes.xaxis, drawn.x_values), (axes.yaxis, drawn.y_values)):
-            if len(values) == 1:
-                axis.set_ticks(values)
-        axes.set_xlabel(quantity_label(x))
-        axes.set_ylabel(quantity_label(y))
-        doubtful = list(doubtful_marks(drawn))
-        paint_marks(axes, doubtful, clipped=False)
-        below = "" if drawn.refined is None else drawn.refined.sentence
-        explain_regimes(figure, [marks.regime for marks in doubtful], below=below)
-        missing = int(np.isnan(drawn.values if orders is None else orders.places).sum())
-        grey = "grey: not interpolated" if drawn.refined else f"grey: {missing} cases without a result"
-        head(figure, title, (*drawn.held, grey) if missing else drawn.held)
-
-    return render(paint, picture, (8.0, 6.0))
+    axes = figure.subplots()
+    borders = map_edges(drawn)
+    if orders is None:
+        mesh = axes.pcolormesh(*borders, np.ma.masked_invalid(drawn.values), cmap="viridis")
+        figure.colorbar(mesh, label=quantity_label(z))
+    else:
+        _paint_orders(axes, borders, orders)
+    axes.grid(visible=False)
+    axes.set_facecolor("0.85")
+    if drawn.values.size <= _MARKED_POINTS:
+        points = np.meshgrid(drawn.x_values, drawn.y_values)
+        axes.plot(*(part.reshape(-1) for part in points), ".", color="0.3", markersize=2.5, clip_on=False)
+    if drawn.refined is not None and drawn.refined.x.size <= _REFINED_POINTS:
+        axes.plot(drawn.refined.x, drawn.refined.y, ".", color="0.3", markersize=1.5, clip_on=False)
+    for axis, values in ((axes.xaxis, drawn.x_values), (axes.yaxis, drawn.y_values)):
+        if len(values) == 1:
+            axis.set_ticks(values)
+    axes.set_xlabel(quantity_label(x))
+    axes.set_ylabel(quantity_label(y))
+    doubtful = list(doubtful_marks(drawn))
+    paint_marks(axes, doubtful, clipped=False)
+    below = "" if drawn.refined is None else drawn.refined.sentence
+    explain_regimes(figure, [marks.regime for marks in doubtful], below=below)
+    missing = int(np.isnan(drawn.values if orders is None else orders.places).sum())
+    grey = "grey: not interpolated" if drawn.refined else f"grey: {missing} cases without a result"
+    head(figure, title, (*drawn.held, grey) if missing else drawn.held)
 
 
 def _paint_orders(axes: Axes, borders: tuple[NDArray[np.float64], NDArray[np.float64]], orders: OrderMap) -> None:

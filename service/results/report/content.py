@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.results.curve_cases import draw, select
-from sprag.service.results.curves import Curves, Fetch
+from sprag.service.results.curve_cases import draw, draw_map, select
+from sprag.service.results.curves import Curves, Fetch, Map
 from sprag.service.results.defaults import main_query
 from sprag.service.results.exports.inputs import Input, inputs, run_inputs
 from sprag.service.results.exports.source import given_texts
@@ -75,6 +76,7 @@ class Report:
     given: dict[str, str]
     ranges: tuple[Range, ...]
     pictures: tuple[Curves, ...]
+    maps: tuple[Map, ...]
     note: str
     drives: DrivesPart | None
     calibration: DrivesPart | None = None
@@ -128,6 +130,7 @@ def make_report(
         {path: _shortened(text) for path, text in given_texts(spec).items()},
         ranges(infos, blocks),
         pictures,
+        _maps(study, infos, fetch),
         note,
         drives_part(study, infos, fetch),
     )
@@ -196,7 +199,7 @@ def _pictures(study: Study, infos: tuple[ResultInfo, ...], fetch: Fetch) -> tupl
     if query is None:
         return (), "Nothing varies in this study, so there is no curve."
     if map_plan(study) is not None:
-        return (), "The results are a refined map: its picture and its numbers are files of their own."
+        return (), ""
     groups = list(_groups(infos, models.presentation_of(study).checks))
     chosen = [info for group in groups for info in group]
     try:
@@ -205,6 +208,17 @@ def _pictures(study: Study, infos: tuple[ResultInfo, ...], fetch: Fetch) -> tupl
     except SelectionError as error:
         return (), f"There are no curves here: {error}."
     return tuple(_part(whole, group) for group in groups), ""
+
+
+def _maps(study: Study, infos: tuple[ResultInfo, ...], fetch: Fetch) -> tuple[Map, ...]:
+    """The refined maps of a study: one for each result that was asked for and each combination of the other axes."""
+    plan = map_plan(study)
+    if plan is None:
+        return ()
+    y, x = (axis.paths[0] for axis in plan.adaptive)
+    held = product(*([(axis.paths[0], repr(value)) for value in axis.values] for axis in plan.fixed))
+    every = [(name, at) for at in held for name in plan.results][:_MOST_PICTURES]
+    return tuple(draw_map(study, infos, x, y, name, at, fetch) for name, at in every)
 
 
 def _groups(infos: Sequence[ResultInfo], checks: tuple[str, ...]) -> Iterator[tuple[ResultInfo, ...]]:

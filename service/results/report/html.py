@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 from sprag.service.results.pictures.curves import draw_curves, draw_figure
+from sprag.service.results.pictures.maps import draw_map
 
 if TYPE_CHECKING:
-    from sprag.service.results.curves import Curves
+    from sprag.service.results.curves import Curves, Map
     from sprag.service.results.figures.figure import Figure
     from sprag.service.results.report.content import Report
 
@@ -29,6 +30,7 @@ def _template() -> Template:
     environment.filters["input"] = input_text
     environment.filters["picture"] = _picture
     environment.filters["figure"] = _figure
+    environment.filters["map_picture"] = _map
     return environment.get_template("report.html")
 
 
@@ -45,6 +47,11 @@ def input_text(value: float | str | None) -> str:
 def _picture(curves: Curves) -> str:
     """The curves as an image embedded in the page."""
     return _embedded(draw_curves(curves, "", "svg"))
+
+
+def _map(drawn: Map) -> str:
+    """A map as an image embedded in the page."""
+    return _embedded(draw_map(drawn, "", "svg"))
 
 
 def _figure(figure: Figure) -> str:

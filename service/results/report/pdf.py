@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.pictures.curves import paint_figure, painting
+from sprag.service.results.pictures.maps import paint_map
 from sprag.service.results.pictures.text import load_matplotlib, writable
 from sprag.service.results.report.html import input_text, number_text
 
@@ -39,6 +40,10 @@ def pdf_report(report: Report) -> bytes:
         for curves in report.pictures:
             figure = _figure()
             paint_figure(figure, curves_figure([("", curves)], by_unit=True), "")
+            pages.savefig(figure)
+        for drawn in report.maps:
+            figure = _figure()
+            paint_map(figure, drawn, "")
             pages.savefig(figure)
         for part in (report.drives, report.calibration):
             if part is not None and part.figure is not None:

@@ -15,6 +15,8 @@ from sprag.service.results.curves import Map
 from sprag.service.results.figures.orders import map_edges
 from sprag.service.results.pictures.maps import draw_map as paint_map
 from sprag.service.results.report.content import report_of
+from sprag.service.results.report.html import html_report
+from sprag.service.results.report.pdf import pdf_report
 from sprag.service.results.selection import SelectionError
 from sprag.worker import models
 from sprag.worker.study import Study
@@ -117,7 +119,13 @@ def test_the_pages_and_files_of_a_service(service: Service, capsys: pytest.Captu
         page = service.http.get(f"/studies/{study_id}{address}").text
         assert f"/studies/{study_id}/figures/map?x=shaft.load&amp;y=excitation.frequency" in page
     report = report_of(service.store, study_id)
-    assert "refined map" in report.note
+    assert report.note == ""
+    expected = [(mass, name) for mass in (0.5, 0.4) for name in (SPEED, EFFICIENCY)]
+    assert [(one.at[MASS], one.result.name) for one in report.maps] == expected
+    html = html_report(report).decode()
+    assert html.count('<img src="data:image/svg+xml') == len(report.maps)
+    assert f'alt="{SPEED} over {LOAD} and {FREQUENCY}"' in html
+    assert pdf_report(report).count(b"/Type /Page ") > len(report.maps)
     assert dict(report.facts)["rounds"] == service.get(f"/studies/{study_id}")["progress"]["rounds"]["sentence"]
     query = {"x": LOAD, "y": FREQUENCY, "z": EFFICIENCY, "at": f"{MASS}=0.4"}
     assert service.http.get(f"/studies/{study_id}/figures/map", params=query).json()["below"].startswith("Within 2 %")
