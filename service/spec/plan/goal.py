@@ -112,7 +112,10 @@ def read_points(
                 allowed=", ".join(sorted(points[0])),
             )  # fmt: skip
         elif point in points[:index]:
-            report.fault(join("/goal/at", index), "repeated", "is the same as a point before", list(point.values()))
+            report.fault(
+                join("/goal/at", index), "repeated", f"repeats point {points.index(point)}", items[index],
+                allowed="each point once",
+            )  # fmt: skip
     return None if report.found > before else points
 
 

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from sprag.worker.planning.goals import GoalPlan, GoalPlanner, Limit, Variable, front
 from sprag.worker.planning.goals.hypervolume import hypervolume
+from sprag.worker.planning.goals.record import Record
+from sprag.worker.planning.goals.scores import Scores
 from sprag.worker.planning.rounds import Rows
 from tests.worker.planning.searching import joined, plan_of, rows_of, searched
 
@@ -139,6 +141,28 @@ def test_two_goals_reach_the_front_of_zdt1() -> None:
     assert summary["hypervolume"] == hypervolume(scores.goals, np.array(summary["reference"]))
     assert summary["best"] == scores.goals.min(axis=0).tolist()
     assert (summary["feasible"], summary["infeasible"], summary["failed"]) == (2400, 0, 0)
+
+
+def test_the_hypervolume_counts_from_the_generation_of_which_half_is_within_the_limits() -> None:
+    """Two early designs in a corner, whose worst goals are (6, 0.1), and a front that lies elsewhere."""
+    plan = plan_of(2, ["f", "g"], population=20)
+    record = Record(plan)
+
+    def scores(goals: list[tuple[float, float]]) -> Scores:
+        filled = np.array(goals + [(np.nan, np.nan)] * (20 - len(goals)))
+        return Scores(filled, np.where(np.isnan(filled[:, 0]), 1.0, 0.0), filled)
+
+    early = scores([(5.0, 0.1), (6.0, 0.05)])
+    record.generation(early, early)
+    assert record.summary("search")["hypervolume"] is None
+    late = scores([(k, 10.0 - k) for k in range(10)])
+    record.generation(late, late)
+    summary = record.summary("search")
+    assert summary["reference"] == [9.0, 10.0]
+    assert summary["hypervolume"] == sum(range(9))
+    best = scores([(k, 9.0 - k) for k in range(10)])
+    record.generation(best, best)
+    assert record.summary("search")["hypervolume"] > summary["hypervolume"]
 
 
 def test_one_goal_is_found_with_a_limit_that_is_active() -> None:

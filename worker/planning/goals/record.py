@@ -24,7 +24,8 @@ class Record:
     """Counts, best values and hypervolume, and what the polish has reached.
 
     The reference point of the hypervolume is the worst of each goal among the survivors of the first generation of
-    which at least a tenth, and at least two, are within the limits.
+    which at least half are within the limits. Of fewer it would lie in a corner that later fronts do not reach, and
+    the hypervolume would stay 0.
     """
 
     def __init__(self, plan: GoalPlan) -> None:
@@ -46,7 +47,7 @@ class Record:
             return
         self._best = goals.min(axis=0) * self._signs + 0.0  # no negative zero
         if 2 <= len(self._signs) <= MOST_GOALS:
-            if self._reference is None and len(goals) >= max(2, self._plan.population // 10):
+            if self._reference is None and 2 * len(goals) >= self._plan.population:
                 self._reference = goals.max(axis=0)
             if self._reference is not None:
                 self._volume = hypervolume(goals[fronts(goals) == 0], self._reference)
