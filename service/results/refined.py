@@ -116,8 +116,11 @@ def sentence(plan: RefinePlan, curves: Sequence[Refined], names: Iterable[str]) 
     asked = [name for name in drawn if name in plan.results]
     if not asked:
         return ""
-    count = sum(_apart(jumps_of(curve, asked)) for curve in curves)
-    outside = f" outside {count} jump{'s' if count > 1 else ''}" if count else ""
+    broken = [jumps_of(curve, asked) for curve in curves]
+    count = sum(map(_apart, broken))
+    within = sum(jump["high"] - jump["low"] for jumps in broken for jump in jumps)
+    share = within / sum(float(np.ptp(curve.x)) for curve in curves if len(curve.x)) if count else 0.0
+    outside = f" outside {count} jump{'s' if count > 1 else ''} ({percent(share)} of the axis)" if count else ""
     every = [curve.errors[name] for curve in curves for name in asked if np.isfinite(curve.values[name]).any()]
     error = None if None in every or not every else max(error for error in every if error is not None)
     passed = all(curve.passed for curve in curves)

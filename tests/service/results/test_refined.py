@@ -20,6 +20,7 @@ from sprag.service.results.figures.figure import BANDS, Figure, Line
 from sprag.service.results.pictures.curves import paint_figure, painting
 from sprag.service.results.report.content import report_of
 from sprag.service.results.rounds import sentence
+from sprag.service.results.wording import percent
 from sprag.service.storage.records import RoundProgress, RoundRecord
 from sprag.worker import models
 from sprag.worker.study import Study
@@ -160,7 +161,9 @@ def test_jumps_are_marked_in_the_panels_of_their_results(study: Study) -> None:
 
 def test_a_sentence_tells_how_right_the_curves_are(study: Study) -> None:
     told = curves_figure([("", drawn(study))]).below
-    assert told.startswith("Within 1 % of the range, as asked, outside 1 jump (estimate: ")
+    (jump,) = drawn(study).to_json()["curves"][0]["jumps"]  # none on the other curve; both are 1 N*m long
+    share = percent((jump["high"] - jump["low"]) / 2.0)
+    assert told.startswith(f"Within 1 % of the range, as asked, outside 1 jump ({share} of the axis) (estimate: ")
     assert plotly_figure(curves_figure([("", drawn(study))]))["below"] == told
     smooth = drawn(study, y=(SPEED, TORQUE), by=(), at=(("excitation.frequency", "25"),))
     told = curves_figure([("", smooth)]).below
