@@ -62,10 +62,12 @@ def goal_schema(path: Schema) -> Schema:
     quantile = {"type": ["number", "string"], "description": f"{QUANTILE.help}: {QUANTILE.limits}"}
     conditions = YIELD.schema(object_schema(limits, required=("result",)))
     share = {"type": ["number", "string"], "description": 'a share, as in "90 %"'}
+    # Generators of clients write invalid code for a constant that is true.
+    largest = {"type": "boolean", "description": "true: a yield is to be as large as possible"}
     best = {
         "anyOf": [
             object_schema({"result": _RESULT, "max": MAX.schema(), "quantile": quantile}, required=("result",)),
-            object_schema({"yield": conditions, "max": {"const": True}}, required=("yield",)),
+            object_schema({"yield": conditions, "max": largest}, required=("yield",)),
         ]
     }
     constraint = {
