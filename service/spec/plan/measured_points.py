@@ -208,7 +208,9 @@ def read_results(
         deviations: list[float] = []
         if sigma is not None:
             pairs = zip(rows, values, strict=True)
-            deviations = [_deviation(report, where, row, sigma, value, info.unit) for (row, _), value in pairs]
+            deviations = [
+                _deviation(report, where, row, sigma, value, (column.unit, info.unit)) for (row, _), value in pairs
+            ]
         measured.append(Measured(info.name, tuple(at for _, at in rows), tuple(values), tuple(deviations)))
     return None if report.found > before else tuple(measured)
 
@@ -221,8 +223,12 @@ def _value(report: Report, where: str, row: CsvRow, column: Column, unit: str) -
         return math.nan
 
 
-def _deviation(report: Report, where: str, row: CsvRow, column: Column, value: float, unit: str) -> float:
-    """The standard deviation of a value: a number of its unit, or a share of the value."""
+def _deviation(report: Report, where: str, row: CsvRow, column: Column, value: float, units: tuple[str, str]) -> float:
+    """The standard deviation of a value: a quantity, or a share of the value.
+
+    A number without a unit is in that of the column of its result, ``units[0]``, or else in SI, ``units[1]``.
+    """
+    written, unit = units
     cell = _plain(row.cells[column.place])
     share = re.fullmatch(r"(.*?)\s*%", f"{cell} {column.unit}" if parse_number(cell) is not None else cell)
     try:
@@ -232,7 +238,7 @@ def _deviation(report: Report, where: str, row: CsvRow, column: Column, value: f
                 raise QuantityError("not-a-number", "is not a number")
             deviation = abs(value) * number / 100.0
         else:
-            deviation = parse_quantity(_quantity(cell, column.unit), unit)
+            deviation = parse_quantity(_quantity(cell, column.unit or written), unit)
         if not 0.0 < deviation < math.inf and math.isfinite(value):
             raise QuantityError("out-of-range", "is not a standard deviation greater than 0")
         return deviation

@@ -91,6 +91,18 @@ def test_outliers_hardly_move_a_fit_with_another_loss(loss: Any) -> None:
     assert set(np.argsort(-np.abs(other.residuals))[:2].tolist()) == {3, 11}
 
 
+@pytest.mark.parametrize("loss", ["soft_l1", "cauchy"])
+def test_intervals_stay_around_the_values_where_outliers_are_on_one_side(loss: Any) -> None:
+    y = _measured(noise=0.01)
+    y[[4, 12]] -= [0.5, 0.9]
+    found = _answer(plan_of(WIDE, X, {"y": y}, np.full(len(X), 0.01), refits=100, loss=loss), _rise)
+    assert found.intervals is not None
+    low, high = found.intervals.T
+    for value in (found.values, TRUE):
+        assert np.all((low < value) & (value < high))
+    assert np.all(np.abs(0.5 * (low + high) - found.values) < 0.35 * (high - low))
+
+
 def test_failed_cases_and_jumps_do_not_break_a_fit() -> None:
     def form(parameters: Floats, at: Floats) -> dict[str, Floats]:
         y = _rise(parameters, at)["y"]
@@ -118,6 +130,8 @@ def test_what_only_acts_as_a_product_cannot_be_separated() -> None:
     assert set(direction.parameters) == {0, 1}
     changes = dict(zip(direction.parameters, direction.changes, strict=True))
     assert changes[0] * changes[1] < 0.0
+    changed = [found.values[place] + changes[place] for place in (0, 1)]
+    assert changed[0] * changed[1] == pytest.approx(1.6, rel=0.03), "what is reported hardly changes the points"
     assert found.values[0] * found.values[1] == pytest.approx(1.6, rel=0.01)
     assert found.intervals is not None
     assert np.ptp(found.intervals[2]) < 0.05

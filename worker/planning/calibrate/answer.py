@@ -24,6 +24,8 @@ LEAST_REFITS: Final = 20
 #: Standard deviation along a direction, in widths of the ranges, from which on the direction is not determined: its
 #: interval is then as wide as the ranges.
 _UNDETERMINED: Final = 0.25
+#: Longest change along a direction that is reported, in widths of the ranges: farther off, it is no straight line.
+_STRAIGHT: Final = 0.05
 #: Condition index and share of variance from which on parameters are collinear (D. A. Belsley, E. Kuh, R. E. Welsch
 #: 1980).
 _COLLINEAR, _SHARE = 30.0, 0.5
@@ -42,7 +44,8 @@ class Direction:
     parameters : tuple of int
         Positions of the unknown parameters, the largest change first.
     changes : tuple of float
-        Their changes, SI, for one standard deviation along the direction.
+        Their changes, SI, for one standard deviation along the direction; along one that is not determined, for a
+        twentieth of the ranges.
     undetermined : bool
         Whether the data say nothing about it within the ranges; otherwise it is only known badly.
     """
@@ -203,7 +206,7 @@ def _directions(planner: CalibratePlanner, state: State) -> list[Direction]:
     for eigenvalue, vector in zip(eigenvalues, vectors.T, strict=True):
         deviation = 1.0 / np.sqrt(max(float(eigenvalue), 1e-300))
         if deviation > _UNDETERMINED:
-            found.append(_direction(vector, slopes * vector * min(deviation, 1.0), undetermined=True))
+            found.append(_direction(vector, slopes * vector * _STRAIGHT, undetermined=True))
     return found or _collinear(curvature, slopes)
 
 

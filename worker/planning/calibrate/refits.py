@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from sprag.worker.planning.calibrate.batches import total
 from sprag.worker.planning.calibrate.fit import damped_steps, quadratic
+from sprag.worker.planning.calibrate.losses import slopes
 
 if TYPE_CHECKING:
     from collections.abc import Generator
 
     from sprag.worker.planning.calibrate.data import Data
     from sprag.worker.planning.calibrate.fit import Lanes
+    from sprag.worker.planning.calibrate.plan import Loss
     from sprag.worker.planning.goals.draws import Draws
 
 Floats = NDArray[np.float64]
@@ -30,6 +32,8 @@ Ints = NDArray[np.int64]
 #: after one that was no better. A thousandth of an interval's width squared.
 _CONVERGED, _HARDLY = 2e-3, 2e-2
 _PATIENCE = 4
+#: Steps to the centre of residuals.
+_CENTRED = 30
 _DAMPING = 1e-3
 
 
@@ -64,13 +68,22 @@ def drawn(
     if known and data.loss == "linear":
         return modelled + draws.normals(count, len(modelled)) * scale
     residuals = data.residuals(modelled)[used] / np.sqrt(np.maximum(1.0 - leverage[used], 0.05))
-    residuals = residuals - residuals.mean()
+    residuals = residuals - _centre(data.loss, residuals)
     noise = np.zeros((count, len(modelled)))
     noise[:, used] = residuals[draws.integers(len(residuals), count, len(residuals))]
     if not known:
         normals = draws.normals(count, max(freedom, 1))
         noise = noise * np.sqrt(max(freedom, 1) / total(normals * normals))[:, None]
     return modelled + noise * scale
+
+
+def _centre(loss: Loss, residuals: Floats) -> float:
+    """The constant that fits the residuals best by their loss; their mean would follow outliers."""
+    centre = float(np.median(residuals))
+    for _ in range(_CENTRED):
+        weights = slopes(loss, residuals - centre)[0]
+        centre = float(total((weights * residuals)[None, :])[0] / total(weights[None, :])[0])
+    return centre
 
 
 def refit(

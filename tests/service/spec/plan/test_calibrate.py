@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from typing import Any
 
 import pytest
@@ -57,7 +58,7 @@ def test_a_calibration_is_read_in_si_and_its_study_is_settled() -> None:
                 "result": "shaft.speed.mean",
                 "at": [0, 1, 0],
                 "values": pytest.approx([21.991148575, 18.849555922, 22.200588085]),
-                "sigma": [2.0, 2.0, 2.0],
+                "sigma": pytest.approx([0.20943951] * 3),
             }
         ],
         "loss": "linear",
@@ -85,6 +86,15 @@ def test_separators_decimal_commas_and_shares(text: str) -> None:
     (one,) = plan["measured"]
     assert one["values"] == [20.5, 18.0, 15.0]
     assert one["sigma"] == pytest.approx([0.41, 0.36, 0.3])
+
+
+def test_a_sigma_without_a_unit_is_in_that_of_its_result() -> None:
+    text = "shaft.load,shaft.speed.mean [rpm],torque.max [N*mm],sigma\n0.1,300,400,30\n0.2,240,300,2 %\n"
+    plan = read(text).study.plan
+    assert plan is not None
+    speed, torque = plan["measured"]
+    assert speed["sigma"] == pytest.approx([30.0 * math.tau / 60.0, 4.8 * math.tau / 60.0])
+    assert torque["sigma"] == pytest.approx([0.03, 0.006])
 
 
 def test_a_column_sigma_holds_for_the_results_before_it_and_empty_cells_were_not_measured() -> None:
