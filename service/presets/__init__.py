@@ -27,6 +27,11 @@ ABOUT: Final[dict[str, About]] = {
         "two pendulums of different stiffness on one shaft: one clutch drives while the other overruns",
         "the rig of one_pendulum with a second, stiffer pendulum and clutches with a backlash of 0.3 degrees",
     ),
+    "refined_characteristic": About(
+        "speed and efficiency against load at two frequencies, in rounds that add loads until lines between the points "
+        "are accurate to within 1 %",
+        "the rig of one_pendulum",
+    ),
     "press": About(
         "a crank press whose irregularity falls with the flywheel; too little inertia at low speed is an ending of its "
         "own",
