@@ -32,8 +32,9 @@ _WIDE: Final = 0.05
 #: Starts of the fit are farther from each other than this in at least one coordinate.
 _DISTINCT: Final = 0.1
 #: Largest scatter of a scan around the fit, in widths of the ranges; logarithm of the factor by which it reaches beyond
-#: the scatter of the fit; places that are fitted from; standard deviations of chi-square that are improbable.
-_WIDEST, _FARTHEST, _AGAIN, _IMPROBABLE = 0.5, 3.0, 2, 3.0
+#: the scatter of the fit; shells of distances, from each of which it is fitted again; standard deviations of chi-square
+#: that are improbable.
+_WIDEST, _FARTHEST, _SHELLS, _IMPROBABLE = 0.5, 3.0, 3, 3.0
 #: By how much (in squares of standard deviations) another set must be better than the fit to begin again from there.
 _BEGIN_AGAIN: Final = 0.02
 
@@ -160,7 +161,7 @@ def _scaled(plan: CalibratePlan, state: State) -> Generator[Request, Floats, Non
 
 
 def _searched(plan: CalibratePlan, state: State, draws: Draws) -> Generator[Request, Floats, None]:
-    """Scan around the fit, farthest where it is least determined, and fit again from the best two places.
+    """Scan around the fit, farthest where it is least determined, and fit again from the best place at each distance.
 
     On a rough surface the first fit often ends in a side valley.
     """
@@ -169,13 +170,16 @@ def _searched(plan: CalibratePlan, state: State, draws: Draws) -> Generator[Requ
     p = len(plan.unknown)
     curvature = quadratic(state.data, best.modelled, best.derivatives)[1][0]
     factor = cholesky(curvature + np.eye(p) / _WIDEST**2)
-    steps = draws.normals(plan.scan, p) * exponential(_FARTHEST * draws.uniforms(plan.scan))[:, None]
+    far = draws.uniforms(plan.scan)
+    steps = draws.normals(plan.scan, p) * exponential(_FARTHEST * far)[:, None]
     for j in reversed(range(p)):  # the inverse of the factor's transpose gives them the scatter of the fit
         steps[:, j] /= factor[j, j]
         steps[:, :j] -= steps[:, j : j + 1] * factor[j, :j]
     places = np.clip(best.places + steps, 0.0, 1.0)
     modelled = yield from _run(plan, state, FIT_PHASE, places)
-    chosen = np.argsort(state.data.costs(modelled), kind="stable")[:_AGAIN]
+    order = np.argsort(state.data.costs(modelled), kind="stable")
+    shells = [order[np.floor(_SHELLS * far[order]) == shell][:1] for shell in range(_SHELLS)]
+    chosen = np.concatenate(shells)
     again = fit(state.data, places[chosen], modelled[chosen], plan.fit_sets // 4)
     found = _least((yield from _through(plan, state, FIT_PHASE, again)))
     if found.costs[0] < best.costs[0]:

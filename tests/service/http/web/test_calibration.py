@@ -11,6 +11,8 @@ from tests.service.conftest import API, Service
 
 def test_the_page_shows_values_points_and_figure(service: Service) -> None:
     study_id = calibration(service)
+    for address in (f"/studies/{study_id}/curves", f"/studies/{study_id}/cases", f"/new?clone={study_id}"):
+        assert service.http.get(address).status_code == 200, address
     overview = service.http.get(f"/studies/{study_id}").text
     assert f'href="/studies/{study_id}/calibration"' in overview
     assert f'data-figure="/studies/{study_id}/figures/calibration"' in overview
