@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from sprag.worker.planning.goals import Goal, GoalPlan, GoalPlanner, Limit, Variable, front
 from sprag.worker.planning.goals.polish import Polish
-from sprag.worker.planning.goals.scores import misses, outputs_of
+from sprag.worker.planning.goals.scores import misses, outputs_of, signs
 from sprag.worker.planning.goals.space import Space
 from tests.worker.planning.searching import Function, joined, plan_of, rows_of, searched
 
@@ -33,7 +33,9 @@ def _polished(plan: GoalPlan, function: Function = _curved) -> tuple[GoalPlanner
     """The planner at its end, and how many designs the polish took."""
     planner, rounds = searched(plan, function)
     found = front(plan, joined(rounds), equality=1e-6)
-    summary = planner.ask().summary["polish"]
+    summary, best = planner.ask().summary["polish"], planner.ask().summary["best"]
+    # The best values are those of designs that are exact, not of the band around the equality.
+    assert best == (found.goals[found.feasible].min(axis=0) * signs(plan)).tolist()
     assert summary["met"] == int(found.feasible.sum()) > 0
     assert found.miss[found.feasible].max() <= 1e-6
     assert summary["designs"] == sum(len(rows.points) for rows in rounds[plan.generations :]) // len(plan.at)

@@ -34,6 +34,7 @@ class Record:
         self._counts = {"feasible": 0, "infeasible": 0, "failed": 0}
         self._generation = 0
         self._best = np.full(len(plan.best), np.nan)
+        self._best_exact = self._best
         self._volume: float | None = None
         self._reference: Floats | None = None
         self._polish: dict[str, int] | None = None
@@ -45,7 +46,7 @@ class Record:
         goals = survivors.goals[survivors.feasible]
         if not len(goals):
             return
-        self._best = goals.min(axis=0) * self._signs + 0.0  # no negative zero
+        self._best = goals.min(axis=0)
         if 2 <= len(self._signs) <= MOST_GOALS:
             if self._reference is None and 2 * len(goals) >= self._plan.population:
                 self._reference = goals.max(axis=0)
@@ -56,7 +57,10 @@ class Record:
         """Take the new designs of a round of the polish."""
         self._count(new)
         before = self._polish or {"designs": 0, "met": 0}
-        met = int(np.count_nonzero((misses(self._plan, new.outputs) <= MET) & new.feasible))
+        exact = (misses(self._plan, new.outputs) <= MET) & new.feasible
+        if exact.any():
+            self._best_exact = np.fmin(self._best_exact, new.goals[exact].min(axis=0))
+        met = int(np.count_nonzero(exact))
         self._polish = {"designs": before["designs"] + len(new), "met": before["met"] + met}
 
     def _count(self, scores: Scores) -> None:
@@ -69,10 +73,13 @@ class Record:
         """What is known now.
 
         ``phase`` is "search", "polish" or "ended". ``best`` has the best value of each goal among the survivors within
-        the limits, and ``hypervolume`` what these dominate, up to ``reference`` (two or three goals). Goals have the
-        units and signs of the results, and None where there is none. ``polish`` counts its designs, and those that meet
-        the equalities to 1e-6.
+        the limits, or once the polish has met the equalities, among the designs that meet them to 1e-6.
+        ``hypervolume`` is what the survivors dominate, up to ``reference`` (two or three goals). Goals have the units
+        and signs of the results, and None where there is none. ``polish`` counts its designs, and those that meet the
+        equalities to 1e-6.
         """
+        exact = self._polish is not None and self._polish["met"] > 0
+        best = (self._best_exact if exact else self._best) * self._signs + 0.0  # no negative zero
         reference = None if self._reference is None else (self._reference * self._signs).tolist()
         return {
             "kind": GOAL,
@@ -80,7 +87,7 @@ class Record:
             "generation": self._generation,
             "generations": self._plan.generations,
             **self._counts,
-            "best": [None if np.isnan(value) else value for value in self._best.tolist()],
+            "best": [None if np.isnan(value) else value for value in best.tolist()],
             "hypervolume": self._volume,
             "reference": reference,
             "polish": None if self._polish is None else self._polish.copy(),
