@@ -95,7 +95,10 @@ def test_outliers_hardly_move_a_fit_with_another_loss(loss: Any) -> None:
 def test_intervals_stay_around_the_values_where_outliers_are_on_one_side(loss: Any) -> None:
     y = _measured(noise=0.01)
     y[[4, 12]] -= [0.5, 0.9]
-    found = _answer(plan_of(WIDE, X, {"y": y}, np.full(len(X), 0.01), refits=100, loss=loss), _rise)
+    planner = calibrated(plan_of(WIDE, X, {"y": y}, np.full(len(X), 0.01), refits=100, loss=loss), _rise)[0]
+    found = answer(planner)
+    assert found is not None
+    assert planner.summary()["chi_square"] == pytest.approx(found.chi_square), "not the sum of the loss"
     assert found.intervals is not None
     low, high = found.intervals.T
     for value in (found.values, TRUE):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.worker.planning.calibrate.batches import total
 from sprag.worker.planning.calibrate.course import ENDED, Request, State, course
 from sprag.worker.planning.calibrate.data import first_data
 from sprag.worker.planning.calibrate.plan import CALIBRATE
@@ -14,6 +15,7 @@ from sprag.worker.planning.calibrate.space import Space
 from sprag.worker.planning.rounds import Rows, Step
 
 if TYPE_CHECKING:
+    from sprag.worker.planning.calibrate.data import Data
     from sprag.worker.planning.calibrate.plan import CalibratePlan
 
 Floats = NDArray[np.float64]
@@ -84,6 +86,7 @@ class CalibratePlanner:
     def summary(self) -> dict[str, Any]:
         """What is known now: the phase, the best values so far, chi-square, refits."""
         state, best = self.state, self.state.best
+        square, failed = (None, 0) if best is None else _chi_square(state.data, best.modelled)
         return {
             "kind": CALIBRATE,
             "phase": ENDED if self._request is None else state.phase,
@@ -91,8 +94,8 @@ class CalibratePlanner:
             "complete": state.phase == ENDED,
             "unknown": [one.paths[0] for one in self.plan.unknown],
             "values": None if best is None else self._space.values(best.places[0]).tolist(),
-            "chi_square": None if best is None else 2.0 * float(best.costs[0]),
-            "freedom": self.plan.freedom,
+            "chi_square": square,
+            "freedom": self.plan.freedom - failed,
             "refits": self.plan.refits,
         }
 
@@ -139,3 +142,10 @@ class CalibratePlanner:
         keys = [at.tobytes() for at in np.ascontiguousarray(self._conditions(request))]
         known = [self._known[one.tobytes()] for one in self._space.values(request.places)]
         return np.array([[own[key] for key in keys] for own in known])
+
+
+def _chi_square(data: Data, modelled: Floats) -> tuple[float, int]:
+    """The sum of squares of the residuals, whatever the loss, and how many measured values have no modelled one."""
+    failed = np.isnan(modelled[0])
+    residuals = np.where(failed, 0.0, data.residuals(modelled)[0])
+    return float(total((residuals * residuals)[None, :])[0]), int(failed.sum())
