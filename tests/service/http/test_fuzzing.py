@@ -11,6 +11,7 @@ from sprag.service.http import attempts
 from sprag.service.http.api.schedules import EXAMPLE
 from sprag.service.http.app import create_app
 from sprag.service.http.problems import ApiError
+from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,7 +38,8 @@ def not_here(*_: Any, **__: Any) -> Any:
 
 def things(service: Service) -> dict[str, list[Any]]:
     """Ids of a study at work with half of its rows, of ended ones, and of a schedule, by the names of parameters."""
-    ended, begun = [service.submit(), service.submit()], service.submit()
+    tolerances = {"tolerances": [{"path": "shaft.inertia", "plus_minus": "5 %"}], "drives": 2}
+    ended, begun = [service.submit(), service.submit({**SPEC, **tolerances})], service.submit()
     for study_id in ended:
         service.fill(study_id)
     service.fill(begun, range(4))
@@ -61,8 +63,9 @@ def test_made_up_requests_are_answered_as_documented(
     told = "\n".join(f"{finding}\n{more}" for finding, more in summary.findings.items())
     assert not summary.findings, f"{summary}\n{told}"
     assert summary.operations >= 30
-    # What cases do and reports are not computed here, no study is of settled motion, no worker is heard of.
-    assert len(summary.served) >= summary.operations - 7, sorted(summary.served)
+    # What cases do and reports are not computed here, no worker is heard of, no study is of settled motion, has a goal
+    # or is a calibration, and only one has tolerances.
+    assert len(summary.served) >= summary.operations - 9, sorted(summary.served)
     assert set(summary.phases) == {"examples", "coverage", "fuzzing", "stateful"}
     assert {401, 404, 405, 422} <= set(summary.statuses)
     assert set(CHECKS) <= set(summary.checks)
