@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
@@ -52,7 +51,7 @@ def calibrate(
     say(*(f"warning: {warning}" for warning in parsed.warnings))
     found, study_id = _run(parsed, db, processes)
     if file is not None and form is not None:
-        Path(file).write_bytes(_content(found, form, parsed.study.name))
+        write_pieces(file, [_content(found, form, parsed.study.name)])
     _tell(_report(study_id, found), as_json)
     if file is not None:
         say(f"file: {file}")

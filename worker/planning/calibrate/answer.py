@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from sprag.worker.planning.calibrate.course import ENDED, leverages
 from sprag.worker.planning.calibrate.fit import quadratic
@@ -145,8 +146,9 @@ def answer(planner: CalibratePlanner) -> Answer | None:
     squares = np.where(failed, 0.0, residuals) ** 2
     directions = _directions(planner, state)
     loose = sorted({place for one in directions if one.undetermined for place in one.parameters})
-    intervals = None if values is None else _ends(values)
-    at_bounds = None if places is None or values is None else _touching(_ends(places))
+    around = _likely(planner, state)
+    intervals = None if values is None else _wider(_ends(values), planner.space.values(around))
+    at_bounds = None if places is None or values is None else _touching(_wider(_ends(places), around))
     if intervals is not None and at_bounds is not None:
         # Refits stay where they began along a direction that the data do not determine.
         for place in loose:
@@ -180,6 +182,28 @@ def _ends(samples: Floats) -> Floats:
     """Ends of the 95 % intervals of the columns of (samples, ...): shape (..., 2)."""
     ends: Floats = np.moveaxis(np.quantile(samples, ENDS, axis=0, method="weibull"), 0, -1)
     return ends
+
+
+def _likely(planner: CalibratePlanner, state: State) -> Floats:
+    """Places of all sets that were run and are within a 95 % interval of the likelihood, shape (sets, p).
+
+    Half the change of chi-square that it allows is added to the least cost: 3.84 for one parameter, or the square of
+    Student's t where the standard deviations follow from the residuals. None but the fit with another loss.
+    """
+    best, plan = state.best, planner.plan
+    assert best is not None
+    if plan.loss != "linear":
+        return best.places
+    limit = 1.959964 if plan.known_sigma else float(stdtrit(max(plan.freedom, 1), ENDS[1]))
+    places, modelled = (np.concatenate(parts) for parts in zip(*state.library, strict=True))
+    near = state.data.costs(modelled) <= best.costs[0] + 0.5 * limit**2
+    return np.concatenate([best.places, places[near]])
+
+
+def _wider(ends: Floats, samples: Floats) -> Floats:
+    """Ends, shape (p, 2), widened to all ``samples``, shape (samples, p)."""
+    low, high = samples.min(axis=0), samples.max(axis=0)
+    return np.stack([np.minimum(ends[:, 0], low), np.maximum(ends[:, 1], high)], axis=1)
 
 
 def _ribbon(curves: Floats | None) -> Floats | None:
