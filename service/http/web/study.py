@@ -152,6 +152,7 @@ def _main_figure(study: Study, study_id: str, query: CurveQuery | None) -> dict[
             "picture": f"{views.study_address(study_id)}/front?format=svg" if _drawable(study.cases) else None,
             "others": f"/studies/{study_id}/front",
             "kind": "Designs",
+            "invitation": "More on the page",
             "caption": "Every design of the search; grey ones are outside the limits",
         }
     if _calibrates(study):
@@ -161,10 +162,19 @@ def _main_figure(study: Study, study_id: str, query: CurveQuery | None) -> dict[
             "picture": f"{views.study_address(study_id)}/calibration?format=svg",
             "others": f"/studies/{study_id}/calibration",
             "kind": "Calibration",
+            "invitation": "More on the page",
             "caption": "Measured points on the fitted curve, and the residuals",
         }
     if query is None:
-        return {"heading": "", "figure": None, "picture": None, "others": None, "kind": "", "caption": None}
+        return {
+            "heading": "",
+            "figure": None,
+            "picture": None,
+            "others": None,
+            "kind": "",
+            "invitation": "",
+            "caption": None,
+        }
     mapped = map_query(study, models.study_results(study), QueryParams()) if map_plan(study) is not None else None
     if mapped is not None:
         kind, pairs, more = "map", pairs_of(mapped), ("kind", "heatmap")
@@ -181,6 +191,7 @@ def _main_figure(study: Study, study_id: str, query: CurveQuery | None) -> dict[
         "picture": picture if drawable else None,
         "others": f"/studies/{study_id}/{kind}?{urlencode(pairs)}",
         "kind": kind.capitalize(),
+        "invitation": "Choose others with",
         "caption": told,
     }
 
