@@ -17,6 +17,7 @@ from sprag.worker.models import WorkerEnding
 from sprag.worker.planning.calibrate import CalibratePlan, CalibratePlanner
 from sprag.worker.planning.calibrate.answer import Answer, answer
 from sprag.worker.planning.calibrate.plan import CALIBRATE
+from sprag.worker.planning.calibrate.stored import from_json
 from sprag.worker.planning.rounds import Rows
 
 if TYPE_CHECKING:
@@ -82,7 +83,9 @@ def plan_of(study: Study) -> CalibratePlan:
 
 
 def calibration_of(study: Study, rounds: list[RoundRecord], fetch: Fetch) -> Calibration:
-    """What the rows of whole rounds show; FaultError for a study that is not a calibration.
+    """What the rows of whole rounds show, or the answer that an ended calibration has stored.
+
+    Raises FaultError for a study that is not a calibration.
 
     Parameters
     ----------
@@ -92,6 +95,11 @@ def calibration_of(study: Study, rounds: list[RoundRecord], fetch: Fetch) -> Cal
         Gives rows by numbers of cases and names of results.
     """
     plan = plan_of(study)
+    infos = {info.name: info for info in models.study_results(study) if info.name in plan.results}
+    if rounds and not len(rounds[-1].cases) and "answer" in rounds[-1].summary:
+        summary = dict(rounds[-1].summary)
+        known, converged = summary.pop("answer"), summary.pop("converged")
+        return Calibration(study, plan, infos, None if known is None else from_json(known), summary, converged)
     planner = CalibratePlanner(plan)
     for record in rounds:
         if not len(record.cases):
@@ -103,7 +111,6 @@ def calibration_of(study: Study, rounds: list[RoundRecord], fetch: Fetch) -> Cal
             break
         ok = np.array([ending == models.OK for ending in endings])
         planner.tell(Rows(study.points(record.cases), ok, columns.values))
-    infos = {info.name: info for info in models.study_results(study) if info.name in plan.results}
     refits = planner.state.refits
     converged = 0 if refits is None else int(np.count_nonzero(refits.converged))
     return Calibration(study, plan, infos, answer(planner), planner.summary(), converged)

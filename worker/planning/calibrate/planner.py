@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.worker.planning.calibrate.answer import answer
 from sprag.worker.planning.calibrate.batches import total
 from sprag.worker.planning.calibrate.course import ENDED, Request, State, course
 from sprag.worker.planning.calibrate.data import first_data
 from sprag.worker.planning.calibrate.plan import CALIBRATE
 from sprag.worker.planning.calibrate.space import Space
+from sprag.worker.planning.calibrate.stored import to_json
 from sprag.worker.planning.rounds import Rows, Step
 
 if TYPE_CHECKING:
@@ -80,8 +82,14 @@ class CalibratePlanner:
         self._advance()
 
     def ask(self) -> Step:
-        """The next round; asking changes nothing."""
-        return Step(self._missing, self.summary())
+        """The next round, or at the end the answer as `stored.to_json` writes it; asking changes nothing."""
+        summary = self.summary()
+        if self._request is None:
+            found = answer(self)
+            refits = self.state.refits
+            converged = 0 if refits is None else int(np.count_nonzero(refits.converged))
+            summary |= {"answer": None if found is None else to_json(found), "converged": converged}
+        return Step(self._missing, summary)
 
     def summary(self) -> dict[str, Any]:
         """What is known now: the phase, the best values so far, chi-square, refits."""

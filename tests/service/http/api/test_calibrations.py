@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
+from functools import partial
 
 import pytest
 
 from sprag.service.answers.calibration import CalibrationReport
+from sprag.service.results import calibration as calibration_module
+from sprag.service.results.calibration import calibration_json, calibration_of
 from sprag.service.results.report.content import report_of
 from sprag.service.results.report.html import html_report
 from tests.service.calibrating import DAMPING, INERTIA, calibration
@@ -49,6 +52,18 @@ def test_an_ended_calibration(service: Service) -> None:
     assert max(found["next"]["narrower"].values()) > 0.0
     assert any("degrees of freedom" in sentence for sentence in found["sentences"])
     assert not found["directions"]
+
+
+def test_an_ended_calibration_keeps_its_answer(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A later version of the planner may read other values from the same rows."""
+    study_id = calibration(service)
+    rows, study = service.store.rounds(study_id), service.store.study(study_id)
+    fetch = partial(service.store.rows_for_cases, study_id)
+    assert not len(rows[-1].cases)
+    replayed = calibration_of(study, rows[:-1], fetch)
+    assert calibration_json("", replayed) == calibration_json("", calibration_of(study, rows, fetch))
+    monkeypatch.setattr(calibration_module, "CalibratePlanner", None)
+    assert service.get(f"/studies/{study_id}/calibration")["complete"]
 
 
 def test_what_cannot_be_separated_is_named(service: Service) -> None:
