@@ -9,7 +9,8 @@ import pytest
 
 from sprag.worker.planning.refine import CurveRefiner
 from sprag.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan, half_widths_of
-from tests.worker.planning.test_refine import LOAD, MANY, PLAN
+from tests.worker.planning.refining import LOAD, PLAN
+from tests.worker.planning.test_refine import MANY
 
 
 def test_a_plan_is_the_same_after_json() -> None:

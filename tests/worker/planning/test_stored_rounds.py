@@ -10,7 +10,7 @@ import pytest
 
 from sprag.worker.planning.refine import refiner
 from sprag.worker.planning.refine_plan import AdaptiveAxis, RefinePlan
-from tests.worker.planning.test_refine import LOAD, PLAN, refined, rows_of
+from tests.worker.planning.refining import LOAD, PLAN, refined, rows_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
