@@ -36,7 +36,7 @@ class Ribbon:
                         made = {**fixed, "result": name, "quantile": probability, **nominal, **parts, **counts}
                         rows.append(made)
         table = pd.DataFrame(rows).rename(columns={"values": "value"})
-        table.attrs["units"] = _units(self.data)
+        table.attrs["units"] = _units_of(self.data)
         return table.astype(dict.fromkeys(("nominal", "value", "low", "high"), "float64"))
 
     def causes(self) -> pd.DataFrame:
@@ -69,7 +69,7 @@ class Yield:
             for place, share in enumerate(line["each"])
         ]
         table = pd.DataFrame(rows).rename(columns={"value": "yield"})
-        table.attrs["units"] = _units(self.data)
+        table.attrs["units"] = _units_of(self.data)
         return table.astype(dict.fromkeys(("yield", "low", "high"), "float64"))
 
     def causes(self) -> pd.DataFrame:
@@ -97,7 +97,7 @@ def _x_of(data: RibbonReport | YieldReport, x: list[float], place: int) -> dict[
     return {} if data["x"] is None else {data["x"]["path"]: x[place]}
 
 
-def _units(data: RibbonReport | YieldReport) -> dict[str, str]:
+def _units_of(data: RibbonReport | YieldReport) -> dict[str, str]:
     return dict(data["units"])
 
 
