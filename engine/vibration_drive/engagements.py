@@ -107,7 +107,7 @@ def settled_engagements(columns: Mapping[str, ArrayLike], settings: SettledRun) 
     if ending != Ending.OK or (unloaded and regime in (Regime.COASTING, Regime.HELD)):
         # In the limit of a vanishing load no clutch transmits torque.
         return Engagements(0.0, turn * period, name, (), (), ending)
-    run = settings.run
+    run = settings.fine if repeats else settings.run
     begin, length = float(found.points[0, BEGIN]), float(2 * turn if repeats else turn)
     matrix = with_lengths(case_matrix(columns, run, 1), np.array([begin]), np.array([length]), windowed=False)
     module = kernel_of(columns, settings.tolerance)

@@ -133,7 +133,7 @@ def limit_of(search: Search, case: int, point: Floats, order: int) -> float:
     begin = float(point[BEGIN])
     matrix = with_lengths(search.matrix[case : case + 1], np.array([begin]), np.array([float(order)]), windowed=False)
     places = begin + np.linspace(0.0, order, _SAMPLES * order + 1)
-    done = integrate(search.kernel, matrix, search.fine, starts=point[None, :], times=places)
+    done = integrate(search.kernel, matrix, search.settings.fine, starts=point[None, :], times=places)
     times = places[: done.recorded] * search.matrix[case, Column.PERIOD]
     best = math.nan
     for i in range(search.kernel.LAYOUT.n):

@@ -4,7 +4,7 @@ Every decision about a case follows from that case alone, so its numbers do not 
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,8 +65,6 @@ _BACK = 1.25
 _SENSITIVE = 0.95
 _FINE_STEPS = 3
 _EXACT = 1e-12
-#: Tolerance of what is reported, as a share of the run's: over a single turn smaller steps cost next to nothing.
-_FINER, _FINEST = 0.01, 1e-14
 #: Parts of an orbit closer than this are equal, so that its order is smaller.
 _SAME = 1e-7
 #: Where in the period strobes are moved to when no orbit was found with those at its end; exact in binary, so that
@@ -138,12 +136,6 @@ class Search:
     def run(self) -> Run:
         """Accuracy and budgets."""
         return self.settings.run
-
-    @property
-    def fine(self) -> Run:
-        """The same with a smaller tolerance."""
-        run = self.settings.run
-        return replace(run, tolerance=max(_FINER * run.tolerance, min(_FINEST, run.tolerance)))
 
     def units(self, active: Ints) -> Floats:
         """Scales of the strobes' columns."""
@@ -255,7 +247,7 @@ class Search:
             if not len(rows):
                 break
             some = found.take(rows)
-            moved, told, _ = self._step(some.cases, some.points, some.orders, some.units, self.fine)
+            moved, told, _ = self._step(some.cases, some.points, some.orders, some.units, self.settings.fine)
             good = (told[:, newton.RESIDUAL] < RESIDUAL) & (told[:, newton.MULTIPLIER] < STABLE)
             rows, moved, told = rows[good], moved[good], told[good]
             found.points[rows] = moved
@@ -296,7 +288,7 @@ class Search:
         """Characteristics of orbits over one turn of each, shape (orbits, results)."""
         cases = found.cases
         matrix = with_lengths(self.matrix[cases], found.points[:, BEGIN], found.orders.astype(float), windowed=True)
-        sums = integrate(self.kernel, matrix, self.fine, starts=found.points).sums
+        sums = integrate(self.kernel, matrix, self.settings.fine, starts=found.points).sums
         self.spent[cases] += found.orders
         self.steps[cases] += sums[:, OUT_STEPS]
         self.events[cases] += sums[:, OUT_EVENTS]
