@@ -78,7 +78,9 @@ def engagements(columns: Mapping[str, ArrayLike], run: Run) -> Engagements:
     return Engagements(start * period, end * period, "", rows, _periods(pieces, last, period), ending)
 
 
-def settled_engagements(columns: Mapping[str, ArrayLike], settings: SettledRun) -> Engagements:
+def settled_engagements(
+    columns: Mapping[str, ArrayLike], settings: SettledRun, start: Floats | None = None
+) -> Engagements:
     """The engagements in one turn of the settled motion, and the means of its periods.
 
     Times count from the start of an excitation period. An engagement that continues into the next turn is given
@@ -90,13 +92,15 @@ def settled_engagements(columns: Mapping[str, ArrayLike], settings: SettledRun) 
     columns : mapping
         As for ``simulate``, scalars only.
     settings : SettledRun
+    start : array, shape (1, strobes.width(n)), optional
+        As ``starts`` of ``settle``; without it the case's own start.
 
     Raises
     ------
     ValueError
         If a required parameter is missing or the number of pendulums or coefficients is out of range.
     """
-    found = settle(columns, settings, cases=1)
+    found = settle(columns, settings, cases=1, starts=start)
     regime, ending = Regime(int(found.regimes[0])), ENDINGS[int(found.endings[0])]
     period = 1.0 / float(np.asarray(columns["excitation.frequency"]))
     repeats = regime.repeats

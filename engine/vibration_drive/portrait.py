@@ -60,8 +60,8 @@ def portrait(columns: Mapping[str, ArrayLike], run: Run) -> Portrait:
     return Portrait("", 0, strobes, _nothing(), 0, ending)
 
 
-def settled_portrait(columns: Mapping[str, ArrayLike], settings: SettledRun) -> Portrait:
-    """The strobes of a case from its own start until it is settled, and one turn of its orbit.
+def settled_portrait(columns: Mapping[str, ArrayLike], settings: SettledRun, start: Floats | None = None) -> Portrait:
+    """The strobes of a case from its start until it is settled, and one turn of its orbit.
 
     For irregular or unsettled motion the strobes of the whole search are returned, without an orbit.
 
@@ -70,6 +70,8 @@ def settled_portrait(columns: Mapping[str, ArrayLike], settings: SettledRun) -> 
     columns : mapping
         As for ``simulate``, scalars only.
     settings : SettledRun
+    start : array, shape (1, strobes.width(n)), optional
+        As ``starts`` of ``settle``, at the start of a period.
 
     Raises
     ------
@@ -77,7 +79,7 @@ def settled_portrait(columns: Mapping[str, ArrayLike], settings: SettledRun) -> 
         If a required parameter is missing or the number of pendulums or coefficients is out of range.
     """
     values = scalars(columns)
-    found = settle(values, settings, cases=1)
+    found = settle(values, settings, cases=1, starts=start)
     regime, ending = Regime(int(found.regimes[0])), ENDINGS[int(found.endings[0])]
     names = [info.name for info in settled_infos(pendulum_count(values))]
     row = dict(zip(names, found.values[0].tolist(), strict=True))
@@ -86,7 +88,7 @@ def settled_portrait(columns: Mapping[str, ArrayLike], settings: SettledRun) -> 
     periods = settings.at_most
     if regime.repeats and row["regime.settled_after"] < periods:
         periods = min(periods, max(_LEAST, int(np.ceil(row["regime.settled_after"])) + _TURNS * order))
-    _, strobes = _strobes(values, run, periods)
+    _, strobes = _strobes(values, run, periods, start)
     if not order:
         return Portrait(regime.name.lower() if regime else "", 0, strobes, _nothing(), 0, ending)
     orbit, points = _orbit(values, run, found.points, order)
@@ -97,12 +99,14 @@ def _nothing() -> Trajectory:
     return Trajectory(np.empty(0), (), (), np.empty((0, 0)), {}, Ending.OK)
 
 
-def _strobes(values: Mapping[str, float], run: Run, periods: int) -> tuple[Ending, Trajectory]:
+def _strobes(
+    values: Mapping[str, float], run: Run, periods: int, start: Floats | None = None
+) -> tuple[Ending, Trajectory]:
     """How the case ends, and its last strobes."""
     n = pendulum_count(values)
     matrix = with_lengths(case_matrix(values, run, 1), np.zeros(1), np.array([float(periods)]), windowed=False)
     kept = min(periods, MAX_STROBES)
-    done = integrate(kernel_of(values, run.tolerance), matrix, run, strobes=kept)
+    done = integrate(kernel_of(values, run.tolerance), matrix, run, starts=start, strobes=kept)
     ending = ENDINGS[int(done.sums[0, OUT_ENDING])]
     # A run that did not end ok has no more than its first strobes.
     rows = in_order(done.strobes, np.array([periods]))[0] if kept else done.strobes[0]

@@ -108,6 +108,8 @@ class Search:
     matrix: Floats
     settings: SettledRun
     steady_shaft: bool = False
+    #: States at which cases begin (`strobes.continued`, or `from_rest`); None: all at their own initial values.
+    given: Floats | None = None
     starts: Floats = field(init=False)
     #: The last strobes of each case, the newest last, and how many of them are filled for those that still go on.
     history: Floats = field(init=False)
@@ -125,12 +127,18 @@ class Search:
 
     def __post_init__(self) -> None:
         cases, n = len(self.matrix), self.kernel.LAYOUT.n
-        self.starts = from_rest(cases, n)
+        self.starts = from_rest(cases, n) if self.given is None else self.given.copy()
         self.history = np.zeros((cases, 3 * max(self.settings.max_period, WINDOW) + 1, width(n)))
         self.periods = np.zeros(cases, dtype=np.int64)
         self.turns = np.zeros((cases, self.settings.at_most))
         self.steps, self.events, self.wait, self.spent = (np.zeros(cases) for _ in range(4))
         self.endings = np.full(cases, _OK, dtype=np.int8)
+
+    @property
+    def from_stop(self) -> Flags:
+        """Which cases begin at their own initial values with the shaft at rest, shape (cases,): they run up."""
+        own = True if self.given is None else self.given[:, SHAFT] == NOT_GIVEN
+        return np.asarray(own & (self.matrix[:, Column.SPEED] == 0.0), dtype=np.bool_)
 
     @property
     def run(self) -> Run:
@@ -157,7 +165,8 @@ class Search:
         The cases are those of the calls before or some of them. The ending of cases that do not end ok is recorded.
         """
         starts = self.starts[active]
-        # A case whose strobes have just been moved begins before its first strobe and ends at one.
+        # A case whose strobes are moved, or were elsewhere where its start comes from, begins before its first strobe
+        # and ends at one.
         begin = np.where(starts[:, SHAFT] == NOT_GIVEN, 0.0, starts[:, BEGIN])
         extra = np.where(starts[:, FRACTION] < 1.0, starts[:, FRACTION], 0.0) - begin
         matrix = with_lengths(self.matrix[active], begin, periods + extra, windowed=windowed)

@@ -18,7 +18,7 @@ from sprag.engine.vibration_drive.orbits import distances, settling_periods
 from sprag.engine.vibration_drive.regimes import Regime, means, settled_infos
 from sprag.engine.vibration_drive.results import STEADY_SHAFT, result_infos
 from sprag.engine.vibration_drive.search import ROUND, Orbits, Search, joined, transient_rounds
-from sprag.engine.vibration_drive.strobes import ANGLE, FRACTION, PENDULUM_WIDTH, SHAFT_SPEED, SHAFT_WIDTH, SPEED
+from sprag.engine.vibration_drive.strobes import ANGLE, FRACTION, PENDULUM_WIDTH, SHAFT_SPEED, SHAFT_WIDTH, SPEED, width
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -79,8 +79,10 @@ class _Results:
         self.values[cases, self.column(name)] = values
 
 
-def settle(columns: Mapping[str, ArrayLike], settings: SettledRun, *, cases: int) -> SettledBatch:
-    """Find the settled motion of each case, from its own start.
+def settle(
+    columns: Mapping[str, ArrayLike], settings: SettledRun, *, cases: int, starts: Floats | None = None
+) -> SettledBatch:
+    """Find the settled motion of each case, from its own start or from a given state.
 
     Each run is continued while its strobes are examined. Where they seem to approach an orbit, Newton's method finds
     it. The orbit is accepted if its multipliers show that it is stable and the run is close to it (docs/theory.md,
@@ -94,6 +96,10 @@ def settle(columns: Mapping[str, ArrayLike], settings: SettledRun, *, cases: int
     settings : SettledRun
     cases : int
         Number of cases, at least 0.
+    starts : array, shape (cases, strobes.width(n)), optional
+        The state at which each case begins: a row of ``strobes.continued``, whose numbers may come from a case with
+        other parameters, or of ``strobes.from_rest`` for its own initial values. A case that begins at a given state
+        has no run-up; without a load, ``shaft.speed.from_rest`` is the speed that it reaches from there.
 
     Returns
     -------
@@ -102,12 +108,15 @@ def settle(columns: Mapping[str, ArrayLike], settings: SettledRun, *, cases: int
     Raises
     ------
     ValueError
-        If a required parameter is missing or the number of pendulums or coefficients is out of range.
+        If a required parameter is missing, the number of pendulums or coefficients is out of range, or ``starts`` has
+        another shape or a number that is not finite.
     """
     n = pendulum_count(columns)
     module = kernel_of(columns, settings.tolerance)
     matrix = case_matrix(columns, settings.run, cases)
-    search = Search(module, matrix, settings)
+    if starts is not None and (starts.shape != (cases, width(n)) or not np.isfinite(starts).all()):
+        raise ValueError(f"starts must be finite numbers in the shape {(cases, width(n))}, not {starts.shape}")
+    search = Search(module, matrix, settings, given=starts)
     results = _Results(cases, n, search.starts.shape[1])
     if cases:
         loaded = matrix[:, Column.LOAD] > 0.0
@@ -203,8 +212,7 @@ def _whole_run(search: Search, cases: Ints, results: _Results) -> None:
     period = search.matrix[cases, Column.PERIOD]
     wanted = RUNUP_SHARE * results.values[cases, results.column("shaft.speed.mean")] * period
     runup = _runup(search.turns[cases], wanted)
-    started = search.matrix[cases, Column.SPEED] == 0.0
-    results.put(cases, "runup.time", np.where(started, period * runup, math.nan))
+    results.put(cases, "runup.time", np.where(search.from_stop[cases], period * runup, math.nan))
 
 
 def _runup(turns: Floats, wanted: Floats) -> Floats:
@@ -276,9 +284,8 @@ def _steady_shaft(search: Search, case: int, speed: float, results: _Results) ->
         results.put(at, name, value(speed, time))
     results.points[case, SHAFT_SPEED] = speed
     rest = results.values[case, results.column("shaft.speed.from_rest")]
-    started = search.matrix[case, Column.SPEED] == 0.0
     runup = _runup(search.turns[at], np.array([RUNUP_SHARE * rest * period]))
-    results.put(at, "runup.time", period * runup if started else math.nan)
+    results.put(at, "runup.time", period * runup if search.from_stop[case] else math.nan)
 
 
 def _speed_from_rest(search: Search, cases: Ints) -> Floats:

@@ -82,7 +82,7 @@ def _trajectory_columns(n: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return tuple(name for name, _ in pairs), tuple(unit for _, unit in pairs)
 
 
-def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike) -> Trajectory:
+def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike, start: Floats | None = None) -> Trajectory:
     """Run one case and sample it.
 
     Parameters
@@ -92,6 +92,8 @@ def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike) -> 
     run : Run
     times : array, shape (m,)
         Times in s from the start, ascending, within the run. At a transition the value before it is given.
+    start : array, shape (1, strobes.width(n)), optional
+        The state from which the case is run, as ``starts`` of ``settle``, at the start of a period.
 
     Returns
     -------
@@ -111,7 +113,8 @@ def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike) -> 
     if asked.size and (np.any(np.diff(asked) < 0) or asked[0] < 0 or asked[-1] > end * (1 + 1e-12)):
         raise ValueError(f"times must ascend within 0 .. {end:g} s")
     periods = np.minimum(asked * frequency, run.duration.in_periods(frequency))
-    found = integrate(kernel_of(values, run.tolerance), case_matrix(values, run, 1), run, times=periods)
+    module = kernel_of(values, run.tolerance)
+    found = integrate(module, case_matrix(values, run, 1), run, starts=start, times=periods)
     return sampled(values, found, asked)
 
 

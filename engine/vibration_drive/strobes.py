@@ -49,6 +49,23 @@ def from_rest(cases: int, pendulums: int) -> Floats:
     return rows
 
 
+def continued(points: Floats) -> Floats:
+    """Rows with which cases begin at these states, with strobes at the ends of the periods and the turn at 0.
+
+    The cases may have other parameters than those that the states come from: angles, speeds, windups, the states of
+    clutches and shaft and the part of the excitation period are kept.
+
+    Parameters
+    ----------
+    points : array, shape (cases, columns)
+        Strobes, such as ``SettledBatch.points``.
+    """
+    rows = points.copy()
+    rows[:, FRACTION] = 1.0
+    rows[:, TURN] = 0.0
+    return rows
+
+
 def in_order(recorded: Floats, periods: Ints) -> Floats:
     """The last strobes of each case, the newest last, from the kernel's ring buffer.
 
