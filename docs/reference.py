@@ -78,6 +78,7 @@ def limits() -> Iterator[Row]:
     yield "coefficients of a clutch law", f"{models.MAX_COEFFICIENTS}"
     yield "rows of measured clutch data", f"{limit.MAX_CLUTCH_ROWS:,}"
     yield "steps of an operation, constants of formulas", f"{machine_shaft.MAX_STEPS}"
+    yield "stages of a drive train", f"{machine_shaft.MAX_STAGES}"
     yield "rows of a table of a machine", f"{machine_shaft.MAX_ROWS:,}"
     yield "characters of a formula", f"{MAX_LENGTH:,}"
     yield "excitation periods of a run", f"{limit.MAX_RUN_PERIODS:,.0f}"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sprag.engine.machine_shaft.cams import Cam
+from sprag.engine.machine_shaft.drive_train import Train
 from sprag.engine.machine_shaft.expressions import RESERVED, Expression
 from sprag.engine.machine_shaft.linkages import CrankShaper, FourBar, SliderCrank, Whitworth
 from sprag.engine.machine_shaft.mechanisms import Mechanism, Motion
@@ -173,6 +174,7 @@ class Machine:
         self.spec, self.columns = spec, columns
         self.cycle = _TURN * spec.cycle
         self.constants = columns.under("constants.")
+        self.train = Train.of(spec.drive, columns.values)
         self.mechanism = mechanism_of(spec.mechanism)
         self.mechanism_values = columns.under(f"mechanism.{spec.mechanism.kind}.")
         names = ("phi", *spec.constants)
@@ -255,13 +257,13 @@ class Machine:
         if self.spec.balance == "motor":
             return np.zeros(1)
         if self.spec.drive.form == "constant":
-            return values["drive.torque"]
+            return self.train.at_shaft(values["drive.torque"])
         scale = values["drive.scale"]
         if self._drive_curve is not None:
-            return np.asarray(scale * self._drive_curve(phi))
+            return self.train.at_shaft(np.asarray(scale * self._drive_curve(phi)))
         if self._drive_formula is None:
             raise AssertionError("a drive that is not constant has a table or a formula")
-        return np.asarray(scale * self._drive_formula.evaluate(self._environment(phi))[0])
+        return self.train.at_shaft(np.asarray(scale * self._drive_formula.evaluate(self._environment(phi))[0]))
 
     def _carried(self, motion: Motion | None) -> Floats:
         """Torque of the weight and the spring on the working part."""
@@ -280,7 +282,7 @@ class Machine:
         inertia, slope = self._inertia(phi, motion)
         resistance = self._operation.torque(phi, None if motion is None else motion.way_slope) + self._carried(motion)
         shape = (self.columns.cases, *phi.shape[1:])
-        parts = (inertia + self.columns.values["drive.inertia"], slope, self._drive(phi), resistance)
+        parts = (inertia + self.train.inertia, slope, self._drive(phi), resistance)
         return Fields(*(np.ascontiguousarray(np.broadcast_to(part, shape)) for part in parts))
 
     def inertia_jumps(self) -> Jumps:

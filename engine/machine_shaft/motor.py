@@ -20,8 +20,14 @@ def motor_torque(motor: Motor, values: Mapping[str, Floats], omega: Floats) -> t
     """Torque in N*m at the speeds ``omega`` (rad/s) and its derivative by the speed.
 
     Linear: M_0 (1 - omega/omega_0). Kloss: 2 M_k/(s/s_k + s_k/s) with the slip s = 1 - omega/omega_s, written so that
-    no slip is singular.
+    no slip is singular. With an ``efficiency`` among the values, of a drive train, less of the torque reaches the main
+    shaft, and more of it where the motor brakes.
     """
+    if "efficiency" in values:
+        own = {name: value for name, value in values.items() if name != "efficiency"}
+        torque, slope = motor_torque(motor, own, omega)
+        passed = np.where(torque >= 0.0, values["efficiency"], 1.0 / values["efficiency"])
+        return passed * torque, passed * slope
     if motor == "linear":
         stall, free = values["stall_torque"], values["no_load_speed"]
         return stall * (1.0 - omega / free), np.broadcast_to(-stall / free, omega.shape)
@@ -34,6 +40,11 @@ def motor_torque(motor: Motor, values: Mapping[str, Floats], omega: Floats) -> t
 
 def steady_speed(motor: Motor, values: Mapping[str, Floats], torque: Floats) -> Floats:
     """Speed of the stable branch at which the motor gives ``torque``; that of its largest torque where it cannot."""
+    if "efficiency" in values:
+        own = {name: value for name, value in values.items() if name != "efficiency"}
+        return steady_speed(
+            motor, own, torque * np.where(torque >= 0.0, 1.0 / values["efficiency"], values["efficiency"])
+        )
     if motor == "linear":
         return np.asarray(values["no_load_speed"] * (1.0 - torque / values["stall_torque"]))
     most, critical = values["breakdown_torque"], values["breakdown_slip"]
@@ -77,7 +88,8 @@ def limit_cycle(
     ----------
     motor : {"linear", "kloss"}
     values : mapping
-        Parameters under ``drive.motor.``, each of shape (cases or 1, 1, 1).
+        Parameters under ``drive.motor.``, each of shape (cases or 1, 1, 1), reduced to the main shaft by
+        ``Train.motor``.
     panels : Panels
     cycle : float
         In rad.
@@ -138,7 +150,7 @@ def _overruns(
         own = {name: float(value[case if len(value) > 1 else 0, 0, 0]) for name, value in values.items()}
         row = case if len(panels.half) > 1 else 0
         real = panels.half[row] > 0.0
-        if work[case] > own["breakdown_torque"] * panels.weights[row][real].sum():
+        if work[case] > own["breakdown_torque"] / own.get("efficiency", 1.0) * panels.weights[row][real].sum():
             out[case] = True
         else:
             nodes = (panels.weights[row][real].ravel(), inertia[case][real].ravel(), resistance[case][real].ravel())

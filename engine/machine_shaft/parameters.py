@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from itertools import chain
 
 from sprag.engine.catalogue import STANDARD_GRAVITY, Parameter
-from sprag.engine.machine_shaft.spec import MachineSpec, MechanismKind
+from sprag.engine.machine_shaft.spec import MOVING, MachineSpec, MechanismKind, Stage
 
 _INF = math.inf
 _TURN = 2.0 * math.pi
@@ -137,9 +137,31 @@ def _step(spec: MachineSpec, index: int, unit: str) -> tuple[Parameter, ...]:
     )
 
 
+def _stage(index: int, kind: Stage) -> tuple[Parameter, ...]:
+    p = f"drive.stages.{index}"
+    common = (
+        _inertia(f"{p}.inertia", "J_1", "inertia that turns with the stage's input shaft"),
+        _mass(f"{p}.mass", "m", "mass that the stage moves: of the belt or chain, or what goes with the nut or rack"),
+    )
+    if kind == "screw_nut":
+        return (_length(f"{p}.lead", "p", "way of the nut in a revolution of the screw"), *common)
+    radius = "radius of the driving pulley or sprocket, or of the rack's pinion"
+    if kind in MOVING:
+        return (_length(f"{p}.radius", "r", radius), *common)
+    turning = (
+        Parameter(f"{p}.ratio", "u", "1", 0.0, 1e6, True, None, "speed of its input shaft over that of its output"),
+        Parameter(f"{p}.efficiency", "eta", "1", 0.0, 1.0, True, 1.0, "power given over power taken"),
+        _inertia(f"{p}.output_inertia", "J_2", "inertia that turns with the stage's output shaft"),
+    )
+    if kind in {"gear", "worm"}:
+        return (*turning, common[0])
+    return (*turning, *common, Parameter(f"{p}.radius", "r", "m", 0.0, 1e3, False, 0.0, radius))
+
+
 def _drive(spec: MachineSpec) -> tuple[Parameter, ...]:
     if spec.balance == "motor":
-        return _MOTOR[spec.drive.motor] if spec.drive.motor else ()
+        rotor = _inertia("drive.motor.inertia", "J_m", "inertia of its rotor")
+        return (*_MOTOR[spec.drive.motor], rotor) if spec.drive.motor else ()
     if spec.drive.form == "constant":
         return (Parameter("drive.torque", "M_d", "N*m", -_ANY, _ANY, False, 0.0, "driving torque"),)
     return (Parameter("drive.scale", "k_d", "1", -_ANY, _ANY, False, 1.0, "factor on the driving torque"),)
@@ -152,10 +174,11 @@ def parameters(spec: MachineSpec) -> tuple[Parameter, ...]:
         if spec.balance == "motor"
         else (Parameter("mean_speed", "w_m", "rad/s", 0.0, 1e6, True, None, "required mean speed of the shaft"),)
     )
+    own = 0.0 if spec.drive.stages else None
     return (
         *speed,
         Parameter("gravity", "g", "m/s^2", 0.0, 1e3, False, STANDARD_GRAVITY, "gravitational acceleration"),
-        Parameter("drive.inertia", "I'", "kg*m^2", 0.0, 1e12, False, None, "inertia that turns with the shaft"),
+        Parameter("drive.inertia", "I'", "kg*m^2", 0.0, 1e12, False, own, "inertia that turns with the shaft"),
         Parameter(
             "wanted_irregularity",
             "delta",
@@ -167,6 +190,7 @@ def parameters(spec: MachineSpec) -> tuple[Parameter, ...]:
             "irregularity that determines required_inertia",
         ),
         *_drive(spec),
+        *chain.from_iterable(_stage(index, kind) for index, kind in enumerate(spec.drive.stages)),
         *MECHANISM_PARAMETERS[spec.mechanism.kind],
         *_operation(spec),
         *(

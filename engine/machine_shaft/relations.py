@@ -12,9 +12,10 @@ def check_relations(spec: MachineSpec, row: Columns) -> None:
     Raises
     ------
     RelationError
-        Discharge below suction, or above what the clearance lets the compressor reach; a step over the stroke that
-        ends before it begins.
+        A belt with a mass but without a radius; discharge below suction, or above what the clearance lets the
+        compressor reach; a step over the stroke that ends before it begins.
     """
+    _check_stages(spec, row)
     if spec.operation.quantity == "gas":
         _check_gas(row)
     elif spec.operation.form == "steps" and spec.operation.over == "stroke":
@@ -27,6 +28,13 @@ def check_relations(spec: MachineSpec, row: Columns) -> None:
                     "never act; `during` selects the stroke",
                     f">= {first:.6g} and <= 1",
                 )  # fmt: skip
+
+
+def _check_stages(spec: MachineSpec, row: Columns) -> None:
+    for index, kind in enumerate(spec.drive.stages):
+        path = f"drive.stages.{index}.radius"
+        if kind in {"belt", "chain"} and row.row(f"drive.stages.{index}.mass")[0] > 0.0 == row.row(path)[0]:
+            raise RelationError(path, 0.0, f"is needed for the speed of the {kind}, which has a mass", "> 0 m")
 
 
 def _check_gas(row: Columns) -> None:

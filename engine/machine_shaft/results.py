@@ -56,6 +56,12 @@ MACHINE_RESULTS: tuple[ResultInfo, ...] = (
     _R("balance.work", "1", "residual work of a cycle / largest work within it"),
     _R("least_mean_speed", "rad/s", "mean speed at which the smallest speed would reach 0: none lower is feasible"),
     _R("assembly.angle", "rad", "first angle at which the mechanism cannot be assembled"),
+    _R("inertia.drive", "kg*m^2", "inertia of the drive reduced to the main shaft (I')"),
+    _R("inertia.mechanism.mean", "kg*m^2", "mean reduced inertia of the mechanism over the angle (I'')"),
+    _R("motor.speed.mean", "rad/s", "mean speed of the motor's shaft"),
+    _R("motor.torque.mean", "N*m", "mean torque of the motor over the angle, at its own shaft"),
+    _R("motor.torque.max", "N*m", "largest torque of the motor, at its own shaft"),
+    _R("motor.power.mean", "W", "mean torque of the motor times its mean speed"),
 )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.machine_shaft.balance import balanced, largest_work
 from sprag.engine.machine_shaft.decomposition import Decomposition, characteristics
+from sprag.engine.machine_shaft.drive_train import Train
 from sprag.engine.machine_shaft.flywheel import required_inertia
 from sprag.engine.machine_shaft.machine import Columns, Fields, Machine, check_structure
 from sprag.engine.machine_shaft.motor import LimitCycle, limit_cycle
@@ -45,9 +46,9 @@ BLOCK = 64
 _NAMES = tuple(info.name for info in result_infos())
 _OF_TIME = np.array([_NAMES.index("omega.mean_time"), _NAMES.index("irregularity.time")])
 #: Prefixes of results that a case without motion does not have.
-_OF_MOTION = ("omega.", "irregularity", "acceleration.", "s1.", "s2.", "power.", "energy.m")
+_OF_MOTION = ("omega.", "irregularity", "acceleration.", "s1.", "s2.", "power.", "energy.m", "motor.s", "motor.p")
 #: The same for a motor that has no steady torque.
-_OF_MOTOR = ("drive_torque.", "work.drive", "balance.work", "energy.", "s3.", "s4.", "phi_c")
+_OF_MOTOR = ("drive_torque.", "motor.", "work.drive", "balance.work", "energy.", "s3.", "s4.", "phi_c")
 _CODE = {ending: np.int8(code) for code, ending in enumerate(ENDINGS)}
 
 
@@ -188,6 +189,7 @@ def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
         results[name] = np.where(np.isnan(start), np.nan, results[name])
     results["inertia.min"] = np.where(negative, least_inertia, results["inertia.min"])
     _by_definition(spec, d, results)
+    results |= machine.train.results(panels, d.drive.torque, results)
     results["required_inertia"] = _required(spec, columns, d, endings)
     no_cycle = (endings == _CODE[Ending.MOTOR_STALLED]) | (endings == _CODE[Ending.MOTOR_OVERRUN])
     if no_cycle.any():
@@ -202,7 +204,7 @@ def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
 def _motored(spec: MachineSpec, columns: Columns, panels: Panels, cycle: float, fields: Fields) -> LimitCycle:
     if spec.drive.motor is None:
         raise AssertionError("check_structure lets no motor be missing")
-    values = columns.under("drive.motor.")
+    values = Train.of(spec.drive, columns.values).motor(columns.under("drive.motor."))
     return limit_cycle(spec.drive.motor, values, panels, cycle, fields.inertia, fields.resistance)
 
 
@@ -247,7 +249,8 @@ def _required(spec: MachineSpec, columns: Columns, d: Decomposition, endings: Co
     known = (endings == _CODE[Ending.OK]) | (endings == _CODE[Ending.INERTIA_INSUFFICIENT])
     rows = np.nonzero(np.isfinite(wanted) & known)[0]
     if rows.size and spec.balance != "motor":
-        mechanism = d.fields.inertia[rows] - columns.row("drive.inertia")[rows, None, None]
+        drive = Train.of(spec.drive, columns.values).inertia
+        mechanism = d.fields.inertia[rows] - (drive[rows] if len(drive) > 1 else drive)
         with np.errstate(all="ignore"):
             required[rows] = required_inertia(
                 Shape(d.panels.take(rows), d.cycle, mechanism, d.total.nodes[rows]), d.total.torque[rows],

@@ -10,6 +10,7 @@ from sprag.engine.machine_shaft.tables import Interpolation, Table
 MeanSpeed = Literal["midrange", "angle", "time"]
 Balance = Literal["scale", "constant", "refuse", "motor"]
 Motor = Literal["linear", "kloss"]
+Stage = Literal["gear", "belt", "chain", "worm", "screw_nut", "rack"]
 MechanismKind = Literal["none", "table", "formula", "slider_crank", "four_bar", "quick_return", "cam"]
 QuickReturn = Literal["whitworth", "crank_shaper"]
 Form = Literal["constant", "table", "formula", "steps"]
@@ -20,6 +21,9 @@ Sense = Literal["resisting", "fixed"]
 
 #: Mechanisms with dimensions: those whose working part a force can act on.
 LINKED: frozenset[str] = frozenset({"slider_crank", "four_bar", "quick_return", "cam"})
+#: Stages that move a mass beside the shaft on which they sit.
+MOVING: frozenset[str] = frozenset({"screw_nut", "rack"})
+MAX_STAGES = 16
 MAX_STEPS = 32
 MAX_CONSTANTS = 32
 REVOLUTIONS = (1, 2, 3)
@@ -27,12 +31,16 @@ REVOLUTIONS = (1, 2, 3)
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """The driving torque: ``drive.torque`` (constant), or a table or formula over the angle, or a motor."""
+    """The driving torque: ``drive.torque`` (constant), or a table or formula over the angle, or a motor.
+
+    ``stages`` are the kinds of the stages between motor and main shaft, motor first; the torque is then the motor's.
+    """
 
     form: Literal["constant", "table", "formula"] = "constant"
     table: Table | None = None
     formula: str | None = None
     motor: Motor | None = None
+    stages: tuple[Stage, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +123,7 @@ class MachineSpec:
         """Plain data that ``from_json`` reads."""
         data = asdict(self)
         data["constants"] = list(self.constants)
+        data["drive"]["stages"] = list(self.drive.stages)
         for part in ("drive", "mechanism", "operation"):
             table = data[part]["table"]
             if table is not None:
@@ -131,6 +140,8 @@ class MachineSpec:
                 own = dict(fields[name])
                 if own.get("table") is not None:
                     own["table"] = _table(own["table"])
+                if "stages" in own:
+                    own["stages"] = tuple(own["stages"])
                 fields[name] = part(**own)
         fields["constants"] = tuple(fields.get("constants", ()))
         return cls(**fields)

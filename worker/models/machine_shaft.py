@@ -7,7 +7,7 @@ import math
 from dataclasses import replace
 from functools import cache
 from itertools import product
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 
@@ -18,12 +18,14 @@ from sprag.engine.machine_shaft.results import result_infos
 from sprag.engine.machine_shaft.spec import (
     LINKED,
     MAX_CONSTANTS,
+    MAX_STAGES,
     MAX_STEPS,
     REVOLUTIONS,
     Drive,
     MachineSpec,
     MechanismChoice,
     OperationChoice,
+    Stage,
 )
 from sprag.engine.machine_shaft.tables import MAX_ROWS
 from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, case_machine, chunk_result
@@ -44,8 +46,10 @@ __all__ = [
     "LINKED",
     "MAX_CONSTANTS",
     "MAX_ROWS",
+    "MAX_STAGES",
     "MAX_STEPS",
     "REVOLUTIONS",
+    "STAGE_KINDS",
     "ExpressionError",
     "MachineError",
     "RelationError",
@@ -57,6 +61,7 @@ __all__ = [
 ]
 
 MODEL = "machine-shaft"
+STAGE_KINDS: tuple[str, ...] = get_args(Stage)
 #: All machines share their compiled code.
 SHAPE = KernelShape(MODEL)
 Structure = dict[str, Any]
@@ -79,13 +84,14 @@ def catalogue() -> tuple[Parameter, ...]:
     every: list[MachineSpec] = [MachineSpec(cycle=max(REVOLUTIONS), constants=("NAME",))]
     every += [MachineSpec(drive=Drive("formula")), MachineSpec(balance="motor", drive=Drive(motor="linear"))]
     every += [MachineSpec(balance="motor", drive=Drive(motor="kloss"))]
+    every += [MachineSpec(drive=Drive(stages=(stage,))) for stage in get_args(Stage)]
     every += [MachineSpec(mechanism=MechanismChoice(kind)) for kind in kinds]
     forms = (OperationChoice("force"), OperationChoice("force", "steps", steps=1), OperationChoice("gas"))
     every += [MachineSpec(cycle=max(REVOLUTIONS), operation=form) for form in forms]
     found: dict[str, Parameter] = {}
     for spec in every:
         for entry in _engine_parameters(spec):
-            path = entry.path.replace(".steps.0.", ".steps.K.")
+            path = entry.path.replace(".steps.0.", ".steps.K.").replace(".stages.0.", ".stages.K.")
             found.setdefault(path, replace(entry, path=path, help=entry.help + _REMARKS.get(path, "")))
     order = ("mean_speed", "wanted_irregularity", "gravity", "drive", "mechanism", "operation", "constants")
     return tuple(sorted(found.values(), key=lambda entry: order.index(entry.path.split(".")[0])))
@@ -98,6 +104,9 @@ _REMARKS = {
     "operation.steps.K.value": _OF_FORCE,
     "operation.steps.K.from": _OF_ANGLE,
     "operation.steps.K.to": _OF_ANGLE,
+    "drive.inertia": "; required without stages",
+    "drive.torque": "; at the motor where there are stages",
+    "drive.stages.K.radius": "; required for a rack",
 }
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from sprag.service.spec.described import FIT
-from sprag.service.spec.machine import shaft, shaft_parts
+from sprag.service.spec.machine import shaft, shaft_drive, shaft_parts
 
 if TYPE_CHECKING:
     from sprag.worker.study import Study
@@ -15,9 +15,10 @@ if TYPE_CHECKING:
 _MEANINGS: Final = {
     "cycle": "revolutions of a cycle",
     "mean_speed_is": shaft.MEAN_SPEED_IS.help,
-    "balance": shaft_parts.BALANCE.help,
+    "balance": shaft_drive.BALANCE.help,
     "phi_c": shaft_parts.PHI_C.help,
-    "drive.motor.kind": shaft_parts.MOTOR.help,
+    "drive.motor.kind": shaft_drive.MOTOR.help,
+    "drive.stages": shaft_drive.STAGES.help,
     "mechanism": "the mechanism",
     "operation": "how the resistance is given",
     **{
@@ -67,6 +68,8 @@ def _chosen(structure: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "phi_c", "the first at which T rises" if phi_c is None else str(phi_c)
     if drive["motor"]:
         yield "drive.motor.kind", drive["motor"]
+    if drive.get("stages"):
+        yield "drive.stages", ", ".join(drive["stages"])
     if drive["table"]:
         yield "drive.torque.interpolation", drive["table"]["interpolation"]
     yield "mechanism", mechanism["kind"]

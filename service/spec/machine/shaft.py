@@ -14,12 +14,11 @@ from sprag.service.spec.described import choice
 from sprag.service.spec.fields import read_object
 from sprag.service.spec.machine.machine import Machine, read_numbers
 from sprag.service.spec.machine.shaft_check import check_machine
+from sprag.service.spec.machine.shaft_drive import read_balance, read_drive
 from sprag.service.spec.machine.shaft_parts import (
     PHI_C,
-    read_balance,
     read_constants,
     read_cycle,
-    read_drive,
     read_mechanism,
     read_operation,
 )
@@ -34,7 +33,7 @@ FIELDS: Final = (
 )  # fmt: skip
 _MEAN_HELP: Final = "which mean of the speed mean_speed and the irregularity refer to"
 MEAN_SPEED_IS: Final = choice("mean_speed_is", _MEAN_HELP, "midrange", "angle", "time", default="midrange")
-_INDEXED = re.compile(r"operation\.steps\.([0-9]{1,9})\.")
+_INDEXED = re.compile(r"(operation\.steps|drive\.stages)\.([0-9]{1,9})\.")
 
 
 @dataclass
@@ -57,10 +56,15 @@ class ShaftMachine(Machine):
 
     def why_not(self, path: str) -> str:
         """A sentence that explains why an axis cannot vary ``path``, and what it can vary."""
-        steps = 0 if self.structure is None else int(self.structure["operation"]["steps"])
-        step = _INDEXED.match(path)
-        if step and steps:
-            return f"there is no step {step[1]}: steps are numbered from 0 to {steps - 1}"
+        item = _INDEXED.match(path)
+        if item and self.structure is not None:
+            part = item[1].rpartition(".")[2]
+            counts = {
+                "steps": int(self.structure["operation"]["steps"]),
+                "stages": len(self.structure["drive"].get("stages", ())),
+            }
+            if int(item[2]) >= counts[part] > 0:
+                return f"there is no {part[:-1]} {item[2]}: {part} are numbered from 0 to {counts[part] - 1}"
         if path.startswith("constants.") and self.structure is not None:
             return "is not a constant of this machine" + did_you_mean(path, self.parameters)
         catalogue = {entry.path for entry in models.parameter_catalogue(models.MACHINE_SHAFT)}

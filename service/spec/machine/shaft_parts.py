@@ -1,4 +1,4 @@
-"""The parts of a machine shaft in a spec: the fields of drive, mechanism, operation and cycle that are not numbers."""
+"""The parts of a machine shaft in a spec: the fields of mechanism, operation and cycle that are not numbers."""
 
 from __future__ import annotations
 
@@ -14,11 +14,6 @@ from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker import models
 from sprag.worker.models import Parameter, machine_shaft
 
-_BALANCE_HELP: Final = (
-    "what makes the work over a cycle zero; by default constant, refuse where a torque is given, motor where there is "
-    "one"
-)
-BALANCE: Final = choice("balance", _BALANCE_HELP, "constant", "scale", "refuse", "motor")
 _PHI_C_HELP: Final = (
     "which of the angles with T = T_mean S3 and S4 count from, from 0; by default the first where T rises"
 )
@@ -31,7 +26,6 @@ INTERPOLATION: Final = choice(
     "linear",
     default="smooth",
 )
-MOTOR: Final = choice("kind", "kind of the motor", "linear", "kloss")
 #: What of a mechanism is no number.
 MECHANISM_CHOICES: Final[dict[str, dict[str, Described]]] = {
     "slider_crank": {},
@@ -55,7 +49,7 @@ STEPS: Final = Listed("steps", 1, machine_shaft.MAX_STEPS, "constant pieces; zer
 ROWS: Final = Listed("rows", 2, machine_shaft.MAX_ROWS)
 _NAME = re.compile(r"[A-Za-z_][A-Za-z_0-9]{0,39}")
 _ANY: Final = 1e30
-_ANGLE = Parameter("angle", "phi", "rad", -100.0, 100.0, False, None, "angle of the shaft")
+ANGLE = Parameter("angle", "phi", "rad", -100.0, 100.0, False, None, "angle of the shaft")
 _FRACTION = Parameter("fraction", "x", "1", 0.0, 1.0, False, None, "fraction of the stroke")
 
 
@@ -86,35 +80,6 @@ def read_cycle(report: Report, value: object) -> int | None:
     return None
 
 
-def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, Any] | None) -> str | None:
-    """Read how the work over a cycle is made zero; by default a motor does it, and a given torque is kept."""
-    motor = drive is not None and drive["motor"] is not None
-    given = isinstance(found.get("drive"), Mapping) and "torque" in found["drive"]
-    default = "motor" if motor else "refuse" if given else "constant"
-    balance: str | None = BALANCE.read(report, "/base", {"balance": default, **found})
-    if balance is None or drive is None:
-        return balance
-    if balance == "motor" and not motor:
-        report.fault(
-            "/base/drive/motor", "required", 'is required by the balance "motor"', allowed="a motor, linear or kloss"
-        )
-        return None
-    if balance != "motor" and motor:
-        report.fault(
-            "/base/balance", "conflict", "is not possible for a machine with a motor", balance, allowed="'motor'"
-        )
-        return None
-    if balance == "scale" and not given:
-        report.fault(
-            "/base/drive/torque",
-            "required",
-            'is required by the balance "scale", which multiplies it by a factor',
-            allowed="a torque, a table or a formula",
-        )
-        return None
-    return balance
-
-
 def read_constants(report: Report, data: object) -> list[str] | None:
     """Read the names of the constants of formulas."""
     if not isinstance(data, Mapping) or len(data) > machine_shaft.MAX_CONSTANTS:
@@ -130,47 +95,11 @@ def read_constants(report: Report, data: object) -> list[str] | None:
     return None if wrong else sorted(data)
 
 
-def read_drive(report: Report, data: object, places: dict[str, str]) -> dict[str, Any] | None:
-    """Read the drive: the form of its torque, or its motor."""
-    places["drive"] = "/base/drive"
-    found = read_object(report, "/base/drive", data, ("inertia", "torque", "scale", "motor"))
-    if found is None:
-        return None
-    drive: dict[str, Any] = {"form": "constant", "table": None, "formula": None, "motor": None}
-    if "motor" in found:
-        if "torque" in found:
-            report.fault("/base/drive/torque", "conflict", "cannot be given with a motor, which sets the torque",
-                           found["torque"], allowed="a torque or a motor")  # fmt: skip
-            return None
-        return _read_motor(report, found["motor"], drive)
-    torque = found.get("torque")
-    if not isinstance(torque, Mapping):
-        return drive
-    given = read_object(report, "/base/drive/torque", torque, ("table", "formula", "interpolation"))
-    diagram = None if given is None else _diagram(report, "/base/drive/torque", given, _ANGLE, _unit("N*m"))
-    if diagram is None:
-        return None
-    places["drive"] = f"/base/drive/torque/{diagram['form']}"
-    return drive | diagram
-
-
-def _read_motor(report: Report, data: object, drive: dict[str, Any]) -> dict[str, Any] | None:
-    found = read_object(report, "/base/drive/motor", data, ("kind", *numbers_under("drive.motor.")))
-    if found is None:
-        return None
-    kind = MOTOR.read(report, "/base/drive/motor", found)
-    if kind is None:
-        return None
-    own = _numbers_of({"balance": "motor", "drive": {"motor": kind}}, "drive.motor.")
-    _refuse_foreign(report, "/base/drive/motor", found, ("kind", *own), f"a {kind} motor")
-    return drive | {"motor": kind}
-
-
-def _numbers_of(structure: Mapping[str, Any], prefix: str) -> list[str]:
+def numbers_of(structure: Mapping[str, Any], prefix: str) -> list[str]:
     return [path.removeprefix(prefix) for path in machine_shaft.parameters_of(structure) if path.startswith(prefix)]
 
 
-def _refuse_foreign(report: Report, pointer: str, found: Mapping[str, Any], own: Sequence[str], what: str) -> None:
+def refuse_foreign(report: Report, pointer: str, found: Mapping[str, Any], own: Sequence[str], what: str) -> None:
     for name in found:
         if name not in own:
             report.fault(
@@ -191,7 +120,7 @@ def read_mechanism(report: Report, data: object, places: dict[str, str]) -> dict
         return None
     places["mechanism"] = pointer = join("/base/mechanism", kind)
     if kind in {"table", "formula"}:
-        diagram = _diagram(report, "/base/mechanism", found, _ANGLE, _unit("kg*m^2"))
+        diagram = read_diagram(report, "/base/mechanism", found, ANGLE, value_in("kg*m^2"))
         return None if diagram is None else {"kind": kind, "table": diagram["table"], "formula": diagram["formula"]}
     if "interpolation" in found:
         report.fault(
@@ -230,8 +159,10 @@ def read_operation(report: Report, data: object, places: dict[str, str]) -> dict
     if form == "steps":
         count = _read_steps(report, found["steps"])
         return None if count is None else operation | {"form": "steps", "steps": count}
-    place = _ANGLE if chosen["over"] == "angle" else _FRACTION
-    diagram = _diagram(report, "/base/operation", found, place, _unit("N" if chosen["quantity"] == "force" else "N*m"))
+    place = ANGLE if chosen["over"] == "angle" else _FRACTION
+    diagram = read_diagram(
+        report, "/base/operation", found, place, value_in("N" if chosen["quantity"] == "force" else "N*m")
+    )
     return None if diagram is None else operation | diagram
 
 
@@ -257,11 +188,11 @@ def _read_steps(report: Report, data: object) -> int | None:
     return None if not read or None in read else len(read)
 
 
-def _unit(unit: str) -> Parameter:
+def value_in(unit: str) -> Parameter:
     return Parameter("value", "", unit, -_ANY, _ANY, False, None, "value")
 
 
-def _diagram(
+def read_diagram(
     report: Report, pointer: str, found: Mapping[str, Any], place: Parameter, value: Parameter
 ) -> dict[str, Any] | None:
     """Form, table and formula of a diagram that is given either as a table or as a formula."""

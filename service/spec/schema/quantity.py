@@ -48,9 +48,10 @@ def without_numbers(schema: Schema) -> Schema:
     fields = schema.get("properties", {})
     if "required" in schema:
         found["required"] = [name for name in schema["required"] if "x-unit" not in fields.get(name, {})]
-    ways = schema.get("oneOf", [])
-    if any("x-unit" in fields.get(name, {}) for way in ways for name in way.get("required", ())):
-        del found["oneOf"]
+    for kind in ("oneOf", "anyOf"):
+        ways = schema.get(kind, [])
+        if any("x-unit" in fields.get(name, {}) for way in ways for name in way.get("required", ())):
+            del found[kind]
     if schema.get("items") == QUANTITY:
         found["items"] = {"type": [*QUANTITY["type"], "null"]}
     return found

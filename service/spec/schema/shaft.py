@@ -6,13 +6,12 @@ from typing import Any, Final
 
 from sprag.service.spec.described import schemas
 from sprag.service.spec.machine.shaft import MEAN_SPEED_IS
+from sprag.service.spec.machine.shaft_drive import BALANCE, MOTOR, STAGE, STAGES
 from sprag.service.spec.machine.shaft_parts import (
-    BALANCE,
     FORMS,
     INTERPOLATION,
     MECHANISM_CHOICES,
     MECHANISMS,
-    MOTOR,
     OPERATION_CHOICES,
     PHI_C,
     ROWS,
@@ -66,11 +65,13 @@ def _drive() -> Schema:
         required=("kind",),
         description="a motor whose torque depends on its speed",
     )
-    return object_schema(
-        {**numbers, "torque": {**torque, "anyOf": [*torque["anyOf"], diagram]}, "motor": motor},
-        required=("inertia",),
+    stage = numbers_under("drive.stages.K.")
+    stages = STAGES.schema(object_schema({"kind": STAGE.schema(), **quantities(stage)}, required=("kind",)))
+    schema = object_schema(
+        {**numbers, "torque": {**torque, "anyOf": [*torque["anyOf"], diagram]}, "motor": motor, "stages": stages},
         description="what turns the shaft",
     )
+    return {**schema, "anyOf": [{"required": [name]} for name in ("inertia", "stages")]}
 
 
 def _mechanism() -> Schema:

@@ -117,7 +117,7 @@ def test_other_base_errors() -> None:
         check(motor, weak)
     stalled = dict(zip(NAMES, simulate(motor, weak, cases=1).values[0], strict=True))
     assert {name for name, value in stalled.items() if not np.isnan(value)} == {
-        "work.resistance", "inertia.mean", "inertia.max", "inertia.min"
+        "work.resistance", "inertia.mean", "inertia.max", "inertia.min", "inertia.drive", "inertia.mechanism.mean",
     }  # fmt: skip
     with pytest.raises(QuadratureError):
         check(formula("1 + sin(3000*phi)^2/10"), FLAT)

@@ -1,0 +1,95 @@
+"""The drive train between motor and main shaft, reduced to the main shaft.
+
+A body of inertia J that turns at i times the speed of the main shaft counts as J i^2, a mass m that moves at v per
+rad/s of it as m v^2: the kinetic energy is the same (K. J. Waldron, G. L. Kinzel, *Kinematics, Dynamics, and Design of
+Machinery*). A torque passes a stage of the ratio u and the efficiency eta as u eta M from the motor, and as u M/eta
+where the load drives the motor.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sprag.engine.machine_shaft.panels import Panels
+from sprag.engine.machine_shaft.spec import MOVING, Drive
+
+Floats = NDArray[np.float64]
+
+#: Numbers of motors that are torques and speeds.
+_TORQUES, _SPEEDS = ("stall_torque", "breakdown_torque"), ("no_load_speed", "synchronous_speed")
+
+
+@dataclass(frozen=True, slots=True)
+class Train:
+    """A drive train with the numbers of a block of cases; all arrays have the shape (cases or 1, 1, 1).
+
+    Attributes
+    ----------
+    inertia : array
+        I' in kg*m^2: all that turns in proportion to the main shaft, reduced to it.
+    ratio, efficiency : arrays
+        Speed of the motor's shaft over that of the main shaft; power at the main shaft over that at the motor.
+    direct : bool
+        Whether there are no stages: the motor's shaft is the main shaft.
+    """
+
+    inertia: Floats
+    ratio: Floats
+    efficiency: Floats
+    direct: bool
+
+    @classmethod
+    def of(cls, drive: Drive, values: Mapping[str, Floats]) -> "Train":
+        """The train of ``drive`` with the ``values`` by path."""
+        inertia, ratio, efficiency = values["drive.inertia"], np.ones((1, 1, 1)), np.ones((1, 1, 1))
+        for index in reversed(range(len(drive.stages))):
+            kind, prefix = drive.stages[index], f"drive.stages.{index}."
+            own = {path.removeprefix(prefix): value for path, value in values.items() if path.startswith(prefix)}
+            if kind not in MOVING:
+                inertia = inertia + own["output_inertia"] * ratio**2
+                ratio, efficiency = ratio * own["ratio"], efficiency * own["efficiency"]
+            way = own["lead"] / (2.0 * math.pi) if kind == "screw_nut" else own.get("radius", 0.0)
+            inertia = inertia + (own["inertia"] + own.get("mass", 0.0) * way**2) * ratio**2
+        if "drive.motor.inertia" in values:
+            inertia = inertia + values["drive.motor.inertia"] * ratio**2
+        return cls(inertia, ratio, efficiency, not drive.stages)
+
+    def motor(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Numbers of a motor as it acts on the main shaft, with the efficiency of the train."""
+        if self.direct:
+            return dict(values)
+        factors = {**dict.fromkeys(_TORQUES, self.ratio), **dict.fromkeys(_SPEEDS, 1.0 / self.ratio)}
+        return {name: value * factors.get(name, 1.0) for name, value in values.items()} | {
+            "efficiency": self.efficiency
+        }
+
+    def results(self, panels: Panels, drive: Floats, known: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Results by name, each (cases,), from those ``known`` and the driving torque at the nodes."""
+        cases = len(drive)
+        inertia, ratio = (np.broadcast_to(value[:, 0, 0], (cases,)) for value in (self.inertia, self.ratio))
+        most = known["drive_torque.max"]
+        mean = known["drive_torque.mean"]
+        if not self.direct:
+            most = self.at_motor(most[:, None, None])[:, 0, 0]
+            mean = panels.integral(self.at_motor(drive)) / panels.cuts[0, -1]
+        speed = ratio * known["omega.mean"]
+        return {
+            "inertia.drive": inertia, "inertia.mechanism.mean": known["inertia.mean"] - inertia,
+            "motor.speed.mean": speed, "motor.torque.mean": mean, "motor.torque.max": most,
+            "motor.power.mean": mean * speed,
+        }  # fmt: skip
+
+    def at_shaft(self, torque: Floats) -> Floats:
+        """Torque on the main shaft of a ``torque`` of the motor."""
+        if self.direct:
+            return torque
+        return np.asarray(self.ratio * torque * np.where(torque >= 0.0, self.efficiency, 1.0 / self.efficiency))
+
+    def at_motor(self, torque: Floats) -> Floats:
+        """Torque of the motor for a ``torque`` on the main shaft."""
+        if self.direct:
+            return torque
+        return np.asarray(torque * np.where(torque >= 0.0, 1.0 / self.efficiency, self.efficiency) / self.ratio)

@@ -1,0 +1,115 @@
+"""The drive of a machine shaft in a spec: torque, motor and stages, and the balance of its work."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from sprag.service.spec.described import Listed, choice
+from sprag.service.spec.fields import read_object
+from sprag.service.spec.machine.shaft_parts import (
+    ANGLE,
+    numbers_of,
+    numbers_under,
+    read_diagram,
+    refuse_foreign,
+    value_in,
+)
+from sprag.service.spec.report import Report, join
+from sprag.worker.models import machine_shaft
+
+_BALANCE_HELP: Final = (
+    "what makes the work over a cycle zero; by default constant, refuse where a torque is given, motor where there is "
+    "one"
+)
+BALANCE: Final = choice("balance", _BALANCE_HELP, "constant", "scale", "refuse", "motor")
+MOTOR: Final = choice("kind", "kind of the motor", "linear", "kloss")
+STAGE: Final = choice("kind", "kind of the stage", *machine_shaft.STAGE_KINDS)
+STAGES: Final = Listed("stages", 1, machine_shaft.MAX_STAGES, "stages between motor and main shaft, motor first")
+
+
+def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, Any] | None) -> str | None:
+    """Read how the work over a cycle is made zero; by default a motor does it, and a given torque is kept."""
+    motor = drive is not None and drive["motor"] is not None
+    given = isinstance(found.get("drive"), Mapping) and "torque" in found["drive"]
+    default = "motor" if motor else "refuse" if given else "constant"
+    balance: str | None = BALANCE.read(report, "/base", {"balance": default, **found})
+    if balance is None or drive is None:
+        return balance
+    if balance == "motor" and not motor:
+        report.fault(
+            "/base/drive/motor", "required", 'is required by the balance "motor"', allowed="a motor, linear or kloss"
+        )
+        return None
+    if balance != "motor" and motor:
+        report.fault(
+            "/base/balance", "conflict", "is not possible for a machine with a motor", balance, allowed="'motor'"
+        )
+        return None
+    if balance == "scale" and not given:
+        report.fault(
+            "/base/drive/torque",
+            "required",
+            'is required by the balance "scale", which multiplies it by a factor',
+            allowed="a torque, a table or a formula",
+        )
+        return None
+    return balance
+
+
+def read_drive(report: Report, data: object, places: dict[str, str]) -> dict[str, Any] | None:
+    """Read the drive: the form of its torque, or its motor."""
+    places["drive"] = "/base/drive"
+    found = read_object(report, "/base/drive", data, ("inertia", "torque", "scale", "motor", "stages"))
+    if found is None:
+        return None
+    drive: dict[str, Any] = {"form": "constant", "table": None, "formula": None, "motor": None}
+    if "stages" in found:
+        stages = _read_stages(report, found["stages"])
+        if stages is None:
+            return None
+        drive["stages"] = stages
+    if "motor" in found:
+        if "torque" in found:
+            report.fault("/base/drive/torque", "conflict", "cannot be given with a motor, which sets the torque",
+                           found["torque"], allowed="a torque or a motor")  # fmt: skip
+            return None
+        return _read_motor(report, found["motor"], drive)
+    torque = found.get("torque")
+    if not isinstance(torque, Mapping):
+        return drive
+    given = read_object(report, "/base/drive/torque", torque, ("table", "formula", "interpolation"))
+    diagram = None if given is None else read_diagram(report, "/base/drive/torque", given, ANGLE, value_in("N*m"))
+    if diagram is None:
+        return None
+    places["drive"] = f"/base/drive/torque/{diagram['form']}"
+    return drive | diagram
+
+
+def _read_stages(report: Report, data: object) -> list[str] | None:
+    """Read the kinds of the stages between motor and main shaft."""
+    where = "/base/drive/stages"
+    before = report.found
+    kinds: list[str] = []
+    for index, item in enumerate(STAGES.read(report, where, data) or ()):
+        pointer = join(where, index)
+        found = read_object(report, pointer, item, ("kind", *numbers_under("drive.stages.K.")))
+        kind = None if found is None else STAGE.read(report, pointer, found)
+        if found is None or kind is None:
+            continue
+        own = numbers_of({"drive": {"stages": [kind]}}, "drive.stages.0.")
+        refuse_foreign(report, pointer, found, ("kind", *own), f"a stage of the kind {kind}")
+        kinds.append(kind)
+    return None if report.found > before else kinds
+
+
+def _read_motor(report: Report, data: object, drive: dict[str, Any]) -> dict[str, Any] | None:
+    found = read_object(report, "/base/drive/motor", data, ("kind", *numbers_under("drive.motor.")))
+    if found is None:
+        return None
+    kind = MOTOR.read(report, "/base/drive/motor", found)
+    if kind is None:
+        return None
+    own = numbers_of({"balance": "motor", "drive": {"motor": kind}}, "drive.motor.")
+    refuse_foreign(report, "/base/drive/motor", found, ("kind", *own), f"a {kind} motor")
+    return drive | {"motor": kind}

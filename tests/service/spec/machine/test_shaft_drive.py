@@ -1,0 +1,74 @@
+"""Drive trains in specs: stages with their numbers, on axes, and everything wrong with its place."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jsonschema
+import pytest
+
+from sprag.service.spec.document import parse_spec
+from sprag.service.spec.machine.registry import part_of
+from sprag.service.spec.schema.document import spec_schema
+from tests.service.spec.machine.test_shaft import changed, problems
+
+STAGES: list[dict[str, Any]] = [
+    {"kind": "belt", "ratio": 3, "inertia": "50 kg*cm^2", "mass": "2 kg", "radius": "60 mm", "efficiency": 0.95},
+    {"kind": "gear", "ratio": 4.5, "output_inertia": "0.3 kg*m^2"},
+    {"kind": "screw_nut", "lead": "10 mm", "mass": "80 kg"},
+]
+
+
+def test_stages_are_structure_and_numbers() -> None:
+    axis = {"path": "drive.stages.1.ratio", "values": [4, 5, 6]}
+    spec = changed({"/base/drive": {"stages": STAGES}, "/axes": [axis]})
+    parsed = parse_spec(spec)
+    assert parsed.warnings == ()
+    study = parsed.study
+    assert study.structure is not None
+    assert study.structure["drive"]["stages"] == ["belt", "gear", "screw_nut"]
+    assert study.base["drive.inertia"] == 0.0
+    assert study.base["drive.stages.0.inertia"] == 5e-3
+    assert study.base["drive.stages.0.radius"] == 0.06
+    assert study.base["drive.stages.2.lead"] == 0.01
+    assert study.base["drive.stages.1.efficiency"] == 1.0
+    assert study.case_parameters(2)["drive.stages.1.ratio"] == 6.0
+    jsonschema.Draft202012Validator(spec_schema()).validate(spec)
+    chosen = {choice.path: choice.text for choice in part_of("machine-shaft").choices(study, spec)}
+    assert chosen["drive.stages"] == "belt, gear, screw_nut"
+
+
+@pytest.mark.parametrize(
+    ("changes", "pointer", "code"),
+    [
+        ({"/base/drive/stages": []}, "/base/drive/stages", "wrong-type"),
+        ({"/base/drive/stages": [{"ratio": 3}]}, "/base/drive/stages/0/kind", "required"),
+        ({"/base/drive/stages": [{"kind": "gears"}]}, "/base/drive/stages/0/kind", "invalid-choice"),
+        ({"/base/drive/stages": [{"kind": "gear"}]}, "/base/drive/stages/0/ratio", "required"),
+        (
+            {"/base/drive/stages": [{"kind": "rack", "radius": 1, "ratio": 2}]},
+            "/base/drive/stages/0/ratio",
+            "unknown-field",
+        ),
+        ({"/base/drive/stages": [{"kind": "gear", "ratio": 0}]}, "/base/drive/stages/0/ratio", "out-of-range"),
+        (
+            {"/base/drive/stages": [{"kind": "gear", "ratio": 2, "efficiency": 1.1}]},
+            "/base/drive/stages/0/efficiency",
+            "out-of-range",
+        ),
+        (
+            {"/base/drive/stages": [{"kind": "belt", "ratio": 2, "mass": 1}]},
+            "/base/drive/stages/0/radius",
+            "conflict",
+        ),
+        ({"/base/drive": {}}, "/base/drive/inertia", "required"),
+    ],
+)
+def test_wrong_stages(changes: dict[str, Any], pointer: str, code: str) -> None:
+    assert problems(changes | {"/axes": []})[pointer].code == code
+
+
+def test_an_axis_names_a_stage_that_is_there() -> None:
+    axis = {"path": "drive.stages.3.ratio", "values": [4, 5]}
+    found = problems({"/base/drive": {"stages": STAGES}, "/axes": [axis]})
+    assert "there is no stage 3: stages are numbered from 0 to 2" in found["/axes/0/path"].message
