@@ -209,3 +209,17 @@ def test_a_plan_names_what_is_wrong(change: dict[str, Any], named: str) -> None:
     with pytest.raises(ValueError, match=f"calibrate.{named}"):
         CalibratePlan(**(fields | change))
     assert CalibratePlan.from_json(plan.to_json()) == plan
+
+
+@pytest.mark.parametrize("seed", [1, 3, 7])
+def test_a_fit_that_explains_its_values_badly_begins_again(seed: int) -> None:
+    """The first scan of each of these misses the valley, which is a hundredth of the range wide."""
+
+    def wave(parameters: Floats, at: Floats) -> dict[str, Floats]:
+        return {"y": np.sin(parameters[:, 0] * at[:, 0]) * np.exp(-parameters[:, 1] * at[:, 0])}
+
+    x, true = X**1.37, np.array([166.0, 0.8])
+    y = _values(wave, true, x) + 0.02 * np.random.default_rng(seed).normal(size=len(x))
+    found = _answer(plan_of([(0.0, 200.0), (0.0, 5.0)], x, {"y": y}, np.full(len(x), 0.02), refits=2, seed=seed), wave)
+    assert found.values == pytest.approx(true, rel=0.1)
+    assert found.chi_square < 30.0

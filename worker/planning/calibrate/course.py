@@ -12,7 +12,7 @@ from sprag.worker.planning.calibrate.batches import normal, solved, total
 from sprag.worker.planning.calibrate.candidates import candidates
 from sprag.worker.planning.calibrate.data import Data, first_data, scaled_data
 from sprag.worker.planning.calibrate.fit import Lanes, around, differences, fit, quadratic
-from sprag.worker.planning.calibrate.plan import CURVES, SEARCHES, STARTS, TRIALS
+from sprag.worker.planning.calibrate.plan import CURVES, RESTARTS, SEARCHES, STARTS, TRIALS
 from sprag.worker.planning.calibrate.refits import Refits, drawn, refit
 from sprag.worker.planning.goals.draws import Draws, exponential
 from sprag.worker.planning.goals.linear import cholesky
@@ -37,6 +37,8 @@ _DISTINCT: Final = 0.1
 _WIDEST, _FARTHEST, _SHELLS, _IMPROBABLE = 0.5, 3.0, 3, 3.0
 #: By how much (in squares of standard deviations) another set must be better than the fit to begin again from there.
 _BEGIN_AGAIN: Final = 0.02
+#: Streams of random numbers of each scan of the ranges and the searches that follow it.
+_STREAMS: Final = 10
 
 
 @dataclass(frozen=True)
@@ -82,17 +84,16 @@ class State:
 
 def course(plan: CalibratePlan, space: Space, state: State) -> Generator[Request, Floats, None]:
     """Everything that a calibration runs, in order; ``state`` is kept up to date."""
-    scan = space.scan(plan.scan, Draws(plan.seed, 0))
-    modelled = yield from _run(plan, state, SCAN_PHASE, scan)
-    starts = _starts(scan, state.data.costs(modelled))
-    lanes = yield from _through(plan, state, FIT_PHASE, fit(state.data, scan[starts], modelled[starts], plan.fit_sets))
-    state.best = _least(lanes)
+    state.best = yield from _anywhere(plan, space, state, SCAN_PHASE, Draws(plan.seed, 0))
     yield from _scaled(plan, state)
-    for attempt in range(SEARCHES if plan.refits else 0):
-        before = float(state.best.costs[0])
-        yield from _searched(plan, state, Draws(plan.seed, 2 + attempt))
-        if state.best.costs[0] > before - _BEGIN_AGAIN and not _improbable(plan, state):
-            break
+    if plan.refits:
+        yield from _around_best(plan, state, 0)
+        for attempt in range(1, 1 + RESTARTS):
+            if not _improbable(plan, state):
+                break
+            found = yield from _anywhere(plan, space, state, FIT_PHASE, Draws(plan.seed, _STREAMS * attempt))
+            yield from _taken(plan, state, found)
+            yield from _around_best(plan, state, attempt)
     for attempt in range(2 if plan.refits else 0):
         yield from _refitted(plan, state, attempt)
         places, found = (np.concatenate(parts) for parts in zip(*state.library, strict=True))
@@ -104,6 +105,35 @@ def course(plan: CalibratePlan, space: Space, state: State) -> Generator[Request
         state.best = _least((yield from _through(plan, state, FIT_PHASE, again)))
         yield from _scaled(plan, state)
     yield from _curves(plan, state)
+
+
+def _anywhere(
+    plan: CalibratePlan, space: Space, state: State, phase: str, draws: Draws
+) -> Generator[Request, Floats, Lanes]:
+    """Scan the ranges and fit from the best places: the best of these fits."""
+    scan = space.scan(plan.scan, draws)
+    modelled = yield from _run(plan, state, phase, scan)
+    starts = _starts(scan, state.data.costs(modelled), STARTS if phase == SCAN_PHASE else 2 * STARTS)
+    again = fit(state.data, scan[starts], modelled[starts], plan.fit_sets)
+    return _least((yield from _through(plan, state, FIT_PHASE, again)))
+
+
+def _around_best(plan: CalibratePlan, state: State, attempt: int) -> Generator[Request, Floats, None]:
+    """Search around the fit until that lowers its cost no more, and further where the cost is improbable."""
+    for step in range(SEARCHES):
+        assert state.best is not None
+        before = float(state.best.costs[0])
+        yield from _searched(plan, state, Draws(plan.seed, _STREAMS * attempt + 2 + step))
+        if state.best.costs[0] > before - _BEGIN_AGAIN and (attempt or not _improbable(plan, state)):
+            break
+
+
+def _taken(plan: CalibratePlan, state: State, found: Lanes) -> Generator[Request, Floats, None]:
+    """Go on from a fit that is better than the best."""
+    assert state.best is not None
+    if found.costs[0] < state.best.costs[0]:
+        state.best = found
+        yield from _scaled(plan, state)
 
 
 def _run(plan: CalibratePlan, state: State, phase: str, places: Floats) -> Generator[Request, Floats, Floats]:
@@ -129,13 +159,13 @@ def _through(
         return result
 
 
-def _starts(places: Floats, costs: Floats) -> list[int]:
-    """The best places that are not close to each other."""
+def _starts(places: Floats, costs: Floats, most: int) -> list[int]:
+    """The best places that are not close to each other, at most so many."""
     chosen: list[int] = []
     for index in np.argsort(costs, kind="stable").tolist():
         if all(np.abs(places[index] - places[other]).max() > _DISTINCT for other in chosen):
             chosen.append(index)
-        if len(chosen) == STARTS:
+        if len(chosen) == most:
             break
     return chosen
 
@@ -181,10 +211,7 @@ def _searched(plan: CalibratePlan, state: State, draws: Draws) -> Generator[Requ
     shells = [order[np.floor(_SHELLS * far[order]) == shell][:1] for shell in range(_SHELLS)]
     chosen = np.concatenate(shells)
     again = fit(state.data, places[chosen], modelled[chosen], plan.fit_sets // 4)
-    found = _least((yield from _through(plan, state, FIT_PHASE, again)))
-    if found.costs[0] < best.costs[0]:
-        state.best = found
-        yield from _scaled(plan, state)
+    yield from _taken(plan, state, _least((yield from _through(plan, state, FIT_PHASE, again))))
 
 
 def _improbable(plan: CalibratePlan, state: State) -> bool:

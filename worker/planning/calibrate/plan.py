@@ -26,10 +26,10 @@ REFITS: Final = (0, 1000)
 #: Sets of parameters: the scan has `SCAN` for each unknown, at least `LEAST_SCAN`; starts of the fit, their
 #: iterations on average, and trials of each refit.
 SCAN, LEAST_SCAN, STARTS, ITERATIONS, TRIALS = 24, 48, 4, 40, 10
-#: Scans around the fit at most.
-SEARCHES: Final = 3
+#: Scans around the fit at most; scans of the ranges at most that begin again because the fit explains the values badly.
+SEARCHES, RESTARTS = 3, 3
 #: Iterations of a fit at most, and those that a plan must have room for; fits one after another.
-MOST_ITERATIONS, LEAST_ITERATIONS, AGAIN = 100, 8, 12
+MOST_ITERATIONS, LEAST_ITERATIONS, AGAIN = 100, 8, 24
 #: Conditions between and around the measured ones at most, for the fitted curve and the next point.
 CURVE: Final = 40
 #: Refits that are run there.
@@ -155,7 +155,8 @@ class CalibratePlan:
     @property
     def most_cases(self) -> int:
         """Cases of scan, fit, later fits, refits and curve; beyond it the refits end early."""
-        sets = (1 + SEARCHES) * self.scan + 3 * self.fit_sets + self.refits * TRIALS * 3 // 2
+        scans, fits = (1 + RESTARTS) * (1 + SEARCHES), 3 + RESTARTS
+        sets = scans * self.scan + fits * self.fit_sets + self.refits * TRIALS * 3 // 2
         return min(sets * len(self.conditions) + (1 + CURVES) * CURVE, MAX_PLANNED_CASES)
 
     @property
