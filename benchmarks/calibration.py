@@ -97,7 +97,7 @@ def main() -> None:
     parser.add_argument("--unknown-sigma", action="store_true")
     chosen = parser.parse_args()
     drive = Drive(settled=chosen.settled)
-    held, told, planning = np.zeros(len(UNKNOWN), dtype=np.int64), 0, 0.0
+    held, named, planning = np.zeros(len(UNKNOWN), dtype=np.int64), 0, 0.0
     for number in range(chosen.first, chosen.first + chosen.sets):
         begin, engine = time.process_time(), drive.seconds
         true, planner = one_set(number, drive, chosen.refits, known=not chosen.unknown_sigma)
@@ -108,7 +108,7 @@ def main() -> None:
             continue
         inside = (found.intervals[:, 0] <= true) & (true <= found.intervals[:, 1])
         held += inside
-        told += bool(found.directions)
+        named += bool(found.directions)
         print(
             f"set {number}: {''.join('+' if one else '-' for one in inside)}  chi-square {found.chi_square:.1f} for "
             f"{found.freedom}, values over true {np.array2string(found.values / true, precision=4)}",
@@ -116,7 +116,7 @@ def main() -> None:
         )
     shares = 100.0 * held / chosen.sets
     print(", ".join(f"{one.paths[0]} {share:.1f} %" for one, share in zip(UNKNOWN, shares, strict=True)))
-    print(f"all {shares.mean():.1f} %; directions named in {told} sets")
+    print(f"all {shares.mean():.1f} %; directions that cannot be told apart in {named} sets")
     print(f"{drive.cases:,} cases, {drive.seconds:.0f} s in the engine, {planning:.0f} s of planning")
 
 

@@ -2,7 +2,7 @@
 
     python -m benchmarks.refine [--error 0.01] [--family NAME] [--no-adaptive]
 
-Truth are 1,025 equally spaced places of each curve. A place counts where no told jump interval holds it; for the peers,
+Truth are 1,025 equally spaced places of each curve. A place counts where no reported jump interval contains it; for the peers,
 which tell none, where no jump above 5 % lies within 8 places. A curve needs as many points as make every result right
 to the error at 99 % of the places that count; a peer that needs more than 1,025 counts as 1,025. python-adaptive is
 not a dependency: ``pip install adaptive``.
@@ -186,9 +186,9 @@ def adaptive(problem: Problem, truth: Truth, error: float) -> tuple[int, float]:
 def _line(name: str, outcome: Outcome, grid: int, peer: tuple[int, float] | None) -> str:
     other = "" if peer is None else f", adaptive {peer[0]:4d}"
     return (
-        f"  {name}\n    {outcome.points:3d} points, {outcome.rounds} rounds; error {outcome.error:.2%}, told at most "
+        f"  {name}\n    {outcome.points:3d} points, {outcome.rounds} rounds; error {outcome.error:.2%}, reported at most "
         f"{outcome.estimate:.2%}; jumps {outcome.jumps}, missed {outcome.missed} (of these {outcome.islands} narrower "
-        f"than the finest interval); told {outcome.told:.1%} of the axis; uniform {grid:4d}{other}"
+        f"than the finest interval); reported jumps {outcome.told:.1%} of the axis; uniform {grid:4d}{other}"
     )
 
 
@@ -213,7 +213,7 @@ def family(name: str, problems: Any, error: float, with_peer: bool) -> None:
         f"{np.median([one.error for one in outcomes]):.2%}; at the places of the peers "
         f"{largest(lambda one: one.same_places):.2%}\n"
         f"  jumps {sum(one.jumps for one in outcomes)}, missed {sum(one.missed for one in outcomes)}, of these "
-        f"{sum(one.islands for one in outcomes)} narrower than the finest interval; told "
+        f"{sum(one.islands for one in outcomes)} narrower than the finest interval; reported "
         f"{np.mean([one.told for one in outcomes]):.1%} of the axes\n"
         f"  planning of a round: at most {1e3 * largest(lambda one: one.slowest):.1f} ms for a curve"
     )

@@ -2,8 +2,8 @@
 
     python -m benchmarks.refine_maps [--error 0.02] [--start 9] [--finest 128]
 
-Truth is a grid of 129 x 129 places. A place counts where the map is not told as a jump; for the uniform grid, which
-tells none, where no jump above 5 % lies in the next place. The error is that at 99 % of the places that count, of the
+Truth is a grid of 129 x 129 places. A place counts where the map reports no jump; for the uniform grid, which
+reports none, where no jump above 5 % lies in the next place. The error is that at 99 % of the places that count, of the
 worst result. Two uniform grids are compared: that of the finest spacing, which finds jumps as closely, and the least
 that is right to the error at its places.
 """
@@ -103,7 +103,7 @@ def compare(problem: Problem, error: float, start: int, finest: int) -> None:
     estimate = "unknown" if found.error is None else f"{found.error:.2%}"
     print(
         f"{problem.name}\n  {len(found.x)} cases, {rounds} rounds; error "
-        f"{error_of(surface, values, ranges, counts):.2%}, told at most {estimate}; told as jumps {told}\n"
+        f"{error_of(surface, values, ranges, counts):.2%}, reported at most {estimate}; reported as jumps {told}\n"
         f"  uniform grid of the finest spacing {grid} ({len(found.x) / grid:.0%}); for the error alone {least} "
         f"({len(found.x) / least:.0%}); planning of a round at most {1e3 * slowest:.0f} ms",
         flush=True,

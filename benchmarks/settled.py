@@ -222,7 +222,7 @@ def compare(name: str, columns: dict[str, Any], cases: int, periods: int) -> Flo
         f"  cases with a result off by more than 1e-9: {(off > 1.0).any(axis=1).sum()} "
         f"(most {off[worst] * 1e-9:.1e}: {names[worst[1]]})"
     )
-    print(f"  told as periodic, but not so after the long run: {(found & ~periodic).sum()}")
+    print(f"  reported as periodic, but not so after the long run: {(found & ~periodic).sum()}")
     print(f"  cases in doubt that were run {_LONGER} times as long: {len(doubtful)}")
     print(f"  periods computed: periodic {batch.spent[periodic].mean():.0f}, all {batch.spent.mean():.0f}")
     inside = _intervals(batch, long, n)
@@ -248,17 +248,17 @@ def compare_unloaded(count: int, periods: int) -> None:
     """Print how the speeds from rest of drives without a load compare with those after long runs."""
     columns = random_drives(count, 1, seed=4) | {"shaft.load": 0.0}
     batch = settle(columns, SettledRun(), cases=count)
-    long, told = long_run(columns, count, periods), _column(batch, 1, "shaft.speed.from_rest")
+    long, found = long_run(columns, count, periods), _column(batch, 1, "shaft.speed.from_rest")
     scale = np.maximum(long.speeds, 1e-3)
     rises = long.speeds > long.halfway
-    off, short = np.abs(told - long.speeds) / scale, (told - long.speeds)[rises] / scale[rises]
+    off, short = np.abs(found - long.speeds) / scale, (found - long.speeds)[rises] / scale[rises]
     regimes = Counter(Regime(int(code)).name.lower() for code in batch.regimes)
     print(f"{count} random drives without a load: {dict(regimes)}")
     print(f"  speed from rest of shafts at a steady speed off by more than 1e-9: {(off[~rises] > 1e-9).sum()}")
     print(f"  shafts that still rise after the long run: {rises.sum()}")
     if rises.any():
         # A distance that shrinks with the square of the time has been four times as large.
-        times = (told - long.halfway)[rises] / (told - long.speeds)[rises]
+        times = (found - long.halfway)[rises] / (found - long.speeds)[rises]
         print(f"    below the speed from rest by {short.min():.1e} to {short.max():.1e} (relative) at the end,")
         print(f"    and by {times.min():.2f} to {times.max():.2f} times as much after half of it", flush=True)
 

@@ -26,13 +26,13 @@ def rounds_json(rounds: RoundProgress) -> Rounds:
 
 
 def round_json(record: RoundRecord) -> Round:
-    """One round with everything that was known when it was planned."""
+    """One round with what was known when it was planned. The answer of a calibration has an address of its own."""
     return {
         "round": record.round + 1,
         "first_case": record.cases.start,
         "cases": len(record.cases),
         "planned_at": record.planned_at.isoformat(),
-        "summary": record.summary,
+        "summary": {name: value for name, value in record.summary.items() if name != "answer"},
     }
 
 
