@@ -3,9 +3,9 @@
     python -m benchmarks.refine [--error 0.01] [--family NAME] [--no-adaptive]
 
 Truth are 1,025 equally spaced places of each curve. A place counts where no reported jump interval contains it; for the
-peers, which report none, where no jump above 5 % lies within 8 places. A curve needs as many points as make every result right
-to the error at 99 % of the places that count; a peer that needs more than 1,025 counts as 1,025. python-adaptive is
-not a dependency: ``pip install adaptive``.
+peers, which report none, where no jump above 5 % lies within 8 places. A curve needs as many points as make every
+result right to the error at 99 % of the places that count; a peer that needs more than 1,025 counts as 1,025.
+python-adaptive is not a dependency: ``pip install adaptive``.
 """
 
 from __future__ import annotations
@@ -187,8 +187,8 @@ def _line(name: str, outcome: Outcome, grid: int, peer: tuple[int, float] | None
     other = "" if peer is None else f", adaptive {peer[0]:4d}"
     return (
         f"  {name}\n    {outcome.points:3d} points, {outcome.rounds} rounds; error {outcome.error:.2%}, reported "
-        f"at most {outcome.estimate:.2%}; jumps {outcome.jumps}, missed {outcome.missed} (of these {outcome.islands} narrower "
-        f"than the finest interval); reported jumps {outcome.told:.1%} of the axis; uniform {grid:4d}{other}"
+        f"at most {outcome.estimate:.2%}; jumps {outcome.jumps}, missed {outcome.missed} (of these {outcome.islands} "
+        f"narrower than the finest interval); reported jumps {outcome.told:.1%} of the axis; uniform {grid:4d}{other}"
     )
 
 

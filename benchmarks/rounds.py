@@ -3,8 +3,9 @@
     python -m benchmarks.rounds [REPETITIONS [CURVES]]
 
 Both run in this process, one after the other, on the same plan and in the same chunks; times are processor times, the
-least of the repetitions. The engine alone computes the same rounds, asked for by a planner without a store. What a round
-costs is the time between the last row of one round and the first chunk of the next: reading its rows, planning, the transaction.
+least of the repetitions. The engine alone computes the same rounds, asked for by a planner without a store. What a
+round costs is the time between the last row of one round and the first chunk of the next: reading its rows, planning,
+the transaction.
 """
 
 from __future__ import annotations
