@@ -91,8 +91,8 @@ def course(plan: CalibratePlan, space: Space, state: State) -> Generator[Request
         for attempt in range(1, 1 + RESTARTS):
             if not _improbable(plan, state):
                 break
-            found = yield from _anywhere(plan, space, state, FIT_PHASE, Draws(plan.seed, _STREAMS * attempt))
-            yield from _taken(plan, state, found)
+            another = yield from _anywhere(plan, space, state, FIT_PHASE, Draws(plan.seed, _STREAMS * attempt))
+            yield from _taken(plan, state, another)
             yield from _around_best(plan, state, attempt)
     for attempt in range(2 if plan.refits else 0):
         yield from _refitted(plan, state, attempt)
