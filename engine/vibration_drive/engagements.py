@@ -69,7 +69,7 @@ def engagements(columns: Mapping[str, ArrayLike], run: Run) -> Engagements:
     since = max(0.0, last - MAX_PERIODS)
     start = min(max(start, since), end)
     module = kernel_of(columns, run.tolerance)
-    ending, pieces = _pieces(module, case_matrix(columns, run, 1), run, since, last - since)
+    ending, pieces = read_steps(module, case_matrix(columns, run, 1), run, since, last - since)
     period = 1.0 / frequency
     if ending != Ending.OK:
         return Engagements(start * period, end * period, "", (), (), ending)
@@ -115,7 +115,7 @@ def settled_engagements(
     begin, length = float(found.points[0, BEGIN]), float(2 * turn if repeats else turn)
     matrix = with_lengths(case_matrix(columns, run, 1), np.array([begin]), np.array([length]), windowed=False)
     module = kernel_of(columns, settings.tolerance)
-    ending, pieces = _pieces(module, matrix, run, 0.0, length + 1.0, starts=found.points)
+    ending, pieces = read_steps(module, matrix, run, 0.0, length + 1.0, starts=found.points)
     if ending != Ending.OK:
         return Engagements(0.0, turn * period, name, (), (), ending)
     if not repeats:
@@ -128,7 +128,7 @@ def settled_engagements(
     return Engagements(0.0, turn * period, name, tuple(rows), means, ending)
 
 
-def _pieces(
+def read_steps(
     module: Kernel, matrix: Floats, run: Run, since: float, periods: float, starts: Floats | None = None
 ) -> tuple[Ending, Pieces]:
     """How the one case of a matrix ends, and its steps from the time ``since`` on (in excitation periods)."""

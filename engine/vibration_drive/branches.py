@@ -1,0 +1,132 @@
+"""The branch of orbits through the settled motion of a case, along one parameter (docs/branches.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sprag.engine.catalogue import ResultInfo
+from sprag.engine.continuation.follow import Range, follow
+from sprag.engine.continuation.problem import End, Point, Special
+from sprag.engine.endings import ENDINGS, Ending
+from sprag.engine.run import SettledRun
+from sprag.engine.vibration_drive.cases import Column, case_matrix, pendulum_count, scalars, with_lengths
+from sprag.engine.vibration_drive.characteristics import characteristics
+from sprag.engine.vibration_drive.integration import integrate
+from sprag.engine.vibration_drive.kernel import kernel_of
+from sprag.engine.vibration_drive.orbits import find_units
+from sprag.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag.engine.vibration_drive.results import result_infos
+from sprag.engine.vibration_drive.return_map import DriveMap, Machines
+from sprag.engine.vibration_drive.settle import settle
+from sprag.engine.vibration_drive.strobes import BEGIN
+
+Floats = NDArray[np.float64]
+
+
+class NoOrbitError(ValueError):
+    """The settled motion of the case has no orbit that can be followed."""
+
+
+#: Results that belong to a run from its start.
+_OF_RUNS = frozenset({"runup.time", "run.steps", "run.events"})
+
+
+def branch_infos(pendulums: int) -> tuple[ResultInfo, ...]:
+    """Every result of an orbit of a branch."""
+    return tuple(info for info in result_infos(pendulums) if info.name not in _OF_RUNS)
+
+
+@dataclass(frozen=True, slots=True)
+class DriveBranch:
+    """A branch of orbits of a drive.
+
+    Attributes
+    ----------
+    order : int
+        Excitation periods in one turn of each orbit.
+    points : tuple of Point
+        Their states are strobes (``strobes.width``).
+    values : array, shape (points, results)
+        Results over one turn of each orbit, in the order of ``branch_infos``.
+    specials : tuple of Special
+    ends : tuple of two End
+    start : int
+        Place of the case's own orbit.
+    """
+
+    order: int
+    points: tuple[Point, ...]
+    values: Floats
+    specials: tuple[Special, ...]
+    ends: tuple[End, End]
+    start: int
+
+
+def branch(
+    machines: Machines, parameter: float, settings: SettledRun, along: Range, bounds: tuple[float, float]
+) -> DriveBranch:
+    """Follow the orbit that a case settles to along a parameter, in both directions.
+
+    Parameters
+    ----------
+    machines : function
+        Parameters of cases, as for ``simulate``, for values of the parameter, shape (cases,).
+    parameter : float
+        Its value in the case.
+    settings : SettledRun
+        Of the search for the case's own orbit.
+    along : Range
+    bounds : tuple of float
+        Smallest and largest value of the parameter that a machine may have.
+
+    Raises
+    ------
+    NoOrbitError
+        If the case does not settle to a periodic motion with a turning shaft.
+    ValueError
+        If a required parameter is missing, the number of pendulums or coefficients is out of range, or the range does
+        not contain the parameter.
+    """
+    case = machines(np.array([parameter]))
+    columns = scalars({path: np.asarray(value).reshape(-1)[0] for path, value in case.items()})
+    found = settle(columns, settings, cases=1)
+    regime, ending = Regime(int(found.regimes[0])), ENDINGS[int(found.endings[0])]
+    if regime != Regime.PERIODIC:
+        what = ending.sentence if ending != Ending.OK else regime.sentence
+        raise NoOrbitError(f"the case has no periodic motion of a turning shaft to be followed: {what}")
+    names = [info.name for info in settled_infos(pendulum_count(columns))]
+    order = int(found.values[0, names.index("regime.order")])
+    map_ = DriveMap(
+        kernel_of(columns, settings.tolerance), machines, bounds, settings.fine, order, found.points[0],
+        _units(machines, parameter, settings, found.points, order),
+    )  # fmt: skip
+    made = follow(map_, map_.point(found.points[0]).tolist(), parameter, along)
+    values = _results(map_, made.points)
+    return DriveBranch(order, made.points, values, made.specials, made.ends, made.start)
+
+
+def _units(machines: Machines, parameter: float, settings: SettledRun, start: Floats, order: int) -> Floats:
+    """Scales of the strobes' columns, from one turn of the orbit."""
+    run = settings.fine
+    matrix = case_matrix(machines(np.array([parameter])), run, 1)
+    kernel = kernel_of(machines(np.array([parameter])), settings.tolerance)
+    turn = with_lengths(matrix, start[:, BEGIN], np.array([float(order)]), windowed=False)
+    strobes = integrate(kernel, turn, run, starts=start, strobes=order).strobes
+    units = np.empty((1, start.shape[1]))
+    find_units(strobes, np.zeros(1, dtype=np.int64), order, order, matrix[:, Column.NU], False, units)
+    own: Floats = units[0]
+    return own
+
+
+def _results(map_: DriveMap, points: tuple[Point, ...]) -> Floats:
+    """Results over one turn of each orbit, as those of settled cases are."""
+    states = np.array([point.state for point in points])
+    matrix = case_matrix(map_.machines(np.array([point.parameter for point in points])), map_.run, len(points))
+    matrix = with_lengths(matrix, states[:, BEGIN], np.full(len(points), float(map_.order)), windowed=True)
+    sums = integrate(map_.kernel, matrix, map_.run, starts=states).sums
+    kept = [info.name not in _OF_RUNS for info in result_infos(map_.kernel.LAYOUT.n)]
+    values: Floats = characteristics(map_.kernel.LAYOUT, matrix, sums)[:, kept]
+    return values
