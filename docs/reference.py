@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from pathlib import Path
 
 import typer
@@ -52,10 +52,10 @@ def parameters(model: str) -> Iterator[Row]:
         yield f"`{entry.path}`", entry.unit, entry.range_text(), default, entry.help
 
 
-def results(model: str, *, settled: bool = False) -> Iterator[Row]:
-    """Every result of a model that all cases have; or those that settled cases have besides."""
+def results(model: str, besides: Container[str] | None = None) -> Iterator[Row]:
+    """Every result of a model that all cases have; or those that some cases have ``besides``."""
     for info in models.result_catalogue(model):
-        if settled == (info.name in SETTLED_ONLY):
+        if info.name not in {*SETTLED_ONLY, *STARTS_ONLY} if besides is None else info.name in besides:
             yield f"`{info.name}`", info.unit, info.description
 
 
@@ -70,6 +70,7 @@ def limits() -> Iterator[Row]:
     yield "columns of a table of cases", f"{limit.MAX_COLUMNS:,}"
     yield "derived parameters of a study", f"{limit.MAX_DERIVED:,}"
     yield "tolerances of a study, drawn drives", f"{limit.MAX_TOLERANCES:,}, {limit.MAX_DRIVES:,}"
+    yield "starts of a case, initial values that differ", f"2 to {limit.MAX_STARTS:,}, {limit.MAX_START_RANGES}"
     yield "cases of a study", f"{limit.MAX_CASES:,}"
     yield "values on all axes together", f"{limit.MAX_AXIS_VALUES:,}"
     yield "size of a spec", f"{limit.MAX_BODY_BYTES:,} bytes"
@@ -105,16 +106,21 @@ def limits() -> Iterator[Row]:
 DRIVE = models.VIBRATION_DRIVE
 WORDS = {name: name.replace("-", " ") for name in models.model_names()}
 PARAMETER_HEADS = "path | unit | allowed | default | "
-TIMED = {info.name.replace("pendulums.0.", "pendulums.N.") for info in models.result_infos(DRIVE, "1")}
-#: Results that cases of a given time have not.
-SETTLED_ONLY = {info.name for info in models.result_catalogue(DRIVE)} - TIMED
+TIMED, SETTLED = (
+    {info.name.replace("pendulums.0.", "pendulums.N.") for info in models.result_infos(DRIVE, variant)}
+    for variant in ("1", "1-settled")
+)
+#: Results that cases of a given time have not, and those of cases with starts only.
+SETTLED_ONLY = SETTLED - TIMED
+STARTS_ONLY = {info.name for info in models.result_catalogue(DRIVE)} - SETTLED
 #: Name of a table, as the page has it in a comment above -> heads of its columns, and its rows.
 TABLES: dict[str, tuple[str, Iterable[Row]]] = {
     "commands": ("command | ", commands()),
     "settings": ("variable | default | ", settings()),
     **{f"parameters of the {WORDS[name]}": (PARAMETER_HEADS, parameters(name)) for name in models.model_names()},
     **{f"results of the {WORDS[name]}": ("result | unit | ", results(name)) for name in models.model_names()},
-    "results of settled cases": ("result | unit | meaning ", results(DRIVE, settled=True)),
+    "results of settled cases": ("result | unit | meaning ", results(DRIVE, SETTLED_ONLY)),
+    "results of cases with starts": ("result | unit | meaning ", results(DRIVE, STARTS_ONLY)),
     "regimes": ("regime | meaning ", meanings(models.REGIME_SENTENCES)),
     "endings": ("ending | ", meanings(dict(models.ENDING_SENTENCES))),
     "flags": ("flag | ", meanings({k: v for name in models.model_names() for k, v in models.flags_of(name).items()})),

@@ -43,12 +43,16 @@ class Chunking:
         cases = study.cases if count is None else count
         if self.cases:
             return chunk_cases(cases, 0.0, self.processes, fixed=self.cases)
-        seconds = models.estimate_seconds_per_case(study)
-        return chunk_cases(cases, seconds, self.processes, timeout=self.timeout)
+        # A case with many starts fills the lanes by itself.
+        lanes = models.lanes_per_case(study)
+        seconds = models.estimate_seconds_per_case(study) / lanes
+        found = chunk_cases(cases * lanes, seconds, self.processes, timeout=self.timeout) // lanes
+        return max(found, math.ceil(cases / MAX_CHUNKS), 1)
 
     def warnings(self, study: Study) -> tuple[str, ...]:
         """Warnings about ``study`` before it runs: a single case may exceed the time limit."""
-        seconds = models.estimate_seconds_per_case(study) * work_of(1)
+        lanes = models.lanes_per_case(study)
+        seconds = models.estimate_seconds_per_case(study) / lanes * work_of(lanes)
         if seconds <= self.timeout:
             return ()
         text = (

@@ -66,6 +66,11 @@ def pendulum_count(columns: Mapping[str, ArrayLike]) -> int:
     return max(indices) + 1
 
 
+def default_of(path: str) -> float | None:
+    """The value of a parameter that is not given; None where it is required."""
+    return _DEFAULTS[".".join("N" if part.isdigit() else part for part in path.split("."))]
+
+
 def scalars(columns: Mapping[str, ArrayLike]) -> dict[str, float]:
     """The parameters of one case as numbers."""
     return {path: float(np.asarray(value)) for path, value in columns.items()}
@@ -121,7 +126,7 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
         return np.broadcast_to(np.asarray(value, dtype=np.float64), (cases,))
 
     def parameter(path: str) -> Floats:
-        return column(path, _DEFAULTS[".".join("N" if part.isdigit() else part for part in path.split("."))])
+        return column(path, default_of(path))
 
     frequency = parameter("excitation.frequency")
     nu = 2.0 * math.pi * frequency

@@ -18,6 +18,7 @@ from sprag.service.spec.fields import TOLERANCE_FIELDS, read_object
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.plan.outline import Outline, chooses, first_round, read_outline
 from sprag.service.spec.report import Report, SpecError, did_you_mean
+from sprag.service.spec.starts import read_starts
 from sprag.service.spec.text import Format, load_spec
 from sprag.worker import models
 from sprag.worker.limits import MAX_NAME_LENGTH
@@ -37,7 +38,7 @@ UNNAMED: Final = "untitled"
 
 FIELDS: Final = (
     "sprag", "model", "name", "base", "derive", "run", "axes", "combine", "exclude", "refine", "goal", "calibrate",
-    *TOLERANCE_FIELDS,
+    "starts", *TOLERANCE_FIELDS,
 )  # fmt: skip
 
 
@@ -106,6 +107,7 @@ def parse_spec(data: object) -> ParsedSpec:
             allowed="`goal`, or plain axes",
         )
     run = part.read_run(report, found.get("run", {}), machine, axes, combine)
+    run |= read_starts(report, found, machine, run)
     part.check(report, machine, axes or (), combine)
     report.raise_if_any()
     study = Study(model, name, _in_order(machine), run, structure=machine.structure, derive=machine.derive)

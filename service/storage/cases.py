@@ -15,7 +15,7 @@ from cachetools import LRUCache
 from sprag.service.storage.order import Orders
 from sprag.service.storage.part import MAX_INTEGER
 from sprag.service.storage.records import CaseColumns, CaseRow, Kinds, RowBlock
-from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
+from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, further_table, results_table
 from sprag.worker import models
 from sprag.worker.models import WorkerEnding, regime_info
 from sprag.worker.ports import Chunk
@@ -47,6 +47,9 @@ class _Rows:
     infos: tuple[models.ResultInfo, ...]
     cases: int
     cancelled: bool
+    #: Rows above number 0 of cases that can have several; None where they cannot, and the result with their number.
+    further: sa.Table | None = None
+    numbered: str | None = None
 
 
 #: A finished chunk: its range of places, and when it finished.
@@ -80,13 +83,18 @@ class Cases(Orders):
             models.result_infos(row.model, row.variant),
             row.cases,
             row.state == StudyState.CANCELLED.value,
+            further_table(row.model, row.variant),
+            models.numbered_by(row.model, row.variant),
         )
 
     def case_rows(self, study_id: str, after_case: int = -1, limit: int = BLOCK_ROWS) -> RowBlock:
-        """At most ``limit`` finished cases with numbers above ``after_case``, in order; raises StudyNotFoundError."""
+        """At most ``limit`` finished cases with numbers above ``after_case``, in order; raises StudyNotFoundError.
+
+        With all rows of cases that have several, in the order of their numbers.
+        """
         with self.session.read() as connection:
             rows = self._rows(connection, study_id)
-            return _block(rows.infos, _read(connection, rows, after_case, limit))
+            return _block(rows.infos, _with_further(connection, rows, _read(connection, rows, after_case, limit)))
 
     def case_page(
         self,
@@ -97,7 +105,7 @@ class Cases(Orders):
         regime: str | None = None,
         flag: str | None = None,
     ) -> RowBlock:
-        """The same, with the cases that a cancelled study never ran at their positions.
+        """The first row of each, with the cases that a cancelled study never ran at their positions.
 
         ``ending``, ``regime`` and ``flag`` select the cases with that ending, regime or flag.
         """
@@ -180,10 +188,15 @@ class Cases(Orders):
         found = self.case_page(study_id, case - 1, 1)
         return next(found.rows()) if len(found) and found.cases[0] == case else None
 
-    def rows_for_cases(self, study_id: str, cases: ArrayLike, names: Sequence[str]) -> CaseColumns:
+    def all_rows(self, study_id: str, case: int) -> tuple[CaseRow, ...]:
+        """Every row of a case in the order of their numbers, none while it is not finished."""
+        return tuple(row for row in self.case_rows(study_id, case - 1, 1).rows() if row.case == case)
+
+    def rows_for_cases(self, study_id: str, cases: ArrayLike, names: Sequence[str], number: int = 0) -> CaseColumns:
         """Results ``names`` of the given case numbers (shape (m,), any order), aligned with them.
 
-        Raises StudyNotFoundError, and KeyError for a name that is not a result of the study.
+        Of cases with several rows those of the row with that ``number``; a case without one has its ending and no
+        results. Raises StudyNotFoundError, and KeyError for a name that is not a result of the study.
         """
         wanted: NDArray[np.int64] = np.asarray(cases, dtype=np.int64).reshape(-1)
         unique, position = np.unique(wanted, return_inverse=True)
@@ -192,18 +205,11 @@ class Cases(Orders):
         with self.session.read() as connection:
             rows = self._rows(connection, study_id)
             columns = {info.name: info.column for info in rows.infos}
-            c = rows.table.c
-            query = sa.select(c.case_number, c.ending, *(c[columns[name]] for name in names)).where(
-                c.study == rows.number
-            )
-            for condition in conditions(c.case_number, unique):
-                found = connection.execute(query.where(condition)).all()
-                if found:
-                    numbers, ended, *results = zip(*found, strict=True)
-                    at = np.searchsorted(unique, np.array(numbers, dtype=np.int64))
-                    endings[at] = np.array(ended, dtype=object)
-                    for index, column in enumerate(results):
-                        values[at, index] = np.array(column, dtype=np.float64)
+            wanted_columns = [columns[name] for name in names]
+            _fill(connection, rows, rows.table, wanted_columns if number == 0 else [], unique, endings, values)
+            if number and rows.further is not None and rows.numbered is not None:
+                own = rows.further.c[columns[rows.numbered]] == number
+                _fill(connection, rows, rows.further, wanted_columns, unique, endings, values, own)
         if rows.cancelled:
             endings[[ending is None for ending in endings]] = WorkerEnding.CANCELLED.value
         return CaseColumns(
@@ -233,6 +239,43 @@ class Cases(Orders):
             yield from range(reached, first)
             reached = max(reached, first + count)
         yield from range(reached, rows.cases)
+
+
+def _fill(
+    connection: sa.Connection,
+    rows: _Rows,
+    table: sa.Table,
+    columns: Sequence[str],
+    cases: NDArray[np.int64],
+    endings: NDArray[np.object_],
+    values: NDArray[np.float64],
+    *which: sa.ColumnElement[bool],
+) -> None:
+    """Write endings (shape (m,)) and columns (shape (m, columns)) of ``cases`` (ascending) that are in a table."""
+    c = table.c
+    query = sa.select(c.case_number, c.ending, *(c[name] for name in columns)).where(c.study == rows.number, *which)
+    for condition in conditions(c.case_number, cases):
+        found = connection.execute(query.where(condition)).all()
+        if found:
+            numbers, ended, *results = zip(*found, strict=True)
+            at = np.searchsorted(cases, np.array(numbers, dtype=np.int64))
+            endings[at] = np.array(ended, dtype=object)
+            for index, column in enumerate(results):
+                values[at, index] = np.array(column, dtype=np.float64)
+
+
+def _with_further(connection: sa.Connection, rows: _Rows, found: Sequence[Sequence[Any]]) -> Sequence[Sequence[Any]]:
+    """Rows of consecutive finished cases with their further rows among them."""
+    if rows.further is None or rows.numbered is None or not found:
+        return found
+    c = rows.further.c
+    names = [info.column for info in rows.infos]
+    between = c.case_number.between(found[0][0], found[-1][0])
+    query = sa.select(c.case_number, c.ending, c.flags, *(c[name] for name in names))
+    more = connection.execute(query.where(c.study == rows.number, between)).all()
+    place = 3 + [info.name for info in rows.infos].index(rows.numbered)
+    # A failed case has no number.
+    return sorted([*found, *more], key=lambda row: (row[0], row[place] or 0))
 
 
 def _read(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import sqlalchemy as sa
 
 from sprag.service.storage.part import Part
-from sprag.service.storage.tables import CHUNKS, ROUNDS, STUDIES, results_table
+from sprag.service.storage.tables import CHUNKS, ROUNDS, STUDIES, further_table, results_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -32,6 +32,8 @@ class Purging(Part):
         for number, model, variant in gone:
             rows = results_table(model, variant)
             yield from self._emptied(rows, rows.c.case_number, number)
+            if (further := further_table(model, variant)) is not None:
+                yield from self._emptied(further, further.c.case_number, number)
             yield from self._emptied(CHUNKS, CHUNKS.c["first"], number)
             with self.session.write() as connection:
                 connection.execute(sa.delete(ROUNDS).where(ROUNDS.c.study == number))
@@ -39,7 +41,7 @@ class Purging(Part):
             yield 1
 
     def _emptied(self, table: sa.Table, key: sa.Column[int], number: int) -> Iterator[int]:
-        """Delete the rows of a study from a table, in the order of ``key``, which is unique in the study."""
+        """Delete the rows of a study from a table, in the order of ``key``, which few rows share."""
         mine = table.c.study == number
         while True:
             with self.session.write() as connection:

@@ -14,7 +14,7 @@ from cachetools import LRUCache
 from sprag.service.storage.cases import conditions
 from sprag.service.storage.order import Orders
 from sprag.service.storage.round_table import latest_round
-from sprag.service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, results_table
+from sprag.service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, further_table, results_table
 from sprag.service.storage.warning_texts import read_warnings, write_warnings
 from sprag.worker import fingerprint, models
 from sprag.worker.models import WarningText, WorkerEnding
@@ -242,7 +242,15 @@ def mark_origin(connection: sa.Connection, number: int) -> None:
 
 def copy_rows(connection: sa.Connection, model: str, variant: str, chunk: Chunk, known: Known) -> bool:
     """Copy the known rows of a chunk; False when some no longer exist."""
-    table = results_table(model, variant)
+    if _copy(connection, results_table(model, variant), chunk, known) != known.cases.size:
+        return False
+    if (further := further_table(model, variant)) is not None:
+        _copy(connection, further, chunk, known)
+    return True
+
+
+def _copy(connection: sa.Connection, table: sa.Table, chunk: Chunk, known: Known) -> int:
+    """Copy the known rows of a chunk in one table; how many there are."""
     rest = ", ".join(column.name for column in table.c if column.name not in KEY_COLUMNS[:2])
     mark = "?" if connection.dialect.name == "sqlite" else "%s"
     statement = (
@@ -251,7 +259,7 @@ def copy_rows(connection: sa.Connection, model: str, variant: str, chunk: Chunk,
     )
     pairs = zip(known.cases.tolist(), known.studies.tolist(), known.there.tolist(), strict=True)
     done = connection.exec_driver_sql(statement, [(chunk.study, case, study, there) for case, study, there in pairs])
-    return done.rowcount == known.cases.size
+    return done.rowcount
 
 
 def endings_of(connection: sa.Connection, model: str, variant: str, study: int, cases: Cases) -> Counter[str]:

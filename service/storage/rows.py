@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag.service.storage.tables import KEY_COLUMNS, results_table
+from sprag.service.storage.tables import KEY_COLUMNS, further_table, results_table
 from sprag.worker import models
+from sprag.worker.models import ChunkResult
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-
-    from sprag.worker.models import ChunkResult
 
 
 @lru_cache(maxsize=64)
@@ -23,6 +22,25 @@ def target(model: str, variant: str) -> tuple[str, tuple[str, ...]]:
     """A results table and its columns in the order of `tuples`."""
     names = (*KEY_COLUMNS, *(info.column for info in models.result_infos(model, variant)))
     return results_table(model, variant).name, names
+
+
+@lru_cache(maxsize=64)
+def further_target(model: str, variant: str) -> tuple[str, tuple[str, ...]] | None:
+    """The same of the table with further rows of a case; None where there is none."""
+    table = further_table(model, variant)
+    return None if table is None else (table.name, target(model, variant)[1])
+
+
+def all_tuples(
+    study: int, numbers: Sequence[int], result: ChunkResult, infos: Sequence[models.ResultInfo]
+) -> tuple[list[tuple[Any, ...]], list[tuple[Any, ...]]]:
+    """Rows for `target` and for `further_target`, of the cases with those numbers."""
+    own = tuples(study, numbers, result, infos)
+    if result.further is None:
+        return own, []
+    cases = [numbers[place] for place in result.further.of.tolist()]
+    rows = ChunkResult(result.first, [models.OK] * len(cases), result.further.flags, result.further.values)
+    return own, tuples(study, cases, rows, infos)
 
 
 def tuples(

@@ -8,7 +8,7 @@ from sprag.worker import models
 from sprag.worker.states import ChunkState
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0017"
+HEAD_REVISION = "0018"
 
 METADATA = sa.MetaData(
     naming_convention={
@@ -162,14 +162,35 @@ def results_name(model: str, variant: str) -> str:
 @cache
 def results_table(model: str, variant: str) -> sa.Table:
     """The table with the results of that variant of ``model``: a row for each finished case."""
-    name = results_name(model, variant)
-    if name in METADATA.tables:
-        return METADATA.tables[name]
-    infos = models.result_infos(model, variant)
-    results = (sa.Column(info.column, sa.Double if info.kind == "real" else sa.Integer) for info in infos)
+    name, infos = results_name(model, variant), models.result_infos(model, variant)
     # Cases are counted and selected by their categories.
     categories = [info.column for info in infos if info.kind == "category"]
     indexes = (sa.Index(f"ix_{name}_{column}", "study", column, "case_number") for column in categories)
+    return _table_of_rows(name, infos, *indexes)
+
+
+@cache
+def further_table(model: str, variant: str) -> sa.Table | None:
+    """The table with further rows of a case, numbered from 1; None where a case of the variant has one row.
+
+    Its columns are those of `results_table`, which has the row with the number 0.
+    """
+    numbered = models.numbered_by(model, variant)
+    if numbered is None:
+        return None
+    return _table_of_rows(f"{results_name(model, variant)}_more", models.result_infos(model, variant), number=numbered)
+
+
+def _table_of_rows(
+    name: str, infos: tuple[models.ResultInfo, ...], *indexes: sa.Index, number: str | None = None
+) -> sa.Table:
+    """A table of rows; the result ``number`` belongs to its key."""
+    if name in METADATA.tables:
+        return METADATA.tables[name]
+    results = (
+        sa.Column(info.column, sa.Double if info.kind == "real" else sa.Integer, primary_key=info.name == number)
+        for info in infos
+    )
     return sa.Table(
         name,
         METADATA,
@@ -188,4 +209,5 @@ def all_tables() -> sa.MetaData:
     for model in models.model_names():
         for variant in models.variants(model):
             results_table(model, variant)
+            further_table(model, variant)
     return METADATA

@@ -13,7 +13,7 @@ from sprag.service.storage.part import add_chunks, micros_of, moment, optional_m
 from sprag.service.storage.records import DispatcherRecord
 from sprag.service.storage.reuse import Reuse, copy_rows, endings_of, mark_origin
 from sprag.service.storage.round_table import add_round, latest_round
-from sprag.service.storage.rows import target, tuples, without_collector
+from sprag.service.storage.rows import all_tuples, further_target, target, without_collector
 from sprag.service.storage.tables import (
     CHUNKS,
     DISPATCHER,
@@ -235,8 +235,11 @@ class Work(Reuse):
         numbers = (self._cases(chunk, connection) if known is None else known.missing).tolist()
         if result.count:
             with without_collector():
-                rows = tuples(chunk.study, numbers, result, models.result_infos(model, variant))
+                rows, further = all_tuples(chunk.study, numbers, result, models.result_infos(model, variant))
                 self.session.insert_rows(connection, *target(model, variant), rows)
+                # In the same transaction: a case has all of its rows or none.
+                if further and (place := further_target(model, variant)) is not None:
+                    self.session.insert_rows(connection, *place, further)
         endings = Counter(result.endings)
         if known is not None and known.cases.size:
             if not copy_rows(connection, model, variant, chunk, known):

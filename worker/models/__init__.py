@@ -35,7 +35,7 @@ from sprag.engine.vibration_drive.parameters import (
 )
 from sprag.engine.warning_text import WarningText
 from sprag.worker.models import machine_shaft, vibration_drive
-from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, run_accepted
+from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, FurtherRows, KernelShape, run_accepted
 from sprag.worker.models.model import Model, all_models, model_names, model_of, register, unregister
 from sprag.worker.models.parameters import refused_cases
 from sprag.worker.models.presentation import Panel, Presentation
@@ -82,6 +82,7 @@ __all__ = [
     "Engagements",
     "ExpressionError",
     "Extent",
+    "FurtherRows",
     "InsufficientInertiaError",
     "KernelShape",
     "MachineError",
@@ -116,10 +117,12 @@ __all__ = [
     "is_compiled",
     "is_settled",
     "kernel_source",
+    "lanes_per_case",
     "load",
     "model_names",
     "model_of",
     "motion_sentence",
+    "numbered_by",
     "parameter_catalogue",
     "parameters_of",
     "prepare",
@@ -230,6 +233,11 @@ def result_infos(model: str, variant: str) -> tuple[ResultInfo, ...]:
     return model_of(model).results(variant)
 
 
+def numbered_by(model: str, variant: str) -> str | None:
+    """Result that numbers the rows of a case of that variant; None where a case has one row."""
+    return model_of(model).numbered_by(variant)
+
+
 def result_catalogue(model: str) -> tuple[ResultInfo, ...]:
     """Every result of ``model``, with placeholders as in `parameter_catalogue`."""
     return model_of(model).result_catalogue()
@@ -309,6 +317,11 @@ def has_strobes(study: Study) -> bool:
 def run_portrait(study: Study, case: int) -> Portrait:
     """How one case approaches its motion, strobe by strobe; ValueError where its machine has no strobes."""
     return model_of(study.model).portrait(study, case)
+
+
+def lanes_per_case(study: Study) -> int:
+    """Runs of the engine that one case of ``study`` takes side by side."""
+    return model_of(study.model).lanes_per_case(study)
 
 
 def estimate_seconds_per_case(study: Study) -> float:

@@ -19,6 +19,24 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
+class FurtherRows:
+    """Further rows of cases that have several.
+
+    Attributes
+    ----------
+    of : int64 array, shape (rows,)
+        Position in the chunk of the case of each row.
+    flags : list of str, length rows
+    values : float64 array, shape (rows, results)
+        As those of the `ChunkResult`. All of them ended ok.
+    """
+
+    of: NDArray[np.int64]
+    flags: list[str]
+    values: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
 class ChunkResult:
     """The result of a run of consecutive cases.
 
@@ -32,12 +50,15 @@ class ChunkResult:
         Names of the flags of each case joined by commas; "" where there is none.
     values : float64 array, shape (count, results), C-contiguous
         Results in the order of `result_infos`, SI units; NaN where a result could not be computed.
+    further : FurtherRows or None
+        Further rows of some of the cases, for a variant whose cases can have several.
     """
 
     first: int
     endings: list[str]
     flags: list[str]
     values: NDArray[np.float64]
+    further: FurtherRows | None = None
 
     @property
     def count(self) -> int:
@@ -93,6 +114,9 @@ def run_accepted(task: ChunkTask, run: Callable[[ChunkTask], ChunkResult], endin
         values[rows] = found.values
         for row, one, flag in zip(rows.tolist(), found.endings, found.flags, strict=True):
             endings[row], flags[row] = one, flag
+        if found.further is not None:
+            further = replace(found.further, of=rows[found.further.of])
+            return ChunkResult(task.first, endings, flags, values, further)
     return ChunkResult(task.first, endings, flags, values)
 
 

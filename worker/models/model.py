@@ -66,6 +66,10 @@ class Model(Protocol):
         """Every result of a variant, in the order of the columns of `ChunkResult.values`."""
         ...
 
+    def numbered_by(self, variant: str) -> str | None:
+        """Result that numbers the rows of a case of that variant, from 0; None where a case has one row."""
+        return None
+
     def result_catalogue(self) -> tuple[ResultInfo, ...]:
         """Every result for a catalogue, with placeholders for indices."""
         return self.results(self.variants()[0])
@@ -110,6 +114,10 @@ class Model(Protocol):
     def portrait(self, study: Study, case: int) -> Portrait:
         """How one case approaches its motion; ValueError where there are no strobes."""
         raise ValueError(f"a machine of model {self.name} has no strobes")
+
+    def lanes_per_case(self, study: Study) -> int:
+        """Runs of the engine that one case of the study takes side by side."""
+        return 1
 
     def estimate_seconds_per_case(self, study: Study) -> float:
         """Rough time of one case on one core, in s."""

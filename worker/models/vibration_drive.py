@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import numpy as np
 
 from sprag.engine import Ending, Run, Span
+from sprag.engine.catalogue import ResultInfo
 from sprag.engine.vibration_drive.clutch import ClutchLawError, check_law
 from sprag.engine.vibration_drive.parameters import (
     CLUTCH_COEFFICIENT,
@@ -18,17 +20,27 @@ from sprag.engine.vibration_drive.parameters import (
 )
 from sprag.engine.vibration_drive.regimes import Regime, settled_infos
 from sprag.engine.vibration_drive.results import result_infos
-from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, case_machine, chunk_result
+from sprag.engine.vibration_drive.start_results import NUMBER, started_infos
+from sprag.worker.models.common import (
+    ChunkResult,
+    ChunkTask,
+    Extent,
+    FurtherRows,
+    KernelShape,
+    case_machine,
+    chunk_result,
+)
 from sprag.worker.models.drive_presentation import PRESENTATION
 from sprag.worker.models.model import Model
 from sprag.worker.models.settled import REGIME_FLAGS, followed_periods, is_settled, mean_periods, settings_of
+from sprag.worker.models.starts import count_of, further_starts, has_starts
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from numpy.typing import NDArray
 
-    from sprag.engine.catalogue import Parameter, ResultInfo
+    from sprag.engine.catalogue import Parameter
     from sprag.engine.outcome import Engagements, Portrait, Trajectory
     from sprag.engine.run import Reset, Unit
     from sprag.worker.study import Study
@@ -49,8 +61,11 @@ FLAG_SENTENCES: dict[str, str] = {
 }
 #: Most cases whose frequency is evaluated for an estimate.
 _SPREAD = 1_000
-#: Suffix of the variants of settled studies, after the number of pendulums.
-_SETTLED_VARIANT = "-settled"
+#: Suffixes of the variants of settled studies and of those with starts, after the number of pendulums.
+_SETTLED_VARIANT, _STARTS_VARIANT = "-settled", "-starts"
+_INFOS: Final[dict[str, Callable[[int], tuple[ResultInfo, ...]]]] = {
+    "": result_infos, _SETTLED_VARIANT: settled_infos, _STARTS_VARIANT: started_infos,
+}  # fmt: skip
 
 _PENDULUM = re.compile(r"pendulums\.(\d+)\.")
 _COEFFICIENT = re.compile(r"(?:^|\.)clutch\.coefficients\.(\d+)$")
@@ -126,7 +141,7 @@ def _frequency(study: Study, case: int) -> float:
 def _mean_periods(study: Study) -> float:
     """Computed excitation periods per case, averaged over the study."""
     if is_settled(study.run):
-        return mean_periods(study.run)
+        return mean_periods(study.run) * count_of(study.run)
     periods = run_of(study.run).duration.in_periods(float(np.mean(_frequencies(study))))
     return periods + followed_periods(periods)
 
@@ -165,20 +180,23 @@ class VibrationDrive(Model):
         return (*PARAMETERS, CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT)
 
     def variants(self) -> tuple[str, ...]:
-        numbers = range(1, MAX_PENDULUMS + 1)
-        return (*map(str, numbers), *(f"{number}{_SETTLED_VARIANT}" for number in numbers))
+        return tuple(f"{number}{kind}" for kind in _INFOS for number in range(1, MAX_PENDULUMS + 1))
 
     def variant_of(self, study: Study) -> str:
-        return f"{pendulums(study)}{_SETTLED_VARIANT if is_settled(study.run) else ''}"
+        kind = _STARTS_VARIANT if has_starts(study.run) else _SETTLED_VARIANT if is_settled(study.run) else ""
+        return f"{pendulums(study)}{kind}"
 
     def results(self, variant: str) -> tuple[ResultInfo, ...]:
-        number = int(variant.removesuffix(_SETTLED_VARIANT))
-        return settled_infos(number) if variant.endswith(_SETTLED_VARIANT) else result_infos(number)
+        number, dash, kind = variant.partition("-")
+        return _INFOS[f"{dash}{kind}"](int(number))
+
+    def numbered_by(self, variant: str) -> str | None:
+        return NUMBER if variant.endswith(_STARTS_VARIANT) else None
 
     def result_catalogue(self) -> tuple[ResultInfo, ...]:
         # One pendulum represents all.
         one = "pendulums.0."
-        return tuple(replace(info, name=info.name.replace(one, "pendulums.N.")) for info in settled_infos(1))
+        return tuple(replace(info, name=info.name.replace(one, "pendulums.N.")) for info in started_infos(1))
 
     def shape_of(self, study: Study) -> KernelShape:
         return KernelShape(MODEL, DriveKey(pendulums(study), coefficients(study), run_of(study.run).tolerance))
@@ -200,6 +218,8 @@ class VibrationDrive(Model):
         from sprag.engine.vibration_drive.transients import simulate_judged
 
         number = _key_of(task.shape).pendulums
+        if has_starts(task.run):
+            return _run_starts(task, number)
         if is_settled(task.run):
             settled = settle(task.columns, settings_of(task.run), cases=task.count)
             flags = _flags(settled_infos(number), settled.values)
@@ -249,6 +269,9 @@ class VibrationDrive(Model):
             return settled_portrait(columns, settings_of(study.run))
         return portrait(columns, run_of(study.run))
 
+    def lanes_per_case(self, study: Study) -> int:
+        return count_of(study.run)
+
     def estimate_seconds_per_case(self, study: Study) -> float:
         from sprag.engine.vibration_drive.simulate import estimate_seconds
 
@@ -266,6 +289,18 @@ class VibrationDrive(Model):
         from sprag.engine.vibration_drive.simulate import warm_up
 
         warm_up(*_key_of(shape))
+
+
+def _run_starts(task: ChunkTask, number: int) -> ChunkResult:
+    """Every regime to which the starts of the cases come."""
+    from sprag.engine.vibration_drive.starts import settle_starts
+
+    found = settle_starts(task.columns, settings_of(task.run), further_starts(task.run), cases=task.count)
+    infos = started_infos(number)
+    own = chunk_result(task.first, found.endings, _flags(infos, found.values), found.values)
+    # Adding zero makes negative zeros positive, as in `chunk_result`.
+    further = FurtherRows(found.further, _flags(infos, found.further_values), found.further_values + 0.0)
+    return replace(own, further=further)
 
 
 def _not_laws(laws: NDArray[np.float64]) -> NDArray[np.bool_]:

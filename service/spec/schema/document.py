@@ -14,6 +14,7 @@ from sprag.service.spec.schema.axes import axes_schema, exclude_schema, path_sch
 from sprag.service.spec.schema.draws import tolerances_schema
 from sprag.service.spec.schema.plan import calibrate_schema, goal_schema, refine_schema
 from sprag.service.spec.schema.quantity import Schema, object_schema, without_numbers
+from sprag.service.spec.starts import starts_schema
 from sprag.worker import models
 from sprag.worker.limits import MAX_NAME_LENGTH
 
@@ -40,6 +41,7 @@ def spec_schema() -> Schema:
             "goal": goal_schema(path_schema()),
             "calibrate": calibrate_schema(path_schema()),
             "derive": derive_schema(),
+            "starts": starts_schema(),
             **tolerances_schema(),
         },
         required=("sprag", "model", "base"),

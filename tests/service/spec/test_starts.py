@@ -1,0 +1,93 @@
+"""The starts of a spec."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import jsonschema
+import pytest
+
+from sprag.service.spec.document import SpecError, parse_spec
+from sprag.service.spec.schema.document import spec_schema
+from sprag.worker import models
+from sprag.worker.models.starts import at_start
+from tests.service.spec_sample import SPEC
+
+SPEED, ANGLE = "shaft.initial_speed", "pendulums.0.initial_angle"
+
+
+def _spec(**starts: Any) -> dict[str, Any]:
+    spec = copy.deepcopy(SPEC)
+    spec.pop("run", None)
+    return {**spec, "starts": {"ranges": {SPEED: ["0 rad/s", "300 rpm"]}, **starts}}
+
+
+def test_starts_are_drawn_within_their_ranges() -> None:
+    spec = _spec(count=16, seed=3, ranges={SPEED: [0, 30], "pendulums.*.initial_angle": ["-10 deg", "10 deg"]})
+    study = parse_spec(spec).study
+    starts = study.run["starts"]
+    assert (starts["count"], starts["seed"]) == (16, 3)
+    assert {SPEED, ANGLE} <= starts["values"].keys() == starts["ranges"].keys()
+    for path, values in starts["values"].items():
+        low, high = starts["ranges"][path]
+        assert len(set(values)) == 15
+        assert low <= min(values) < max(values) <= high
+    assert starts["ranges"][ANGLE] == pytest.approx([-0.174533, 0.174533], abs=1e-6)
+    assert parse_spec(spec).study == study
+    assert parse_spec({**spec, "starts": {**spec["starts"], "seed": 4}}).study.run["starts"] != starts
+    assert models.variant_of(study).endswith("-starts")
+
+
+def test_the_number_and_the_seed_have_defaults() -> None:
+    starts = parse_spec(_spec()).study.run["starts"]
+    assert (starts["count"], starts["seed"], len(starts["values"][SPEED])) == (32, 1, 31)
+    assert starts["ranges"][SPEED] == pytest.approx([0.0, 31.415926535], abs=1e-6)
+
+
+def test_a_start_is_a_study_of_one_case() -> None:
+    study = parse_spec(_spec(count=4)).study
+    own, third = (at_start(study, 1, start) for start in (0, 3))
+    assert own.cases == third.cases == 1
+    assert "starts" not in own.run
+    assert own.base == {**study.base, **study.case_parameters(1)}
+    assert third.base == {**own.base, SPEED: study.run["starts"]["values"][SPEED][2]}
+    with pytest.raises(IndexError, match=r"0 \.\. 3"):
+        at_start(study, 1, 4)
+
+
+@pytest.mark.parametrize(
+    ("starts", "pointer", "code"),
+    [
+        ({"count": 1}, "/starts/count", "out-of-range"),
+        ({"count": 5000}, "/starts/count", "out-of-range"),
+        ({"seed": -1}, "/starts/seed", "out-of-range"),
+        ({"ranges": None}, "/starts/ranges", "required"),
+        ({"ranges": {}}, "/starts/ranges", "wrong-type"),
+        ({"ranges": {"shaft.load": [0, 1]}}, "/starts/ranges/shaft.load", "invalid-path"),
+        ({"ranges": {"pendulums.9.initial_angle": [0, 1]}}, "/starts/ranges/pendulums.9.initial_angle", "invalid-path"),
+        ({"ranges": {SPEED: [0]}}, f"/starts/ranges/{SPEED}", "wrong-type"),
+        ({"ranges": {SPEED: [3, 3]}}, f"/starts/ranges/{SPEED}", "invalid-range"),
+        ({"ranges": {SPEED: [-1, 3]}}, f"/starts/ranges/{SPEED}/0", "out-of-range"),
+        ({"ranges": {ANGLE: [0, 1], "pendulums.*.initial_angle": [0, 1]}},
+         "/starts/ranges/pendulums.*.initial_angle", "repeated"),
+        ({"many": 1}, "/starts/many", "unknown-field"),
+    ],
+)  # fmt: skip
+def test_faults_of_starts_name_their_place(starts: dict[str, Any], pointer: str, code: str) -> None:
+    with pytest.raises(SpecError) as error:
+        parse_spec(_spec(**starts))
+    assert [(fault.where, fault.code) for fault in error.value.faults] == [(pointer, code)]
+
+
+def test_a_run_of_a_given_time_has_no_starts() -> None:
+    with pytest.raises(SpecError) as error:
+        parse_spec({**_spec(), "run": {"duration": "10 periods"}})
+    assert [(fault.where, fault.code) for fault in error.value.faults] == [("/starts", "conflict")]
+
+
+def test_the_schema_accepts_starts() -> None:
+    check = jsonschema.Draft202012Validator(spec_schema())
+    assert check.is_valid(_spec(count=16))
+    assert not check.is_valid(_spec(count=1))
+    assert not check.is_valid(_spec(many=1))
