@@ -11,15 +11,21 @@ _FORMULA, _OWN, _SWITCHES = 0.1, 0.7, 1.0
 #: Additional time of a formula that may have a narrow peak. Measured: 2 for a width of 1 rad, 10 for 0.1 rad, 27 for
 #: 0.01 rad, 48 for 0.001 rad.
 _PEAK = 12.0
+#: Additional time of each part beyond the first.
+_PART = 0.2
 _SHARP = frozenset({"exp", "tanh", "sinh", "cosh", "atan"})
 
 
 def estimate_seconds(model: MachineSpec) -> float:
     """Rough time of one case on one core, in s."""
-    parts = (model.drive, model.mechanism, model.operation)
+    every = [part for _, part in model.every_part()]
+    parts = [model.drive, *(own for part in every for own in (part.mechanism, part.operation))]
     panels = PANELS * model.cycle + sum(len(part.table.rows) for part in parts if part.table is not None)
+    # Dead centres and kinks of each further part are cuts.
+    panels += 2 * model.cycle * (len(every) - 1)
     factor = 8.0 if model.balance == "motor" else _COST[model.mean_speed_is]
     factor += sum(_formula_cost(part.formula, model.constants) for part in parts if part.formula is not None)
+    factor += _PART * (len(every) - 1)
     return 1e-5 + factor * 7e-6 * panels
 
 

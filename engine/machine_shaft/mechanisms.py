@@ -107,8 +107,14 @@ class Mechanism(ABC):
         del values
         return None
 
-    def unassembled(self, values: Values) -> Floats:
+    def unassembled(self, values: Values, ahead: Floats | None = None) -> Floats:
         """First angle at which the mechanism cannot be assembled, in 0 .. 2 pi; NaN where it always can.
+
+        Parameters
+        ----------
+        values : mapping
+        ahead : array, shape (cases or 1, 1, 1), optional
+            The mechanism's angle is the returned one plus this, in rad.
 
         Returns
         -------
@@ -117,19 +123,22 @@ class Mechanism(ABC):
         with np.errstate(invalid="ignore", divide="ignore"):
             margins = [self.margin(values, angle) for angle in self.worst_angles(values)]
             least = np.minimum.reduce(np.broadcast_arrays(*margins))[:, 0, 0]
+        if ahead is not None and len(least) == 1:
+            least = np.broadcast_to(least, (len(ahead),))
         angle = np.full(len(least), np.nan)
         for case in np.nonzero(~(least > 1e-12))[0]:
             own = {name: value[case if len(value) > 1 else 0].reshape(1, 1, 1) for name, value in values.items()}
-            angle[case] = self._first_failure(own)
+            turned = 0.0 if ahead is None else float(np.mod(ahead.flat[case if len(ahead) > 1 else 0], 2.0 * np.pi))
+            angle[case] = self._first_failure(own, turned)
         return angle
 
-    def _first_failure(self, values: Values) -> float:
+    def _first_failure(self, values: Values, ahead: float) -> float:
         def fails(phi: Floats) -> NDArray[np.bool_]:
             with np.errstate(invalid="ignore", divide="ignore"):
-                margin = self.margin(values, phi.reshape(1, 1, -1))
+                margin = self.margin(values, phi.reshape(1, 1, -1) + ahead)
             return np.asarray(~np.broadcast_to(margin > 1e-12, (1, 1, phi.size))[0, 0])
 
-        worst = [float(np.mod(angle[0, 0, 0], 2.0 * np.pi)) for angle in self.worst_angles(values)]
+        worst = [float(np.mod(angle[0, 0, 0] - ahead, 2.0 * np.pi)) for angle in self.worst_angles(values)]
         grid = np.unique(np.concatenate([np.linspace(0.0, 2.0 * np.pi, _SCAN + 1), np.array(worst)]))
         failing = fails(grid)
         first = int(np.argmax(failing)) if failing.any() else 0

@@ -2,10 +2,18 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import chain
 
 from sprag.engine.catalogue import STANDARD_GRAVITY, Parameter
-from sprag.engine.machine_shaft.spec import MOVING, MachineSpec, MechanismKind, Stage
+from sprag.engine.machine_shaft.spec import (
+    MOVING,
+    MachineSpec,
+    MechanismKind,
+    OperationChoice,
+    PartChoice,
+    Stage,
+)
 
 _INF = math.inf
 _TURN = 2.0 * math.pi
@@ -112,8 +120,7 @@ _GAS = (
 )
 
 
-def _operation(spec: MachineSpec) -> tuple[Parameter, ...]:
-    operation = spec.operation
+def _operation(operation: OperationChoice, cycle: int) -> tuple[Parameter, ...]:
     if operation.quantity == "none":
         return ()
     scale = Parameter("operation.scale", "k", "1", -_ANY, _ANY, False, 1.0, "factor on the whole diagram")
@@ -123,13 +130,12 @@ def _operation(spec: MachineSpec) -> tuple[Parameter, ...]:
     if operation.form == "constant":
         own = Parameter("operation.value", "F", unit, -_ANY, _ANY, False, None, "resistance, the same at every angle")
         return (scale, own)
-    return (scale, *chain.from_iterable(_step(spec, k, unit) for k in range(operation.steps)))
+    return (scale, *chain.from_iterable(_step(operation, cycle, k, unit) for k in range(operation.steps)))
 
 
-def _step(spec: MachineSpec, index: int, unit: str) -> tuple[Parameter, ...]:
+def _step(operation: OperationChoice, cycle: int, index: int, unit: str) -> tuple[Parameter, ...]:
     p = f"operation.steps.{index}"
-    over_angle = spec.operation.over == "angle"
-    end, end_unit = (_TURN * spec.cycle, "rad") if over_angle else (1.0, "1")
+    end, end_unit = (_TURN * cycle, "rad") if operation.over == "angle" else (1.0, "1")
     return (
         Parameter(f"{p}.from", "from", end_unit, 0.0, end, False, None, "where the step begins"),
         Parameter(f"{p}.to", "to", end_unit, 0.0, end, False, None, "where the step ends"),
@@ -156,6 +162,19 @@ def _stage(index: int, kind: Stage) -> tuple[Parameter, ...]:
     if kind in {"gear", "worm"}:
         return (*turning, common[0])
     return (*turning, *common, Parameter(f"{p}.radius", "r", "m", 0.0, 1e3, False, 0.0, radius))
+
+
+_CRANK_ANGLE = Parameter(
+    "crank_angle", "alpha", "rad", -100.0, 100.0, False, 0.0, "angle of the part's crank at the shaft's angle 0"
+)
+
+
+def _part(prefix: str, part: PartChoice, cycle: int) -> tuple[Parameter, ...]:
+    """Parameters of a mechanism and its operation; with a crank angle where it is one of several."""
+    own = (*MECHANISM_PARAMETERS[part.mechanism.kind], *_operation(part.operation, cycle))
+    if not prefix:
+        return own
+    return tuple(replace(entry, path=prefix + entry.path) for entry in (_CRANK_ANGLE, *own))
 
 
 def _drive(spec: MachineSpec) -> tuple[Parameter, ...]:
@@ -191,8 +210,7 @@ def parameters(spec: MachineSpec) -> tuple[Parameter, ...]:
         ),
         *_drive(spec),
         *chain.from_iterable(_stage(index, kind) for index, kind in enumerate(spec.drive.stages)),
-        *MECHANISM_PARAMETERS[spec.mechanism.kind],
-        *_operation(spec),
+        *chain.from_iterable(_part(prefix, part, spec.cycle) for prefix, part in spec.every_part()),
         *(
             Parameter(f"constants.{name}", name, "1", -_ANY, _ANY, False, None, "constant of the formulas")
             for name in spec.constants

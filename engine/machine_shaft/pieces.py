@@ -48,28 +48,38 @@ class Formula:
         Values of its names beside ``phi`` and ``x``, each of shape (cases or 1, 1, 1).
     stroke : Stroke or None
         The stroke of which ``x`` is the fraction.
+    ahead : array, shape (cases or 1, 1, 1), optional
+        Its ``phi`` is the shaft's angle plus this one, in rad, counted over the ``cycle``; None: they are the same.
+    cycle : float
+        In rad.
     """
 
     part: Part
     expression: Expression
     constants: Mapping[str, Floats]
-    stroke: Stroke | None
+    stroke: Stroke | None = None
+    ahead: Floats | None = None
+    cycle: float = 2.0 * np.pi
 
     @property
     def cases(self) -> int:
         """1 if all cases share it."""
-        sizes = [len(value) for value in self.constants.values()]
+        sizes = [len(value) for value in (*self.constants.values(), *(() if self.ahead is None else (self.ahead,)))]
         if self.stroke is not None:
             sizes += [len(self.stroke.start), *(len(value) for value in self.stroke.values.values())]
         return max(sizes, default=1)
 
+    def own_angle(self, cases: Integers, phi: Floats) -> Floats:
+        """The formula's own angle at the angles ``phi`` (n, 1, m) of the shaft for the case of each row."""
+        return phi if self.ahead is None else np.asarray(np.mod(phi + _rows(self.ahead, cases), self.cycle))
+
     def ways(self, cases: Integers, phi: Floats) -> Floats | None:
-        """``x`` at ``phi`` (n, 1, m) for the case of each row; None if there is none."""
-        return None if self.stroke is None else self.stroke.take(cases).fraction(phi)
+        """``x`` there; None if there is none."""
+        return None if self.stroke is None else self.stroke.take(cases).fraction(self.own_angle(cases, phi))
 
     def variables(self, cases: Integers, phi: Floats) -> dict[str, tuple[Floats, Floats | float]]:
         """Variables of the expression there."""
-        names: dict[str, tuple[Floats, Floats | float]] = {"phi": (phi, 0.0)}
+        names: dict[str, tuple[Floats, Floats | float]] = {"phi": (self.own_angle(cases, phi), 0.0)}
         ways = self.ways(cases, phi)
         if ways is not None:
             names["x"] = (ways, 0.0)
@@ -159,6 +169,11 @@ def _errors(program: Program, formula: Formula, case: Integers, low: Floats, hig
     constants = [np.broadcast_to(_rows(value, case)[:, 0, 0], case.shape) for value in formula.constants.values()]
     columns = np.stack(constants, axis=1) if constants else np.empty((len(case), 0))
     ways = formula.ways(case, _nodes(low, high))
+    if formula.ahead is not None:
+        # A piece does not cross the end of the formula's own cycle, which is a cut.
+        middle = 0.5 * (low + high)
+        shift = formula.own_angle(case, middle[:, None, None])[:, 0, 0] - middle
+        low, high = low + shift, high + shift
     return program.over(low, high, columns, None if ways is None else ways[:, 0, :])
 
 

@@ -33,7 +33,8 @@ class ExpressionError(MachineError):
     position : int or None
         Position in the text, from 0; None where there is no single position.
     part : str
-        "mechanism", "drive" or "operation"; "" where only the text was checked.
+        "mechanism", "drive", "operation", or of one of several parts "parts.0.mechanism" and so on; "" where only
+        the text was checked.
     """
 
     def __init__(self, message: str, position: int | None, part: str = "") -> None:
@@ -59,17 +60,21 @@ class RelationError(MachineError):
 
 
 class AssemblyError(MachineError):
-    """The mechanism cannot be assembled at ``angle`` (rad); ``rule`` states the violated condition, if known."""
+    """The mechanism cannot be assembled at ``angle`` (rad); ``rule`` states the violated condition, if known.
+
+    ``prefix`` is that of its paths: ``parts.0.`` for the first of several.
+    """
 
     ending = Ending.CANNOT_ASSEMBLE
 
-    def __init__(self, angle: float, rule: str | None = None) -> None:
+    def __init__(self, angle: float, rule: str | None = None, prefix: str = "") -> None:
         why = rule or "its links do not reach each other there"
+        which = f" of {prefix.rstrip('.')}" if prefix else ""
         super().__init__(
-            f"The mechanism cannot be assembled at a shaft angle of {math.degrees(angle):.6g} deg: {why}. "
+            f"The mechanism{which} cannot be assembled at a shaft angle of {math.degrees(angle):.6g} deg: {why}. "
             "Change the dimensions."
         )
-        self.angle = angle
+        self.angle, self.prefix = angle, prefix
 
 
 class NegativeInertiaError(MachineError):

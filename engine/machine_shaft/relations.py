@@ -1,6 +1,6 @@
 """Checks of numbers that are individually in range but contradict each other; done before a base machine is solved."""
 
-from sprag.engine.machine_shaft.machine import Columns
+from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.operations import reachable_pressure
 from sprag.engine.machine_shaft.problems import RelationError
 from sprag.engine.machine_shaft.spec import MachineSpec
@@ -16,18 +16,11 @@ def check_relations(spec: MachineSpec, row: Columns) -> None:
         compressor reach; a step over the stroke that ends before it begins.
     """
     _check_stages(spec, row)
-    if spec.operation.quantity == "gas":
-        _check_gas(row)
-    elif spec.operation.form == "steps" and spec.operation.over == "stroke":
-        for k in range(spec.operation.steps):
-            first, last = (float(row.row(f"operation.steps.{k}.{end}")[0]) for end in ("from", "to"))
-            if last < first:
-                raise RelationError(
-                    f"operation.steps.{k}.to", last,
-                    f"a step over the stroke cannot end before it begins: this one begins at {first:.6g} and would "
-                    "never act; `during` selects the stroke",
-                    f">= {first:.6g} and <= 1",
-                )  # fmt: skip
+    for prefix, part in spec.every_part():
+        if part.operation.quantity == "gas":
+            _check_gas(row, f"{prefix}operation.gas.")
+        elif part.operation.form == "steps" and part.operation.over == "stroke":
+            _check_steps(row, f"{prefix}operation.steps.", part.operation.steps)
 
 
 def _check_stages(spec: MachineSpec, row: Columns) -> None:
@@ -37,9 +30,21 @@ def _check_stages(spec: MachineSpec, row: Columns) -> None:
             raise RelationError(path, 0.0, f"is needed for the speed of the {kind}, which has a mass", "> 0 m")
 
 
-def _check_gas(row: Columns) -> None:
+def _check_steps(row: Columns, prefix: str, steps: int) -> None:
+    for k in range(steps):
+        first, last = (float(row.row(f"{prefix}{k}.{end}")[0]) for end in ("from", "to"))
+        if last < first:
+            raise RelationError(
+                f"{prefix}{k}.to", last,
+                f"a step over the stroke cannot end before it begins: this one begins at {first:.6g} and would "
+                "never act; `during` selects the stroke",
+                f">= {first:.6g} and <= 1",
+            )  # fmt: skip
+
+
+def _check_gas(row: Columns, prefix: str) -> None:
     low, high, clearance, exponent = (
-        row.row(f"operation.gas.{name}") for name in ("suction_pressure", "discharge_pressure", "clearance", "exponent")
+        row.row(f"{prefix}{name}") for name in ("suction_pressure", "discharge_pressure", "clearance", "exponent")
     )
     most, least, wanted = float(reachable_pressure(low, clearance, exponent)[0]), float(low[0]), float(high[0])
     if least <= wanted <= most:
@@ -51,4 +56,4 @@ def _check_gas(row: Columns) -> None:
         f"volume is left, and the gas reaches {most:.6g} Pa at most"
     )
     allowed = f">= {least:.6g} Pa" + (f" and <= {most:.6g} Pa" if most < float("inf") else "")
-    raise RelationError("operation.gas.discharge_pressure", wanted, message, allowed)
+    raise RelationError(f"{prefix}discharge_pressure", wanted, message, allowed)

@@ -4,9 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine.machine_shaft.balance import largest_work
+from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.decomposition import Decomposition
-from sprag.engine.machine_shaft.machine import Columns, Machine
+from sprag.engine.machine_shaft.machine import Machine
 from sprag.engine.machine_shaft.panels import Panels
+from sprag.engine.machine_shaft.parts import ShaftPart
 from sprag.engine.machine_shaft.pieces import Part, Pieces, missed
 from sprag.engine.machine_shaft.spec import MachineSpec
 
@@ -42,8 +44,7 @@ def near_singular(machine: Machine, d: Decomposition, rough: Bools) -> Bools:
 
     Away from its singular positions a linkage moves smoothly: panels that were halved for anything else resolve it.
     """
-    mechanism = machine.mechanism
-    if mechanism is None or not mechanism.has_singular_positions:
+    if not _linkages(machine):
         return np.zeros(len(rough), dtype=np.bool_)
     wild = _wild_panels(machine, d.panels, len(rough))
     return np.asarray((wild & rough & (d.panels.half > 0.0)).any(axis=1))
@@ -54,7 +55,7 @@ def linkage_unresolved(machine: Machine, panels: Panels, cases: int, most: float
 
     The panels are halved for the linkage alone; in other cases they are halved for everything.
     """
-    if machine.mechanism is None or not machine.mechanism.has_singular_positions:
+    if not _linkages(machine):
         return np.zeros(cases, dtype=np.bool_)
     cuts = np.broadcast_to(panels.cuts, (cases, panels.cuts.shape[1]))
     while True:
@@ -67,16 +68,21 @@ def linkage_unresolved(machine: Machine, panels: Panels, cases: int, most: float
         cuts = np.concatenate([panels.cuts, panels.middles(wild & going[:, None])], axis=1)
 
 
+def _linkages(machine: Machine) -> list[ShaftPart]:
+    """The parts whose mechanism has singular positions."""
+    return [part for part in machine.parts if part.mechanism is not None and part.mechanism.has_singular_positions]
+
+
 def _wild_panels(machine: Machine, panels: Panels, cases: int) -> Bools:
-    """Panels that do not resolve the linkage's own motion, (cases, panels)."""
-    assert machine.mechanism is not None
-    with np.errstate(all="ignore"):
-        motion = machine.mechanism.motion(machine.mechanism_values, panels.angles)
+    """Panels that do not resolve the own motion of every linkage, (cases, panels)."""
     shape = (cases, *panels.angles.shape[1:])
     wild = np.zeros(shape[:2], dtype=np.bool_)
-    for values in (np.broadcast_to(motion.inertia, shape), np.broadcast_to(motion.way_slope, shape)):
+    for part in _linkages(machine):
         with np.errstate(all="ignore"):
-            wild |= ~_resolved(panels, values, 1e-11)
+            motion = part.motion(panels.angles)
+            assert motion is not None
+            for values in (np.broadcast_to(motion.inertia, shape), np.broadcast_to(motion.way_slope, shape)):
+                wild |= ~_resolved(panels, values, 1e-11)
     return wild
 
 

@@ -8,10 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.machine_shaft.balance import balanced, largest_work
+from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.decomposition import Decomposition, characteristics
 from sprag.engine.machine_shaft.drive_train import Train
 from sprag.engine.machine_shaft.flywheel import required_inertia
-from sprag.engine.machine_shaft.machine import Columns, Fields, Machine, check_structure
+from sprag.engine.machine_shaft.machine import Fields, Machine, check_structure
 from sprag.engine.machine_shaft.motor import LimitCycle, limit_cycle
 from sprag.engine.machine_shaft.panels import Panels
 from sprag.engine.machine_shaft.pieces import Pieces, pieces
@@ -138,8 +139,9 @@ def settle(spec: MachineSpec, columns: Columns, solved: Solved) -> Bools:
     ok = solved.endings == _CODE[Ending.OK]
     slow = ok & solved.slow.any(axis=1)
     lost = solved.rough.any(axis=1) | solved.unknown | (slow & (spec.balance == "motor"))
-    if spec.mechanism.kind == "formula":
-        lost |= ~np.isnan(Machine(spec, columns).inertia_jumps().angle)
+    if any(part.mechanism.kind == "formula" for _, part in spec.every_part()):
+        for jumps in Machine(spec, columns).inertia_jumps():
+            lost |= ~np.isnan(jumps.angle)
     negative = solved.endings == _CODE[Ending.NEGATIVE_INERTIA]
     singular = np.zeros_like(lost)
     if (lost | negative).any():
@@ -345,9 +347,12 @@ def check(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> None:
         raise problem
 
 
-def _problem(ending: Ending, result: Mapping[str, float], row: Columns, rule: str | None) -> MachineError | None:
+def _problem(
+    ending: Ending, result: Mapping[str, float], row: Columns, broken: tuple[str, str | None]
+) -> MachineError | None:
     if ending is Ending.CANNOT_ASSEMBLE:
-        return AssemblyError(float(result["assembly.angle"]), rule)
+        prefix, rule = broken
+        return AssemblyError(float(result["assembly.angle"]), rule, prefix)
     if ending is Ending.NEGATIVE_INERTIA:
         return NegativeInertiaError(float(result["inertia.min"]))
     if ending is Ending.UNBALANCED_WORK:

@@ -26,6 +26,7 @@ MOVING: frozenset[str] = frozenset({"screw_nut", "rack"})
 MAX_STAGES = 16
 MAX_STEPS = 32
 MAX_CONSTANTS = 32
+MAX_PARTS = 16
 REVOLUTIONS = (1, 2, 3)
 
 
@@ -91,6 +92,17 @@ class OperationChoice:
 
 
 @dataclass(frozen=True, slots=True)
+class PartChoice:
+    """A mechanism with its operation, one of several on a main shaft.
+
+    Its angle is ``phi + parts.N.crank_angle``, counted over the whole cycle, for the mechanism and the operation alike.
+    """
+
+    mechanism: MechanismChoice = field(default_factory=MechanismChoice)
+    operation: OperationChoice = field(default_factory=OperationChoice)
+
+
+@dataclass(frozen=True, slots=True)
 class MachineSpec:
     """A machine's structure.
 
@@ -102,8 +114,11 @@ class MachineSpec:
         Which mean of the speed the required mean speed and the irregularity refer to.
     balance : {"scale", "constant", "refuse", "motor"}
         How the work over a cycle is made zero.
-    drive, mechanism, operation :
-        Its parts.
+    drive : Drive
+    mechanism, operation :
+        Those of a machine without ``parts``.
+    parts : tuple of PartChoice
+        Several mechanisms on the shaft, each with its operation and at its crank angle; 1 to 16, or none.
     constants : tuple of str
         Names used in its formulas besides ``phi`` (and ``x``, the fraction of the stroke); given as ``constants.NAME``.
     phi_c : int, optional
@@ -118,33 +133,54 @@ class MachineSpec:
     operation: OperationChoice = field(default_factory=OperationChoice)
     constants: tuple[str, ...] = ()
     phi_c: int | None = None
+    parts: tuple[PartChoice, ...] = ()
+
+    def every_part(self) -> tuple[tuple[str, PartChoice], ...]:
+        """The mechanisms with their operations, each with the prefix of its paths: ``parts.0.``, or none for one."""
+        if not self.parts:
+            return (("", PartChoice(self.mechanism, self.operation)),)
+        return tuple((f"parts.{k}.", part) for k, part in enumerate(self.parts))
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that ``from_json`` reads."""
         data = asdict(self)
         data["constants"] = list(self.constants)
         data["drive"]["stages"] = list(self.drive.stages)
-        for part in ("drive", "mechanism", "operation"):
-            table = data[part]["table"]
-            if table is not None:
-                table["rows"] = [list(row) for row in table["rows"]]
+        parts = data.pop("parts")
+        if parts:
+            data["parts"] = list(parts)
+        for own in (data, *parts):
+            for name in _TABLED & set(own):
+                table = own[name]["table"]
+                if table is not None:
+                    table["rows"] = [list(row) for row in table["rows"]]
         return data
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> "MachineSpec":
         """The spec of ``to_json``'s data; TypeError where a field is unknown."""
-        parts = {"drive": Drive, "mechanism": MechanismChoice, "operation": OperationChoice}
-        fields = dict(data)
-        for name, part in parts.items():
-            if name in fields:
-                own = dict(fields[name])
-                if own.get("table") is not None:
-                    own["table"] = _table(own["table"])
-                if "stages" in own:
-                    own["stages"] = tuple(own["stages"])
-                fields[name] = part(**own)
+        fields = _choices(data)
         fields["constants"] = tuple(fields.get("constants", ()))
+        fields["parts"] = tuple(PartChoice(**_choices(part)) for part in fields.get("parts", ()))
         return cls(**fields)
+
+
+_CHOICES = {"drive": Drive, "mechanism": MechanismChoice, "operation": OperationChoice}
+_TABLED = frozenset(_CHOICES)
+
+
+def _choices(data: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields of ``data`` with drive, mechanism and operation as what they are."""
+    fields = dict(data)
+    for name, choice in _CHOICES.items():
+        if name in fields:
+            own = dict(fields[name])
+            if own.get("table") is not None:
+                own["table"] = _table(own["table"])
+            if "stages" in own:
+                own["stages"] = tuple(own["stages"])
+            fields[name] = choice(**own)
+    return fields
 
 
 def _table(data: Mapping[str, Any]) -> Table:

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sprag.engine.endings import ENDINGS, Ending
+from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.decomposition import Decomposition
-from sprag.engine.machine_shaft.machine import Columns, Machine, check_structure
+from sprag.engine.machine_shaft.machine import Machine, check_structure
 from sprag.engine.machine_shaft.panels import Points
 from sprag.engine.machine_shaft.simulate import attempts, settle
-from sprag.engine.machine_shaft.spec import MachineSpec
+from sprag.engine.machine_shaft.spec import LINKED, MachineSpec
 from sprag.engine.outcome import Trajectory
 
 Floats = NDArray[np.float64]
@@ -31,6 +32,20 @@ COLUMNS: tuple[tuple[str, str], ...] = (
     ("s3", "rad^2/s^2"),
     ("s4", "rad^2/s^2"),
 )
+
+
+#: Columns of each part of a machine of several, after its prefix ``parts.0.``; ``way`` where it has dimensions.
+_PART_COLUMNS: tuple[tuple[str, str], ...] = (("way", "m"), ("inertia", "kg*m^2"), ("resisting_torque", "N*m"))
+
+
+def columns_of(model: MachineSpec) -> tuple[tuple[str, str], ...]:
+    """Name and SI unit of each column of the tables of a machine."""
+    own = (
+        (f"{prefix}{name}", unit)
+        for prefix, part in model.every_part() if prefix
+        for name, unit in _PART_COLUMNS if name != "way" or part.mechanism.kind in LINKED
+    )  # fmt: skip
+    return (*COLUMNS, *own)
 
 
 def trajectory(model: MachineSpec, columns: Mapping[str, ArrayLike], angles: ArrayLike) -> Trajectory:
@@ -57,7 +72,8 @@ def trajectory(model: MachineSpec, columns: Mapping[str, ArrayLike], angles: Arr
         If an angle is outside the cycle, or a parameter is missing or unknown.
     """
     check_structure(model)
-    names, units = tuple(name for name, _ in COLUMNS), tuple(unit for _, unit in COLUMNS)
+    described = columns_of(model)
+    names, units = tuple(name for name, _ in described), tuple(unit for _, unit in described)
     asked = np.ascontiguousarray(angles, dtype=np.float64)
     cycle = 2.0 * np.pi * model.cycle
     if asked.size and not (asked.min() >= 0.0 and asked.max() <= cycle * (1.0 + 1e-12)):
@@ -77,6 +93,8 @@ def trajectory(model: MachineSpec, columns: Mapping[str, ArrayLike], angles: Arr
     if ending is not Ending.OK:
         return made(nothing[:, 0], nothing, ending)
     table = _table(solved.decomposition, model.phi_c, np.minimum(asked, cycle))
+    if model.parts:
+        table |= _part_table(Machine(model, row), solved.decomposition, np.minimum(asked, cycle))
     values = np.column_stack([table[name] for name in names])
     every = np.sort(np.mod(solved.decomposition.crossings.angle, cycle))
     return made(asked, values, ending, tuple(float(angle) for angle in every))
@@ -119,6 +137,22 @@ def _table(d: Decomposition, chosen: int | None, angles: Floats) -> dict[str, Fl
         "s3": 2.0 * works[0] / inertia,
         "s4": 2.0 * works[1] / inertia,
     }
+
+
+def _part_table(machine: Machine, d: Decomposition, angles: Floats) -> dict[str, Floats]:
+    """Travel, inertia and torque of each part."""
+    panels, cases = d.panels, np.zeros(len(angles), dtype=np.int64)
+    points = panels.locate(0, angles)
+    table = {}
+    for part in machine.parts:
+        fields, motion = part.fields(panels.angles), part.motion(panels.angles)
+        own = {"inertia": fields.inertia, "resisting_torque": fields.resistance}
+        if motion is not None:
+            own["way"] = motion.way
+        for name, values in own.items():
+            shaped = np.ascontiguousarray(np.broadcast_to(values, panels.angles.shape))
+            table[f"{part.prefix}{name}"] = panels.at_rows(shaped, cases, points)
+    return table
 
 
 def _time(d: Decomposition, cases: NDArray[np.int64], points: Points) -> Floats:

@@ -49,6 +49,14 @@ ABOUT: Final[dict[str, About]] = {
         "the gas itself as resistance: flywheel and irregularity against discharge pressure",
         "a workshop compressor of 100 mm bore and 80 mm stroke at 750 rpm",
     ),
+    "two_cylinder_compressor": About(
+        "two mechanisms on one shaft: irregularity against the angle between their cranks",
+        "two cylinders of the workshop compressor",
+    ),
+    "four_cylinder_engine": About(
+        "four mechanisms with the firing order 1-3-4-2, two revolutions a cycle: irregularity against the flywheel",
+        "a petrol engine of 80 mm bore and stroke with a compression ratio of 9 and 50 bar",
+    ),
     "conveyor": About(
         "irregularity caused by masses more than by work: a tray that rocks back and forth",
         "an oscillating conveyor of 30 mm of stroke at 300 strokes a minute with 150 kg",

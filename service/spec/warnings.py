@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,27 +81,37 @@ def warn_machine_shaft(report: Report, study: Study) -> None:
         )
     if structure["balance"] == "motor" and _values(study, "wanted_irregularity").size:
         report.warn("no-effect", "/base/wanted_irregularity: is not used: with a motor no required inertia is computed")
-    if structure["operation"]["quantity"] == "none" and structure["mechanism"]["kind"] == "none":
+    if all(
+        part["operation"]["quantity"] == "none" and part["mechanism"]["kind"] == "none" for _, part in _parts(study)
+    ):
         report.warn("nothing-acts", "/base: has neither a mechanism nor an operation, so the shaft turns evenly")
     _shaft_relations(report, study)
 
 
+def _parts(study: Study) -> list[tuple[str, dict[str, Any]]]:
+    """The mechanisms of a machine shaft with their operations: the prefix of their paths, and their structure."""
+    structure = study.structure or {}
+    several = structure.get("parts", ())
+    return [(f"parts.{k}.", part) for k, part in enumerate(several)] or [("", structure)]
+
+
 def _shaft_relations(report: Report, study: Study) -> None:
     """Warn of cases whose numbers are inconsistent; a base with such numbers is refused."""
-    operation = (study.structure or {})["operation"]
-    if operation["quantity"] == "gas":
-        _discharge(report, study)
-    elif operation.get("form") == "steps":
-        for k in range(operation["steps"]):
-            _turned_step(report, study, k, wraps=operation["over"] == "angle")
+    for prefix, part in _parts(study):
+        operation = part["operation"]
+        if operation["quantity"] == "gas":
+            _discharge(report, study, f"{prefix}operation.gas.")
+        elif operation.get("form") == "steps":
+            for k in range(operation["steps"]):
+                _turned_step(report, study, f"{prefix}operation.steps.{k}.", wraps=operation["over"] == "angle")
     _chosen_angle(report, study)
 
 
-def _discharge(report: Report, study: Study) -> None:
+def _discharge(report: Report, study: Study, prefix: str) -> None:
     names = ("suction_pressure", "discharge_pressure", "clearance", "exponent")
-    low, high, clearance, exponent, weight = _columns(study, [f"operation.gas.{name}" for name in names])
+    low, high, clearance, exponent, weight = _columns(study, [prefix + name for name in names])
     low, high, most = np.broadcast_arrays(low, high, machine_shaft.reachable_pressure(low, clearance, exponent))
-    where = _pointer(study, "operation.gas.discharge_pressure")
+    where = _pointer(study, f"{prefix}discharge_pressure")
     beyond, below = high > most, high < low
     if beyond.any():
         report.warn(
@@ -114,8 +124,8 @@ def _discharge(report: Report, study: Study) -> None:
         report.warn("no-compression", text + _share(below, weight))
 
 
-def _turned_step(report: Report, study: Study, index: int, *, wraps: bool) -> None:
-    paths = [f"operation.steps.{index}.{end}" for end in ("from", "to")]
+def _turned_step(report: Report, study: Study, prefix: str, *, wraps: bool) -> None:
+    paths = [prefix + end for end in ("from", "to")]
     first, last, weight = _columns(study, paths)
     turned = np.asarray(first > last)
     varied = [path for path in paths if path in study.column_paths]

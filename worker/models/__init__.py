@@ -14,7 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 from sprag.engine import ENGINE_VERSION, Ending, Run, Span
 from sprag.engine.catalogue import Parameter, ResultInfo
-from sprag.engine.machine_shaft.problems import ExpressionError, InsufficientInertiaError, MachineError, TableError
+from sprag.engine.machine_shaft.problems import (
+    AssemblyError,
+    ExpressionError,
+    InsufficientInertiaError,
+    MachineError,
+    TableError,
+)
 from sprag.engine.outcome import Engagements, Portrait, Trajectory
 from sprag.engine.run import MEANS_FROM_PERIODS
 from sprag.engine.sources import engine_folder, source_hash
@@ -71,6 +77,7 @@ __all__ = [
     "SETTLED",
     "VIBRATION_DRIVE",
     "WINDUP_OUT_OF_DATA",
+    "AssemblyError",
     "ChunkResult",
     "ChunkTask",
     "ClutchFit",

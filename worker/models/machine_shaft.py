@@ -18,6 +18,7 @@ from sprag.engine.machine_shaft.results import result_infos
 from sprag.engine.machine_shaft.spec import (
     LINKED,
     MAX_CONSTANTS,
+    MAX_PARTS,
     MAX_STAGES,
     MAX_STEPS,
     REVOLUTIONS,
@@ -25,6 +26,7 @@ from sprag.engine.machine_shaft.spec import (
     MachineSpec,
     MechanismChoice,
     OperationChoice,
+    PartChoice,
     Stage,
 )
 from sprag.engine.machine_shaft.tables import MAX_ROWS
@@ -45,6 +47,7 @@ if TYPE_CHECKING:
 __all__ = [
     "LINKED",
     "MAX_CONSTANTS",
+    "MAX_PARTS",
     "MAX_ROWS",
     "MAX_STAGES",
     "MAX_STEPS",
@@ -78,7 +81,8 @@ def spec_of(structure: Mapping[str, Any] | None) -> MachineSpec:
 def catalogue() -> tuple[Parameter, ...]:
     """Every parameter of any machine, with ``K`` for the number of a step and ``NAME`` for the name of a constant.
 
-    Where the unit depends on the machine, it is that of a force or of the shaft's angle.
+    Each part of a machine of several has the parameters of mechanisms and operations under ``parts.N.``. Where the unit
+    depends on the machine, it is that of a force or of the shaft's angle.
     """
     kinds: tuple[MechanismKind, ...] = ("slider_crank", "four_bar", "quick_return", "cam")
     every: list[MachineSpec] = [MachineSpec(cycle=max(REVOLUTIONS), constants=("NAME",))]
@@ -88,12 +92,14 @@ def catalogue() -> tuple[Parameter, ...]:
     every += [MachineSpec(mechanism=MechanismChoice(kind)) for kind in kinds]
     forms = (OperationChoice("force"), OperationChoice("force", "steps", steps=1), OperationChoice("gas"))
     every += [MachineSpec(cycle=max(REVOLUTIONS), operation=form) for form in forms]
+    every += [MachineSpec(parts=(PartChoice(),))]
     found: dict[str, Parameter] = {}
     for spec in every:
         for entry in _engine_parameters(spec):
             path = entry.path.replace(".steps.0.", ".steps.K.").replace(".stages.0.", ".stages.K.")
+            path = path.replace("parts.0.", "parts.N.")
             found.setdefault(path, replace(entry, path=path, help=entry.help + _REMARKS.get(path, "")))
-    order = ("mean_speed", "wanted_irregularity", "gravity", "drive", "mechanism", "operation", "constants")
+    order = ("mean_speed", "wanted_irregularity", "gravity", "drive", "mechanism", "operation", "parts", "constants")
     return tuple(sorted(found.values(), key=lambda entry: order.index(entry.path.split(".")[0])))
 
 
@@ -113,8 +119,14 @@ _REMARKS = {
 def parameters_of(structure: Mapping[str, Any]) -> dict[str, Parameter]:
     """Every numeric parameter of a machine of this structure, by path."""
     # Rows of tables are not parameters.
-    bare = {name: {**part, "table": None} if isinstance(part, dict) else part for name, part in structure.items()}
+    bare = _without_tables(structure)
+    if "parts" in structure:
+        bare["parts"] = [_without_tables(part) for part in structure["parts"]]
     return dict(_parameters(json.dumps(bare, sort_keys=True)))
+
+
+def _without_tables(structure: Mapping[str, Any]) -> Structure:
+    return {name: {**part, "table": None} if isinstance(part, dict) else part for name, part in structure.items()}
 
 
 @cache

@@ -22,14 +22,16 @@ _INDEX: Final = re.compile(r"\.(\d+)(?=\.|$)")
 
 def general_path(path: str) -> str:
     """``path`` with the catalogue's letters for its indices: ``pendulums.1.mass`` -> ``pendulums.N.mass``."""
-    return _INDEX.sub(lambda match: ".N" if path[: match.start()].endswith("pendulums") else ".K", path)
+    return _INDEX.sub(lambda match: ".N" if path[: match.start()].endswith(("pendulums", "parts")) else ".K", path)
 
 
 def model_parameter(model: str, path: str) -> Parameter | None:
     """The entry of ``model``'s catalogue for a flat path of a spec; None when there is no such parameter."""
     general = general_path(path)
-    # The clutch of one pendulum has the parameters of a common clutch.
-    wanted = {general, general.removeprefix("pendulums.N.")} if ".clutch." in general else {general}
+    # The clutch of one pendulum has the parameters of a common clutch, each part of a shaft those of the only one.
+    wanted = {general, general.removeprefix("parts.N.")}
+    if ".clutch." in general:
+        wanted.add(general.removeprefix("pendulums.N."))
     return next((entry for entry in model_of(model).parameters() if entry.path in wanted), None)
 
 

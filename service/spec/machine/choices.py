@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -31,6 +32,9 @@ _MEANINGS: Final = {
 }
 
 
+_PART: Final = re.compile(r"^parts\.[0-9]+\.")
+
+
 class Choice(NamedTuple):
     """One choice: its path in the base, the chosen value, and its meaning."""
 
@@ -56,12 +60,11 @@ def drive_choices(study: Study, spec: Mapping[str, Any]) -> Iterator[Choice]:
 def shaft_choices(study: Study, _: Mapping[str, Any]) -> Iterator[Choice]:
     """The structure of a machine shaft."""
     for path, text in _chosen(study.structure or {}):
-        yield Choice(path, text, _MEANINGS[path])
+        yield Choice(path, text, _MEANINGS[_PART.sub("", path)])
 
 
 def _chosen(structure: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    drive, mechanism, operation = (structure[name] for name in ("drive", "mechanism", "operation"))
-    cycle, phi_c = structure["cycle"], structure["phi_c"]
+    drive, cycle, phi_c = (structure[name] for name in ("drive", "cycle", "phi_c"))
     yield "cycle", f"{cycle} revolution{'s' if cycle > 1 else ''}"
     yield "mean_speed_is", structure["mean_speed_is"]
     yield "balance", structure["balance"]
@@ -72,6 +75,13 @@ def _chosen(structure: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield "drive.stages", ", ".join(drive["stages"])
     if drive["table"]:
         yield "drive.torque.interpolation", drive["table"]["interpolation"]
+    several = structure.get("parts", ())
+    for prefix, part in [(f"parts.{k}.", part) for k, part in enumerate(several)] or [("", structure)]:
+        for path, text in (*_mechanism_choices(part["mechanism"]), *_operation_choices(part["operation"])):
+            yield f"{prefix}{path}", text
+
+
+def _mechanism_choices(mechanism: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "mechanism", mechanism["kind"]
     if "quick_return" in mechanism:
         yield "mechanism.quick_return.kind", mechanism["quick_return"]
@@ -80,7 +90,6 @@ def _chosen(structure: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             yield f"mechanism.cam.{law}", mechanism[law]
     if mechanism.get("table"):
         yield "mechanism.interpolation", mechanism["table"]["interpolation"]
-    yield from _operation_choices(operation)
 
 
 def _operation_choices(operation: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

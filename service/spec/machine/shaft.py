@@ -21,19 +21,21 @@ from sprag.service.spec.machine.shaft_parts import (
     read_cycle,
     read_mechanism,
     read_operation,
+    read_parts,
 )
 from sprag.service.spec.report import Report, did_you_mean
 from sprag.worker import models
 from sprag.worker.models import machine_shaft
-from sprag.worker.models.parameters import general_path
+from sprag.worker.models.parameters import model_parameter
 
 FIELDS: Final = (
-    "cycle", "mean_speed", "mean_speed_is", "drive", "mechanism", "operation", "balance", "phi_c", "constants",
+    "cycle", "mean_speed", "mean_speed_is", "drive", "mechanism", "operation", "parts", "balance", "phi_c", "constants",
     "wanted_irregularity", "gravity",
 )  # fmt: skip
 _MEAN_HELP: Final = "which mean of the speed mean_speed and the irregularity refer to"
 MEAN_SPEED_IS: Final = choice("mean_speed_is", _MEAN_HELP, "midrange", "angle", "time", default="midrange")
-_INDEXED = re.compile(r"(operation\.steps|drive\.stages)\.([0-9]{1,9})\.")
+_INDEXED = re.compile(r"(?:parts\.[0-9]{1,9}\.)?(operation\.steps|drive\.stages)\.([0-9]{1,9})\.")
+_PART: Final = re.compile(r"parts\.([0-9]{1,9})\.")
 
 
 @dataclass
@@ -42,33 +44,36 @@ class ShaftMachine(Machine):
 
     Attributes
     ----------
-    places : "drive", "mechanism", "operation" -> JSON Pointer of its formula, its table, or the whole part
+    places : "drive", "mechanism", "operation", "parts.0.mechanism" and so on -> JSON Pointer of its formula, its table,
+        or the whole part
     """
 
     places: dict[str, str] = field(default_factory=dict)
 
     def assumed(self, path: str) -> bool:
         """Whether ``path`` may belong to a machine whose structure could not be read."""
-        return self.structure is None and any(
-            entry.path in {general_path(path), re.sub(r"^constants\..*", "constants.NAME", path)}
-            for entry in models.parameter_catalogue(models.MACHINE_SHAFT)
-        )
+        general = re.sub(r"^constants\..*", "constants.NAME", path)
+        return self.structure is None and model_parameter(models.MACHINE_SHAFT, general) is not None
 
     def why_not(self, path: str) -> str:
         """A sentence that explains why an axis cannot vary ``path``, and what it can vary."""
+        structure = self.structure or {}
+        several = structure.get("parts", ())
+        part = _PART.match(path)
+        if part and int(part[1]) >= len(several) > 0:
+            return f"there is no part {part[1]}: parts are numbered from 0 to {len(several) - 1}"
         item = _INDEXED.match(path)
         if item and self.structure is not None:
-            part = item[1].rpartition(".")[2]
+            name = item[1].rpartition(".")[2]
+            owner = several[int(part[1])] if part and several else structure
             counts = {
-                "steps": int(self.structure["operation"]["steps"]),
-                "stages": len(self.structure["drive"].get("stages", ())),
-            }
-            if int(item[2]) >= counts[part] > 0:
-                return f"there is no {part[:-1]} {item[2]}: {part} are numbered from 0 to {counts[part] - 1}"
+                "steps": int(owner["operation"]["steps"]), "stages": len(structure["drive"].get("stages", ())),
+            }  # fmt: skip
+            if int(item[2]) >= counts[name] > 0:
+                return f"there is no {name[:-1]} {item[2]}: {name} are numbered from 0 to {counts[name] - 1}"
         if path.startswith("constants.") and self.structure is not None:
             return "is not a constant of this machine" + did_you_mean(path, self.parameters)
-        catalogue = {entry.path for entry in models.parameter_catalogue(models.MACHINE_SHAFT)}
-        if general_path(path) in catalogue:
+        if model_parameter(models.MACHINE_SHAFT, path) is not None:
             return "is not a parameter of this machine, which has other parts" + did_you_mean(path, self.parameters)
         return super().why_not(path)
 
@@ -101,19 +106,31 @@ def _read_structure(report: Report, found: Mapping[str, Any], places: dict[str, 
     drive = read_drive(report, found.get("drive"), places)
     mechanism = read_mechanism(report, found.get("mechanism"), places)
     operation = read_operation(report, found.get("operation"), places)
+    several = [] if found.get("parts") is None else read_parts(report, found["parts"], places)
+    _refuse_both(report, found)
     cycle = read_cycle(report, found.get("cycle", 1))
     constants = read_constants(report, found.get("constants", {}))
     balance = read_balance(report, found, drive)
     mean = MEAN_SPEED_IS.read(report, "/base", found)
     before = report.found
     phi_c = None if found.get("phi_c") is None else PHI_C.read(report, "/base", found)
-    parts = (drive, mechanism, operation, cycle, constants, balance, mean)
+    parts = (drive, mechanism, operation, several, cycle, constants, balance, mean)
     if any(part is None for part in parts) or report.found > before:
         return None
-    return {
+    structure = {
         "cycle": cycle, "mean_speed_is": mean, "balance": balance, "drive": drive, "mechanism": mechanism,
         "operation": operation, "constants": constants, "phi_c": phi_c,
     }  # fmt: skip
+    return structure | {"parts": several} if several else structure
+
+
+def _refuse_both(report: Report, found: Mapping[str, Any]) -> None:
+    """Record a mechanism or an operation beside a list of parts."""
+    for name in ("mechanism", "operation"):
+        if found.get("parts") is not None and found.get(name) is not None:
+            allowed = f"{name} in each of the parts, or no parts"
+            report.fault(f"/base/{name}", "conflict", "cannot be given beside parts, which have their own", found[name],
+                         allowed=allowed)  # fmt: skip
 
 
 def _unused(report: Report, found: Mapping[str, Any], structure: Mapping[str, Any]) -> None:
@@ -129,7 +146,12 @@ def _unused(report: Report, found: Mapping[str, Any], structure: Mapping[str, An
             "scales a table or formula of the driving torque, but none is given",
             drive["scale"],
         )
-    operation = found.get("operation")
-    if isinstance(operation, Mapping) and structure["operation"]["over"] == "angle" and "during" in operation:
-        report.fault("/base/operation/during", "not-used", "selects strokes, but this diagram is over the angle",
-                       operation["during"], allowed='with `over` "stroke" only')  # fmt: skip
+    told = "selects strokes, but this diagram is over the angle"
+    owners = [("/base", found, structure)]
+    several = zip(found.get("parts") or (), structure.get("parts", ()), strict=True)
+    owners += [(f"/base/parts/{k}", given, own) for k, (given, own) in enumerate(several)]
+    for pointer, given, own in owners:
+        operation = given.get("operation")
+        if isinstance(operation, Mapping) and own["operation"]["over"] == "angle" and "during" in operation:
+            report.fault(f"{pointer}/operation/during", "not-used", told,
+                           operation["during"], allowed='with `over` "stroke" only')  # fmt: skip

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
 from typing import Any, Final, cast
 
 from sprag.service.faults import Code
 from sprag.service.spec.report import Report
 from sprag.worker.models import (
+    AssemblyError,
     Ending,
     ExpressionError,
     InsufficientInertiaError,
@@ -28,7 +29,6 @@ _POINTERS: Final[dict[Ending | None, str]] = {
     Ending.MOTOR_STALLED: "/base/drive/motor",
     Ending.MOTOR_OVERRUN: "/base/drive/motor",
 }
-_PARTS: Final = ("mechanism", "drive", "operation")
 _NEUTRAL: Final[dict[str, dict[str, Any]]] = {"drive": {}, "mechanism": {"kind": "none"}, "operation": {}}
 
 
@@ -73,13 +73,8 @@ def check_machine(
             raise NotCompiledError(shape)
         _load(shape)
     before = report.found
-    for part in _PARTS:
-        # Each part alone (an operation with its mechanism), so that a fault is reported at its place.
-        alone = {name: structure[name] if name in {part, "mechanism"} else _NEUTRAL[name] for name in _PARTS}
-        own = {**structure, **alone}
-        if part != "drive" and structure["balance"] == "motor":
-            own["balance"] = "constant"
-        _note(report, places[part], partial(machine_shaft.check_structure, own), structure[part].get("formula"))
+    for place, alone, formula in _alone(structure):
+        _note(report, places[place], partial(machine_shaft.check_structure, alone), formula)
         if report.found > before:
             return
     _note(report, "/base", partial(machine_shaft.check_structure, structure))
@@ -88,9 +83,8 @@ def check_machine(
     try:
         machine_shaft.check(structure, values)
     except ExpressionError as error:
-        report.fault(
-            places.get(error.part, "/base"), "invalid-formula", str(error), structure.get(error.part, {}).get("formula")
-        )
+        formula = _at(structure, error.part).get("formula") if error.part in places else None
+        report.fault(places.get(error.part, "/base"), "invalid-formula", str(error), formula)
     except InsufficientInertiaError as error:
         allowed = f"> {error.least_mean_speed:.6g} rad/s"
         report.fault("/base/mean_speed", "inertia-insufficient", str(error), error.asked, allowed=allowed, unit="rad/s")
@@ -99,12 +93,41 @@ def check_machine(
             "/base/" + error.path.replace(".", "/"), "conflict", str(error), error.value, allowed=error.allowed
         )
     except MachineError as error:
-        pointer = _POINTERS.get(error.ending)
-        if error.ending in {Ending.CANNOT_ASSEMBLE, Ending.NEAR_SINGULAR}:
-            pointer = places["mechanism"]
-        if error.ending is Ending.NEGATIVE_INERTIA and structure["mechanism"]["kind"] in {"table", "formula"}:
-            pointer = places["mechanism"]
-        report.fault(pointer or "/base", code_of(error), str(error))
+        report.fault(_pointer(error, structure, places), code_of(error), str(error))
+
+
+def _alone(structure: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any], Any]]:
+    """Each part by itself, an operation with its mechanism, so that a fault is reported at its place: the place, the
+    structure with nothing else, and the part's formula.
+    """
+    whole = {name: value for name, value in structure.items() if name != "parts"}
+    given = structure["balance"] if structure["balance"] != "motor" else "constant"
+    yield "drive", {**whole, "mechanism": _NEUTRAL["mechanism"], "operation": {}}, structure["drive"].get("formula")
+    owners = [(f"parts.{k}.", part) for k, part in enumerate(structure.get("parts", ()))] or [("", structure)]
+    for prefix, own in owners:
+        neutral = {**whole, **_NEUTRAL, "balance": given}
+        for name in ("mechanism", "operation"):
+            with_mechanism = {**neutral, "mechanism": own["mechanism"], name: own[name]}
+            yield f"{prefix}{name}", with_mechanism, own[name].get("formula")
+
+
+def _at(structure: Mapping[str, Any], place: str) -> Mapping[str, Any]:
+    """The part of a structure at a place such as "drive" or "parts.0.mechanism"."""
+    *owner, name = place.split(".")
+    found: Mapping[str, Any] = (structure["parts"][int(owner[1])] if owner else structure)[name]
+    return found
+
+
+def _pointer(error: MachineError, structure: Mapping[str, Any], places: Mapping[str, str]) -> str:
+    """Where the fault of a machine as a whole is reported."""
+    if isinstance(error, AssemblyError):
+        return places[f"{error.prefix}mechanism"]
+    only = "parts" not in structure
+    if only and error.ending is Ending.NEAR_SINGULAR:
+        return places["mechanism"]
+    if only and error.ending is Ending.NEGATIVE_INERTIA and structure["mechanism"]["kind"] in {"table", "formula"}:
+        return places["mechanism"]
+    return _POINTERS.get(error.ending) or "/base"
 
 
 def code_of(error: MachineError) -> Code:

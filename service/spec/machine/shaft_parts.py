@@ -45,6 +45,13 @@ OPERATION_CHOICES: Final = named(
     choice("during", _DURING, "forward", "return", "both", default="forward"),
     choice("sense", _SENSE, "resisting", "fixed", default="resisting"),
 )
+PARTS: Final = Listed(
+    "parts",
+    1,
+    machine_shaft.MAX_PARTS,
+    "several mechanisms on the shaft, each with its operation and at its crank angle",
+)
+PART_FIELDS: Final = ("crank_angle", "mechanism", "operation")
 STEPS: Final = Listed("steps", 1, machine_shaft.MAX_STEPS, "constant pieces; zero elsewhere")
 ROWS: Final = Listed("rows", 2, machine_shaft.MAX_ROWS)
 _NAME = re.compile(r"[A-Za-z_][A-Za-z_0-9]{0,39}")
@@ -107,25 +114,29 @@ def refuse_foreign(report: Report, pointer: str, found: Mapping[str, Any], own: 
             )
 
 
-def read_mechanism(report: Report, data: object, places: dict[str, str]) -> dict[str, Any] | None:
+def _place(prefix: str, name: str) -> str:
+    """JSON Pointer of a field of the base, or of one of its parts (``prefix`` "parts.0.")."""
+    return "/base/" + prefix.replace(".", "/") + name
+
+
+def read_mechanism(report: Report, data: object, places: dict[str, str], prefix: str = "") -> dict[str, Any] | None:
     """Read the mechanism: its kind and its non-numeric fields."""
-    places["mechanism"] = "/base/mechanism"
+    where = places[f"{prefix}mechanism"] = _place(prefix, "mechanism")
     if data is None:
         return {"kind": "none"}
-    found = read_object(report, "/base/mechanism", data, (*MECHANISMS, "interpolation"))
+    found = read_object(report, where, data, (*MECHANISMS, "interpolation"))
     if found is None:
         return None
-    kind = read_one(report, "/base/mechanism", found, MECHANISMS)
+    kind = read_one(report, where, found, MECHANISMS)
     if kind is None:
         return None
-    places["mechanism"] = pointer = join("/base/mechanism", kind)
+    places[f"{prefix}mechanism"] = pointer = join(where, kind)
     if kind in {"table", "formula"}:
-        diagram = read_diagram(report, "/base/mechanism", found, ANGLE, value_in("kg*m^2"))
+        diagram = read_diagram(report, where, found, ANGLE, value_in("kg*m^2"))
         return None if diagram is None else {"kind": kind, "table": diagram["table"], "formula": diagram["formula"]}
     if "interpolation" in found:
-        report.fault(
-            "/base/mechanism/interpolation", "not-used", "applies to a table, and there is none", found["interpolation"]
-        )
+        told = "applies to a table, and there is none"
+        report.fault(join(where, "interpolation"), "not-used", told, found["interpolation"])
     choices = MECHANISM_CHOICES[kind]
     own = read_object(report, pointer, found[kind], (*choices, *numbers_under(f"mechanism.{kind}.")))
     if own is None:
@@ -136,56 +147,67 @@ def read_mechanism(report: Report, data: object, places: dict[str, str]) -> dict
     return None if None in made.values() else made
 
 
-def read_operation(report: Report, data: object, places: dict[str, str]) -> dict[str, Any] | None:
+def read_operation(report: Report, data: object, places: dict[str, str], prefix: str = "") -> dict[str, Any] | None:
     """Read the operation: the resistance, its form and its variable."""
-    places["operation"] = "/base/operation"
+    where = places[f"{prefix}operation"] = _place(prefix, "operation")
     if data is None:
         return {"quantity": "none", "over": "angle", "steps": 0}
-    found = read_object(report, "/base/operation", data, (*FORMS, *OPERATION_CHOICES, "interpolation", "scale"))
+    found = read_object(report, where, data, (*FORMS, *OPERATION_CHOICES, "interpolation", "scale"))
     if found is None:
         return None
     if "gas" in found:
-        return _read_gas(report, found)
-    form = read_one(report, "/base/operation", found, FORMS)
+        return _read_gas(report, where, found)
+    form = read_one(report, where, found, FORMS)
     if form is None:
         return None
-    chosen = {name: field.read(report, "/base/operation", found) for name, field in OPERATION_CHOICES.items()}
+    chosen = {name: field.read(report, where, found) for name, field in OPERATION_CHOICES.items()}
     if None in chosen.values():
         return None
     operation: dict[str, Any] = {**chosen, "steps": 0}
-    places["operation"] = join("/base/operation", form)
+    places[f"{prefix}operation"] = join(where, form)
     if form == "value":
         return operation | {"form": "constant"}
     if form == "steps":
-        count = _read_steps(report, found["steps"])
+        count = _read_steps(report, join(where, "steps"), found["steps"])
         return None if count is None else operation | {"form": "steps", "steps": count}
     place = ANGLE if chosen["over"] == "angle" else _FRACTION
-    diagram = read_diagram(
-        report, "/base/operation", found, place, value_in("N" if chosen["quantity"] == "force" else "N*m")
-    )
+    diagram = read_diagram(report, where, found, place, value_in("N" if chosen["quantity"] == "force" else "N*m"))
     return None if diagram is None else operation | diagram
 
 
-def _read_gas(report: Report, found: Mapping[str, Any]) -> dict[str, Any] | None:
+def _read_gas(report: Report, where: str, found: Mapping[str, Any]) -> dict[str, Any] | None:
     foreign = [name for name in found if name not in {"gas", "scale"}]
     for name in foreign:
         report.fault(
-            join("/base/operation", name),
+            join(where, name),
             "not-used",
             "does not belong to a gas, which is compressed by the working part over the whole cycle",
             found[name],
             allowed="gas, scale",
         )
-    if foreign or read_object(report, "/base/operation/gas", found["gas"], numbers_under("operation.gas.")) is None:
+    if foreign or read_object(report, join(where, "gas"), found["gas"], numbers_under("operation.gas.")) is None:
         return None
     return {"quantity": "gas", "over": "angle", "steps": 0}
 
 
-def _read_steps(report: Report, data: object) -> int | None:
-    where, fields = "/base/operation/steps", numbers_under("operation.steps.K.")
+def _read_steps(report: Report, where: str, data: object) -> int | None:
+    fields = numbers_under("operation.steps.K.")
     steps = STEPS.read(report, where, data) or ()
     read = [read_object(report, join(where, k), item, fields) for k, item in enumerate(steps)]
     return None if not read or None in read else len(read)
+
+
+def read_parts(report: Report, data: object, places: dict[str, str]) -> list[dict[str, Any]] | None:
+    """Read the mechanisms of a machine of several with their operations; None, with the faults recorded, if any."""
+    before, parts = report.found, []
+    for index, item in enumerate(PARTS.read(report, "/base/parts", data) or ()):
+        found = read_object(report, join("/base/parts", index), item, PART_FIELDS)
+        if found is not None:
+            prefix = f"parts.{index}."
+            mechanism = read_mechanism(report, found.get("mechanism"), places, prefix)
+            operation = read_operation(report, found.get("operation"), places, prefix)
+            parts.append({"mechanism": mechanism, "operation": operation})
+    return None if report.found > before else parts
 
 
 def value_in(unit: str) -> Parameter:

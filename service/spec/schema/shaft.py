@@ -13,6 +13,7 @@ from sprag.service.spec.machine.shaft_parts import (
     MECHANISM_CHOICES,
     MECHANISMS,
     OPERATION_CHOICES,
+    PARTS,
     PHI_C,
     ROWS,
     STEPS,
@@ -34,10 +35,15 @@ _CONSTANTS: Final[Schema] = {
 }
 
 
+_PART: Final = "a mechanism with its operation; their angle is that of the shaft plus the crank angle"
+
+
 def shaft_schema() -> Schema:
     """Schema of `base` for machine shafts."""
     choices = {field.name: field.schema() for field in (MEAN_SPEED_IS, BALANCE, PHI_C)}
-    parts = {"drive": _drive(), "mechanism": _mechanism(), "operation": _operation()}
+    mechanism = {"mechanism": _mechanism(), "operation": _operation()}
+    part = object_schema({**quantities(numbers_under("parts.N.")), **mechanism}, description=_PART)
+    parts = {"drive": _drive(), **mechanism, "parts": PARTS.schema(part)}
     return object_schema(
         {"cycle": _CYCLE, **quantities(numbers_under("")), **choices, "constants": _CONSTANTS, **parts},
         required=("drive",),

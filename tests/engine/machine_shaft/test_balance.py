@@ -12,7 +12,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from sprag.engine.endings import Ending
-from sprag.engine.machine_shaft.machine import Columns, Machine
+from sprag.engine.machine_shaft.columns import Columns
+from sprag.engine.machine_shaft.machine import Machine
 from sprag.engine.machine_shaft.motor import motor_torque, steady_speed
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, Motor, OperationChoice
 from sprag.engine.machine_shaft.trajectory import trajectory

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.machine_shaft.machine import Columns, Machine
+from sprag.engine.machine_shaft.columns import Columns
+from sprag.engine.machine_shaft.machine import Machine
 from sprag.engine.machine_shaft.simulate import simulate
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MeanSpeed, MechanismChoice, OperationChoice
 from sprag.engine.machine_shaft.tables import Table

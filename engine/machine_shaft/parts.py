@@ -1,0 +1,229 @@
+"""A mechanism on the main shaft with its operation, at its crank angle: its inertia and its torques on the shaft.
+
+A machine has one such part or several. The angle of a part is that of the shaft plus its crank angle, counted over the
+whole cycle: the mechanism stands at that angle, and the diagram of the operation is read at it.
+"""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sprag.engine.machine_shaft.cams import Cam
+from sprag.engine.machine_shaft.columns import Columns
+from sprag.engine.machine_shaft.expressions import Expression
+from sprag.engine.machine_shaft.linkages import CrankShaper, FourBar, SliderCrank, Whitworth
+from sprag.engine.machine_shaft.mechanisms import Mechanism, Motion
+from sprag.engine.machine_shaft.operations import Operation, Stroke, every_revolution, formula_breaks
+from sprag.engine.machine_shaft.pieces import Formula
+from sprag.engine.machine_shaft.problems import TableError
+from sprag.engine.machine_shaft.spec import MechanismChoice, PartChoice
+from sprag.engine.machine_shaft.tables import Curve, periodic
+
+Floats = NDArray[np.float64]
+
+_TURN = 2.0 * np.pi
+
+
+def mechanism_of(choice: MechanismChoice) -> Mechanism | None:
+    """The mechanism with dimensions, or None for none, a table or a formula."""
+    if choice.kind == "slider_crank":
+        return SliderCrank()
+    if choice.kind == "four_bar":
+        return FourBar()
+    if choice.kind == "quick_return":
+        return Whitworth() if choice.quick_return == "whitworth" else CrankShaper()
+    return Cam(choice.rise, choice.fall) if choice.kind == "cam" else None
+
+
+def _inertia_curve(choice: MechanismChoice, revolutions: int) -> Curve | None:
+    table = choice.table
+    if choice.kind != "table" or table is None:
+        return None
+    for number, (row, following) in enumerate(pairwise(table.rows), start=1):
+        if row[0] == following[0]:
+            raise TableError(
+                f"Rows {number} and {number + 1} of the inertia both have {row[0]:g} rad, with {row[1]:g} and "
+                f"{following[1]:g} kg*m^2: only a torque may jump, not an inertia."
+            )
+    within_one = len(table.rows) > 0 and table.rows[-1][0] - table.rows[0][0] <= _TURN * (1.0 + 1e-9)
+    return periodic(table, _TURN if within_one else _TURN * revolutions)
+
+
+class PartFields(NamedTuple):
+    """A part at angles of the shaft; arrays that broadcast to (cases, panels, nodes).
+
+    Attributes
+    ----------
+    inertia, slope : arrays
+        I'' in kg*m^2 and dI''/dphi.
+    resistance : array
+        Torque of the operation, the weight and the spring on the shaft in N*m, negative where it resists.
+    """
+
+    inertia: Floats
+    slope: Floats
+    resistance: Floats
+
+
+class Jumps(NamedTuple):
+    """Jumps of the inertia, one a case: the angle in rad, and the values there in kg*m^2; NaN where there is none."""
+
+    angle: Floats
+    before: Floats
+    after: Floats
+
+    @classmethod
+    def none(cls, cases: int) -> "Jumps":
+        """No jump in any of the cases."""
+        return cls(*(np.full(cases, np.nan) for _ in range(3)))
+
+
+class ShaftPart:
+    """A mechanism with its operation, and the numbers of a block of cases.
+
+    Parameters
+    ----------
+    choice : PartChoice
+    prefix : str
+        Of the paths of its numbers: ``parts.0.``, or empty for the only one of a machine.
+    revolutions : int
+        Of a cycle.
+    columns : Columns
+        Of the machine.
+    """
+
+    def __init__(self, choice: PartChoice, prefix: str, revolutions: int, columns: Columns) -> None:
+        self.choice, self.prefix, self.cases = choice, prefix, columns.cases
+        self._revolutions, self.cycle = revolutions, _TURN * revolutions
+        self._ahead = columns.values[f"{prefix}crank_angle"] if prefix else None
+        self._gravity, self._constants = columns.values["gravity"], columns.under("constants.")
+        self.mechanism = mechanism_of(choice.mechanism)
+        self.values = columns.under(f"{prefix}mechanism.{choice.mechanism.kind}.")
+        self._curve = _inertia_curve(choice.mechanism, revolutions)
+        names, text = ("phi", *self._constants), choice.mechanism.formula or ""
+        self.inertia_formula = Expression(text, names) if choice.mechanism.kind == "formula" else None
+        self._stroke = None if self.mechanism is None else Stroke.of(self.mechanism, self.values)
+        own = columns.under(f"{prefix}operation.")
+        self._operation = Operation(choice.operation, revolutions, own, self._constants, self._stroke)
+
+    def own_angle(self, phi: Floats) -> Floats:
+        """Angle of the part, 0 .. cycle, at angles of the shaft."""
+        return phi if self._ahead is None else np.asarray(np.mod(phi + self._ahead, self.cycle))
+
+    def shaft_angle(self, own: Floats) -> Floats:
+        """Angle of the shaft, 0 .. cycle, at angles of the part (cases or 1, n)."""
+        return own if self._ahead is None else np.asarray(np.mod(own - self._ahead[:, 0, :], self.cycle))
+
+    def unassembled(self) -> Floats:
+        """First angle of the shaft at which the mechanism cannot be assembled, (cases,); NaN where it always can."""
+        if self.mechanism is None:
+            return np.full(self.cases, np.nan)
+        return np.broadcast_to(self.mechanism.unassembled(self.values, self._ahead), (self.cases,))
+
+    def broken_rule(self) -> str | None:
+        """The condition that the dimensions of the first case violate; None where its links are merely too short."""
+        return None if self.mechanism is None else self.mechanism.broken_rule(self.values)
+
+    def _environment(self, own: Floats) -> dict[str, tuple[Floats, Floats | float]]:
+        return {"phi": (own, np.ones(1)), **{name: (value, 0.0) for name, value in self._constants.items()}}
+
+    def breaks(self) -> list[Floats]:
+        """Angles of the shaft at which inertia or torque has a kink or a jump, (cases or 1, n); NaN is none."""
+        breaks = list(self._operation.breaks())
+        if self._stroke is not None and self.mechanism is not None:
+            own = [self._stroke.start, self._stroke.end, *self.mechanism.breaks(self.values)]
+            breaks += [every_revolution(angle, self._revolutions) for angle in own]
+        if self._curve is not None:
+            period = float(self._curve.knots[-1] - self._curve.knots[0])
+            repeats = round(self.cycle / period)
+            knots = np.mod(self._curve.knots, period)
+            breaks.append(np.concatenate([knots + period * k for k in range(repeats)])[None, :])
+        if self.inertia_formula is not None:
+            breaks += formula_breaks(self.inertia_formula, self._environment, self._revolutions)
+        if self._ahead is None:
+            return breaks
+        # A formula need not repeat itself: the end of the part's own cycle is a cut, too.
+        return [self.shaft_angle(angles) for angles in (*breaks, np.zeros((1, 1)))]
+
+    def formulas(self) -> list[Formula]:
+        """The formulas of its inertia and its resistance."""
+        own = (("inertia", self.inertia_formula), ("resistance", self._operation.expression))
+        return [
+            Formula(
+                "inertia" if field == "inertia" else "resistance", expression,
+                {name: value for name, value in self._constants.items() if name in expression.used},
+                self._stroke if "x" in expression.used else None, self._ahead, self.cycle,
+            )
+            for field, expression in own if expression is not None
+        ]  # fmt: skip
+
+    def motion(self, phi: Floats) -> Motion | None:
+        """The mechanism at angles of the shaft; None for one without dimensions."""
+        return None if self.mechanism is None else self.mechanism.motion(self.values, self.own_angle(phi))
+
+    def fields(self, phi: Floats) -> PartFields:
+        """Inertia and torque at angles of the shaft, shape (cases or 1, panels, nodes), none of them at a jump."""
+        own = self.own_angle(phi)
+        motion = None if self.mechanism is None else self.mechanism.motion(self.values, own)
+        inertia, slope = self._inertia(own, motion)
+        torque = self._operation.torque(own, None if motion is None else motion.way_slope)
+        return PartFields(inertia, slope, torque + self._carried(motion))
+
+    def _inertia(self, own: Floats, motion: Motion | None) -> tuple[Floats, Floats]:
+        if motion is not None:
+            return motion.inertia, motion.inertia_slope
+        if self._curve is not None:
+            return self._curve(own), self._curve.slope(own)
+        if self.inertia_formula is not None:
+            value, slope = self.inertia_formula.evaluate(self._environment(own))
+            return np.asarray(value), np.asarray(slope)
+        return np.zeros(1), np.zeros(1)
+
+    def _carried(self, motion: Motion | None) -> Floats:
+        """Torque of the weight and the spring on the working part."""
+        if motion is None or self.mechanism is None or self.mechanism.ram_mass is None:
+            return np.zeros(1)
+        own = self.values
+        force = own[self.mechanism.ram_mass] * self._gravity * np.sin(own["inclination"])
+        if self.choice.mechanism.kind == "cam":
+            force = force + own["spring_preload"] + own["spring_rate"] * motion.way
+        return np.asarray(-force * motion.way_slope)
+
+    def inertia_jumps(self, beside: Floats) -> Jumps:
+        """Where a formula of the inertia jumps first, within the cycle or from its end to its start.
+
+        Parameters
+        ----------
+        beside : array, shape (cases or 1, 1, 1)
+            Inertia in kg*m^2 that is added to that of the part.
+        """
+        jumps = Jumps.none(self.cases)
+        if self.inertia_formula is None:
+            return jumps
+        exact = self._inertia(np.array([[[0.0, self.cycle]]]), None)[0] + beside
+        angles = [np.zeros((1, 1))]
+        angles += [np.sort(found, axis=1)
+                   for found in formula_breaks(self.inertia_formula, self._environment, self._revolutions)]  # fmt: skip
+        for found in angles:
+            for column in range(found.shape[1]):
+                angle = found[:, column][:, None, None]
+                closing = np.minimum(angle, self.cycle - angle) < 1e-6
+                left, right = np.where(closing, self.cycle, angle), np.where(closing, 0.0, angle)
+                before, after = self._limits(left, right, beside)
+                # Smooth parts are compared directly; a root has an infinite slope at a kink, but no jump.
+                apart = np.abs(exact[..., :1] - exact[..., 1:]) > 1e-9 * np.abs(exact[..., :1])
+                least = np.where(closing & apart, 1e-9, 1e-6)
+                jump = np.abs(after - before) > least * np.maximum(np.abs(before), np.abs(after))
+                first = (jump & ~np.isnan(angle))[:, 0, 0] & ~(jumps.angle <= angle[:, 0, 0])
+                for kept, value in ((jumps.angle, angle), (jumps.before, before), (jumps.after, after)):
+                    kept[first] = np.broadcast_to(value[:, 0, 0], first.shape)[first]
+        return jumps
+
+    def _limits(self, left: Floats, right: Floats, beside: Floats) -> tuple[Floats, Floats]:
+        """Inertia as the part's angle comes to ``left`` from below and to ``right`` from above; all (cases, 1, 1)."""
+        near = 1e-12 * self.cycle
+        with np.errstate(all="ignore"):
+            (below, rise), (above, fall) = self._inertia(left - near, None), self._inertia(right + near, None)
+            return (below + beside) + near * rise, (above + beside) - near * fall

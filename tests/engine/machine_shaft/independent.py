@@ -1,0 +1,323 @@
+"""Machines of several parts computed in another way: complex steps through positions, own quadrature, own root search.
+
+Nothing of the engine is used: a machine is plain data, made by `random_machine`, and `solve` gives the results that a
+test compares. Velocities are imaginary parts of positions at complex angles, so no derivative is derived by hand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, minimize_scalar
+
+Array = NDArray[Any]
+TURN = 2.0 * math.pi
+_STEP = 1e-30
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
+
+
+@dataclass
+class PartData:
+    """A mechanism with its dimensions, and an operation with its numbers, at a crank angle (rad)."""
+
+    kind: str
+    dimensions: dict[str, float]
+    angle: float
+    operation: str = "none"
+    load: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass
+class MachineData:
+    """Parts on a shaft with an inertia (kg*m^2), a mean speed (midrange, rad/s) and the revolutions of a cycle."""
+
+    parts: list[PartData]
+    inertia: float
+    speed: float
+    cycle: int
+    gravity: float = 9.80665
+
+
+#: Mass, inertia, and at each angle the centre's x and y and a direction (x, y) fixed to the body.
+Body = tuple[float, float, Array, Array, Array, Array]
+
+
+def _rod_and_ram(v: dict[str, float], x: Array, y: Array) -> tuple[list[Body], Array]:
+    """Rod and ram of a pin at (x, y), and the ram's place."""
+    along = np.sqrt(v["rod"] ** 2 - (y - v["offset"]) ** 2)
+    cos, sin = along / v["rod"], (v["offset"] - y) / v["rod"]
+    ram = x + along
+    rod = (v["rod_mass"], v["rod_inertia"], x + v["rod_centre"] * cos, y + v["rod_centre"] * sin, cos, sin)
+    return [rod, (v["ram_mass"], 0.0, ram, v["offset"] + 0.0 * y, 1.0 + 0.0 * x, 0.0 * x)], ram
+
+
+def _slider_crank(v: dict[str, float], p: Array) -> tuple[list[Body], Array]:
+    bodies, ram = _rod_and_ram(v, v["crank"] * np.cos(p), v["crank"] * np.sin(p))
+    return bodies, -ram
+
+
+def _quick_return(v: dict[str, float], p: Array) -> tuple[list[Body], Array]:
+    x, y = v["crank"] * np.cos(p), v["crank"] * np.sin(p)
+    length = np.sqrt(x**2 + (y + v["pivot_distance"]) ** 2)
+    cos, sin = x / length, (y + v["pivot_distance"]) / length
+    bodies, ram = _rod_and_ram(v, v["link_arm"] * cos, v["link_arm"] * sin)
+    link = (0.0, v["link_inertia"], 0.0 * x, 0.0 * x, cos, sin)
+    return [*bodies, link, (v["block_mass"], 0.0, x, y, cos, sin)], -ram
+
+
+def _four_bar(v: dict[str, float], p: Array) -> tuple[list[Body], Array]:
+    """The way is no position but the arc: its derivative is taken of the direction, in `way_slope`."""
+    x, y = v["crank"] * np.cos(p), v["crank"] * np.sin(p)
+    gap_x, gap_y = v["frame"] - x, -y
+    distance = np.sqrt(gap_x**2 + gap_y**2)
+    along = (v["coupler"] ** 2 - v["rocker"] ** 2 + distance**2) / (2.0 * distance)
+    across = np.sqrt(v["coupler"] ** 2 - along**2)
+    pin_x = x + (gap_x * along - gap_y * across) / distance
+    pin_y = y + (gap_y * along + gap_x * across) / distance
+    cos, sin = (pin_x - x) / v["coupler"], (pin_y - y) / v["coupler"]
+    s = v["coupler_centre"]
+    coupler = (v["coupler_mass"], v["coupler_inertia"], x + s * cos, y + s * sin, cos, sin)
+    swing = ((pin_x - v["frame"]) / v["rocker"], pin_y / v["rocker"])
+    return [coupler, (v["tray_mass"], v["rocker_inertia"], pin_x, pin_y, *swing)], 0.0 * x
+
+
+_POSITIONS: dict[str, Callable[[dict[str, float], Array], tuple[list[Body], Array]]] = {
+    "slider_crank": _slider_crank, "quick_return": _quick_return, "four_bar": _four_bar,
+}  # fmt: skip
+
+
+def _turning(body: Body) -> Array:
+    """Angular velocity of a body per that of the shaft."""
+    cos, sin = body[4], body[5]
+    return np.asarray((cos.real * sin.imag - sin.real * cos.imag) / _STEP)
+
+
+def inertia(part: PartData, phi: Array) -> Array:
+    """Reduced inertia of a part at angles of the shaft, kg*m^2."""
+    bodies, _ = _POSITIONS[part.kind](part.dimensions, phi + part.angle + 1j * _STEP)
+    total = np.zeros(phi.shape)
+    for body in bodies:
+        mass, own, x, y = body[:4]
+        total += mass * (x.imag**2 + y.imag**2) / _STEP**2 + own * _turning(body) ** 2
+    return total
+
+
+def way_slope(part: PartData, phi: Array) -> Array:
+    """Travel of the working part per angle, in m/rad."""
+    bodies, way = _POSITIONS[part.kind](part.dimensions, phi + part.angle + 1j * _STEP)
+    if part.kind == "four_bar":
+        return np.asarray(-part.dimensions["rocker"] * _turning(bodies[1]))
+    return np.asarray(way.imag / _STEP)
+
+
+def _gas(part: PartData, phi: Array) -> Array:
+    """Pressure on the piston of a compressor above that on its back, Pa."""
+    load, stroke = part.load, _stroke(part)
+    way = _POSITIONS[part.kind](part.dimensions, phi + part.angle + 0j)[1].real
+    x, c, n = np.clip((way - stroke[0]) / (stroke[1] - stroke[0]), 0.0, 1.0), load["clearance"], load["exponent"]
+    expanding = np.maximum(load["suction_pressure"], load["discharge_pressure"] * (c / (c + x)) ** n)
+    compressing = np.minimum(load["discharge_pressure"], load["suction_pressure"] * ((1.0 + c) / (c + x)) ** n)
+    return np.asarray(np.where(way_slope(part, phi) > 0.0, expanding, compressing) - load["back_pressure"])
+
+
+def _stroke(part: PartData) -> tuple[float, float]:
+    """Least and largest travel of the working part."""
+    ends = [_POSITIONS[part.kind](part.dimensions, np.array([z + part.angle + 0j]))[1].real[0] for z in dead(part)]
+    return min(ends), max(ends)
+
+
+def dead(part: PartData) -> list[float]:
+    """Angles of the shaft, 0 .. 2 pi, at which the working part turns back."""
+    return _zeros(lambda phi: way_slope(part, phi), TURN)
+
+
+def _zeros(function: Callable[[Array], Array], end: float) -> list[float]:
+    grid = np.linspace(0.0, end, 721) + 1e-5
+    values = function(grid)
+    changes = np.nonzero(np.sign(values[1:]) != np.sign(values[:-1]))[0]
+    return [brentq(lambda p: float(function(np.array([p]))[0]), grid[k], grid[k + 1], xtol=1e-15) for k in changes]
+
+
+def resistance(part: PartData, phi: Array, machine: MachineData) -> Array:
+    """Torque of a part on the shaft, N*m."""
+    slope, load = way_slope(part, phi), part.load
+    torque = np.zeros(phi.shape)
+    if "inclination" in part.dimensions:
+        weight = part.dimensions["ram_mass"] * machine.gravity * math.sin(part.dimensions["inclination"])
+        torque -= weight * slope
+    if part.operation == "step":
+        own = np.mod(phi + part.angle - load["from"], TURN * machine.cycle)
+        torque -= np.where(own < load["to"] - load["from"], load["value"], 0.0)
+    elif part.operation == "resisting":
+        torque -= load["value"] * np.abs(slope)
+    elif part.operation == "gas":
+        torque += _gas(part, phi) * load["piston_area"] * slope
+    return torque
+
+
+def _cuts(machine: MachineData) -> Array:
+    """Angles between which inertia and torques are smooth."""
+    end, cuts = TURN * machine.cycle, [np.linspace(0.0, TURN * machine.cycle, 72 * machine.cycle + 1)]
+    for part in machine.parts:
+        own: list[float] = []
+        if part.operation in {"resisting", "gas"}:
+            own += dead(part)
+        if part.operation == "gas":
+            load, (low, high) = part.load, _stroke(part)
+            ratio = (load["discharge_pressure"] / load["suction_pressure"]) ** (1.0 / load["exponent"])
+            c = load["clearance"]
+            for x in (c * (ratio - 1.0), (1.0 + c) / ratio - c):
+                place = low + x * (high - low)
+                own += _zeros(lambda p, part=part, place=place: _POSITIONS[part.kind](
+                    part.dimensions, p + part.angle + 0j)[1].real - place, TURN)  # fmt: skip
+        cuts += [np.array([angle + TURN * k for angle in own for k in range(machine.cycle)])]
+        if part.operation == "step":
+            cuts += [np.mod(np.array([part.load["from"], part.load["to"]]) - part.angle, end)]
+    return np.unique(np.clip(np.concatenate(cuts), 0.0, end))
+
+
+def solve(machine: MachineData) -> dict[str, float]:
+    """Results of the machine with a constant driving torque that balances the resistance."""
+    cuts = _cuts(machine)
+    cuts = cuts[np.concatenate([[True], np.diff(cuts) > 1e-12])]
+    end = TURN * machine.cycle
+
+    def resisting(phi: Array) -> Array:
+        return np.asarray(sum(resistance(part, phi, machine) for part in machine.parts))
+
+    def whole(phi: Array) -> Array:
+        return np.asarray(machine.inertia + sum(inertia(part, phi) for part in machine.parts))
+
+    def work(low: Array, high: Array) -> Array:
+        half = 0.5 * (high - low)
+        nodes = (low + half)[..., None] + half[..., None] * _NODES
+        return np.asarray((half[..., None] * _WEIGHTS * (resisting(nodes) + drive)).sum(axis=-1))
+
+    drive = 0.0
+    pieces = work(cuts[:-1], cuts[1:])
+    against = float(pieces.sum())
+    drive = -against / end
+    pieces = work(cuts[:-1], cuts[1:])
+    sums = np.concatenate([[0.0], np.cumsum(pieces)])
+
+    # Samples in every piece: the work to them, and the inertia there.
+    shares = np.linspace(0.0, 1.0, 13)[:-1]
+    low, width = cuts[:-1, None], np.diff(cuts)[:, None]
+    angles = low + width * shares
+    works = sums[:-1, None] + work(np.broadcast_to(low, angles.shape), angles)
+    inertias = whole(angles)
+
+    def at(k: int, phi: float) -> tuple[float, float]:
+        own = sums[k] + float(work(np.array(cuts[k]), np.array(phi)))
+        return own, float(whole(np.array([phi]))[0])
+
+    def extreme(sign: float, score: Callable[[Any, Any], Any]) -> float:
+        """Largest value of ``sign`` times a function of work and inertia."""
+        flat = int(np.argmax(sign * score(works, inertias)))
+        found = sign * float(score(works.flat[flat], inertias.flat[flat]))
+        middle, step = angles.flat[flat], float(width[flat // len(shares), 0]) / len(shares)
+        for low_end, high_end in ((middle - step, middle), (middle, middle + step)):
+            k = int(np.clip(np.searchsorted(cuts, 0.5 * (low_end + high_end)) - 1, 0, len(cuts) - 2))
+            bounds = max(low_end, 0.0), min(high_end, end)
+            if bounds[1] > bounds[0]:
+                best = minimize_scalar(lambda p, k=k: -sign * score(*at(k, p)), bounds=bounds, method="bounded",
+                                       options={"xatol": 1e-11})  # fmt: skip
+                found = max(found, -float(best.fun))
+        return sign * found
+
+    def speeds(start: float) -> tuple[float, float]:
+        return tuple(math.sqrt(extreme(sign, lambda w, i: 2.0 * (start + w) / i)) for sign in (1.0, -1.0))  # type: ignore[return-value]
+
+    least = -float(works.min())
+    guess = 0.5 * machine.speed**2 * float(inertias.mean())
+    start = brentq(lambda t: sum(speeds(t)) - 2.0 * machine.speed, least + 1e-3 * guess, least + 4.0 * guess,
+                   xtol=1e-12 * guess, rtol=1e-14)  # fmt: skip
+    fastest, slowest = speeds(start)
+    return {
+        "omega.max": fastest,
+        "omega.min": slowest,
+        "irregularity": 2.0 * (fastest - slowest) / (fastest + slowest),
+        "drive_torque.mean": drive,
+        "work.resistance": against,
+        "energy.fluctuation": extreme(1.0, lambda w, _: w) - extreme(-1.0, lambda w, _: w),
+        "inertia.max": extreme(1.0, lambda _, i: i),
+        "inertia.min": extreme(-1.0, lambda _, i: i),
+    }
+
+
+def random_machine(rng: np.random.Generator) -> MachineData:
+    """A machine of two to five parts of any kind, with an even speed that no irregularity of its inertia stops."""
+    cycle = int(rng.integers(1, 3))
+    parts = [_random_part(rng, cycle) for _ in range(int(rng.integers(2, 6)))]
+    probe = MachineData(parts, 0.0, 1.0, cycle)
+    angles = np.linspace(0.0, TURN * cycle, 721)
+    mechanisms = np.asarray(sum(inertia(part, angles) for part in parts))
+    torque = np.asarray(sum(resistance(part, angles, probe) for part in parts))
+    work = np.cumsum(torque - torque.mean()) * (angles[1] - angles[0])
+    flywheel = float(rng.uniform(0.5, 3.0) * (np.ptp(mechanisms) + 0.1))
+    speed = math.sqrt(float(np.ptp(work)) / (flywheel * float(rng.uniform(0.05, 0.3)))) + 1.0
+    return MachineData(parts, flywheel, speed, cycle)
+
+
+def _random_part(rng: np.random.Generator, cycle: int) -> PartData:
+    kind = str(rng.choice(list(_RANDOM)))
+    part = PartData(kind, _RANDOM[kind](rng), float(rng.uniform(-TURN, TURN)))
+    choices = ["none", "step", "resisting"] + (["gas"] if kind in {"slider_crank", "quick_return"} else [])
+    part.operation = str(rng.choice(choices))
+    if part.operation == "step":
+        low = float(rng.uniform(0.0, TURN * cycle - 1.5))
+        part.load = {"from": low, "to": low + float(rng.uniform(0.2, 1.4)), "value": float(rng.uniform(-200.0, 800.0))}
+    elif part.operation == "resisting":
+        part.load = {"value": float(rng.uniform(100.0, 3000.0))}
+    elif part.operation == "gas":
+        part.load = {
+            "piston_area": float(rng.uniform(2e-3, 2e-2)), "suction_pressure": 1e5, "back_pressure": 101325.0,
+            "discharge_pressure": float(rng.uniform(2e5, 8e5)), "clearance": float(rng.uniform(0.03, 0.1)),
+            "exponent": float(rng.uniform(1.1, 1.4)),
+        }  # fmt: skip
+    return part
+
+
+def _rod(rng: np.random.Generator, length: float) -> dict[str, float]:
+    return {
+        "rod": length, "rod_centre": float(rng.uniform(0.2, 0.6)) * length, "rod_mass": float(rng.uniform(0.0, 5.0)),
+        "rod_inertia": float(rng.uniform(0.0, 0.1)), "ram_mass": float(rng.uniform(0.5, 20.0)),
+        "inclination": float(rng.uniform(-math.pi, math.pi)),
+    }  # fmt: skip
+
+
+def _random_slider_crank(rng: np.random.Generator) -> dict[str, float]:
+    crank = float(rng.uniform(0.03, 0.2))
+    rod = crank * float(rng.uniform(2.5, 5.0))
+    return {"crank": crank, "offset": float(rng.uniform(-0.3, 0.3)) * (rod - crank), **_rod(rng, rod)}
+
+
+def _random_quick_return(rng: np.random.Generator) -> dict[str, float]:
+    crank = float(rng.uniform(0.05, 0.2))
+    pivot = crank * float(rng.uniform(0.1, 0.5))
+    return {
+        "crank": crank, "pivot_distance": pivot, "link_arm": 0.8 * crank, "offset": 0.1 * crank,
+        "link_inertia": float(rng.uniform(0.0, 0.5)), "block_mass": float(rng.uniform(0.0, 3.0)),
+        **_rod(rng, 3.0 * crank),
+    }  # fmt: skip
+
+
+def _random_four_bar(rng: np.random.Generator) -> dict[str, float]:
+    crank = float(rng.uniform(0.03, 0.15))
+    coupler, rocker = crank * float(rng.uniform(3.0, 4.0)), crank * float(rng.uniform(2.2, 2.8))
+    return {
+        "crank": crank, "coupler": coupler, "rocker": rocker, "frame": coupler * float(rng.uniform(0.95, 1.05)),
+        "coupler_centre": float(rng.uniform(0.2, 0.8)) * coupler, "coupler_mass": float(rng.uniform(0.0, 5.0)),
+        "coupler_inertia": float(rng.uniform(0.0, 0.1)), "rocker_inertia": float(rng.uniform(0.0, 0.3)),
+        "tray_mass": float(rng.uniform(0.0, 10.0)),
+    }  # fmt: skip
+
+
+_RANDOM: dict[str, Callable[[np.random.Generator], dict[str, float]]] = {
+    "slider_crank": _random_slider_crank, "quick_return": _random_quick_return, "four_bar": _random_four_bar,
+}  # fmt: skip
