@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine.machine_shaft.fluctuation import energy_coefficient, harmonics, shares
 from sprag.engine.machine_shaft.machine import Fields
 from sprag.engine.machine_shaft.panels import Crossings, Extremes, Panels, Points
 from sprag.engine.machine_shaft.start import Shape
@@ -46,6 +47,8 @@ class Decomposition:
     squares : array, shape (cases, panels, nodes)
         omega^2 at the nodes.
     mean_energy, least_energy, largest_energy : arrays, shape (cases,)
+    most_work : array, shape (cases,)
+        Largest work, in J, that drive or resistance has done at any angle since 0.
     crossings : Crossings
         All angles at which T = T_mean.
     phi_c : Points
@@ -64,8 +67,8 @@ class Decomposition:
         self.least_energy = start + self.work_extremes.lowest
         self.largest_energy = start + self.work_extremes.highest
         # Works that cancel at every angle leave rounding errors, whose angles are meaningless.
-        most = np.maximum(self.drive.largest(panels), self.resistance.largest(panels))
-        even = self.work_extremes.highest - self.work_extremes.lowest <= 1e-12 * most
+        self.most_work = np.maximum(self.drive.largest(panels), self.resistance.largest(panels))
+        even = self.work_extremes.highest - self.work_extremes.lowest <= 1e-12 * self.most_work
         level = np.where(even, np.inf, self.mean_work)
         self.crossings = panels.crossings(self.total.torque, self.total.nodes, self.total.ends, level)
 
@@ -78,17 +81,14 @@ class Decomposition:
         panel, t = np.zeros(cases, dtype=np.int64), np.full(cases, -1.0)
         angle, count = np.full(cases, np.nan), np.zeros(cases)
         c: Crossings = self.crossings
-        for case in range(cases):
-            own = np.nonzero(c.case == case)[0]
-            own = own[np.argsort(np.mod(c.angle[own], self.cycle), kind="stable")]
-            count[case] = len(own)
-            wanted = own[c.upward[own]] if chosen is None else own
-            index = 0 if chosen is None else chosen
-            if index < len(wanted):
-                k = wanted[index]
-                panel[case], t[case], angle[case] = c.panel[k], c.t[k], c.angle[k]
-            elif not len(own):
-                angle[case] = 0.0
+        order = np.lexsort((np.mod(c.angle, self.cycle), c.case))
+        count[:] = np.bincount(c.case, minlength=cases)
+        angle[count == 0] = 0.0
+        wanted = order[c.upward[order]] if chosen is None else order
+        first = np.searchsorted(c.case[wanted], np.arange(cases)) + (0 if chosen is None else chosen)
+        rows = np.nonzero(first < np.searchsorted(c.case[wanted], np.arange(cases), side="right"))[0]
+        k = wanted[first[rows]]
+        panel[rows], t[rows], angle[rows] = c.panel[k], c.t[k], c.angle[k]
         return Points(panel, t, angle), count
 
     def works_since(self, points: Points) -> tuple[Floats, Floats]:
@@ -130,6 +130,9 @@ def characteristics(d: Decomposition, phi_c: int | None) -> dict[str, Floats]:
         out["energy.angle_at_max"] = _wrapped(d.work_extremes.at_highest.angle, d.cycle)
         out["energy.angle_at_min"] = _wrapped(d.work_extremes.at_lowest.angle, d.cycle)
         _squares(d, phi_c, out)
+        out |= shares(out)
+        out["energy.coefficient"] = energy_coefficient(out["energy.fluctuation"], d.drive.ends[:, -1], d.most_work)
+        out |= harmonics(panels, d.cycle, {"omega": omega, "torque": d.total.torque})
     return out
 
 
@@ -148,8 +151,9 @@ def _squares(d: Decomposition, phi_c: int | None, out: dict[str, Floats]) -> Non
     out["inertia.mean"] = d.panels.integral(d.fields.inertia) / d.cycle
     for name, energy in (("s1", d.least_energy), ("s2", d.mean_energy - d.least_energy)):
         out[f"{name}.max"], out[f"{name}.min"] = 2.0 * energy * extremes.highest, 2.0 * energy * extremes.lowest
-    for name, work in zip(("s3", "s4"), d.works_since(points), strict=True):
-        found = d.panels.extremes(2.0 * work * inverse)
-        out[f"{name}.max"], out[f"{name}.min"] = found.highest, found.lowest
+    for name, part, work in zip(("s3", "s4"), ("drive", "resistance"), d.works_since(points), strict=True):
+        for known, values in ((name, 2.0 * work * inverse), (f"work.{part}", work)):
+            found = d.panels.extremes(values)
+            out[f"{known}.max"], out[f"{known}.min"] = found.highest, found.lowest
     for name in ("s1", "s2", "s3", "s4"):
         out[f"{name}.amplitude"] = 0.5 * (out[f"{name}.max"] - out[f"{name}.min"])

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.engine.machine_shaft.flywheel import Flywheel
 from sprag.engine.machine_shaft.panels import Panels
 from sprag.engine.machine_shaft.spec import MOVING, Drive
 
@@ -45,6 +46,8 @@ class Train:
     def of(cls, drive: Drive, values: Mapping[str, Floats]) -> "Train":
         """The train of ``drive`` with the ``values`` by path."""
         inertia, ratio, efficiency = values["drive.inertia"], np.ones((1, 1, 1)), np.ones((1, 1, 1))
+        if drive.flywheel:
+            inertia = inertia + Flywheel.of(drive.flywheel, values).inertia
         for index in reversed(range(len(drive.stages))):
             kind, prefix = drive.stages[index], f"drive.stages.{index}."
             own = {path.removeprefix(prefix): value for path, value in values.items() if path.startswith(prefix)}

@@ -1,15 +1,76 @@
-"""The drive inertia required for a given irregularity."""
+"""Flywheels: the drive inertia required for a given irregularity, and rims and discs given by their dimensions."""
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine.machine_shaft.roots import bracketed_roots
+from sprag.engine.machine_shaft.spec import Flywheel as Shapes
 from sprag.engine.machine_shaft.spec import MeanSpeed
 from sprag.engine.machine_shaft.start import Shape, Stop, least_mean_speed, mean_speed
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Flywheel:
+    """A flywheel on the main shaft; all arrays have the shape (cases or 1, 1, 1).
+
+    A thin rim of the mean diameter D has J = m D^2/4 and the hoop stress rho v^2 with v = omega D/2. A solid disc has
+    J = m D^2/8 and, at its centre, the stress (3 + nu)/8 rho v^2 with v at its edge (S. P. Timoshenko, J. N. Goodier,
+    *Theory of Elasticity*, section 32).
+
+    Attributes
+    ----------
+    form : array
+        J/(m D^2).
+    factor : array
+        Stress/(rho v^2).
+    """
+
+    values: Mapping[str, Floats]
+    form: float
+    factor: Floats
+
+    @classmethod
+    def of(cls, shape: Shapes, values: Mapping[str, Floats]) -> "Flywheel":
+        """The flywheel of the ``values`` by path."""
+        prefix = "drive.flywheel."
+        own = {path.removeprefix(prefix): value for path, value in values.items() if path.startswith(prefix)}
+        factor = 1.0 if shape == "rim" else (3.0 + own["poisson_ratio"]) / 8.0
+        return cls(own, 0.25 if shape == "rim" else 0.125, np.asarray(factor))
+
+    @property
+    def inertia(self) -> Floats:
+        """In kg*m^2."""
+        return np.asarray(self.form * self.values["mass"] * self.values["diameter"] ** 2)
+
+    def results(self, fastest: Floats, drive: Floats, required: Floats) -> dict[str, Floats]:
+        """Results by name, each (cases,).
+
+        Parameters
+        ----------
+        fastest : array, shape (cases,)
+            Largest speed of the shaft in rad/s.
+        drive, required : arrays, shape (cases,)
+            I' with the flywheel, and the required I', in kg*m^2.
+        """
+        cases = len(fastest)
+        own = {name: np.broadcast_to(value[:, 0, 0], (cases,)) for name, value in self.values.items()}
+        inertia = np.broadcast_to(self.inertia[:, 0, 0], (cases,))
+        factor = np.broadcast_to(self.factor.ravel(), (cases,))
+        speed = 0.5 * own["diameter"] * fastest
+        stress = factor * own["density"] * speed**2
+        needed = np.maximum(required - (drive - inertia), 0.0)
+        margin = np.sqrt(own["allowed_stress"] / stress)
+        return {
+            "flywheel.inertia": inertia, "flywheel.speed": speed, "flywheel.stress": stress,
+            "flywheel.margin": np.where(np.isfinite(margin), margin, np.nan),
+            "flywheel.required_mass": needed / (self.form * own["diameter"] ** 2),
+            "flywheel.required_diameter": np.sqrt(needed / (self.form * own["mass"])),
+        }  # fmt: skip
 
 
 def required_inertia(mechanism: Shape, torque: Floats, kind: MeanSpeed, mean: Floats, wanted: Floats) -> Floats:

@@ -110,6 +110,14 @@ _MOTOR = {
     ),
 }
 
+_FLYWHEEL = (
+    _length("drive.flywheel.diameter", "D", "mean diameter of the rim, or outer diameter of the disc"),
+    Parameter("drive.flywheel.mass", "m", "kg", 0.0, 1e9, True, None, "mass of the rim or disc"),
+    Parameter("drive.flywheel.density", "rho", "kg/m^3", 0.0, 1e5, True, 7850.0, "density of its material"),
+    Parameter("drive.flywheel.poisson_ratio", "nu", "1", 0.0, 0.5, False, 0.3, "Poisson's ratio of its material"),
+    Parameter("drive.flywheel.allowed_stress", "s_a", "Pa", 0.0, 1e12, True, _INF, "stress that determines its margin"),
+)
+
 _GAS = (
     Parameter("operation.gas.piston_area", "A", "m^2", 0.0, 1e6, True, None, "area of the piston"),
     Parameter("operation.gas.suction_pressure", "p_1", "Pa", 0.0, 1e12, True, None, "absolute pressure of suction"),
@@ -193,7 +201,7 @@ def parameters(spec: MachineSpec) -> tuple[Parameter, ...]:
         if spec.balance == "motor"
         else (Parameter("mean_speed", "w_m", "rad/s", 0.0, 1e6, True, None, "required mean speed of the shaft"),)
     )
-    own = 0.0 if spec.drive.stages else None
+    own = 0.0 if spec.drive.stages or spec.drive.flywheel else None
     return (
         *speed,
         Parameter("gravity", "g", "m/s^2", 0.0, 1e3, False, STANDARD_GRAVITY, "gravitational acceleration"),
@@ -209,6 +217,7 @@ def parameters(spec: MachineSpec) -> tuple[Parameter, ...]:
             "irregularity that determines required_inertia",
         ),
         *_drive(spec),
+        *(_FLYWHEEL if spec.drive.flywheel else ()),
         *chain.from_iterable(_stage(index, kind) for index, kind in enumerate(spec.drive.stages)),
         *chain.from_iterable(_part(prefix, part, spec.cycle) for prefix, part in spec.every_part()),
         *(

@@ -1,6 +1,7 @@
 """The results of a machine shaft: names, units, meaning (docs/theory-machine-shaft.md)."""
 
 from sprag.engine.catalogue import ResultInfo
+from sprag.engine.machine_shaft.spec import HARMONICS
 
 
 def _squares() -> tuple[ResultInfo, ...]:
@@ -14,6 +15,13 @@ def _squares() -> tuple[ResultInfo, ...]:
         ResultInfo(f"s{k}.{end}", "rad^2/s^2", f"{word} value of {meaning[k]}")
         for k in meaning
         for end, word in (("max", "largest"), ("min", "smallest"), ("amplitude", "half the range of the"))
+    )
+
+
+def _harmonics(name: str, unit: str, what: str) -> tuple[ResultInfo, ...]:
+    return tuple(
+        ResultInfo(f"{name}.harmonics.{k}", unit, f"amplitude of the {what} {k} times a cycle")
+        for k in range(1, HARMONICS + 1)
     )
 
 
@@ -62,6 +70,22 @@ MACHINE_RESULTS: tuple[ResultInfo, ...] = (
     _R("motor.torque.mean", "N*m", "mean torque of the motor over the angle, at its own shaft"),
     _R("motor.torque.max", "N*m", "largest torque of the motor, at its own shaft"),
     _R("motor.power.mean", "W", "mean torque of the motor times its mean speed"),
+    _R("energy.coefficient", "1", "coefficient of fluctuation of energy: fluctuation / work of the drive over a cycle"),
+    _R("work.drive.max", "J", "largest work of the drive since phi_c (A_d)"),
+    _R("work.drive.min", "J", "smallest (most negative) work of the drive since phi_c"),
+    _R("work.resistance.max", "J", "largest work of the resistance since phi_c (A_r)"),
+    _R("work.resistance.min", "J", "smallest (most negative) work of the resistance since phi_c"),
+    _R("omega_squared.amplitude", "rad^2/s^2", "half the range of the square of the speed"),
+    *(_R(f"s{k}.share", "1", f"amplitude of S{k} / sum of the amplitudes of S1 to S4") for k in range(1, 5)),
+    *_harmonics("omega", "rad/s", "speed's oscillation"),
+    *_harmonics("torque", "N*m", "oscillation of the sum of driving and resisting torque"),
+    _R("required_inertia.energy", "kg*m^2", "inertia from the energy alone: fluctuation/(irregularity*speed^2)"),
+    _R("flywheel.inertia", "kg*m^2", "inertia of the flywheel that is given by its dimensions"),
+    _R("flywheel.speed", "m/s", "largest speed of the rim (at its mean diameter) or of the disc's edge"),
+    _R("flywheel.stress", "Pa", "largest stress of the flywheel by its rotation"),
+    _R("flywheel.margin", "1", "burst margin: speed at which the stress is the allowed one / largest speed"),
+    _R("flywheel.required_mass", "kg", "mass of the flywheel at its diameter that gives the wanted irregularity"),
+    _R("flywheel.required_diameter", "m", "diameter of the flywheel with its mass that gives the wanted irregularity"),
 )  # fmt: skip
 
 

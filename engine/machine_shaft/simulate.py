@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.machine_shaft.balance import balanced, largest_work
+from sprag.engine.machine_shaft.balance import balanced
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.decomposition import Decomposition, characteristics
 from sprag.engine.machine_shaft.drive_train import Train
-from sprag.engine.machine_shaft.flywheel import required_inertia
+from sprag.engine.machine_shaft.flywheel import Flywheel, required_inertia
 from sprag.engine.machine_shaft.machine import Fields, Machine, check_structure
 from sprag.engine.machine_shaft.motor import LimitCycle, limit_cycle
 from sprag.engine.machine_shaft.panels import Panels
@@ -47,9 +47,15 @@ BLOCK = 64
 _NAMES = tuple(info.name for info in result_infos())
 _OF_TIME = np.array([_NAMES.index("omega.mean_time"), _NAMES.index("irregularity.time")])
 #: Prefixes of results that a case without motion does not have.
-_OF_MOTION = ("omega.", "irregularity", "acceleration.", "s1.", "s2.", "power.", "energy.m", "motor.s", "motor.p")
+_OF_MOTION = (
+    "omega.", "omega_squared.", "irregularity", "acceleration.", "s1.", "s2.", "s3.share", "s4.share", "power.",
+    "energy.m", "motor.s", "motor.p", "flywheel.s", "flywheel.margin",
+)  # fmt: skip
 #: The same for a motor that has no steady torque.
-_OF_MOTOR = ("drive_torque.", "motor.", "work.drive", "balance.work", "energy.", "s3.", "s4.", "phi_c")
+_OF_MOTOR = (
+    "drive_torque.", "torque.", "motor.", "work.drive", "work.resistance.", "balance.work", "energy.", "s3.", "s4.",
+    "phi_c",
+)  # fmt: skip
 _CODE = {ending: np.int8(code) for code, ending in enumerate(ENDINGS)}
 
 
@@ -193,6 +199,7 @@ def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
     _by_definition(spec, d, results)
     results |= machine.train.results(panels, d.drive.torque, results)
     results["required_inertia"] = _required(spec, columns, d, endings)
+    results |= _flywheel(spec, columns, results)
     no_cycle = (endings == _CODE[Ending.MOTOR_STALLED]) | (endings == _CODE[Ending.MOTOR_OVERRUN])
     if no_cycle.any():
         for name, values in results.items():
@@ -240,8 +247,7 @@ def _by_definition(spec: MachineSpec, d: Decomposition, out: dict[str, Floats]) 
     out["irregularity"] = out[f"irregularity.{kind}"]
     out["power.mean"] = out["drive_torque.mean"] * out["omega.mean"]
     left = d.total.ends[:, -1]
-    largest = largest_work(d.panels, d.drive.torque, d.fields.resistance)
-    out["balance.work"] = np.abs(left) / np.where(largest > 0.0, largest, 1.0)
+    out["balance.work"] = np.abs(left) / np.where(d.most_work > 0.0, d.most_work, 1.0)
 
 
 def _required(spec: MachineSpec, columns: Columns, d: Decomposition, endings: Codes) -> Floats:
@@ -259,6 +265,22 @@ def _required(spec: MachineSpec, columns: Columns, d: Decomposition, endings: Co
                 spec.mean_speed_is, columns.row("mean_speed")[rows], wanted[rows],
             )  # fmt: skip
     return required
+
+
+def _flywheel(spec: MachineSpec, columns: Columns, known: Mapping[str, Floats]) -> dict[str, Floats]:
+    """The required inertia by the energy alone, and the results of a flywheel given by its dimensions."""
+    none = np.full(columns.cases, np.nan)
+    out = {name: none for name in _NAMES if name.startswith("flywheel.")} | {"required_inertia.energy": none}
+    if spec.balance != "motor":
+        wanted = columns.row("wanted_irregularity") * columns.row("mean_speed") ** 2
+        finite = np.isfinite(wanted)
+        out["required_inertia.energy"] = np.where(
+            finite, known["energy.fluctuation"] / np.where(finite, wanted, 1.0), np.nan
+        )
+    if spec.drive.flywheel:
+        flywheel = Flywheel.of(spec.drive.flywheel, columns.values)
+        out |= flywheel.results(known["omega.max"], known["inertia.drive"], known["required_inertia"])
+    return out
 
 
 def _block(spec: MachineSpec, columns: Columns) -> tuple[Floats, Codes]:

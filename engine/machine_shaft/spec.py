@@ -10,6 +10,7 @@ from sprag.engine.machine_shaft.tables import Interpolation, Table
 MeanSpeed = Literal["midrange", "angle", "time"]
 Balance = Literal["scale", "constant", "refuse", "motor"]
 Motor = Literal["linear", "kloss"]
+Flywheel = Literal["rim", "disc"]
 Stage = Literal["gear", "belt", "chain", "worm", "screw_nut", "rack"]
 MechanismKind = Literal["none", "table", "formula", "slider_crank", "four_bar", "quick_return", "cam"]
 QuickReturn = Literal["whitworth", "crank_shaper"]
@@ -25,6 +26,8 @@ LINKED: frozenset[str] = frozenset({"slider_crank", "four_bar", "quick_return", 
 MOVING: frozenset[str] = frozenset({"screw_nut", "rack"})
 MAX_STAGES = 16
 MAX_STEPS = 32
+#: Harmonics of the cycle whose amplitudes are results.
+HARMONICS = 6
 MAX_CONSTANTS = 32
 MAX_PARTS = 16
 REVOLUTIONS = (1, 2, 3)
@@ -35,6 +38,7 @@ class Drive:
     """The driving torque: ``drive.torque`` (constant), or a table or formula over the angle, or a motor.
 
     ``stages`` are the kinds of the stages between motor and main shaft, motor first; the torque is then the motor's.
+    ``flywheel`` is the shape of one on the main shaft that is given by its dimensions.
     """
 
     form: Literal["constant", "table", "formula"] = "constant"
@@ -42,6 +46,7 @@ class Drive:
     formula: str | None = None
     motor: Motor | None = None
     stages: tuple[Stage, ...] = ()
+    flywheel: Flywheel | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,6 +37,10 @@ ABOUT: Final[dict[str, About]] = {
         "own",
         "a light press of 200 mm of stroke with 20 kN over the last 60 degrees",
     ),
+    "punching_press": About(
+        "a rim flywheel behind a belt and a gear: the rim that an irregularity needs, its stress, and the motor",
+        "a press of 40 mm of stroke at 40 strokes a minute that punches with 250 kN over the last 30 degrees",
+    ),
     "shaper": About(
         "a crank-shaper quick return under a cutting force over the slow stroke",
         "a shaper of about 0.4 m of stroke at 40 strokes a minute, 3 kN for a cut of 1.5 mm^2 in steel",

@@ -88,6 +88,7 @@ def catalogue() -> tuple[Parameter, ...]:
     every: list[MachineSpec] = [MachineSpec(cycle=max(REVOLUTIONS), constants=("NAME",))]
     every += [MachineSpec(drive=Drive("formula")), MachineSpec(balance="motor", drive=Drive(motor="linear"))]
     every += [MachineSpec(balance="motor", drive=Drive(motor="kloss"))]
+    every += [MachineSpec(drive=Drive(flywheel="rim"))]
     every += [MachineSpec(drive=Drive(stages=(stage,))) for stage in get_args(Stage)]
     every += [MachineSpec(mechanism=MechanismChoice(kind)) for kind in kinds]
     forms = (OperationChoice("force"), OperationChoice("force", "steps", steps=1), OperationChoice("gas"))
@@ -110,7 +111,7 @@ _REMARKS = {
     "operation.steps.K.value": _OF_FORCE,
     "operation.steps.K.from": _OF_ANGLE,
     "operation.steps.K.to": _OF_ANGLE,
-    "drive.inertia": "; required without stages",
+    "drive.inertia": "; required without stages and flywheel",
     "drive.torque": "; at the motor where there are stages",
     "drive.stages.K.radius": "; required for a rack",
 }

@@ -46,7 +46,8 @@ _MASSES: Final = (0.0, 4.0)
 _TOLD: Final = (
     "irregularity", "omega.mean", "omega.max", "omega.angle_at_max", "omega.min", "omega.angle_at_min",
     "energy.fluctuation", "energy.mean", "drive_torque.mean", "power.mean", "acceleration.max",
-    "s1.amplitude", "s2.amplitude", "s3.amplitude", "s4.amplitude", "required_inertia",
+    "omega_squared.amplitude", "s1.amplitude", "s2.amplitude", "s3.amplitude", "s4.amplitude", "s1.share", "s2.share",
+    "s3.share", "s4.share", "energy.coefficient", "required_inertia", "flywheel.stress", "flywheel.margin",
 )  # fmt: skip
 #: Questions about a machine, each a study: its name, and what it varies.
 QUESTIONS: Final = {"inertia": "the drive's inertia", "masses": "the masses", "load": "the operation's load"}

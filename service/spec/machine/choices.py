@@ -19,6 +19,7 @@ _MEANINGS: Final = {
     "balance": shaft_drive.BALANCE.help,
     "phi_c": shaft_parts.PHI_C.help,
     "drive.motor.kind": shaft_drive.MOTOR.help,
+    "drive.flywheel.kind": shaft_drive.FLYWHEEL.help,
     "drive.stages": shaft_drive.STAGES.help,
     "mechanism": "the mechanism",
     "operation": "how the resistance is given",
@@ -71,6 +72,8 @@ def _chosen(structure: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "phi_c", "the first at which T rises" if phi_c is None else str(phi_c)
     if drive["motor"]:
         yield "drive.motor.kind", drive["motor"]
+    if drive.get("flywheel"):
+        yield "drive.flywheel.kind", drive["flywheel"]
     if drive.get("stages"):
         yield "drive.stages", ", ".join(drive["stages"])
     if drive["table"]:

@@ -24,6 +24,7 @@ _BALANCE_HELP: Final = (
 )
 BALANCE: Final = choice("balance", _BALANCE_HELP, "constant", "scale", "refuse", "motor")
 MOTOR: Final = choice("kind", "kind of the motor", "linear", "kloss")
+FLYWHEEL: Final = choice("kind", "shape of the flywheel: a thin rim or a solid disc", "rim", "disc")
 STAGE: Final = choice("kind", "kind of the stage", *machine_shaft.STAGE_KINDS)
 STAGES: Final = Listed("stages", 1, machine_shaft.MAX_STAGES, "stages between motor and main shaft, motor first")
 
@@ -60,7 +61,7 @@ def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, A
 def read_drive(report: Report, data: object, places: dict[str, str]) -> dict[str, Any] | None:
     """Read the drive: the form of its torque, or its motor."""
     places["drive"] = "/base/drive"
-    found = read_object(report, "/base/drive", data, ("inertia", "torque", "scale", "motor", "stages"))
+    found = read_object(report, "/base/drive", data, ("inertia", "torque", "scale", "motor", "stages", "flywheel"))
     if found is None:
         return None
     drive: dict[str, Any] = {"form": "constant", "table": None, "formula": None, "motor": None}
@@ -69,6 +70,14 @@ def read_drive(report: Report, data: object, places: dict[str, str]) -> dict[str
         if stages is None:
             return None
         drive["stages"] = stages
+    if "flywheel" in found:
+        flywheel = read_object(
+            report, "/base/drive/flywheel", found["flywheel"], ("kind", *numbers_under("drive.flywheel."))
+        )
+        kind = None if flywheel is None else FLYWHEEL.read(report, "/base/drive/flywheel", flywheel)
+        if kind is None:
+            return None
+        drive["flywheel"] = kind
     if "motor" in found:
         if "torque" in found:
             report.fault("/base/drive/torque", "conflict", "cannot be given with a motor, which sets the torque",

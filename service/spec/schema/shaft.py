@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from sprag.service.spec.described import schemas
 from sprag.service.spec.machine.shaft import MEAN_SPEED_IS
-from sprag.service.spec.machine.shaft_drive import BALANCE, MOTOR, STAGE, STAGES
+from sprag.service.spec.machine.shaft_drive import BALANCE, FLYWHEEL, MOTOR, STAGE, STAGES
 from sprag.service.spec.machine.shaft_parts import (
     FORMS,
     INTERPOLATION,
@@ -73,11 +73,18 @@ def _drive() -> Schema:
     )
     stage = numbers_under("drive.stages.K.")
     stages = STAGES.schema(object_schema({"kind": STAGE.schema(), **quantities(stage)}, required=("kind",)))
+    wheel = numbers_under("drive.flywheel.")
+    flywheel = object_schema(
+        {"kind": FLYWHEEL.schema(), **quantities(wheel)},
+        required=("kind", *required_of(wheel)),
+        description="a flywheel on the main shaft, given by its dimensions",
+    )
+    torque = {**torque, "anyOf": [*torque["anyOf"], diagram]}
     schema = object_schema(
-        {**numbers, "torque": {**torque, "anyOf": [*torque["anyOf"], diagram]}, "motor": motor, "stages": stages},
+        {**numbers, "torque": torque, "motor": motor, "stages": stages, "flywheel": flywheel},
         description="what turns the shaft",
     )
-    return {**schema, "anyOf": [{"required": [name]} for name in ("inertia", "stages")]}
+    return {**schema, "anyOf": [{"required": [name]} for name in ("inertia", "stages", "flywheel")]}
 
 
 def _mechanism() -> Schema:

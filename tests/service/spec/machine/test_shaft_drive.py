@@ -72,3 +72,19 @@ def test_an_axis_names_a_stage_that_is_there() -> None:
     axis = {"path": "drive.stages.3.ratio", "values": [4, 5]}
     found = problems({"/base/drive": {"stages": STAGES}, "/axes": [axis]})
     assert "there is no stage 3: stages are numbered from 0 to 2" in found["/axes/0/path"].message
+
+
+def test_a_flywheel_is_given_by_its_dimensions() -> None:
+    wheel = {"kind": "rim", "diameter": "1.2 m", "mass": "400 kg", "density": "7.2 g/cm^3", "allowed_stress": "40 MPa"}
+    spec = changed({"/base/drive": {"flywheel": wheel}, "/axes": []})
+    study = parse_spec(spec).study
+    assert study.structure is not None
+    assert study.structure["drive"]["flywheel"] == "rim"
+    assert study.base["drive.flywheel.allowed_stress"] == 4e7
+    assert study.base["drive.flywheel.density"] == pytest.approx(7200.0, rel=1e-15)
+    jsonschema.Draft202012Validator(spec_schema()).validate(spec)
+    chosen = {choice.path: choice.text for choice in part_of("machine-shaft").choices(study, spec)}
+    assert chosen["drive.flywheel.kind"] == "rim"
+    found = problems({"/base/drive": {"flywheel": {"kind": "ring", "mass": 3}}, "/axes": []})
+    assert found["/base/drive/flywheel/kind"].code == "invalid-choice"
+    assert "/base/drive/flywheel/diameter" in problems({"/base/drive": {"flywheel": {"kind": "disc"}}, "/axes": []})
