@@ -48,7 +48,7 @@ _ALIKE = 1e-3
 #: Difference (SI) of means of machines at rest, which are rounding errors.
 _NOTHING = 1e-12
 _TURN = 2.0 * math.pi
-#: How many times as long starts without an orbit are run where others of their case come to one.
+#: How many times as long starts without an orbit are run where their case seems to have several regimes.
 LONGER = 4
 #: Starts that are run together: this bounds the memory, and changes no result.
 TOGETHER = 4096
@@ -164,75 +164,14 @@ def started_columns(
     return spread
 
 
-def _settle_together(
-    columns: Mapping[str, ArrayLike], settings: SettledRun, starts: Mapping[str, Floats], count: int, cases: int
-) -> StartedBatch:
-    """The same for cases that are run together."""
-    spread = started_columns(columns, starts, count, cases)
-    settled = settle(spread, settings, cases=cases * count)
-    _run_longer(spread, settings, settled, count)
-    module = kernel_of(columns, settings.tolerance)
-    matrix = case_matrix(spread, settings.run, cases * count)
-    motions = _Motions(module, matrix, settings, settled)
-    own: list[Floats] = []
-    further: list[Floats] = []
-    rows: list[int] = []
-    members = np.full((cases, count), -1, dtype=np.int64)
-    endings = np.empty(cases, dtype=np.int8)
-    for case in range(cases):
-        lanes = np.arange(case * count, (case + 1) * count)
-        good = settled.endings[lanes] == _OK
-        endings[case] = _OK if good.any() else settled.endings[lanes[0]]
-        groups = motions.regimes(lanes[good])
-        for number, group in enumerate(groups):
-            members[case, group - lanes[0]] = number
-        found = _rows(settled.values, groups, lanes)
-        own.append(found[0])
-        further.append(found[1:])
-        rows += [case] * (len(found) - 1)
-    return StartedBatch(np.stack(own), endings, np.array(rows, dtype=np.int64), np.concatenate(further), members)
-
-
-def _run_longer(columns: Mapping[str, Floats], settings: SettledRun, settled: SettledBatch, count: int) -> None:
-    """Run the starts without an orbit longer, from their beginning, where other starts of their case come to one.
-
-    Chaotic transients last for a random time: beside an orbit an irregular motion is a transient more often than not.
-    """
-    ok = settled.endings == _OK
-    repeats = ok & np.isin(settled.regimes, _REPEATING)
-    beside = np.repeat(repeats.reshape(-1, count).any(axis=1), count)
-    again = np.flatnonzero(ok & ~repeats & beside)
-    if not len(again):
-        return
-    some = {path: column[again] if column.ndim else column for path, column in columns.items()}
-    longer = settle(some, replace(settings, at_most=LONGER * settings.at_most), cases=len(again))
-    settled.values[again], settled.endings[again] = longer.values, longer.endings
-    settled.regimes[again], settled.points[again] = longer.regimes, longer.points
-
-
-def _rows(values: Floats, groups: list[Ints], lanes: Ints) -> Floats:
-    """A row for each regime of a case, by falling share, and those of equal shares by their first start."""
-    failed = len(lanes) - sum(map(len, groups))
-    if not groups:
-        return np.full((1, values.shape[1] + len(REGIME_INFOS)), math.nan)
-    reached = np.array([len(group) for group in groups])
-    share = reached / len(lanes)
-    low, high = wilson(reached, len(lanes))
-    first = np.array([group[0] for group in groups])
-    regime = np.column_stack(
-        [
-            np.arange(len(groups)), np.full(len(groups), len(groups)), share, low, high,
-            np.full(len(groups), share.min()), first - lanes[0], np.full(len(groups), failed),
-        ]
-    )  # fmt: skip
-    return np.column_stack([values[first], regime])
-
-
 class _Motions:
     """The motions to which starts come, and which of them are the same."""
 
     def __init__(self, module: Kernel, matrix: Floats, settings: SettledRun, settled: SettledBatch) -> None:
         n = module.LAYOUT.n
+        self.settled = settled
+        self.ok: Flags = settled.endings == _OK
+        self.repeats: Flags = self.ok & np.isin(settled.regimes, _REPEATING)
         names = [info.name for info in settled_infos(n)]
         self.kinds = settled.regimes.astype(np.int64)
         self.orders = np.nan_to_num(settled.values[:, names.index("regime.order")], nan=0.0).astype(np.int64)
@@ -247,7 +186,8 @@ class _Motions:
     def regimes(self, lanes: Ints) -> list[Ints]:
         """The regimes of one case, by falling share: the starts that come to each, first one that is settled on it."""
         groups: list[Ints] = []
-        repeating = np.isin(self.kinds[lanes], _REPEATING)
+        lanes = lanes[self.ok[lanes]]
+        repeating = self.repeats[lanes]
         left = lanes[repeating]
         while len(left):
             same = self._on_orbit(left, int(left[0]))
@@ -301,6 +241,73 @@ class _Motions:
         # What cannot be computed, such as the efficiency of a machine at rest, tells nothing apart.
         differ: Flags = (apart > allowed).any(axis=1)
         return ~differ
+
+
+def _settle_together(
+    columns: Mapping[str, ArrayLike], settings: SettledRun, starts: Mapping[str, Floats], count: int, cases: int
+) -> StartedBatch:
+    """The same for cases that are run together."""
+    spread = started_columns(columns, starts, count, cases)
+    settled = settle(spread, settings, cases=cases * count)
+    module = kernel_of(columns, settings.tolerance)
+    matrix = case_matrix(spread, settings.run, cases * count)
+    motions = _Motions(module, matrix, settings, settled)
+    if _run_longer(spread, settings, motions, count):
+        motions = _Motions(module, matrix, settings, settled)
+    own: list[Floats] = []
+    further: list[Floats] = []
+    rows: list[int] = []
+    members = np.full((cases, count), -1, dtype=np.int64)
+    endings = np.empty(cases, dtype=np.int8)
+    for case in range(cases):
+        lanes = np.arange(case * count, (case + 1) * count)
+        endings[case] = _OK if motions.ok[lanes].any() else settled.endings[lanes[0]]
+        groups = motions.regimes(lanes)
+        for number, group in enumerate(groups):
+            members[case, group - lanes[0]] = number
+        found = _rows(settled.values, groups, lanes)
+        own.append(found[0])
+        further.append(found[1:])
+        rows += [case] * (len(found) - 1)
+    return StartedBatch(np.stack(own), endings, np.array(rows, dtype=np.int64), np.concatenate(further), members)
+
+
+def _run_longer(columns: Mapping[str, Floats], settings: SettledRun, motions: _Motions, count: int) -> bool:
+    """Run the starts without an orbit longer, from their beginning, in cases that seem to have several regimes.
+
+    Chaotic transients last for a random time: an irregular motion beside another one is a transient more often than
+    not. Replaces what they came to; whether there are any.
+    """
+    settled, again = motions.settled, [np.empty(0, dtype=np.int64)]
+    for first in range(0, len(motions.ok), count):
+        lanes = np.arange(first, first + count)
+        if len(motions.regimes(lanes)) > 1:
+            again.append(lanes[motions.ok[lanes] & ~motions.repeats[lanes]])
+    rows = np.concatenate(again)
+    if len(rows):
+        some = {path: column[rows] if column.ndim else column for path, column in columns.items()}
+        longer = settle(some, replace(settings, at_most=LONGER * settings.at_most), cases=len(rows))
+        settled.values[rows], settled.endings[rows] = longer.values, longer.endings
+        settled.regimes[rows], settled.points[rows] = longer.regimes, longer.points
+    return len(rows) > 0
+
+
+def _rows(values: Floats, groups: list[Ints], lanes: Ints) -> Floats:
+    """A row for each regime of a case, by falling share, and those of equal shares by their first start."""
+    failed = len(lanes) - sum(map(len, groups))
+    if not groups:
+        return np.full((1, values.shape[1] + len(REGIME_INFOS)), math.nan)
+    reached = np.array([len(group) for group in groups])
+    share = reached / len(lanes)
+    low, high = wilson(reached, len(lanes))
+    first = np.array([group[0] for group in groups])
+    regime = np.column_stack(
+        [
+            np.arange(len(groups)), np.full(len(groups), len(groups)), share, low, high,
+            np.full(len(groups), share.min()), first - lanes[0], np.full(len(groups), failed),
+        ]
+    )  # fmt: skip
+    return np.column_stack([values[first], regime])
 
 
 def _united(group: Ints, others: Ints) -> Ints:

@@ -22,11 +22,22 @@ class Case(TypedDict):
     ]
 
 
+class RegimeRow(TypedDict):
+    """A regime to which starts of a case come."""
+
+    number: Annotated[int, Doc("0 for the most frequent one")]
+    flags: list[str]
+    results: Annotated[dict[str, Number | str], Doc("as those of a case")]
+
+
 class CaseDetail(Case):
     """One case with the meaning of its ending."""
 
     ending_meaning: str
     flag_meanings: dict[str, str]
+    regimes: Annotated[
+        list[RegimeRow], Doc("of a case with many starts, a row for each regime, the most frequent first; else empty")
+    ]
     links: dict[str, str]
 
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from threading import Event
 from typing import TYPE_CHECKING, Annotated, Final, cast
 
-from fastapi import Depends, Path, Request
+from fastapi import Depends, Path, Query, Request
 from starlette.convertors import Convertor, register_url_convertor
 
+from sprag.service.faults import parameter_error
 from sprag.service.http.computer import Computes
 from sprag.service.http.problems import ApiError
 from sprag.service.http.shares import Shares
@@ -17,7 +18,8 @@ from sprag.service.jobs.checks import Library
 from sprag.service.results.unaffected import Unaffected
 from sprag.service.settings import Settings
 from sprag.service.storage.store import Store
-from sprag.worker.limits import MAX_CASES, MAX_CHECKS_EACH, MAX_COMPUTATIONS_EACH, MAX_STREAMS
+from sprag.worker.limits import MAX_CASES, MAX_CHECKS_EACH, MAX_COMPUTATIONS_EACH, MAX_STARTS, MAX_STREAMS
+from sprag.worker.models.starts import at_start, count_of
 
 if TYPE_CHECKING:
     from sprag.worker.study import Study
@@ -106,3 +108,25 @@ def study_with(context: Context, study_id: str, case: int) -> Study:
     if case >= study.cases:
         raise ApiError("case-not-found", f"The cases of this study are 0 .. {study.cases - 1}.")
     return study
+
+
+#: The start of a case of a study with `starts`.
+StartNumber = Annotated[
+    int | None,
+    Query(
+        alias="start",
+        ge=0,
+        le=MAX_STARTS - 1,
+        description="of a case with many starts: which of them; by default 0, its own",
+    ),
+]
+
+
+def started(study: Study, case: int, start: int | None) -> tuple[Study, int]:
+    """The study and the number of the case in it; with a start, the study of this case from that start only."""
+    if start is None:
+        return study, case
+    count = count_of(study.run)
+    if start >= count:
+        raise parameter_error("start", "out-of-range", "there is no such start", start, f"0 to {count - 1}")
+    return at_start(study, case, start), 0

@@ -10,7 +10,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
 from sprag.service.http.access import OPEN
-from sprag.service.http.context import study_with
+from sprag.service.http.context import started, study_with
 from sprag.service.spec.machine.shaft_check import NotCompiledError
 from sprag.worker import models
 
@@ -65,12 +65,17 @@ class Work:
         await self.load(models.shape_of(study))
         return await self.compute(function, study, *args)
 
-    async def case_of(self, study_id: str, case: int, look: Callable[[Study], R]) -> tuple[Study, R]:
-        """The study, when it has that case, and what ``look`` finds in it. Raises ApiError, and what ``look`` does."""
+    async def case_of(
+        self, study_id: str, case: int, look: Callable[[Study, int], R], start: int | None = None
+    ) -> tuple[Study, int, R]:
+        """The study, when it has that case, its number, and what ``look`` finds in it.
 
-        def find() -> tuple[Study, R]:
-            study = study_with(self.context, study_id, case)
-            return study, look(study)
+        Raises ApiError, and what ``look`` does. With a ``start`` it is that of one case, from this start only.
+        """
+
+        def find() -> tuple[Study, int, R]:
+            study, number = started(study_with(self.context, study_id, case), case, start)
+            return study, number, look(study, number)
 
         return await run_in_threadpool(find)
 

@@ -37,7 +37,7 @@ def curves_of(library: Library, study_id: str, query: CurveQuery) -> Curves:
     """The curves of a study; raises StudyNotFoundError, and SelectionError as `select` does."""
     study = library.store.study(study_id)
     selection = select(study, models.study_results(study), query)
-    return draw(selection, partial(library.store.rows_for_cases, study_id))
+    return draw(selection, partial(library.store.rows_for_cases, study_id, number=query.number))
 
 
 def curves_json(library: Library, study_id: str, query: CurveQuery) -> bytes:
@@ -88,7 +88,7 @@ def curves_picture(library: Library, study_id: str, query: CurveQuery, title: st
 def map_of(library: Library, study_id: str, query: CurveQuery) -> Map:
     """The map of the one result of ``query`` over its x and its one axis of by; raises as `curves_of` does."""
     study = library.store.study(study_id)
-    fetch = partial(library.store.rows_for_cases, study_id)
+    fetch = partial(library.store.rows_for_cases, study_id, number=query.number)
     return draw_map(study, models.study_results(study), query.x, query.by[0], query.y[0], query.at, fetch)
 
 

@@ -30,12 +30,16 @@ Fetch = Callable[[NDArray[np.int64], Sequence[str]], "CaseColumns"]
 
 @dataclass(frozen=True, slots=True)
 class CurveQuery:
-    """What to draw: paths and result names as in docs/reference.md; values of ``at`` as text with or without a unit."""
+    """What to draw: paths and result names as in docs/reference.md; values of ``at`` as text with or without a unit.
+
+    Of cases with several rows, one for each regime, that with the ``number``.
+    """
 
     x: str
     y: tuple[str, ...]
     by: tuple[str, ...] = ()
     at: tuple[tuple[str, str], ...] = ()
+    number: int = 0
 
 
 @dataclass(frozen=True, slots=True)

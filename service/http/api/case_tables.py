@@ -10,7 +10,7 @@ from starlette.responses import Response
 from sprag.service.answers.results import EngagementTables, Portrait
 from sprag.service.faults import choice_of
 from sprag.service.http.api.document import files, format_query, one_of, problems
-from sprag.service.http.context import CaseNumber, StudyId
+from sprag.service.http.context import CaseNumber, StartNumber, StudyId
 from sprag.service.http.drawing import DRAWN_FORMATS, TABLE_FORMATS, picture
 from sprag.service.http.drawing import table as written
 from sprag.service.http.requests import strict_query
@@ -43,13 +43,14 @@ async def get_engagements(
     table: Annotated[
         str, Query(description="the table of a CSV file; JSON has both", json_schema_extra=one_of(engagements.TABLES))
     ] = "engagements",
+    which: StartNumber = None,
     form: Annotated[str | None, format_query(TABLE_FORMATS)] = None,
 ) -> Response:
     """Every engagement of the clutches of one case, and the means of its periods. The case is run again for this."""
     chosen = choose_format(work.request, form, TABLE_FORMATS)
     asked = choice_of("table", table, engagements.TABLES)
-    study, _ = await work.case_of(study_id, case, engagements.require_clutches)
-    content = await work.run_case(engagements.engagements_file, study, case, asked, chosen)
+    study, number, _ = await work.case_of(study_id, case, lambda study, _: engagements.require_clutches(study), which)
+    content = await work.run_case(engagements.engagements_file, study, number, asked, chosen)
     return written(content, chosen, f"{study_id}-case-{case}-{asked}")
 
 
@@ -72,15 +73,16 @@ async def get_strobes(
             json_schema_extra=one_of(portraits.TABLES),
         ),
     ] = "strobes",
+    which: StartNumber = None,
     form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """The state of one case once per excitation period, and its orbit. The case is run again for this."""
     chosen = choose_format(work.request, form, DRAWN_FORMATS)
     asked = choice_of("table", table, portraits.TABLES)
-    study, _ = await work.case_of(study_id, case, portraits.require_strobes)
+    study, number, _ = await work.case_of(study_id, case, lambda study, _: portraits.require_strobes(study), which)
     if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - so that the types are told apart
-        content = await work.run_case(portraits.portrait_file, study, case, asked, chosen)
+        content = await work.run_case(portraits.portrait_file, study, number, asked, chosen)
         return written(content, chosen, f"{study_id}-case-{case}-{asked}")
-    made = await work.run_case(models.run_portrait, study, case)
+    made = await work.run_case(models.run_portrait, study, number)
     title = f"{study.name}, case {case}"
     return await picture(draw_portrait, chosen, made, models.presentation_of(study), title).response(work)

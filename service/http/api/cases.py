@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from fastapi import APIRouter, Depends, Query
 from starlette.responses import Response
@@ -10,7 +10,7 @@ from starlette.responses import Response
 from sprag.service.answers import results as m
 from sprag.service.faults import choice_of, parameter_error
 from sprag.service.http.api.document import files, format_query, one_of, problems
-from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
+from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, study_with
 from sprag.service.http.drawing import TABLE_FORMATS, table
 from sprag.service.http.requests import strict_query
 from sprag.service.http.respond import choose_format, json_response
@@ -22,6 +22,10 @@ from sprag.service.storage.records import CaseRow
 from sprag.worker import models
 from sprag.worker.codes import FLAG_MASKS, PENDING
 from sprag.worker.limits import MAX_PAGE_SIZE, MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
+
+if TYPE_CHECKING:
+    from sprag.service.http.context import Context
+    from sprag.worker.study import Study
 
 router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
 
@@ -104,9 +108,17 @@ def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
             **row_json(row, parameters),
             "ending_meaning": models.ENDING_SENTENCES.get(row.ending, "The case has not been run yet."),
             "flag_meanings": {flag: models.flags_of(study.model).get(flag, "") for flag in row.flags},
+            "regimes": _regimes(context, study_id, study, case),
             "links": links,
         }
     )
+
+
+def _regimes(context: Context, study_id: str, study: Study, case: int) -> list[m.RegimeRow]:
+    """The rows of a case that can have several."""
+    numbered = models.numbered_by(study.model, models.variant_of(study))
+    rows = () if numbered is None else context.store.all_rows(study_id, case)
+    return [{"number": number, "flags": list(row.flags), "results": row.results} for number, row in enumerate(rows)]
 
 
 @router.get(
@@ -148,10 +160,13 @@ async def get_trajectory(
             examples=[50],
         ),
     ] = 1000,
+    which: StartNumber = None,
     form: Annotated[str | None, format_query(TABLE_FORMATS)] = None,
 ) -> Response:
     """Every variable, torque, power and state of one case over time (or the angle). The case is run again for this."""
     chosen = choose_format(work.request, form, TABLE_FORMATS)
-    study, span = await work.case_of(study_id, case, lambda study: trajectories.span(study, case, start, end))
-    content = await work.run_case(trajectories.trajectory_file, study, case, *span, points, chosen)
+    study, number, span = await work.case_of(
+        study_id, case, lambda study, number: trajectories.span(study, number, start, end), which
+    )
+    content = await work.run_case(trajectories.trajectory_file, study, number, *span, points, chosen)
     return table(content, chosen, f"{study_id}-case-{case}")

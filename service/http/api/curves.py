@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from fastapi import APIRouter, Depends, Query
@@ -23,6 +24,7 @@ from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import completed
 from sprag.service.results.report.content import report_of
 from sprag.worker import models
+from sprag.worker.limits import MAX_STARTS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -49,6 +51,14 @@ Fixed = Annotated[
     Query(
         description="`path=value`: the value at which another axis is held, SI or with a unit; may be repeated",
         examples=[["excitation.frequency=16 Hz"]],
+    ),
+]
+Number = Annotated[
+    int,
+    Query(
+        ge=0,
+        le=MAX_STARTS,
+        description="of cases with many starts, the number of the regime; 0 is the most frequent one of each case",
     ),
 ]
 
@@ -83,6 +93,7 @@ async def get_curves(
         ),
     ] = None,
     at: Fixed = None,
+    number: Number = 0,
     form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """Results against one axis. An axis of several values that is neither x nor in `by` needs its value in `at`.
@@ -92,7 +103,8 @@ async def get_curves(
     """
 
     def chosen(study: Study) -> CurveQuery:
-        return completed(study, models.study_results(study), x, tuple(y or ()), tuple(by or ()), pairs(at))
+        query = completed(study, models.study_results(study), x, tuple(y or ()), tuple(by or ()), pairs(at))
+        return _numbered(study, query, number)
 
     return await _drawn(work, study_id, form, "curves", chosen)
 
@@ -113,11 +125,20 @@ async def get_map(
     y: Annotated[str, Query(description="path of the other axis", examples=["excitation.frequency"])],
     z: Annotated[str, Query(description="the result", examples=["shaft.speed.mean"])],
     at: Fixed = None,
+    number: Number = 0,
     form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
 ) -> Response:
     """One result over two axes."""
     query = CurveQuery(x, (z,), (y,), pairs(at))
-    return await _drawn(work, study_id, form, "map", lambda _study: query)
+    return await _drawn(work, study_id, form, "map", lambda study: _numbered(study, query, number))
+
+
+def _numbered(study: Study, query: CurveQuery, number: int) -> CurveQuery:
+    """The query about the regime with a number; a fault where the cases of the study have one row each."""
+    if number and models.numbered_by(study.model, models.variant_of(study)) is None:
+        allowed = "0; other numbers in studies with `starts`"
+        raise parameter_error("number", "out-of-range", "the cases of this study have one row each", number, allowed)
+    return replace(query, number=number)
 
 
 async def _drawn(

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query
 from starlette.responses import Response
 
 from sprag.service.faults import FaultError
-from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
+from sprag.service.http.context import CaseNumber, Ctx, StartNumber, StudyId, started, study_with
 from sprag.service.http.drawing import picture, unchanging
 from sprag.service.http.respond import json_response
 from sprag.service.http.web.figures.answers import SAMPLES, motion_figures, strobes_figure
@@ -28,6 +28,7 @@ from sprag.worker import models
 from sprag.worker.codes import PENDING
 
 if TYPE_CHECKING:
+    from sprag.service.http.context import Context
     from sprag.service.storage.records import CaseRow
     from sprag.worker.study import Study
 
@@ -35,6 +36,8 @@ router = APIRouter(include_in_schema=False)
 
 #: Periods of the motion that are shown first, at the end of the evaluated window.
 _FIRST_PERIODS = 4
+#: Result with the start that a row describes.
+_START = "regime.start"
 
 Begin = Annotated[str, Query(alias="from", max_length=80)]
 End = Annotated[str, Query(alias="to", max_length=80)]
@@ -51,6 +54,22 @@ def _span(study: Study, case: int, begin: str, end: str) -> tuple[float, float]:
     if window:
         last = min(window[1][0] * (extent.period if window[1][1] == "periods" else 1.0), extent.end)
     return max(last - _FIRST_PERIODS * extent.period, 0.0), last
+
+
+def _rows(context: Context, study: Study, study_id: str, case: int) -> tuple[CaseRow, ...]:
+    """The rows of a case: one, or one for each regime; none while it is not finished."""
+    if models.numbered_by(study.model, models.variant_of(study)) is not None:
+        rows = context.store.all_rows(study_id, case)
+        if rows:
+            return rows
+    row = context.store.case_row(study_id, case)
+    return () if row is None else (row,)
+
+
+def _start_of(row: CaseRow | None) -> int | None:
+    """The start whose motion a row describes; None where a case has one start."""
+    start = None if row is None else row.results.get(_START)
+    return start if isinstance(start, int) else None
 
 
 def _motion(row: CaseRow) -> str:
@@ -74,20 +93,30 @@ def _parameters(study: Study, case: int) -> list[tuple[str, float, str, str]]:
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}")
-def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = "") -> Response:
+def case_page(
+    context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = "", which: StartNumber = None
+) -> Response:
     """One case."""
     study = study_with(context, study_id, case)
-    row = context.store.case_row(study_id, case)
+    rows = _rows(context, study, study_id, case)
+    # The motion that is shown is that of the regime on the page.
+    row = next(
+        (row for row in rows if which is not None and row.results.get(_START) == which), rows[0] if rows else None
+    )
+    which = _start_of(row) if which is None else which
+    single, number = started(study, case, which)
     faults: tuple[Any, ...] = ()
     span = None
     try:
-        span = _span(study, case, begin, end)
+        span = _span(single, number, begin, end)
     except FaultError as error:
         faults = error.faults
-    query = urlencode([("from", repr(span[0])), ("to", repr(span[1]))]) if span else ""
+    start = [] if which is None else [("start", str(which))]
+    query = urlencode([("from", repr(span[0])), ("to", repr(span[1])), *start]) if span else ""
+    own_start = f"?{urlencode(start)}" if start else ""
     own = f"/studies/{study_id}/cases/{case}"
     infos = models.study_results(study)
-    extent = models.extent(study, case)
+    extent = models.extent(single, number)
     return page(
         "case.html",
         status=422 if faults else 200,
@@ -95,6 +124,8 @@ def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = 
         tab="/cases",
         case=case,
         row=row,
+        regimes=[row for row in rows if row.results.get("regime.number") is not None],
+        start="" if which is None else str(which),
         ending=PENDING if row is None else row.ending,
         sentence="The case has not been run yet." if row is None else models.ENDING_SENTENCES.get(row.ending, ""),
         motion="" if row is None else _motion(row),
@@ -111,33 +142,39 @@ def case_page(context: Ctx, study_id: StudyId, case: CaseNumber, begin: Begin = 
         figures=f"{own}/motion?{query}",
         picture=f"{own}/motion.svg?{query}",
         file=f"/api/v1{own}/trajectory?{query}&points={SAMPLES}&format=csv",
-        clutches=f"{own}/engagements" if models.has_clutches(study) else "",
-        strobes=f"{own}/strobes" if models.has_strobes(study) else "",
+        clutches=f"{own}/engagements{own_start}" if models.has_clutches(study) else "",
+        strobes=f"{own}/strobes{own_start}" if models.has_strobes(study) else "",
         settled=models.is_settled(study.run),
         last=study.cases - 1,
     )
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/motion")
-async def motion(work: Attended, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = "") -> Response:
+async def motion(
+    work: Attended, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = "", which: StartNumber = None
+) -> Response:
     """The figures of a motion."""
-    study, span = await work.case_of(study_id, case, lambda study: _span(study, case, begin, end))
+    study, number, span = await work.case_of(
+        study_id, case, lambda study, number: _span(study, number, begin, end), which
+    )
 
     async def make() -> Response:
-        return json_response(await work.run_case(motion_figures, study, case, *span))
+        return json_response(await work.run_case(motion_figures, study, number, *span))
 
     return await unchanging(work, study_id, make)
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/motion.svg")
 async def motion_picture(
-    work: Attended, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = ""
+    work: Attended, study_id: StudyId, case: CaseNumber, begin: Begin = "", end: End = "", which: StartNumber = None
 ) -> Response:
     """The motion as one picture, for pages without JavaScript."""
-    study, span = await work.case_of(study_id, case, lambda study: _span(study, case, begin, end))
+    study, number, span = await work.case_of(
+        study_id, case, lambda study, number: _span(study, number, begin, end), which
+    )
 
     async def make() -> Response:
-        made = await work.run_case(models.run_trajectory, study, case, *span, SAMPLES // 3)
+        made = await work.run_case(models.run_trajectory, study, number, *span, SAMPLES // 3)
         title = f"{study.name}, case {case}"
         return await picture(draw_motion, "svg", made, models.presentation_of(study), title).response(work)
 
@@ -146,12 +183,16 @@ async def motion_picture(
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/strobes")
 async def strobes(
-    work: Attended, study_id: StudyId, case: CaseNumber, columns: Annotated[int, Query(ge=1, le=2)] = 2
+    work: Attended,
+    study_id: StudyId,
+    case: CaseNumber,
+    columns: Annotated[int, Query(ge=1, le=2)] = 2,
+    which: StartNumber = None,
 ) -> Response:
     """The figure of a case's strobes and its orbit: how it approaches its motion."""
-    study, _ = await work.case_of(study_id, case, require_strobes)
+    study, number, _ = await work.case_of(study_id, case, lambda study, _: require_strobes(study), which)
 
     async def make() -> Response:
-        return json_response(await work.run_case(strobes_figure, study, case, columns))
+        return json_response(await work.run_case(strobes_figure, study, number, columns))
 
     return await unchanging(work, study_id, make)

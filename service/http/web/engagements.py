@@ -6,7 +6,7 @@ from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from sprag.service.http.context import CaseNumber, StudyId
+from sprag.service.http.context import CaseNumber, StartNumber, StudyId
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
@@ -20,10 +20,10 @@ _SHOWN = 100
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/engagements")
-async def engagements_page(work: Attended, study_id: StudyId, case: CaseNumber) -> Response:
+async def engagements_page(work: Attended, study_id: StudyId, case: CaseNumber, which: StartNumber = None) -> Response:
     """What the clutches of a case do."""
-    study, _ = await work.case_of(study_id, case, require_clutches)
-    made = await work.run_case(models.run_engagements, study, case)
+    study, number, _ = await work.case_of(study_id, case, lambda study, _: require_clutches(study), which)
+    made = await work.run_case(models.run_engagements, study, number)
     own = f"/studies/{study_id}/cases/{case}"
     frame = await run_in_threadpool(study_frame, work.context, study_id)
     return page(

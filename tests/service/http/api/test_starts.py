@@ -1,0 +1,104 @@
+"""The regimes of cases with many starts over HTTP and on their page."""
+
+from __future__ import annotations
+
+import copy
+import csv
+
+import numpy as np
+import pytest
+
+from sprag.worker import models
+from sprag.worker.models import ChunkResult, FurtherRows
+from tests.service.conftest import API, Service
+from tests.service.timed_spec import SPEC
+
+SPEED = "shaft.initial_speed"
+
+
+@pytest.fixture
+def started(service: Service) -> str:
+    """A study of two cases, the second of which has two regimes."""
+    spec = copy.deepcopy(SPEC)
+    spec.pop("run", None)
+    spec["axes"] = [{"path": "shaft.load", "values": ["0.1 N*m", "0.2 N*m"]}]
+    spec.pop("combine", None)
+    study_id = service.submit({**spec, "starts": {"count": 8, "ranges": {SPEED: [1, 30]}}})
+    record, study = service.store.get_study(study_id), service.store.study(study_id)
+    names = [info.name for info in models.study_results(study)]
+    values = np.zeros((3, len(names)))
+    for name, column in {
+        "shaft.speed.mean": [1.0, 2.0, 3.5], "regime": [1, 1, 1], "regime.order": [1, 1, 2],
+        "regime.number": [0, 0, 1], "regime.count": [1, 2, 2], "regime.share": [1.0, 0.75, 0.25],
+        "regime.start": [0, 0, 5],
+    }.items():  # fmt: skip
+        values[:, names.index(name)] = column
+    further = FurtherRows(np.array([1]), [""], values[2:])
+    (chunk,) = service.store.open_chunks(record.number)
+    epoch = service.store.take_over("test")
+    service.store.claim(epoch, [chunk])
+    assert service.store.commit(epoch, chunk, ChunkResult(0, ["ok"] * 2, [""] * 2, values[:2], further))
+    service.store.settle(epoch, record.number)
+    return study_id
+
+
+def test_a_case_lists_its_regimes(service: Service, started: str) -> None:
+    one, two = (service.get(f"/studies/{started}/cases/{case}") for case in (0, 1))
+    assert [row["results"]["regime.share"] for row in one["regimes"]] == [1.0]
+    assert [(row["number"], row["results"]["shaft.speed.mean"]) for row in two["regimes"]] == [(0, 2.0), (1, 3.5)]
+    assert two["results"] == two["regimes"][0]["results"]
+
+
+def test_rows_of_all_regimes_are_exported(service: Service, started: str) -> None:
+    text = service.http.get(f"{API}/studies/{started}/results", params={"format": "csv"}).text
+    rows = list(csv.DictReader(text.splitlines()))
+    assert [(row["case"], row["regime.number"], row["shaft.speed.mean"]) for row in rows] == [
+        ("0", "0", "1.0"), ("1", "0", "2.0"), ("1", "1", "3.5"),
+    ]  # fmt: skip
+    (page,) = (service.get(f"/studies/{started}/cases")["cases"],)
+    assert [case["case"] for case in page] == [0, 1]
+
+
+@pytest.mark.parametrize("form", ["netcdf", "xlsx", "arrow", "parquet", "json", "jsonl"])
+def test_every_format_takes_several_rows_of_a_case(service: Service, started: str, form: str) -> None:
+    answer = service.http.get(f"{API}/studies/{started}/results", params={"format": form})
+    assert answer.status_code in {200, 422}, answer.text
+
+
+def test_curves_are_those_of_one_regime(service: Service, started: str) -> None:
+    def curve(**params: object) -> list[float | None]:
+        asked = {"x": "shaft.load", "y": "shaft.speed.mean", **params}
+        y: list[float | None] = service.get(f"/studies/{started}/curves", **asked)["curves"][0]["y"]["shaft.speed.mean"]
+        return y
+
+    assert curve() == [1.0, 2.0]
+    assert curve(number=1) == [None, 3.5]
+
+
+def test_other_studies_have_one_regime_a_case(service: Service) -> None:
+    study_id = service.submit()
+    answer = service.http.get(f"{API}/studies/{study_id}/curves", params={"number": 1})
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["parameter"] == "number"
+
+
+def test_a_motion_begins_at_the_start_that_is_asked_for(service: Service, started: str) -> None:
+    service.computer.answer = lambda *_: b"{}"
+    values = service.store.study(started).run["starts"]["values"][SPEED]
+    for part in ("strobes", "trajectory", "engagements"):
+        answer = service.http.get(f"{API}/studies/{started}/cases/1/{part}", params={"start": 5})
+        assert answer.status_code == 200, answer.text
+        _, study, case, *_ = service.computer.calls[-1]
+        assert (case, study.base[SPEED], study.base["shaft.load"]) == (0, values[4], 0.2)
+    wrong = service.http.get(f"{API}/studies/{started}/cases/1/strobes", params={"start": 8})
+    assert (wrong.status_code, wrong.json()["errors"][0]["allowed"]) == (422, "0 to 7")
+
+
+def test_the_page_of_a_case_lists_its_regimes(service: Service, started: str) -> None:
+    page = service.http.get(f"/studies/{started}/cases/1").text
+    assert "<h3>Regimes</h3>" in page
+    assert '<a href="?start=5">5</a>' in page
+    assert "0, shown below" in page
+    other = service.http.get(f"/studies/{started}/cases/1", params={"start": "5"}).text
+    assert "5, shown below" in other
+    assert f"/studies/{started}/cases/1/strobes?start=5&amp;columns=2" in other
