@@ -10,6 +10,7 @@ if WAY == PLAIN:
     from sprag.engine.compile.plain import (
         compiled,
         constant_record,
+        constant_shape,
         inlined,
         lane_loops,
         lane_mask,
@@ -19,9 +20,19 @@ if WAY == PLAIN:
     )
 else:
     from sprag.engine.compile.decorators import compiled, inlined, part, unmanaged
-    from sprag.engine.compile.lowering import constant_record, lane_loops, lane_mask, lowest
+    from sprag.engine.compile.lowering import constant_record, constant_shape, lane_loops, lane_mask, lowest
 
 setattr(numba.config, "CACHE_DIR", str(cache_folder()))  # noqa: B010  (numba does not declare it)
 use_full_vectors()
 
-__all__ = ["compiled", "constant_record", "inlined", "lane_loops", "lane_mask", "lowest", "part", "unmanaged"]
+__all__ = [
+    "compiled",
+    "constant_record",
+    "constant_shape",
+    "inlined",
+    "lane_loops",
+    "lane_mask",
+    "lowest",
+    "part",
+    "unmanaged",
+]

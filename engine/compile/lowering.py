@@ -11,6 +11,7 @@ decides which products are fused with sums.
 """
 
 import ast
+import math
 from collections.abc import Callable
 from typing import Any, cast
 
@@ -109,7 +110,7 @@ class _Lane:
 
 def lane_loops(text: str, first: str, second: str) -> Callable[[Any, float, float, int], None]:
     """A function ``(W, a, b, groups)`` for compiled code that runs the loops in ``text`` over the float64 workspace
-    ``W``, for the first so many groups of `GROUP` lanes.
+    ``W``, contiguous and flat to them, for the first so many groups of `GROUP` lanes.
 
     ``first`` and ``second`` are the names under which the loops know the numbers a and b. The function can only be
     called from a numba function; it is compiled as part of that one.
@@ -193,3 +194,25 @@ def constant_record(record: Any) -> Callable[[Any], Any]:
         return given(given), generate
 
     return cast(Callable[[Any], Any], fixed)
+
+
+def constant_shape(*shape: int) -> Callable[[Any], Any]:
+    """A function for compiled code that gives a contiguous array of this shape with the shape as a constant.
+
+    The place of an element then depends on its indices only, as in a flat array whose row length is known. The array
+    must have passed ``unmanaged``. It is not checked that it has the shape.
+    """
+
+    @intrinsic
+    def shaped(typing_context: Any, array: Any) -> Any:  # noqa: ARG001
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            view = context.make_array(signature.args[0])(context, builder, arguments[0])
+            size = context.get_abi_sizeof(context.get_data_type(array.dtype))
+            strides = [size * math.prod(shape[axis + 1 :]) for axis in range(len(shape))]
+            view.shape = cgutils.pack_array(builder, [_INT(extent) for extent in shape])  # type: ignore[no-untyped-call]
+            view.strides = cgutils.pack_array(builder, [_INT(stride) for stride in strides])  # type: ignore[no-untyped-call]
+            return view._getvalue()
+
+        return array(array), generate
+
+    return cast(Callable[[Any], Any], shaped)

@@ -92,9 +92,9 @@ class _Straight(ast.NodeTransformer):
 def lane_loops(text: str, first: str, second: str) -> Callable[[Any, float, float, int], None]:
     """A function ``(W, a, b, groups)`` for compiled code, as that of ``lowering``."""
     loops = _Straight().visit(fused(text))
-    function = ast.parse(f"def run(W, {first}, {second}, groups):\n    pass")
+    function = ast.parse(f"def run(workspace, {first}, {second}, groups):\n    W = workspace.ravel()")
     assert isinstance(function.body[0], ast.FunctionDef)
-    function.body[0].body = loops.body
+    function.body[0].body += loops.body
     names = {"select": _select, "bits_of": _bits_of, "of_bits": _of_bits, "fma": _fma}
     exec(compile(ast.fix_missing_locations(function), "<lane loops>", "exec"), names)  # noqa: S102
     return cast(Callable[[Any, float, float, int], None], numba.njit(error_model="numpy")(names["run"]))
@@ -104,7 +104,8 @@ def lane_mask(sign: str, row: int, lanes: int) -> Callable[[Any], int]:
     """A function ``(W)`` for compiled code that finds lanes, as that of ``lowering``."""
     names: dict[str, Any] = {}
     text = f"""
-def find(W):
+def find(workspace):
+    W = workspace.ravel()
     mask = 0
     for lane in range({lanes}):
         value = W[{row * lanes} + lane]
@@ -130,4 +131,9 @@ lowest = cast(Callable[[int], int], _lowest)
 
 def constant_record(record: np.void) -> Callable[[Any], Any]:  # noqa: ARG001
     """A function for compiled code that gives a record: here the one that it gets, which is equal."""
+    return cast(Callable[[Any], Any], _same)
+
+
+def constant_shape(*shape: int) -> Callable[[Any], Any]:  # noqa: ARG001
+    """A function for compiled code that gives an array: here as it is."""
     return cast(Callable[[Any], Any], _same)

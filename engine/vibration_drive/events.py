@@ -50,40 +50,38 @@ _BANDS = len(Band)
 @inlined
 def _guard(W: Floats, lay: Layout, lane: int, i: int, band: int, g: Floats) -> None:
     """Write the polynomial (in fractions of the step) that is positive while a guard of pendulum ``i`` holds."""
-    lanes = lay.lanes
     base = lay.pendulums + i * lay.stride
-    edge = W[(base + lay.p_w_low + band) * lanes + lane]
+    edge = W[base + lay.p_w_low + band, lane]
     sign = 1.0 if band % 2 == 0 else -1.0
-    own = (base + lay.p_speed) * lanes + lane
-    shaft = lay.speed * lanes + lane
+    own = base + lay.p_speed
     if band // 2 == 0:
         for k in range(lay.order + 1):
-            g[k] = sign * (W[own + k * lanes] - W[shaft + k * lanes])
+            g[k] = sign * (W[own + k, lane] - W[lay.speed + k, lane])
     elif band // 2 == 1:
-        g[0] = sign * W[(base + lay.p_u) * lanes + lane]
-        step = sign * W[lay.h * lanes + lane]
+        g[0] = sign * W[base + lay.p_u, lane]
+        step = sign * W[lay.h, lane]
         for k in range(lay.order):
-            g[k + 1] = step * (W[own + k * lanes] - W[shaft + k * lanes]) * RECIPROCAL[k + 1]
+            g[k + 1] = step * (W[own + k, lane] - W[lay.speed + k, lane]) * RECIPROCAL[k + 1]
     else:
-        torque = (base + lay.p_torque) * lanes + lane
+        torque = base + lay.p_torque
         for k in range(lay.order + 1):
-            g[k] = sign * W[torque + k * lanes]
+            g[k] = sign * W[torque + k, lane]
     g[0] -= sign * edge
 
 
 @inlined
 def _offer(W: Floats, Z: Ints, lay: Layout, lane: int, x: float, pendulum: int, target: int) -> None:
     """Record an event at the fraction ``x`` of a lane's step if it is the earliest so far; the step then ends there."""
-    first = W[lay.x * lay.lanes + lane]
+    first = W[lay.x, lane]
     if Z[lane, EVENT_PENDULUM] == NO_EVENT and first == 1.0:
         first = 1.5
     if x < first:
         Z[lane, EVENT_PENDULUM] = pendulum
         Z[lane, EVENT_TARGET] = target
         Z[lane, EVENT_SMOOTH] = 1 if x > 0.0 else 0
-        W[lay.x * lay.lanes + lane] = x
+        W[lay.x, lane] = x
         if x < 1.0:
-            W[lay.at_stop * lay.lanes + lane] = 0.0
+            W[lay.at_stop, lane] = 0.0
 
 
 @inlined
@@ -128,18 +126,17 @@ def collect_guards(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks
     Of simultaneous events the shaft's comes first, then that of the pendulum with the lowest index; the others are
     found violated at the start of the next step and follow immediately.
     """
-    lanes = lay.lanes
-    fresh = W[lay.steps * lanes + lane] == Z[lane, SKIP_STEP]
+    fresh = W[lay.steps, lane] == Z[lane, SKIP_STEP]
     shaft = Z[lane, SHAFT_STATE]
-    if not W[(lay.m_sum_high if shaft == HELD else lay.m_speed_low) * lanes + lane] > 0.0:
+    if not W[lay.m_sum_high if shaft == HELD else lay.m_speed_low, lane] > 0.0:
         if shaft == HELD:
             total(W, lay, lane, g)
             for k in range(lay.order + 1):
                 g[k] = -g[k]
-            g[0] += W[lay.sum_high * lanes + lane]
+            g[0] += W[lay.sum_high, lane]
         else:
             for k in range(lay.order + 1):
-                g[k] = W[(lay.speed + k) * lanes + lane]
+                g[k] = W[lay.speed + k, lane]
             if fresh:
                 for k in range(Z[lane, SKIP_SHAFT]):
                     g[k] = 0.0
@@ -149,7 +146,7 @@ def collect_guards(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks
     for i in range(lay.n):
         state = Z[lane, i]
         for band in range(_BANDS):
-            if W[(lay.pendulums + i * lay.stride + lay.p_m_w_low + band) * lanes + lane] > 0.0:
+            if W[lay.pendulums + i * lay.stride + lay.p_m_w_low + band, lane] > 0.0:
                 continue
             _guard(W, lay, lane, i, band, g)
             if fresh and band // 2 < 2:
@@ -181,25 +178,24 @@ def settle_guards(
 @part
 def _start(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> None:
     """Start of interaction (5): the relative turn counts from here."""
-    lanes = lay.lanes
     base = lay.pendulums + i * lay.stride
-    u = W[(base + lay.p_u) * lanes + lane]
+    u = W[base + lay.p_u, lane]
     if Z[lane, i] >= ENGAGED:
-        W[lay.energy_lost * lanes + lane] += stored_energy(W, lay, lane, i, u)
+        W[lay.energy_lost, lane] += stored_energy(W, lay, lane, i, u)
     # w = 0 by the crossing itself, unless the case began with a pendulum already faster than the shaft.
-    speed = W[(base + lay.p_speed) * lanes + lane]
-    shaft = W[lay.speed * lanes + lane]
+    speed = W[base + lay.p_speed, lane]
+    shaft = W[lay.speed, lane]
     size = typical_speed(W, lay, lane, i)
     crossing = Z[lane, EVENT_SMOOTH] == 1 or abs(speed - shaft) <= ROUNDING * size
     if crossing:
-        W[(base + lay.p_speed) * lanes + lane] = shaft
-    backlash = W[(base + lay.p_backlash) * lanes + lane]
+        W[base + lay.p_speed, lane] = shaft
+    backlash = W[base + lay.p_backlash, lane]
     if backlash > 0.0:
-        W[(base + lay.p_u) * lanes + lane] = -backlash
+        W[base + lay.p_u, lane] = -backlash
         set_clutch(W, Z, lay, lane, i, TAKE_UP)
         return
-    W[(base + lay.p_u) * lanes + lane] = 0.0
-    if crossing and W[(base + lay.p_law) * lanes + lane] > 0.0:
+    W[base + lay.p_u, lane] = 0.0
+    if crossing and W[base + lay.p_law, lane] > 0.0:
         again = Z[lane, i] != FREE
         decide(W, Z, lay, lane, i, size, -1)
         again = again and Z[lane, i] != FREE
@@ -207,7 +203,7 @@ def _start(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> None:
         again = True
         set_clutch(W, Z, lay, lane, i, ENGAGED)
     if again:
-        W[(base + lay.p_engagements) * lanes + lane] += 1.0
+        W[base + lay.p_engagements, lane] += 1.0
     if Z[lane, LITERAL] == 1 and Z[lane, i] == ENGAGED:
         # The same applies beyond the data: w has just risen and must fall before it can rise again.
         watch_fall(W, lay, lane, i, True)
@@ -220,14 +216,13 @@ def _at_rest(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> bool:
     Without horizontal vibration the upright position is an equilibrium. The rounding error there can have any size,
     1e-40 rad or 0, and a clutch's guards cannot distinguish such a pendulum from a moving one.
     """
-    lanes = lay.lanes
     base = lay.pendulums + i * lay.stride
-    phi, speed = (base + lay.p_phi) * lanes + lane, (base + lay.p_speed) * lanes + lane
-    still = abs(W[phi]) < _STILL and abs(W[speed]) * W[lay.inverse_rate * lanes + lane] < _STILL
-    driven = W[lay.acc_x * lanes + lane] * W[(base + lay.p_ml) * lanes + lane] != 0.0
-    if not still or Z[lane, i] == LOCKED or driven or (W[phi] == 0.0 and W[speed] == 0.0):
+    phi, speed = base + lay.p_phi, base + lay.p_speed
+    still = abs(W[phi, lane]) < _STILL and abs(W[speed, lane]) * W[lay.inverse_rate, lane] < _STILL
+    driven = W[lay.acc_x, lane] * W[base + lay.p_ml, lane] != 0.0
+    if not still or Z[lane, i] == LOCKED or driven or (W[phi, lane] == 0.0 and W[speed, lane] == 0.0):
         return False
-    W[phi] = W[speed] = 0.0
+    W[phi, lane] = W[speed, lane] = 0.0
     return True
 
 
@@ -241,7 +236,7 @@ def _break_away(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
     for j in range(lay.n):
         if Z[lane, j] == FREE:
             _at_rest(W, Z, lay, lane, j)
-            speed = W[(lay.pendulums + j * lay.stride + lay.p_speed) * lay.lanes + lane]
+            speed = W[lay.pendulums + j * lay.stride + lay.p_speed, lane]
             if speed == 0.0 and acceleration(W, lay, lane, j) == 0.0:
                 Z[lane, SKIP_W + j] = 2
 
@@ -266,21 +261,20 @@ def transit(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
     The skips tell the root finder which leading coefficients are zero by the nature of the crossing (a shaft that
     breaks away starts with no acceleration) so that their rounding errors cannot fire a guard.
     """
-    lanes = lay.lanes
     i = Z[lane, EVENT_PENDULUM]
     target = Z[lane, EVENT_TARGET]
     smooth = Z[lane, EVENT_SMOOTH] == 1
-    if W[lay.steps * lanes + lane] != Z[lane, SKIP_STEP]:
-        Z[lane, SKIP_STEP] = int(W[lay.steps * lanes + lane])
+    if W[lay.steps, lane] != Z[lane, SKIP_STEP]:
+        Z[lane, SKIP_STEP] = int(W[lay.steps, lane])
         for k in range(SKIP_SHAFT, LANE_INTEGERS):
             Z[lane, k] = 0
     if i == OF_SHAFT:
         Z[lane, SKIP_SHAFT] = 0
-        W[lay.speed * lanes + lane] = 0.0
+        W[lay.speed, lane] = 0.0
         for j in range(lay.n):
             # A locked pendulum stops with the shaft.
             if Z[lane, j] == LOCKED:
-                W[(lay.pendulums + j * lay.stride + lay.p_speed) * lanes + lane] = 0.0
+                W[lay.pendulums + j * lay.stride + lay.p_speed, lane] = 0.0
         set_shaft(W, Z, lay, lane, target)
         if target == ROTATING and smooth:
             _break_away(W, Z, lay, lane)
@@ -298,24 +292,24 @@ def transit(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
         _start(W, Z, lay, lane, i)
         return
     if source == target:
-        W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
+        W[base + lay.p_speed, lane] = W[lay.speed, lane]
         watch_fall(W, lay, lane, i, False)
         return
     if source == LOCKED:
         _unlock(W, Z, lay, lane, i, target)
         return
     if source == ENGAGED and target == FREE and not asked and grazes(W, lay, lane, i):
-        W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
-        W[(base + lay.p_u) * lanes + lane] = 0.0
+        W[base + lay.p_speed, lane] = W[lay.speed, lane]
+        W[base + lay.p_u, lane] = 0.0
         decide(W, Z, lay, lane, i, typical_speed(W, lay, lane, i), -1)
         return
     if source == TAKE_UP and target == FREE:
         if smooth:
-            W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
+            W[base + lay.p_speed, lane] = W[lay.speed, lane]
     elif BEYOND in (source, target):
-        W[(base + lay.p_u) * lanes + lane] = W[(base + lay.p_limit) * lanes + lane]
+        W[base + lay.p_u, lane] = W[base + lay.p_limit, lane]
     else:
-        W[(base + lay.p_u) * lanes + lane] = 0.0
+        W[base + lay.p_u, lane] = 0.0
         if target == ENGAGED:
-            W[(base + lay.p_engagements) * lanes + lane] += 1.0
+            W[base + lay.p_engagements, lane] += 1.0
     set_clutch(W, Z, lay, lane, i, target)

@@ -81,7 +81,7 @@ def integrate(
     done = kernel.integrate(
         kernel.RECORD, matrix, from_rest(cases, n) if starts is None else starts, recorded,
         run.tolerance, same_everywhere(math.log2(run.tolerance)), int(run.reset == "literal"),
-        run.max_events_per_period, aligned_zeros(lay.rows * lay.lanes),
+        run.max_events_per_period, aligned_zeros(lay.rows * lay.lanes).reshape(lay.rows, lay.lanes),
         np.zeros((lay.lanes, LANE_INTEGERS), dtype=np.int64),
         np.zeros(MAX_DEGREE + 1), work_stack(),
         blocks_for(listed, lay.order), np.zeros((listed, 3), dtype=np.int64),

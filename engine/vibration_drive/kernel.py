@@ -34,11 +34,12 @@ _MODULE = '''"""Generated kernel: {n} pendulum(s), {coefficients} clutch coeffic
 
 import numpy as np
 
-from sprag.engine.compile.jit import compiled, constant_record, lane_loops, lane_mask, lowest, unmanaged
+from sprag.engine.compile.jit import compiled, constant_record, constant_shape, lane_loops, lane_mask, lowest, unmanaged
 from sprag.engine.vibration_drive.events import settle_guards
 from sprag.engine.vibration_drive.lanes import highest, load_case, look_for_events, pack, record, settle
 from sprag.engine.vibration_drive.layout import Layout, as_record
 from sprag.engine.vibration_drive.pieces import keep
+from sprag.engine.vibration_drive.states import LANE_INTEGERS
 from sprag.engine.vibration_drive.stops import next_stop
 from sprag.engine.vibration_drive.strobes import FRACTION
 from sprag.engine.vibration_drive.window import collect_peaks, settle_peaks
@@ -46,6 +47,7 @@ from sprag.engine.vibration_drive.window import collect_peaks, settle_peaks
 LAYOUT = {layout!r}
 RECORD = as_record(LAYOUT)
 fixed = constant_record(RECORD)
+workspace, integers = constant_shape(LAYOUT.rows, LAYOUT.lanes), constant_shape(LAYOUT.lanes, LANE_INTEGERS)
 
 
 # Series, step size, distances to guards and extrema of every lane.
@@ -82,9 +84,8 @@ def integrate(
     lay = fixed(lay)
     starts, strobes = unmanaged(starts), unmanaged(strobes)
     cases, turns, sums, times = unmanaged(cases), unmanaged(turns), unmanaged(sums), unmanaged(times)
-    W, Z, g, stack, blocks, meta = (
-        unmanaged(W), unmanaged(Z), unmanaged(g), unmanaged(stack), unmanaged(blocks), unmanaged(meta)
-    )
+    W, Z = workspace(unmanaged(W)), integers(unmanaged(Z))
+    g, stack, blocks, meta = unmanaged(g), unmanaged(stack), unmanaged(blocks), unmanaged(meta)
     samples, states, pieces = unmanaged(samples), unmanaged(states), unmanaged(pieces)
     groups = min((cases.shape[0] + {group} - 1) // {group}, {groups})  # of lanes that are used
     busy = 0  # bit k: lane k has a case

@@ -57,37 +57,36 @@ def load_case(
 
     ``cases`` has the columns of ``cases.case_matrix``.
     """
-    lanes = lay.lanes
     row = cases[case]
     for k in range(lay.rows):
-        W[k * lanes + lane] = 0.0
+        W[k, lane] = 0.0
     for k in range(ev.LANE_INTEGERS):
         Z[lane, k] = 0
     Z[lane, ev.CASE] = case
     Z[lane, ev.LITERAL] = literal
     Z[lane, ev.EVENT_PENDULUM] = ev.NO_EVENT
-    W[lay.nu * lanes + lane] = row[_NU]
-    W[lay.period * lanes + lane] = row[_PERIOD]
-    W[lay.acc_x * lanes + lane] = row[_ACC_X]
-    W[lay.acc_y * lanes + lane] = row[_ACC_Y]
-    W[lay.cos_chi * lanes + lane] = cosine(row[_CHI])
-    W[lay.sin_chi * lanes + lane] = sine(row[_CHI])
-    W[lay.gravity * lanes + lane] = row[_GRAVITY]
-    W[lay.load * lanes + lane] = row[_LOAD]
-    W[lay.inertia * lanes + lane] = row[_INERTIA]
-    W[lay.inverse_rate * lanes + lane] = row[_INVERSE_RATE]
-    W[lay.most_steps * lanes + lane] = row[_MOST_STEPS]
-    W[lay.speed * lanes + lane] = row[_SPEED]
+    W[lay.nu, lane] = row[_NU]
+    W[lay.period, lane] = row[_PERIOD]
+    W[lay.acc_x, lane] = row[_ACC_X]
+    W[lay.acc_y, lane] = row[_ACC_Y]
+    W[lay.cos_chi, lane] = cosine(row[_CHI])
+    W[lay.sin_chi, lane] = sine(row[_CHI])
+    W[lay.gravity, lane] = row[_GRAVITY]
+    W[lay.load, lane] = row[_LOAD]
+    W[lay.inertia, lane] = row[_INERTIA]
+    W[lay.inverse_rate, lane] = row[_INVERSE_RATE]
+    W[lay.most_steps, lane] = row[_MOST_STEPS]
+    W[lay.speed, lane] = row[_SPEED]
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
         column = _FIRST_PENDULUM + i * (PENDULUM_COLUMNS + lay.coefficients)
         for k in range(_P_COPIED):
-            W[(base + lay.p_ml + k) * lanes + lane] = row[column + k]
-        W[(base + lay.p_phi) * lanes + lane] = row[column + _P_ANGLE]
-        W[(base + lay.p_speed) * lanes + lane] = row[column + _P_SPEED]
+            W[base + lay.p_ml + k, lane] = row[column + k]
+        W[base + lay.p_phi, lane] = row[column + _P_ANGLE]
+        W[base + lay.p_speed, lane] = row[column + _P_SPEED]
         for k in range(lay.coefficients):
-            W[(base + lay.p_law + k) * lanes + lane] = row[column + PENDULUM_COLUMNS + k]
-        W[(base + lay.p_u) * lanes + lane] = -W[(base + lay.p_backlash) * lanes + lane]
+            W[base + lay.p_law + k, lane] = row[column + PENDULUM_COLUMNS + k]
+        W[base + lay.p_u, lane] = -W[base + lay.p_backlash, lane]
         set_clutch(W, Z, lay, lane, i, _FREE)
     set_shaft(W, Z, lay, lane, _HELD if row[_SPEED] == 0.0 and row[_LOAD] > 0.0 else _ROTATING)
     begin_at(W, Z, lay, lane, starts[case])
@@ -122,7 +121,7 @@ def _finish(
     case = Z[lane, ev.CASE]
     out = sums[case]
     out[OUT_ENDING] = ending
-    out[OUT_STEPS] = W[lay.steps * lay.lanes + lane]
+    out[OUT_STEPS] = W[lay.steps, lane]
     out[OUT_EVENTS] = Z[lane, ev.EVENTS]
     out[OUT_RUNUP] = math.nan
     if ending != _OK:
@@ -150,19 +149,15 @@ def _take_event(W: Floats, Z: Ints, lay: Layout, lane: int, h: float, most_event
 @part
 def _lost(W: Floats, lay: Layout, lane: int) -> int:
     """The abnormal ending a lane has reached after a step, or ``_RUNNING``."""
-    lanes = lay.lanes
-    if not abs(W[lay.speed * lanes + lane]) < SPEED_BOUND:
+    if not abs(W[lay.speed, lane]) < SPEED_BOUND:
         return _DIVERGED
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
-        if not (
-            abs(W[(base + lay.p_phi) * lanes + lane]) < ANGLE_BOUND
-            and abs(W[(base + lay.p_speed) * lanes + lane]) < SPEED_BOUND
-        ):
+        if not (abs(W[base + lay.p_phi, lane]) < ANGLE_BOUND and abs(W[base + lay.p_speed, lane]) < SPEED_BOUND):
             return _DIVERGED
-    if W[lay.h_free * lanes + lane] < STEP_FLOOR * W[lay.period * lanes + lane]:
+    if W[lay.h_free, lane] < STEP_FLOOR * W[lay.period, lane]:
         return _ACCURACY
-    return _STEP_BUDGET if W[lay.steps * lanes + lane] >= W[lay.most_steps * lanes + lane] else _RUNNING
+    return _STEP_BUDGET if W[lay.steps, lane] >= W[lay.most_steps, lane] else _RUNNING
 
 
 @part
@@ -179,27 +174,26 @@ def settle(
     most_events: int,
 ) -> bool:
     """After ``advance``: events, stops, budgets of a lane that needs attention. True while its case goes on."""
-    lanes = lay.lanes
-    h = W[lay.x * lanes + lane] * W[lay.h * lanes + lane]
+    h = W[lay.x, lane] * W[lay.h, lane]
     ending = _lost(W, lay, lane)
     event = Z[lane, ev.EVENT_PENDULUM] != ev.NO_EVENT
-    at_stop = W[lay.at_stop * lanes + lane] == 1.0
+    at_stop = W[lay.at_stop, lane] == 1.0
     if at_stop and h > 0.0:
         # The stop is met exactly, regardless of the rounding of the sum of steps.
-        W[lay.f * lanes + lane] = W[lay.f_stop * lanes + lane]
+        W[lay.f, lane] = W[lay.f_stop, lane]
     if ending == _RUNNING and event:
         ending = _take_event(W, Z, lay, lane, h, most_events)
         Z[lane, ev.EVENT_PENDULUM] = ev.NO_EVENT
     if ending == _RUNNING and at_stop and h > 0.0:
         case = Z[lane, ev.CASE]
         strobe = starts[case, FRACTION]
-        at_strobe = W[lay.f * lanes + lane] == strobe
-        if W[lay.f * lanes + lane] == 1.0:
-            W[lay.f * lanes + lane] = 0.0
+        at_strobe = W[lay.f, lane] == strobe
+        if W[lay.f, lane] == 1.0:
+            W[lay.f, lane] = 0.0
             Z[lane, ev.PERIOD] += 1
             Z[lane, ev.EVENTS_IN_PERIOD] = 0
             if Z[lane, ev.PERIOD] < turns.shape[1]:
-                turns[lane, Z[lane, ev.PERIOD]] = W[lay.turn * lanes + lane]
+                turns[lane, Z[lane, ev.PERIOD]] = W[lay.turn, lane]
         kept = strobes.shape[1]
         if at_strobe and kept > 0 and Z[lane, ev.PERIOD] > 0:
             note(W, Z, lay, lane, strobe, strobes[case, (Z[lane, ev.PERIOD] - 1) % kept])
@@ -242,7 +236,7 @@ def pack(W: Floats, Z: Ints, lay: Layout, turns: Floats, busy: int, groups: int)
         while (busy >> free) & 1 == 1:
             free += 1
         for row in range(lay.rows):
-            W[row * lay.lanes + free] = W[row * lay.lanes + lane]
+            W[row, free] = W[row, lane]
         for k in range(ev.LANE_INTEGERS):
             Z[free, k] = Z[lane, k]
         for k in range(min(turns.shape[1], Z[lane, ev.PERIOD] + 1)):
@@ -254,23 +248,22 @@ def pack(W: Floats, Z: Ints, lay: Layout, turns: Floats, busy: int, groups: int)
 @part
 def shorten(W: Floats, lay: Layout, lane: int, g: Floats) -> None:
     """Halve the part x of the step that is taken until the series of every clutch's torque meets its law there."""
-    lanes = lay.lanes
     x = 1.0
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
-        if W[(base + lay.p_locked) * lanes + lane] > 0.5:
+        if W[base + lay.p_locked, lane] > 0.5:
             continue
         for _ in range(MOST_HALVINGS):
-            primitive(W, lay, lane, W[(base + lay.p_u) * lanes + lane], base + lay.p_speed, lay.speed, g)
+            primitive(W, lay, lane, W[base + lay.p_u, lane], base + lay.p_speed, lay.speed, g)
             u = evaluate(g, lay.order, x)
             series(W, lay, lane, base + lay.p_torque, g)
-            torque = law(W, base + lay.p_force, lay.coefficients, lanes, lane, u)
-            if abs(torque - evaluate(g, lay.order, x)) <= W[(base + lay.p_allowed) * lanes + lane]:
+            torque = law(W, base + lay.p_force, lay.coefficients, lane, u)
+            if abs(torque - evaluate(g, lay.order, x)) <= W[base + lay.p_allowed, lane]:
                 break
             x *= 0.5
     if x < 1.0:
-        W[lay.x * lanes + lane] = x
-        W[lay.at_stop * lanes + lane] = 0.0
+        W[lay.x, lane] = x
+        W[lay.at_stop, lane] = 0.0
 
 
 @part
@@ -278,7 +271,7 @@ def look_for_events(
     W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks: Floats, meta: Ints, used: int
 ) -> int:
     """Examine a lane whose bounds cannot exclude an event: list its doubtful guards, return the length."""
-    if W[lay.margin * lay.lanes + lane] == TOO_LONG:
+    if W[lay.margin, lane] == TOO_LONG:
         shorten(W, lay, lane, g)
     return collect_guards(W, Z, lay, lane, g, blocks, meta, used)
 
@@ -290,14 +283,14 @@ def record(
     """Write the samples that fall into the lane's step, given sample times in excitation periods; how many are done
     then.
     """
-    f = W[lay.f * lay.lanes + lane]
-    x_taken = W[lay.x * lay.lanes + lane]
-    at_stop = W[lay.at_stop * lay.lanes + lane] == 1.0
-    length = W[lay.h * lay.lanes + lane] / W[lay.period * lay.lanes + lane]
+    f = W[lay.f, lane]
+    x_taken = W[lay.x, lane]
+    at_stop = W[lay.at_stop, lane] == 1.0
+    length = W[lay.h, lane] / W[lay.period, lane]
     while done < times.shape[0]:
         ahead = (times[done] - Z[lane, ev.PERIOD]) - f
         x = max(0.0, ahead / length)
-        if at_stop and times[done] - Z[lane, ev.PERIOD] <= W[lay.f_stop * lay.lanes + lane]:
+        if at_stop and times[done] - Z[lane, ev.PERIOD] <= W[lay.f_stop, lane]:
             x = min(1.0, x)
         if x > x_taken or x_taken == 0.0:
             break

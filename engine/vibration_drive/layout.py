@@ -1,7 +1,8 @@
 """Rows of the lane workspace, shared by the generated kernel and the event code.
 
-The workspace is one flat float64 array; quantity ``row`` of lane ``lane`` is at ``row * lanes + lane``. Rows of
-pendulum i start at ``pendulums + i * stride``; fields that begin with ``p_`` are offsets into that block.
+The workspace ``W`` is one float64 array of shape (rows, lanes); scalar code reads quantity ``row`` of a lane as
+``W[row, lane]``, and lane loops see the same numbers as one flat array. Rows of pendulum i start at ``pendulums + i *
+stride``; fields that begin with ``p_`` are offsets into that block.
 """
 
 from enum import IntEnum

@@ -55,28 +55,27 @@ def _coefficient(W: Floats, lay: Layout, lane: int, i: int, k: int, rate: float)
     """Coefficient ``k``, 0 or 1, of the acceleration of pendulum ``i`` without its clutch, from the lane's state on;
     its acceleration there is ``rate``.
     """
-    lanes = lay.lanes
     base = lay.pendulums + i * lay.stride
-    theta = 2.0 * math.pi * W[lay.f * lanes + lane]
+    theta = 2.0 * math.pi * W[lay.f, lane]
     x, y = _base_series(
-        W[lay.acc_x * lanes + lane],
-        W[lay.acc_y * lanes + lane],
-        W[lay.nu * lanes + lane],
+        W[lay.acc_x, lane],
+        W[lay.acc_y, lane],
+        W[lay.nu, lane],
         sine(theta),
         cosine(theta),
-        W[lay.sin_chi * lanes + lane],
-        W[lay.cos_chi * lanes + lane],
+        W[lay.sin_chi, lane],
+        W[lay.cos_chi, lane],
     )
-    phi = (W[(base + lay.p_phi) * lanes + lane], W[(base + lay.p_speed) * lanes + lane])
+    phi = (W[base + lay.p_phi, lane], W[base + lay.p_speed, lane])
     w = (phi[1], rate)
     s, c = sine(phi[0]), cosine(phi[0])
     sin, cos = (s, c * phi[1]), (c, -s * phi[1])
-    ml = W[(base + lay.p_ml) * lanes + lane]
+    ml = W[base + lay.p_ml, lane]
     acceleration = _free_acceleration(
         ml,
-        ml * W[lay.gravity * lanes + lane],
-        W[(base + lay.p_spring) * lanes + lane],
-        W[(base + lay.p_damping) * lanes + lane],
+        ml * W[lay.gravity, lane],
+        W[base + lay.p_spring, lane],
+        W[base + lay.p_damping, lane],
         phi[k],
         w[k],
         sin[k],
@@ -100,34 +99,32 @@ def _jerk(W: Floats, lay: Layout, lane: int, i: int, rate: float) -> float:
 @part
 def typical_speed(W: Floats, lay: Layout, lane: int, i: int) -> float:
     """Size of the motion of pendulum ``i`` at the lane's state, rad/s."""
-    speed = W[(lay.pendulums + i * lay.stride + lay.p_speed) * lay.lanes + lane]
-    return float(abs(speed) + abs(acceleration(W, lay, lane, i)) * W[lay.inverse_rate * lay.lanes + lane])
+    speed = W[lay.pendulums + i * lay.stride + lay.p_speed, lane]
+    return float(abs(speed) + abs(acceleration(W, lay, lane, i)) * W[lay.inverse_rate, lane])
 
 
 @part
 def grazes(W: Floats, lay: Layout, lane: int, i: int) -> bool:
     """Whether clutch ``i``, about to open, could lock and has w = 0 but for rounding."""
-    lanes = lay.lanes
     base = lay.pendulums + i * lay.stride
-    if W[(base + lay.p_backlash) * lanes + lane] > 0.0 or not W[(base + lay.p_law) * lanes + lane] > 0.0:
+    if W[base + lay.p_backlash, lane] > 0.0 or not W[base + lay.p_law, lane] > 0.0:
         return False
-    w = W[(base + lay.p_speed) * lanes + lane] - W[lay.speed * lanes + lane]
+    w = W[base + lay.p_speed, lane] - W[lay.speed, lane]
     return bool(abs(w) <= ROUNDING * typical_speed(W, lay, lane, i))
 
 
 @part
 def _meets(W: Floats, Z: Ints, lay: Layout, lane: int, j: int, size: float) -> bool:
     """Whether clutch ``j`` is locked, or at w = 0 and u = 0 to rounding and could lock; ``size``: a typical speed."""
-    lanes = lay.lanes
     base = lay.pendulums + j * lay.stride
     if Z[lane, j] == LOCKED:
         return True
-    if W[(base + lay.p_backlash) * lanes + lane] > 0.0 or not W[(base + lay.p_law) * lanes + lane] > 0.0:
+    if W[base + lay.p_backlash, lane] > 0.0 or not W[base + lay.p_law, lane] > 0.0:
         return False
     near = TOUCHING * size
-    w = W[(base + lay.p_speed) * lanes + lane] - W[lay.speed * lanes + lane]
-    u = W[(base + lay.p_u) * lanes + lane]
-    wound = Z[lane, j] == ENGAGED and abs(u) <= near * W[lay.inverse_rate * lanes + lane]
+    w = W[base + lay.p_speed, lane] - W[lay.speed, lane]
+    u = W[base + lay.p_u, lane]
+    wound = Z[lane, j] == ENGAGED and abs(u) <= near * W[lay.inverse_rate, lane]
     return bool(abs(w) <= near and (Z[lane, j] == FREE or wound))
 
 
@@ -135,15 +132,15 @@ def _meets(W: Floats, Z: Ints, lay: Layout, lane: int, j: int, size: float) -> b
 def _torque(W: Floats, lay: Layout, lane: int, j: int, rate: float) -> float:
     """Torque of a clutch, or its rate, while the shaft's acceleration, or its rate, is ``rate``."""
     base = lay.pendulums + j * lay.stride
-    notes = (base + lay.p_m_w_low) * lay.lanes + lane
-    free = W[notes + _PULL * lay.lanes] - W[(base + lay.p_inertia) * lay.lanes + lane] * rate
-    return float(min(max(free, W[notes + _LEAST * lay.lanes]), W[notes + _MOST * lay.lanes]))
+    notes = base + lay.p_m_w_low
+    free = W[notes + _PULL, lane] - W[base + lay.p_inertia, lane] * rate
+    return float(min(max(free, W[notes + _LEAST, lane]), W[notes + _MOST, lane]))
 
 
 @part
 def _excess(W: Floats, lay: Layout, lane: int, push: float, rate: float) -> float:
     """Torque that is left over if the shaft's acceleration is ``rate``; rises with it."""
-    left = W[lay.inertia * lay.lanes + lane] * rate - push
+    left = W[lay.inertia, lane] * rate - push
     for j in range(lay.n):
         left -= _torque(W, lay, lane, j, rate)
     return float(left)
@@ -155,32 +152,31 @@ def _consistent(W: Floats, lay: Layout, lane: int, push: float) -> float:
 
     Its corners are where a clutch's torque comes to one of its bounds; between two of them the function is linear.
     """
-    lanes = lay.lanes
     low, high = -math.inf, math.inf
     for j in range(lay.n):
         base = lay.pendulums + j * lay.stride
-        notes = (base + lay.p_m_w_low) * lanes + lane
-        own = W[(base + lay.p_inertia) * lanes + lane]
+        notes = base + lay.p_m_w_low
+        own = W[base + lay.p_inertia, lane]
         for bound in (_LEAST, _MOST):
-            corner = (W[notes + _PULL * lanes] - W[notes + bound * lanes]) / own
+            corner = (W[notes + _PULL, lane] - W[notes + bound, lane]) / own
             if abs(corner) < math.inf:
                 if _excess(W, lay, lane, push, corner) <= 0.0:
                     low = max(low, corner)
                 else:
                     high = min(high, corner)
-    inertia = W[lay.inertia * lanes + lane]
+    inertia = W[lay.inertia, lane]
     for j in range(lay.n):
         base = lay.pendulums + j * lay.stride
-        notes = (base + lay.p_m_w_low) * lanes + lane
-        own = W[(base + lay.p_inertia) * lanes + lane]
-        least, most = W[notes + _LEAST * lanes], W[notes + _MOST * lanes]
-        if (W[notes + _PULL * lanes] - most) / own >= high:
+        notes = base + lay.p_m_w_low
+        own = W[base + lay.p_inertia, lane]
+        least, most = W[notes + _LEAST, lane], W[notes + _MOST, lane]
+        if (W[notes + _PULL, lane] - most) / own >= high:
             push += most
-        elif (W[notes + _PULL * lanes] - least) / own <= low:
+        elif (W[notes + _PULL, lane] - least) / own <= low:
             push += least
         else:
             inertia += own
-            push += W[notes + _PULL * lanes]
+            push += W[notes + _PULL, lane]
     return float(push / inertia)
 
 
@@ -192,28 +188,27 @@ def _shared_acceleration(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, siz
     Each clutch opens (torque 0), locks (between) or winds up (c_1) as the shaft outruns it, keeps pace or falls behind:
     a linear complementarity problem.
     """
-    lanes = lay.lanes
-    push = -W[lay.load * lanes + lane]
+    push = -W[lay.load, lane]
     for j in range(lay.n):
         base = lay.pendulums + j * lay.stride
-        notes = (base + lay.p_m_w_low) * lanes + lane
+        notes = base + lay.p_m_w_low
         for k in range(_SHARE + 1):
-            W[notes + k * lanes] = 0.0
+            W[notes + k, lane] = 0.0
         if j == i or _meets(W, Z, lay, lane, j, size):
-            W[notes + _MEETS * lanes] = 1.0
-            W[notes + _PULL * lanes] = W[(base + lay.p_inertia) * lanes + lane] * acceleration(W, lay, lane, j)
-            W[notes + _MOST * lanes] = W[(base + lay.p_law) * lanes + lane]
+            W[notes + _MEETS, lane] = 1.0
+            W[notes + _PULL, lane] = W[base + lay.p_inertia, lane] * acceleration(W, lay, lane, j)
+            W[notes + _MOST, lane] = W[base + lay.p_law, lane]
         elif Z[lane, j] >= ENGAGED:
-            push += law(W, base + lay.p_force, lay.coefficients, lanes, lane, W[(base + lay.p_u) * lanes + lane])
+            push += law(W, base + lay.p_force, lay.coefficients, lane, W[base + lay.p_u, lane])
     rate = 0.0
     if Z[lane, SHAFT_STATE] == ROTATING or _excess(W, lay, lane, push, 0.0) < 0.0:
         rate = _consistent(W, lay, lane, push)
     for j in range(lay.n):
         base = lay.pendulums + j * lay.stride
-        notes = (base + lay.p_m_w_low) * lanes + lane
-        if W[notes + _MEETS * lanes] > 0.0:
-            own = W[(base + lay.p_inertia) * lanes + lane]
-            W[notes + _SHARE * lanes] = (W[notes + _PULL * lanes] - own * rate) / W[(base + lay.p_law) * lanes + lane]
+        notes = base + lay.p_m_w_low
+        if W[notes + _MEETS, lane] > 0.0:
+            own = W[base + lay.p_inertia, lane]
+            W[notes + _SHARE, lane] = (W[notes + _PULL, lane] - own * rate) / W[base + lay.p_law, lane]
     return rate
 
 
@@ -223,28 +218,27 @@ def _shared_jerk(W: Floats, Z: Ints, lay: Layout, lane: int, rate: float, near: 
 
     A clutch at the edge of opening can only gain torque, one at the edge of winding up can only lose it.
     """
-    lanes = lay.lanes
     push = 0.0
     for j in range(lay.n):
         base = lay.pendulums + j * lay.stride
-        notes = (base + lay.p_m_w_low) * lanes + lane
-        if W[notes + _MEETS * lanes] > 0.0:
-            share = W[notes + _SHARE * lanes]
+        notes = base + lay.p_m_w_low
+        if W[notes + _MEETS, lane] > 0.0:
+            share = W[notes + _SHARE, lane]
             opening, winding = abs(share) < near, abs(share - 1.0) < near
             beyond = not (opening or winding) and not 0.0 < share < 1.0
-            W[notes + _PULL * lanes] = W[(base + lay.p_inertia) * lanes + lane] * _jerk(W, lay, lane, j, rate)
-            W[notes + _LEAST * lanes] = 0.0 if opening or beyond else -math.inf
-            W[notes + _MOST * lanes] = 0.0 if winding or beyond else math.inf
+            W[notes + _PULL, lane] = W[base + lay.p_inertia, lane] * _jerk(W, lay, lane, j, rate)
+            W[notes + _LEAST, lane] = 0.0 if opening or beyond else -math.inf
+            W[notes + _MOST, lane] = 0.0 if winding or beyond else math.inf
         elif Z[lane, j] >= ENGAGED:
-            w = W[(base + lay.p_speed) * lanes + lane] - W[lay.speed * lanes + lane]
-            u = W[(base + lay.p_u) * lanes + lane]
-            push += w * law_slope(W, base + lay.p_force, lay.coefficients, lanes, lane, u)
+            w = W[base + lay.p_speed, lane] - W[lay.speed, lane]
+            u = W[base + lay.p_u, lane]
+            push += w * law_slope(W, base + lay.p_force, lay.coefficients, lane, u)
     jerk = 0.0
     if Z[lane, SHAFT_STATE] == ROTATING or rate > 0.0:
         jerk = _consistent(W, lay, lane, push)
     for j in range(lay.n):
         base = lay.pendulums + j * lay.stride
-        W[(base + lay.p_m_w_low + _PULL) * lanes + lane] -= W[(base + lay.p_inertia) * lanes + lane] * jerk
+        W[base + lay.p_m_w_low + _PULL, lane] -= W[base + lay.p_inertia, lane] * jerk
 
 
 @part
@@ -252,9 +246,9 @@ def _at_edge(W: Floats, lay: Layout, lane: int, near: float) -> bool:
     """Whether the lock torque of a clutch that meets others is at 0 or c_1."""
     count = 0
     for j in range(lay.n):
-        notes = (lay.pendulums + j * lay.stride + lay.p_m_w_low) * lay.lanes + lane
-        share = W[notes + _SHARE * lay.lanes]
-        if W[notes + _MEETS * lay.lanes] > 0.0 and (abs(share) < near or abs(share - 1.0) < near):
+        notes = lay.pendulums + j * lay.stride + lay.p_m_w_low
+        share = W[notes + _SHARE, lane]
+        if W[notes + _MEETS, lane] > 0.0 and (abs(share) < near or abs(share - 1.0) < near):
             count += 1
     return count > 0
 
@@ -265,12 +259,11 @@ def _put(W: Floats, Z: Ints, lay: Layout, lane: int, j: int, state: int, edge: i
 
     The skips at the edge tell the guards which leading coefficients are zero there.
     """
-    lanes = lay.lanes
     base = lay.pendulums + j * lay.stride
     if Z[lane, j] == FREE and state != FREE:
-        W[(base + lay.p_engagements) * lanes + lane] += 1.0
-    W[(base + lay.p_speed) * lanes + lane] = W[lay.speed * lanes + lane]
-    W[(base + lay.p_u) * lanes + lane] = 0.0
+        W[base + lay.p_engagements, lane] += 1.0
+    W[base + lay.p_speed, lane] = W[lay.speed, lane]
+    W[base + lay.p_u, lane] = 0.0
     Z[lane, SKIP_W + j] = 2 if edge > 0 and state != LOCKED else 0
     Z[lane, SKIP_U + j] = 3 if edge > 0 and state == ENGAGED else 0
     Z[lane, SKIP_T + j] = edge if state == LOCKED else 0
@@ -293,23 +286,22 @@ def decide(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float, targ
     bool
         Whether any state changed, or a clutch was found at the edge of two.
     """
-    lanes = lay.lanes
     rate = _shared_acceleration(W, Z, lay, lane, i, size)
     near = EDGE
-    own = (lay.pendulums + i * lay.stride + lay.p_m_w_low + _SHARE) * lanes + lane
+    own = lay.pendulums + i * lay.stride + lay.p_m_w_low + _SHARE
     if target >= 0:
         # Its share is at the edge up to the error of the preceding step, as are those of identical clutches.
         passed = 1.0 if target == ENGAGED else 0.0
-        near += abs(W[own] - passed)
-        W[own] = passed
+        near += abs(W[own, lane] - passed)
+        W[own, lane] = passed
     if _at_edge(W, lay, lane, near):
         _shared_jerk(W, Z, lay, lane, rate, near)
     put = 0
     for j in range(lay.n):
-        notes = (lay.pendulums + j * lay.stride + lay.p_m_w_low) * lanes + lane
-        if not W[notes + _MEETS * lanes] > 0.0:
+        notes = lay.pendulums + j * lay.stride + lay.p_m_w_low
+        if not W[notes + _MEETS, lane] > 0.0:
             continue
-        share, trend = W[notes + _SHARE * lanes], W[notes + _PULL * lanes]
+        share, trend = W[notes + _SHARE, lane], W[notes + _PULL, lane]
         state = FREE if share < 0.0 else (ENGAGED if share > 1.0 else LOCKED)
         edge = 0
         if abs(share) < near:

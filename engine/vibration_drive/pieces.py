@@ -32,26 +32,25 @@ def keep(W: Floats, Z: Ints, lay: Layout, lane: int, since: float, done: int, pi
 
     Series are written in fractions of the part of the step that is taken. Returns the number of rows written so far.
     """
-    lanes = lay.lanes
-    x = W[lay.x * lanes + lane]
-    length = x * W[lay.h * lanes + lane]
-    if not length > 0.0 or Z[lane, ev.PERIOD] + W[lay.f * lanes + lane] < since:
+    x = W[lay.x, lane]
+    length = x * W[lay.h, lane]
+    if not length > 0.0 or Z[lane, ev.PERIOD] + W[lay.f, lane] < since:
         return done
     out = pieces[done]
     out[WHOLE] = Z[lane, ev.PERIOD]
-    out[FRACTION] = W[lay.f * lanes + lane]
+    out[FRACTION] = W[lay.f, lane]
     out[LENGTH] = length
     power = 1.0
     for k in range(lay.order + 1):
         column = HEAD + k
-        out[column] = power * W[(lay.speed + k) * lanes + lane]
+        out[column] = power * W[lay.speed + k, lane]
         for i in range(lay.n):
             base = lay.pendulums + i * lay.stride
             column = HEAD + lay.order + 1 + i * 2 * (lay.order + 2)
             out[column] = Z[lane, i]
-            out[column + 1] = W[(base + lay.p_engagements) * lanes + lane]
-            out[column + 2 + k] = power * W[(base + lay.p_speed + k) * lanes + lane]
-            out[column + lay.order + 3 + k] = power * W[(base + lay.p_torque + k) * lanes + lane]
+            out[column + 1] = W[base + lay.p_engagements, lane]
+            out[column + 2 + k] = power * W[base + lay.p_speed + k, lane]
+            out[column + lay.order + 3 + k] = power * W[base + lay.p_torque + k, lane]
         power *= x
     return done + 1
 

@@ -48,21 +48,21 @@ _horner, _slope, _integral, _beyond = part(horner), part(slope), part(integral),
 
 
 @inlined
-def _coefficients(W: Floats, first: int, count: int, lanes: int, lane: int) -> Floats:
+def _coefficients(W: Floats, first: int, count: int, lane: int) -> Floats:
     """The lane's elements of ``count`` workspace rows from ``first`` on."""
-    return W[first * lanes + lane : (first + count) * lanes : lanes]
+    return W[first : first + count, lane]
 
 
 @part
-def law(W: Floats, first: int, count: int, lanes: int, lane: int, u: float) -> float:
+def law(W: Floats, first: int, count: int, lane: int, u: float) -> float:
     """Clutch torque at windup ``u`` by the polynomial whose coefficients start at workspace row ``first``."""
-    return float(_horner(_coefficients(W, first, count, lanes, lane), u))
+    return float(_horner(_coefficients(W, first, count, lane), u))
 
 
 @part
-def law_slope(W: Floats, first: int, count: int, lanes: int, lane: int, u: float) -> float:
+def law_slope(W: Floats, first: int, count: int, lane: int, u: float) -> float:
     """Derivative of ``law``."""
-    return float(_slope(_coefficients(W, first, count, lanes, lane), u))
+    return float(_slope(_coefficients(W, first, count, lane), u))
 
 
 @inlined
@@ -73,20 +73,20 @@ def total(W: Floats, lay: Layout, lane: int, g: Floats) -> None:
     for i in range(lay.n):
         first = lay.pendulums + i * lay.stride + lay.p_torque
         for k in range(lay.order + 1):
-            g[k] += W[(first + k) * lay.lanes + lane]
+            g[k] += W[first + k, lane]
 
 
 @part
 def stored_energy(W: Floats, lay: Layout, lane: int, i: int, u: float) -> float:
     """Energy Pi(u) in the clutch of pendulum ``i`` at windup ``u >= 0``, including the linear part beyond the data."""
     base = lay.pendulums + i * lay.stride
-    limit = W[(base + lay.p_limit) * lay.lanes + lane]
+    limit = W[base + lay.p_limit, lane]
     inside = min(u, limit)
     first = base + lay.p_law
-    value = _integral(_coefficients(W, first, lay.coefficients, lay.lanes, lane), inside)
+    value = _integral(_coefficients(W, first, lay.coefficients, lane), inside)
     if u > limit:
-        end = law(W, first, lay.coefficients, lay.lanes, lane, limit)
-        rate = law_slope(W, first, lay.coefficients, lay.lanes, lane, limit)
+        end = law(W, first, lay.coefficients, lane, limit)
+        rate = law_slope(W, first, lay.coefficients, lane, limit)
         value += _beyond(end, rate, u - limit)
     return float(value)
 
@@ -97,14 +97,13 @@ def watch_fall(W: Floats, lay: Layout, lane: int, i: int, fall: bool) -> None:
     it.
     """
     first = lay.pendulums + i * lay.stride + lay.p_w_low
-    W[(first + _W_LOW) * lay.lanes + lane] = 0.0 if fall else -NEVER
-    W[(first + _W_HIGH) * lay.lanes + lane] = NEVER if fall else 0.0
+    W[first + _W_LOW, lane] = 0.0 if fall else -NEVER
+    W[first + _W_HIGH, lane] = NEVER if fall else 0.0
 
 
 @part
 def set_clutch(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, state: int) -> None:
     """Put the clutch of pendulum ``i`` into a state: its guards' bands, the law in force, the flags."""
-    lanes = lay.lanes
     base = lay.pendulums + i * lay.stride
     source = Z[lane, i]
     Z[lane, i] = state
@@ -112,40 +111,40 @@ def set_clutch(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, state: int) -
         kind = CLUTCH_THRESHOLD[Z[lane, LITERAL], state, band]
         edge = -NEVER if band % 2 == 0 else NEVER
         if kind == _AT_DATA_END:
-            edge = W[(base + lay.p_limit) * lanes + lane]
+            edge = W[base + lay.p_limit, lane]
         elif kind == _AT_FIRST:
-            edge = W[(base + lay.p_law) * lanes + lane]
+            edge = W[base + lay.p_law, lane]
         elif kind != 0:
             edge = 0.0
-        W[(base + lay.p_w_low + band) * lanes + lane] = edge
+        W[base + lay.p_w_low + band, lane] = edge
     if Z[lane, LITERAL] == 1 and (ENGAGED <= state <= BEYOND):
         watch_fall(W, lay, lane, i, source != BEYOND)
-    limit = W[(base + lay.p_limit) * lanes + lane]
+    limit = W[base + lay.p_limit, lane]
     for k in range(lay.coefficients):
         value = 0.0
         if state == ENGAGED:
-            value = W[(base + lay.p_law + k) * lanes + lane]
+            value = W[base + lay.p_law + k, lane]
         elif state == BEYOND and k < 2:
-            rate = law_slope(W, base + lay.p_law, lay.coefficients, lanes, lane, limit)
+            rate = law_slope(W, base + lay.p_law, lay.coefficients, lane, limit)
             value = rate
             if k == 0:
-                value = law(W, base + lay.p_law, lay.coefficients, lanes, lane, limit) - rate * limit
-        W[(base + lay.p_force + k) * lanes + lane] = value
-    W[(base + lay.p_locked) * lanes + lane] = 1.0 if state == LOCKED else 0.0
-    W[(base + lay.p_engaged) * lanes + lane] = 1.0 if state >= ENGAGED else 0.0
-    W[(base + lay.p_beyond) * lanes + lane] = 1.0 if state == BEYOND else 0.0
+                value = law(W, base + lay.p_law, lay.coefficients, lane, limit) - rate * limit
+        W[base + lay.p_force + k, lane] = value
+    W[base + lay.p_locked, lane] = 1.0 if state == LOCKED else 0.0
+    W[base + lay.p_engaged, lane] = 1.0 if state >= ENGAGED else 0.0
+    W[base + lay.p_beyond, lane] = 1.0 if state == BEYOND else 0.0
     driving = 0.0
     for j in range(lay.n):
-        driving += W[(lay.pendulums + j * lay.stride + lay.p_engaged) * lanes + lane]
-    W[lay.driven * lanes + lane] = 1.0 if driving > 0.0 else 0.0
-    W[lay.driving_max * lanes + lane] = max(driving, W[lay.driving_max * lanes + lane])
+        driving += W[lay.pendulums + j * lay.stride + lay.p_engaged, lane]
+    W[lay.driven, lane] = 1.0 if driving > 0.0 else 0.0
+    W[lay.driving_max, lane] = max(driving, W[lay.driving_max, lane])
     _set_mobility(W, Z, lay, lane)
 
 
 @part
 def count_event(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
     """Count a transition; those at t = 0 belong to the start."""
-    if Z[lane, PERIOD] > 0 or W[lay.f * lay.lanes + lane] > 0.0:
+    if Z[lane, PERIOD] > 0 or W[lay.f, lane] > 0.0:
         Z[lane, EVENTS] += 1
         Z[lane, EVENTS_IN_PERIOD] += 1
 
@@ -153,22 +152,20 @@ def count_event(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
 @part
 def set_shaft(W: Floats, Z: Ints, lay: Layout, lane: int, state: int) -> None:
     """Put the shaft into a state: its guard, its flag, its mobility."""
-    lanes = lay.lanes
-    load = W[lay.load * lanes + lane]
+    load = W[lay.load, lane]
     Z[lane, SHAFT_STATE] = state
-    W[lay.rotating * lanes + lane] = 1.0 if state == ROTATING else 0.0
-    W[lay.sum_high * lanes + lane] = load if state == HELD else NEVER
+    W[lay.rotating, lane] = 1.0 if state == ROTATING else 0.0
+    W[lay.sum_high, lane] = load if state == HELD else NEVER
     # Without a load nothing slows down the shaft, so it is never held.
-    W[lay.speed_low * lanes + lane] = 0.0 if state == ROTATING and load > 0.0 else -NEVER
+    W[lay.speed_low, lane] = 0.0 if state == ROTATING and load > 0.0 else -NEVER
     _set_mobility(W, Z, lay, lane)
 
 
 @part
 def _set_mobility(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
     """1/(inertia of the shaft and of all pendulums locked to it), or 0 while the load holds it."""
-    lanes = lay.lanes
-    inertia = W[lay.inertia * lanes + lane]
+    inertia = W[lay.inertia, lane]
     for i in range(lay.n):
         if Z[lane, i] == LOCKED:
-            inertia += W[(lay.pendulums + i * lay.stride + lay.p_inertia) * lanes + lane]
-    W[lay.mobility * lanes + lane] = 1.0 / inertia if Z[lane, SHAFT_STATE] == ROTATING else 0.0
+            inertia += W[lay.pendulums + i * lay.stride + lay.p_inertia, lane]
+    W[lay.mobility, lane] = 1.0 / inertia if Z[lane, SHAFT_STATE] == ROTATING else 0.0

@@ -20,14 +20,14 @@ _STOPS = stop_column(0)
 @part
 def _zero_sums(W: Floats, lay: Layout, lane: int) -> None:
     for row in range(lay.sum_held, lay.work_clutch + 1):
-        W[row * lay.lanes + lane] = 0.0
-    W[lay.energy_lost * lay.lanes + lane] = 0.0
-    W[lay.driving_max * lay.lanes + lane] = 0.0
+        W[row, lane] = 0.0
+    W[lay.energy_lost, lane] = 0.0
+    W[lay.driving_max, lane] = 0.0
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
         for row in range(lay.p_sum_phi, lay.p_engagements + 1):
-            W[(base + row) * lay.lanes + lane] = 0.0
-        W[lay.driving_max * lay.lanes + lane] += W[(base + lay.p_engaged) * lay.lanes + lane]
+            W[base + row, lane] = 0.0
+        W[lay.driving_max, lane] += W[base + lay.p_engaged, lane]
 
 
 @part
@@ -36,14 +36,14 @@ def _go_on_from_extrema(W: Floats, lay: Layout, lane: int, sums: Floats) -> None
     for row in range(lay.speed_max, lay.power_max + 1):
         value = sums[OUT_SUMS + row - lay.sum_held]
         if not math.isnan(value):
-            W[row * lay.lanes + lane] = value
+            W[row, lane] = value
     first = OUT_SUMS + lay.energy_lost - lay.sum_held + 1
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
         for row in range(lay.p_phi_max, lay.p_u_max + 1):
             value = sums[first + row - lay.p_sum_phi]
             if not math.isnan(value):
-                W[(base + row) * lay.lanes + lane] = value
+                W[base + row, lane] = value
         first += lay.p_u_max - lay.p_sum_phi + 1
 
 
@@ -52,8 +52,8 @@ def _input_work(W: Floats, lay: Layout, lane: int) -> float:
     total = 0.0
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
-        moment = W[(base + lay.p_ml) * lay.lanes + lane] * W[(base + lay.p_inertia) * lay.lanes + lane]
-        total += moment * W[(base + lay.p_work_input) * lay.lanes + lane]
+        moment = W[base + lay.p_ml, lane] * W[base + lay.p_inertia, lane]
+        total += moment * W[base + lay.p_work_input, lane]
     return total
 
 
@@ -62,29 +62,28 @@ def _pass_stop(W: Floats, Z: Ints, lay: Layout, lane: int, stop: int, sums: Floa
     """Do what a stop asks: 0 starts the window, 1 its whole periods, 2 ends it (3, the end of the run, asks
     nothing).
     """
-    lanes = lay.lanes
     if stop == 0:
         _zero_sums(W, lay, lane)
         watch_extrema(W, lay, lane, True)
         _go_on_from_extrema(W, lay, lane, sums)
-        W[lay.turn_0 * lanes + lane] = W[lay.turn * lanes + lane]
-        W[lay.speed_0 * lanes + lane] = W[lay.speed * lanes + lane]
-        W[lay.energy_0 * lanes + lane] = energy(W, Z, lay, lane)
+        W[lay.turn_0, lane] = W[lay.turn, lane]
+        W[lay.speed_0, lane] = W[lay.speed, lane]
+        W[lay.energy_0, lane] = energy(W, Z, lay, lane)
     elif stop == 1:
-        W[lay.turn_1 * lanes + lane] = W[lay.turn * lanes + lane]
-        W[lay.input_1 * lanes + lane] = _input_work(W, lay, lane)
+        W[lay.turn_1, lane] = W[lay.turn, lane]
+        W[lay.input_1, lane] = _input_work(W, lay, lane)
     elif stop == 2:
-        W[lay.turn_2 * lanes + lane] = W[lay.turn * lanes + lane]
-        W[lay.speed_2 * lanes + lane] = W[lay.speed * lanes + lane]
-        W[lay.energy_2 * lanes + lane] = energy(W, Z, lay, lane)
+        W[lay.turn_2, lane] = W[lay.turn, lane]
+        W[lay.speed_2, lane] = W[lay.speed, lane]
+        W[lay.energy_2, lane] = energy(W, Z, lay, lane)
         column = OUT_SUMS
         for row in range(lay.sum_held, lay.energy_lost + 1):
-            sums[column] = W[row * lanes + lane]
+            sums[column] = W[row, lane]
             column += 1
         for i in range(lay.n):
             base = lay.pendulums + i * lay.stride
             for row in range(lay.p_sum_phi, lay.p_u_max + 1):
-                sums[column] = W[(base + row) * lanes + lane]
+                sums[column] = W[base + row, lane]
                 column += 1
         watch_extrema(W, lay, lane, False)
 
@@ -98,7 +97,7 @@ def next_stop(W: Floats, Z: Ints, lay: Layout, lane: int, cases: Floats, strobe:
     Stops are pairs (whole periods, fraction), so that a window given in periods is met exactly.
     """
     row = cases[Z[lane, ev.CASE]]
-    f = W[lay.f * lay.lanes + lane]
+    f = W[lay.f, lane]
     period_end = strobe if f < strobe else 1.0
     while Z[lane, ev.NEXT_STOP] < STOPS:
         stop = Z[lane, ev.NEXT_STOP]
@@ -107,9 +106,9 @@ def next_stop(W: Floats, Z: Ints, lay: Layout, lane: int, cases: Floats, strobe:
         if whole > Z[lane, ev.PERIOD]:
             break
         if whole == Z[lane, ev.PERIOD] and fraction > f:
-            W[lay.f_stop * lay.lanes + lane] = min(fraction, period_end)
+            W[lay.f_stop, lane] = min(fraction, period_end)
             return True
         _pass_stop(W, Z, lay, lane, stop, sums)
         Z[lane, ev.NEXT_STOP] = stop + 1
-    W[lay.f_stop * lay.lanes + lane] = period_end
+    W[lay.f_stop, lane] = period_end
     return bool(Z[lane, ev.NEXT_STOP] < STOPS)

@@ -92,15 +92,14 @@ def begin_at(W: Floats, Z: Ints, lay: Layout, lane: int, start: Floats) -> None:
     """Put a lane, whose case has just been loaded, into the state of a strobe."""
     if start[SHAFT] == NOT_GIVEN:
         return
-    lanes = lay.lanes
-    W[lay.f * lanes + lane] = start[BEGIN]
-    W[lay.speed * lanes + lane] = start[SHAFT_SPEED]
+    W[lay.f, lane] = start[BEGIN]
+    W[lay.speed, lane] = start[SHAFT_SPEED]
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
         column = SHAFT_WIDTH + i * PENDULUM_WIDTH
-        W[(base + lay.p_phi) * lanes + lane] = start[column + ANGLE]
-        W[(base + lay.p_speed) * lanes + lane] = start[column + SPEED]
-        W[(base + lay.p_u) * lanes + lane] = start[column + WINDUP]
+        W[base + lay.p_phi, lane] = start[column + ANGLE]
+        W[base + lay.p_speed, lane] = start[column + SPEED]
+        W[base + lay.p_u, lane] = start[column + WINDUP]
         state = int(start[column + CLUTCH])
         set_clutch(W, Z, lay, lane, i, state)
         if Z[lane, LITERAL] == 1 and ENGAGED <= state <= BEYOND:
@@ -111,22 +110,21 @@ def begin_at(W: Floats, Z: Ints, lay: Layout, lane: int, start: Floats) -> None:
 @part
 def note(W: Floats, Z: Ints, lay: Layout, lane: int, fraction: float, out: Floats) -> None:
     """Write a lane's state into the row ``out``."""
-    lanes = lay.lanes
     out[FRACTION] = fraction
     out[BEGIN] = fraction if fraction < 1.0 else 0.0
-    out[SHAFT_SPEED] = W[lay.speed * lanes + lane]
-    out[TURN] = W[lay.turn * lanes + lane]
+    out[SHAFT_SPEED] = W[lay.speed, lane]
+    out[TURN] = W[lay.turn, lane]
     out[SHAFT] = Z[lane, SHAFT_STATE]
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
         column = SHAFT_WIDTH + i * PENDULUM_WIDTH
         state = Z[lane, i]
-        out[column + ANGLE] = W[(base + lay.p_phi) * lanes + lane]
-        out[column + SPEED] = W[(base + lay.p_speed) * lanes + lane]
+        out[column + ANGLE] = W[base + lay.p_phi, lane]
+        out[column + SPEED] = W[base + lay.p_speed, lane]
         # The windup of a free clutch is irrelevant: the next interaction starts anew.
-        out[column + WINDUP] = -W[(base + lay.p_backlash) * lanes + lane]
+        out[column + WINDUP] = -W[base + lay.p_backlash, lane]
         if state != FREE:
-            out[column + WINDUP] = W[(base + lay.p_u) * lanes + lane]
+            out[column + WINDUP] = W[base + lay.p_u, lane]
         out[column + CLUTCH] = state
-        waits = ENGAGED <= state <= BEYOND and W[(base + lay.p_w_high) * lanes + lane] == NEVER
+        waits = ENGAGED <= state <= BEYOND and W[base + lay.p_w_high, lane] == NEVER
         out[column + FALLS] = 1.0 if Z[lane, LITERAL] == 1 and waits else 0.0

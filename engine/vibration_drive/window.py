@@ -24,15 +24,15 @@ _ANGLE, _SPEED, _ACCELERATION, _TORQUE, _WINDUP, _DRIVE = map(int, PendulumSampl
 def series(W: Floats, lay: Layout, lane: int, row: int, g: Floats) -> None:
     """Copy a stored series into ``g`` (shape (order + 1,)), in fractions of the planned step."""
     for k in range(lay.order + 1):
-        g[k] = W[(row + k) * lay.lanes + lane]
+        g[k] = W[row + k, lane]
 
 
 @inlined
 def rate(W: Floats, lay: Layout, lane: int, row: int, g: Floats) -> None:
     """Like ``series``, but its time derivative; one order less, so the highest coefficient is zero."""
-    per_h = 1.0 / W[lay.h * lay.lanes + lane]
+    per_h = 1.0 / W[lay.h, lane]
     for k in range(lay.order):
-        g[k] = (k + 1) * per_h * W[(row + k + 1) * lay.lanes + lane]
+        g[k] = (k + 1) * per_h * W[row + k + 1, lane]
     g[lay.order] = 0.0
 
 
@@ -41,12 +41,12 @@ def primitive(W: Floats, lay: Layout, lane: int, start: float, row: int, minus: 
     """Like ``series``, but its time integral from the value ``start``; the series at row ``minus`` (if >= 0) is
     subtracted first.
     """
-    h = W[lay.h * lay.lanes + lane]
+    h = W[lay.h, lane]
     g[0] = start
     for k in range(lay.order):
-        value = W[(row + k) * lay.lanes + lane]
+        value = W[row + k, lane]
         if minus >= 0:
-            value -= W[(minus + k) * lay.lanes + lane]
+            value -= W[minus + k, lane]
         g[k + 1] = h * value * RECIPROCAL[k + 1]
 
 
@@ -57,7 +57,7 @@ def _power(W: Floats, lay: Layout, lane: int, g: Floats) -> None:
     for k in range(lay.order, -1, -1):
         value = 0.0
         for j in range(k + 1):
-            value += g[j] * W[(lay.speed + k - j) * lay.lanes + lane]
+            value += g[j] * W[lay.speed + k - j, lane]
         g[k] = value
 
 
@@ -79,27 +79,27 @@ def _enter(
     The extremum is a maximum for ``sign`` 1, a minimum for -1; ``block`` rows further stands by how much the step may
     exceed it. Returns the length of the list.
     """
-    at = row * lay.lanes + lane
-    if W[at + block * lay.lanes] <= 0.0:
+    if W[row + block, lane] <= 0.0:
         return used
-    x = W[lay.x * lay.lanes + lane]
+    x = W[lay.x, lane]
     start = slot_start(lay.order, used)
     power = sign
     for k in range(lay.order + 1):
         blocks[start + k * SLOTS] = g[k] * power
         power *= x
-    blocks[start + (lay.order + KNOWN) * SLOTS] = sign * W[at]
-    meta[used, 0] = at
-    meta[used, 1] = int(sign)
+    blocks[start + (lay.order + KNOWN) * SLOTS] = sign * W[row, lane]
+    meta[used, 0] = row
+    meta[used, 1] = lane
+    meta[used, 2] = int(sign)
     return used + 1
 
 
 @inlined
-def _exceeds(W: Floats, lay: Layout, lane: int, first: int, last: int) -> bool:
+def _exceeds(W: Floats, lane: int, first: int, last: int) -> bool:
     """Whether any of the excesses at rows ``first`` .. ``last`` is positive."""
     found = False
     for row in range(first, last + 1):
-        found |= not W[row * lay.lanes + lane] <= 0.0
+        found |= not W[row, lane] <= 0.0
     return found
 
 
@@ -109,44 +109,43 @@ def collect_peaks(W: Floats, lay: Layout, lane: int, g: Floats, blocks: Floats, 
 
     The list holds the quantities' polynomials; nothing is sampled. Returns its length.
     """
-    lanes = lay.lanes
     block = lay.x_speed_max - lay.speed_max
-    if _exceeds(W, lay, lane, lay.x_speed_max, lay.x_speed_min):
+    if _exceeds(W, lane, lay.x_speed_max, lay.x_speed_min):
         series(W, lay, lane, lay.speed, g)
         used = _enter(W, lay, lane, lay.speed_max, block, 1.0, g, blocks, meta, used)
         used = _enter(W, lay, lane, lay.speed_min, block, -1.0, g, blocks, meta, used)
-    if _exceeds(W, lay, lane, lay.x_acc_max, lay.x_acc_max):
+    if _exceeds(W, lane, lay.x_acc_max, lay.x_acc_max):
         rate(W, lay, lane, lay.speed, g)
         used = _enter(W, lay, lane, lay.acc_max, block, 1.0, g, blocks, meta, used)
     # The sum of a single torque has that torque's extremum.
-    if lay.n > 1 and _exceeds(W, lay, lane, lay.x_sum_max, lay.x_sum_max):
+    if lay.n > 1 and _exceeds(W, lane, lay.x_sum_max, lay.x_sum_max):
         total(W, lay, lane, g)
         used = _enter(W, lay, lane, lay.sum_max, block, 1.0, g, blocks, meta, used)
-    if _exceeds(W, lay, lane, lay.x_power_max, lay.x_power_max):
+    if _exceeds(W, lane, lay.x_power_max, lay.x_power_max):
         _power(W, lay, lane, g)
         used = _enter(W, lay, lane, lay.power_max, block, 1.0, g, blocks, meta, used)
     block = lay.p_x_phi_max - lay.p_phi_max
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
         speed = base + lay.p_speed
-        if _exceeds(W, lay, lane, base + lay.p_x_phi_max, base + lay.p_x_phi_min):
-            primitive(W, lay, lane, W[(base + lay.p_phi) * lanes + lane], speed, -1, g)
+        if _exceeds(W, lane, base + lay.p_x_phi_max, base + lay.p_x_phi_min):
+            primitive(W, lay, lane, W[base + lay.p_phi, lane], speed, -1, g)
             used = _enter(W, lay, lane, base + lay.p_phi_max, block, 1.0, g, blocks, meta, used)
             used = _enter(W, lay, lane, base + lay.p_phi_min, block, -1.0, g, blocks, meta, used)
-        if _exceeds(W, lay, lane, base + lay.p_x_speed_max, base + lay.p_x_speed_min):
+        if _exceeds(W, lane, base + lay.p_x_speed_max, base + lay.p_x_speed_min):
             series(W, lay, lane, speed, g)
             used = _enter(W, lay, lane, base + lay.p_speed_max, block, 1.0, g, blocks, meta, used)
             used = _enter(W, lay, lane, base + lay.p_speed_min, block, -1.0, g, blocks, meta, used)
-        if _exceeds(W, lay, lane, base + lay.p_x_acc_max, base + lay.p_x_acc_min):
+        if _exceeds(W, lane, base + lay.p_x_acc_max, base + lay.p_x_acc_min):
             rate(W, lay, lane, speed, g)
             used = _enter(W, lay, lane, base + lay.p_acc_max, block, 1.0, g, blocks, meta, used)
             used = _enter(W, lay, lane, base + lay.p_acc_min, block, -1.0, g, blocks, meta, used)
-        if _exceeds(W, lay, lane, base + lay.p_x_torque_max, base + lay.p_x_torque_max):
+        if _exceeds(W, lane, base + lay.p_x_torque_max, base + lay.p_x_torque_max):
             series(W, lay, lane, base + lay.p_torque, g)
             used = _enter(W, lay, lane, base + lay.p_torque_max, block, 1.0, g, blocks, meta, used)
         # A free clutch has u <= 0 (it opens with w <= 0), so that only real windup can exceed the initial maximum 0.
-        if _exceeds(W, lay, lane, base + lay.p_x_u_max, base + lay.p_x_u_max):
-            primitive(W, lay, lane, W[(base + lay.p_u) * lanes + lane], speed, lay.speed, g)
+        if _exceeds(W, lane, base + lay.p_x_u_max, base + lay.p_x_u_max):
+            primitive(W, lay, lane, W[base + lay.p_u, lane], speed, lay.speed, g)
             used = _enter(W, lay, lane, base + lay.p_u_max, block, 1.0, g, blocks, meta, used)
     return used
 
@@ -160,7 +159,7 @@ def settle_peaks(W: Floats, lay: Layout, g: Floats, stack: Floats, blocks: Float
         if blocks[start + (lay.order + STATUS) * SLOTS] == HARD:
             take(blocks, lay.order, slot, g)
             value = largest(g, lay.order, blocks[start + (lay.order + KNOWN) * SLOTS], stack)
-        W[meta[slot, 0]] = meta[slot, 1] * value
+        W[meta[slot, 0], meta[slot, 1]] = meta[slot, 2] * value
 
 
 @part
@@ -168,32 +167,31 @@ def watch_extrema(W: Floats, lay: Layout, lane: int, active: bool) -> None:
     """Start the extrema of a lane afresh, or switch them off (then no step can exceed them)."""
     low = -NEVER if active else NEVER
     for row in (lay.speed_max, lay.acc_max, lay.sum_max, lay.power_max):
-        W[row * lay.lanes + lane] = low
-    W[lay.speed_min * lay.lanes + lane] = -low
+        W[row, lane] = low
+    W[lay.speed_min, lane] = -low
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
         for row in (lay.p_phi_max, lay.p_speed_max, lay.p_acc_max, lay.p_torque_max):
-            W[(base + row) * lay.lanes + lane] = low
+            W[base + row, lane] = low
         for row in (lay.p_phi_min, lay.p_speed_min, lay.p_acc_min):
-            W[(base + row) * lay.lanes + lane] = -low
-        W[(base + lay.p_u_max) * lay.lanes + lane] = 0.0 if active else NEVER
+            W[base + row, lane] = -low
+        W[base + lay.p_u_max, lane] = 0.0 if active else NEVER
 
 
 @part
 def energy(W: Floats, Z: Ints, lay: Layout, lane: int) -> float:
     """Mechanical energy of a lane (docs/theory.md): pendulums, springs, weight, shaft and wound-up clutches."""
-    lanes = lay.lanes
-    speed = W[lay.speed * lanes + lane]
-    total = 0.5 * W[lay.inertia * lanes + lane] * speed * speed
+    speed = W[lay.speed, lane]
+    total = 0.5 * W[lay.inertia, lane] * speed * speed
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
-        phi = W[(base + lay.p_phi) * lanes + lane]
-        w = W[(base + lay.p_speed) * lanes + lane]
-        weight = W[(base + lay.p_ml) * lanes + lane] * W[lay.gravity * lanes + lane] * cosine(phi)
-        spring = 0.5 * W[(base + lay.p_spring) * lanes + lane] * phi * phi
-        total += W[(base + lay.p_inertia) * lanes + lane] * (0.5 * w * w + weight + spring)
+        phi = W[base + lay.p_phi, lane]
+        w = W[base + lay.p_speed, lane]
+        weight = W[base + lay.p_ml, lane] * W[lay.gravity, lane] * cosine(phi)
+        spring = 0.5 * W[base + lay.p_spring, lane] * phi * phi
+        total += W[base + lay.p_inertia, lane] * (0.5 * w * w + weight + spring)
         if Z[lane, i] == _ENGAGED or Z[lane, i] == _BEYOND:
-            total += stored_energy(W, lay, lane, i, W[(base + lay.p_u) * lanes + lane])
+            total += stored_energy(W, lay, lane, i, W[base + lay.p_u, lane])
     return float(total)
 
 
@@ -204,8 +202,7 @@ def sample(W: Floats, Z: Ints, lay: Layout, lane: int, x: float, g: Floats, out:
     Columns: ``ShaftSample``, then ``PendulumSample`` of each pendulum. ``states`` gets the shaft's state and the
     clutches'.
     """
-    lanes = lay.lanes
-    primitive(W, lay, lane, W[lay.turn * lanes + lane], lay.speed, -1, g)
+    primitive(W, lay, lane, W[lay.turn, lane], lay.speed, -1, g)
     out[_TURN] = evaluate(g, lay.order, x)
     series(W, lay, lane, lay.speed, g)
     out[_SHAFT_SPEED] = evaluate(g, lay.order, x)
@@ -213,12 +210,12 @@ def sample(W: Floats, Z: Ints, lay: Layout, lane: int, x: float, g: Floats, out:
     out[_SHAFT_ACCELERATION] = evaluate(g, lay.order, x)
     total(W, lay, lane, g)
     out[_SHAFT_TORQUE] = evaluate(g, lay.order, x)
-    states[0] = int(W[lay.rotating * lanes + lane])
+    states[0] = int(W[lay.rotating, lane])
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
         speed = base + lay.p_speed
         column = _SHAFT_SAMPLES + _PENDULUM_SAMPLES * i
-        primitive(W, lay, lane, W[(base + lay.p_phi) * lanes + lane], speed, -1, g)
+        primitive(W, lay, lane, W[base + lay.p_phi, lane], speed, -1, g)
         out[column + _ANGLE] = evaluate(g, lay.order, x)
         series(W, lay, lane, speed, g)
         out[column + _SPEED] = evaluate(g, lay.order, x)
@@ -226,7 +223,7 @@ def sample(W: Floats, Z: Ints, lay: Layout, lane: int, x: float, g: Floats, out:
         out[column + _ACCELERATION] = evaluate(g, lay.order, x)
         series(W, lay, lane, base + lay.p_torque, g)
         out[column + _TORQUE] = evaluate(g, lay.order, x)
-        primitive(W, lay, lane, W[(base + lay.p_u) * lanes + lane], speed, lay.speed, g)
+        primitive(W, lay, lane, W[base + lay.p_u, lane], speed, lay.speed, g)
         out[column + _WINDUP] = evaluate(g, lay.order, x)
         series(W, lay, lane, base + lay.p_drive, g)
         out[column + _DRIVE] = evaluate(g, lay.order - 1, x)

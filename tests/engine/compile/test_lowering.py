@@ -11,7 +11,8 @@ import numba
 import numpy as np
 import pytest
 
-from sprag.engine.compile.lowering import constant_record, lane_loops, lane_mask, lowest
+from sprag.engine.compile.decorators import unmanaged
+from sprag.engine.compile.lowering import constant_record, constant_shape, lane_loops, lane_mask, lowest
 from sprag.engine.compile.ways import GROUP
 from sprag.engine.taylor.batch import aligned_zeros
 from sprag.engine.taylor.straight import (
@@ -219,6 +220,20 @@ def test_a_record_becomes_a_constant() -> None:
         return record.a, record.b
 
     assert fields(other) == (3, -5)
+
+
+def test_a_shape_becomes_a_constant() -> None:
+    """The array of another shape shows that its own is not looked at, neither by elements nor by slices."""
+    shaped = constant_shape(4, 6)
+
+    @numba.njit
+    def parts(W: Any, row: int, lane: int) -> tuple[tuple[int, int], float, float]:
+        W = shaped(unmanaged(W))
+        column = W[row : row + 2, lane]
+        return W.shape, W[row, lane], column[1]
+
+    numbers = np.arange(24.0)
+    assert parts(numbers.reshape(3, 8), 2, 5) == ((4, 6), 17.0, 23.0)
 
 
 @pytest.mark.parametrize("size", [1, 7, 64, 1000, 40_000])

@@ -99,6 +99,9 @@ USED = {
     ("array", "data"): "a workspace's first element, and a field of an array without reference count",
     **{("array", field): "a field of an array without reference count" for field in ("shape", "strides", "itemsize")},
     **{("array", field): "a field of an array without reference count" for field in ("nitems", "meminfo", "parent")},
+    ("context", "get_abi_sizeof"): "bytes of an element, for the strides of a constant shape",
+    ("context", "get_data_type"): "the LLVM type of an element",
+    ("cgutils", "pack_array"): "a constant shape and its strides",
     ("cgutils", "for_range"): "the loop over lanes",
     ("cgutils", "get_null_value"): "no reference count",
     ("cgutils", "global_constant"): "the layout as a constant",
@@ -175,6 +178,6 @@ def test_both_ways_offer_the_same() -> None:
     for name in ("compiled", "part", "inlined", "unmanaged"):
         assert callable(getattr(decorators, name))
         assert callable(getattr(plain, name))
-    for name in ("lane_loops", "lane_mask", "lowest", "constant_record"):
+    for name in ("lane_loops", "lane_mask", "lowest", "constant_record", "constant_shape"):
         assert callable(getattr(lowering, name))
         assert callable(getattr(plain, name))

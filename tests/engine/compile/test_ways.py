@@ -20,7 +20,7 @@ _PROGRAM = """
 import sys
 import numba
 import numpy as np
-from sprag.engine.compile.jit import constant_record, lane_loops, lane_mask
+from sprag.engine.compile.jit import constant_record, constant_shape, lane_loops, lane_mask, unmanaged
 from sprag.engine.taylor.batch import ROWS, SLOTS, aligned_zeros, peaks_loop, roots_loop
 from sprag.engine.taylor.roots import work_stack
 from sprag.engine.vibration_drive.advance import advance_loop
@@ -30,7 +30,7 @@ from sprag.engine.vibration_drive.layout import as_record, make_layout
 from tests.engine.taylor.polynomials import first_root, largest
 
 LAYOUT = make_layout(1, 4, 6, 8)
-fixed = constant_record(as_record(LAYOUT))
+fixed, workspace = constant_record(as_record(LAYOUT)), constant_shape(LAYOUT.rows, 8)
 step = lane_loops(series_loop(LAYOUT) + "\\n" + bounds_loop(LAYOUT), "tolerance", "log2_tolerance")
 advance = lane_loops(advance_loop(LAYOUT), "unused", "unused_too")
 find_roots = lane_loops(roots_loop(6), "unused", "unused_too")
@@ -39,20 +39,20 @@ exceeding = lane_mask(">", LAYOUT.excess, 8)
 
 @numba.njit(error_model="numpy")
 def run(lay, W, blocks):
-    lay = fixed(lay)
+    lay, W = fixed(lay), workspace(unmanaged(W))
     step(W, 1e-4, -13.0, 1)
     mask = exceeding(W)
     find_roots(blocks, 0.0, 0.0, 1)
     find_peaks(blocks, 0.0, 0.0, 1)
     advance(W, 0.0, 0.0, 1)
-    return mask + lay.rows
+    return mask + lay.rows + W[lay.pendulums + lay.p_phi, 5]
 
 rng = np.random.default_rng(1)
 found = []
 for _ in range(50):
-    W, blocks = aligned_zeros(LAYOUT.rows * 8), aligned_zeros(SLOTS * (6 + ROWS))
+    W, blocks = aligned_zeros(LAYOUT.rows * 8).reshape(LAYOUT.rows, 8), aligned_zeros(SLOTS * (6 + ROWS))
     W[:], blocks[:] = rng.uniform(0.01, 1.0, W.shape), rng.normal(size=blocks.shape)
-    found += [np.array([run(as_record(LAYOUT), W, blocks)], dtype=float), W, blocks]
+    found += [np.array([run(as_record(LAYOUT), W, blocks)], dtype=float), W.ravel(), blocks]
     g = rng.normal(size=7)
     g[0] = abs(g[0])
     found.append(np.array([first_root(g, 6, work_stack()), largest(g, 6, 0.1, work_stack())]))
