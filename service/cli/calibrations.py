@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from sprag.service.cli.console import WrongInputError, progress_bar, say, show_table, write_json, write_text
+from sprag.service.cli.console import WrongInputError, say, show_table, write_json, write_text
 from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes, read_spec, spec_failure, write_pieces
 from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Processes, Server, SpecFile, StudyId, Token
 from sprag.service.cli.pictures import file_format, heading
 from sprag.service.cli.remote import connection
+from sprag.service.cli.running import run_parsed
 from sprag.service.cli.settings import read_settings
 from sprag.service.faults import Fault
 
@@ -75,23 +76,18 @@ def _read(path: str, measured: str | None) -> ParsedSpec:
 
 def _run(parsed: ParsedSpec, db: str | None, processes: int | None) -> tuple[Calibration, str]:
     """Run the study to its end; what it has found, and its id."""
-    from sprag.service.jobs.local import pool_size, run_here
     from sprag.service.results.calibration import calibration_of
     from sprag.service.results.rounds import sentence
 
     settings = read_settings(database=db, processes=processes)
-    with (
-        progress_bar(parsed.study.name or "calibration") as update,
-        run_here(
-            parsed.spec,
-            parsed.study,
-            processes=pool_size(parsed.study, settings.pool_processes, asked=processes is not None),
-            database_url=settings.database_url if db is not None else None,
-            chunk_timeout=settings.chunk_timeout,
-            warnings=parsed.warnings,
-            on_progress=lambda now: update(now.done, now.total, sentence(now.rounds) if now.rounds else ""),
-        ) as done,
-    ):
+    with run_parsed(
+        parsed,
+        settings,
+        lambda now: sentence(now.rounds) if now.rounds else "",
+        title="calibration",
+        db=db,
+        processes=processes,
+    ) as done:
         study_id, store = done.record.id, done.store
         rows = partial(store.rows_for_cases, study_id)
         return calibration_of(store.study(study_id), store.rounds(study_id), rows), study_id

@@ -16,7 +16,6 @@ from sprag.service.cli.console import (
     WrongInputError,
     duration_text,
     ending_lines,
-    progress_bar,
     progress_text,
     say,
     show_table,
@@ -27,6 +26,7 @@ from sprag.service.cli.console import (
 from sprag.service.cli.files import is_json, output, read_study, require_cases, to_file
 from sprag.service.cli.options import ChunkCases, FinishBy, Fresh, JsonFlag, OutputFile, PointsFile, Processes, SpecFile
 from sprag.service.cli.remote import TableFormat, table_format
+from sprag.service.cli.running import run_parsed
 from sprag.service.cli.settings import read_settings
 from sprag.service.faults import Fault, warned
 from sprag.worker.limits import MAX_TRAJECTORY_POINTS, MIN_TRAJECTORY_POINTS
@@ -249,7 +249,6 @@ def run(
     as_json: JsonFlag = False,
 ) -> None:
     """Run a study here, without a service: rows or a report to standard output or FILE, progress on standard error."""
-    from sprag.service.jobs.local import pool_size, run_here
     from sprag.service.results.rounds import sentence
     from sprag.service.results.unaffected import Unaffected
 
@@ -261,18 +260,14 @@ def run(
     with (
         _telling_what_is_kept(),
         output(file) as write,
-        progress_bar(parsed.study.name or "study") as update,
-        run_here(
-            parsed.spec,
-            parsed.study,
-            processes=pool_size(parsed.study, settings.pool_processes, asked=processes is not None),
-            database_url=settings.database_url if db is not None else None,
-            chunk_cases=settings.chunk_cases,
-            chunk_timeout=settings.chunk_timeout,
-            warnings=parsed.warnings,
+        run_parsed(
+            parsed,
+            settings,
+            lambda now: _remark(now, finish_by),
+            db=db,
+            processes=processes,
             fresh=fresh,
             finish_by=finish,
-            on_progress=lambda now: update(now.done, now.total, _remark(now, finish_by)),
         ) as done,
     ):
         for piece in _rows(done, table_format(form, file, as_json)):

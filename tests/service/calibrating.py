@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
 from sprag.worker.models import ChunkResult
 from sprag.worker.rounds import Rounds
 from sprag.worker.study import Study
 from tests.service.conftest import Service
+from tests.service.rounds import run_round
 from tests.service.timed_spec import SPEC
 
 DAMPING, INERTIA = 0.01, 0.002
@@ -69,13 +69,6 @@ def rows_of(study: Study, cases: range) -> ChunkResult:
     return ChunkResult(cases.start, endings, [""] * len(cases), values)
 
 
-def run_round(store: Store, number: int, epoch: int) -> None:
-    """Give every waiting case its row."""
-    study = store.study_of(number)
-    for chunk in store.claim(epoch, store.open_chunks(number)):
-        assert store.commit(epoch, chunk, rows_of(study, range(chunk.first, chunk.first + chunk.count)))
-
-
 def calibration(service: Service, rounds: int = 999, *, kills: bool = False, **fields: Any) -> str:
     """The id of a calibration that has had at most so many rounds; it has ended where there are no more.
 
@@ -89,7 +82,7 @@ def calibration(service: Service, rounds: int = 999, *, kills: bool = False, **f
         if kills and turn % 3 == 2:
             store.claim(epoch, store.open_chunks(number))
             epoch, planner = store.take_over("test"), Rounds(store)
-        run_round(store, number, epoch)
+        run_round(store, number, epoch, rows_of)
         if planner.advance(epoch, number, store.study(study_id)) is None:
             break
     return study_id

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import httpx
@@ -14,6 +16,7 @@ import pytest
 from anyio.from_thread import BlockingPortal, start_blocking_portal
 from fastapi import FastAPI
 
+from sprag.service.client.plain import ServiceClient
 from sprag.service.http.app import chunking, create_app
 from sprag.service.settings import Settings
 from sprag.service.storage.store import Store
@@ -167,3 +170,17 @@ def service(settings: Settings, connect: Callable[..., httpx.Client]) -> Iterato
 def spec() -> dict[str, Any]:
     """The documentation's example, free to be changed."""
     return copy.deepcopy(SPEC)
+
+
+@pytest.fixture
+def connected(
+    service: Service, portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch
+) -> Callable[[ModuleType], None]:
+    """Makes the commands of a module ask the service of this test."""
+
+    @contextmanager
+    def connection(*_: object) -> Iterator[ServiceClient]:
+        with ServiceClient("http://localhost", transport=PortalTransport(service.app, portal)) as client:
+            yield client
+
+    return lambda module: monkeypatch.setattr(module, "connection", connection)

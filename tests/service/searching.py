@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.models import ChunkResult
 from sprag.worker.rounds import Rounds
 from sprag.worker.study import Study
 from tests.service.conftest import Service
+from tests.service.rounds import run_round
 from tests.service.timed_spec import SPEC
 
 #: A trade-off of two results along the frequency; the amplitude alone determines the speed.
@@ -53,20 +53,13 @@ def rows_of(study: Study, cases: range) -> ChunkResult:
     return ChunkResult(cases.start, endings, [""] * len(cases), values)
 
 
-def run_round(store: Store, number: int, epoch: int) -> None:
-    """Give every waiting case its row."""
-    study = store.study_of(number)
-    for chunk in store.claim(epoch, store.open_chunks(number)):
-        assert store.commit(epoch, chunk, rows_of(study, range(chunk.first, chunk.first + chunk.count)))
-
-
 def search(service: Service, rounds: int = 99, **fields: Any) -> str:
     """The id of a study with a goal that has had at most so many rounds; it has ended where there are no more."""
     study_id = service.submit(spec_of(**fields))
     store = service.store
     number, epoch, planner = store.get_study(study_id).number, store.take_over("test"), Rounds(store)
     for _ in range(rounds):
-        run_round(store, number, epoch)
+        run_round(store, number, epoch, rows_of)
         if planner.advance(epoch, number, store.study(study_id)) is None:
             break
     return study_id

@@ -22,15 +22,13 @@ from sprag.service.spec.document import SpecError, parse_spec
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.schema.document import spec_schema
 from sprag.service.storage.part import SystemClock
-from sprag.service.storage.session import Session
-from sprag.service.storage.tables import METADATA, results_table
-from sprag.worker import models
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
 from sprag.worker.models.model import Model
 from sprag.worker.models.presentation import Presentation
 from sprag.worker.study import Study
+from tests.service.registered import create_table, registered
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
@@ -108,20 +106,14 @@ SPEC: dict[str, Any] = {
 @pytest.fixture(autouse=True)
 def toy() -> Iterator[None]:
     """The model, for the time of a test."""
-    models.register(DampedOscillator())
-    yield
-    METADATA.remove(results_table(NAME, ""))
-    results_table.cache_clear()
-    models.unregister(NAME)
+    with registered(DampedOscillator()):
+        yield
 
 
 @pytest.fixture
 def settings(settings: Settings) -> Settings:
     """Settings of a service whose database has the model's table, as a migration would make it."""
-    session = Session(settings.database_url)
-    with session.write() as connection:
-        results_table(NAME, "").create(connection)
-    session.close()
+    create_table(settings, NAME)
     return settings
 
 

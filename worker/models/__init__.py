@@ -33,6 +33,7 @@ from sprag.engine.vibration_drive.clutch import (
     check_law,
     fit_clutch,
 )
+from sprag.engine.vibration_drive.clutch import torque as clutch_torque
 from sprag.engine.vibration_drive.parameters import (
     CLUTCH_COEFFICIENT,
     CLUTCH_WINDUP_LIMIT,
@@ -109,6 +110,7 @@ __all__ = [
     "cache_is_wanted",
     "check_law",
     "chunk_task",
+    "clutch_torque",
     "coefficients",
     "discard_compiled",
     "duration_seconds",

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -12,6 +9,7 @@ import numpy as np
 
 from sprag.service.spec.axes.axes import read_paths
 from sprag.service.spec.axes.blocks import Block
+from sprag.service.spec.csv_text import HEADING, CsvRow, read_csv
 from sprag.service.spec.fields import exact, read_object
 from sprag.service.spec.numbers import parse_number
 from sprag.service.spec.report import Report, join, shorten_text
@@ -25,29 +23,15 @@ if TYPE_CHECKING:
     from sprag.worker.models import Parameter
 
 FIELDS: Final = ("points",)
-#: "shaft.load", "shaft.load [N*mm]", "shaft.load (N*mm)"
-HEADING: Final = re.compile(r"\s*([^\s\[\(]+)\s*(?:[\[\(]\s*([^\]\)]+?)\s*[\]\)])?\s*")
 
 
 def read_points(report: Report, pointer: str, data: Mapping[str, Any], machine: Machine) -> Block | None:
     """Read the block of cases of a CSV text; None, with the faults recorded, when it is invalid."""
     found = read_object(report, pointer, data, FIELDS) or {}
     where, text = join(pointer, "points"), found.get("points")
-    if not isinstance(text, str):
-        allowed = "a header of paths, then a line for each case"
-        report.fault(where, "wrong-type", "must be the text of a CSV file", text, allowed=allowed)
-        return None
-    try:
-        rows = csv_rows(text.removeprefix("\ufeff"))
-    except csv.Error as error:
-        report.fault(where, "unreadable", f"is not CSV: {error}")
-        return None
-    columns = len(rows[0].cells) if rows else 0
-    if len(rows) < 2 or not 1 <= columns <= MAX_COLUMNS or len(rows) - 1 > MAX_AXIS_VALUES:
-        report.fault(
-            where, "out-of-range", f"has {max(len(rows) - 1, 0)} lines of {columns} columns under its header",
-            allowed=f"1 line or more of 1 to {MAX_COLUMNS} columns",
-        )  # fmt: skip
+    example = "a header of paths, then a line for each case"
+    rows = read_csv(report, where, text, (MAX_AXIS_VALUES, MAX_COLUMNS), example)
+    if rows is None:
         return None
     headings = [_read_heading(report, where, cell, machine) for cell in rows[0].cells]
     known = [heading for heading in headings if heading is not None]
@@ -64,13 +48,6 @@ def read_points(report: Report, pointer: str, data: Mapping[str, Any], machine: 
     return Block(pointer, paths, len(lines), lambda: dict(zip(paths, values, strict=True)), lines)
 
 
-class CsvRow(NamedTuple):
-    """The cells of a row, and the number of the line in which it ends, from 1."""
-
-    line: int
-    cells: list[str]
-
-
 class _Heading(NamedTuple):
     """The heading of a column; ``unit`` is "" where it gives none."""
 
@@ -79,18 +56,6 @@ class _Heading(NamedTuple):
 
     def __str__(self) -> str:
         return self.parameter.path + (f" [{self.unit}]" if self.unit else "")
-
-
-def csv_rows(text: str) -> list[CsvRow]:
-    """The non-empty rows. The header's separator (comma, semicolon or tab) applies to the whole text.
-
-    Lines may end with LF, CRLF or CR.
-    """
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
-    header = text.lstrip().partition("\n")[0]
-    delimiter = next((sign for sign in ",;\t" if sign in header), ",")
-    reader = csv.reader(io.StringIO(text), delimiter=delimiter, strict=True)
-    return [CsvRow(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
 
 
 def _read_heading(report: Report, where: str, cell: str, machine: Machine) -> _Heading | None:
@@ -110,11 +75,6 @@ def _read_cells(
     columns = [np.empty(len(rows)) for _ in headings]
     before = report.found
     for number, (line, row) in enumerate(rows):
-        if len(row) != len(headings):
-            report.fault(
-                where, "unequal-lengths", f"line {line} has {len(row)} cells", allowed=f"{len(headings)} cells"
-            )
-            continue
         for column, cell, heading in zip(columns, row, headings, strict=True):
             try:
                 column[number] = _read_cell(cell.strip(), heading)

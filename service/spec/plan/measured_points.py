@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from sprag.service.spec.axes.points import HEADING, CsvRow, csv_rows
 from sprag.service.spec.catalogue import result_of
+from sprag.service.spec.csv_text import HEADING, CsvRow, read_csv
 from sprag.service.spec.fields import exact
 from sprag.service.spec.numbers import parse_number
 from sprag.service.spec.report import Report, did_you_mean, shorten_text
@@ -68,7 +67,8 @@ class MeasuredTable:
 
 def read_table(report: Report, where: str, text: object, machine: Machine) -> MeasuredTable | None:
     """Read headings and conditions; None, and the faults recorded, where they are invalid."""
-    rows = _read_rows(report, where, text)
+    example = f"headings, then a line for each point, {_EXAMPLE}"
+    rows = read_csv(report, where, text, (MOST_MEASURED, MOST_COLUMNS), example)
     if rows is None:
         return None
     before = report.found
@@ -96,42 +96,6 @@ def read_table(report: Report, where: str, text: object, machine: Machine) -> Me
         tuple(rows[1:]),
         results,
     )
-
-
-def _read_rows(report: Report, where: str, text: object) -> list[CsvRow] | None:
-    """Rows of equal lengths, the headings first; None, and the faults recorded, where they are invalid."""
-    if not isinstance(text, str):
-        message = "is required" if text is None else "must be the text of a CSV file"
-        report.fault(
-            where, "required" if text is None else "wrong-type", message, text,
-            allowed=f"headings, then a line for each point, {_EXAMPLE}",
-        )  # fmt: skip
-        return None
-    try:
-        rows = csv_rows(text.removeprefix("\ufeff"))
-    except csv.Error as error:
-        report.fault(where, "unreadable", f"is not CSV: {error}")
-        return None
-    columns = len(rows[0].cells) if rows else 0
-    if not 2 <= len(rows) <= MOST_MEASURED + 1 or not 1 <= columns <= MOST_COLUMNS:
-        report.fault(
-            where, "out-of-range", f"has {max(len(rows) - 1, 0)} lines of {columns} columns under its headings",
-            allowed=f"1 to {MOST_MEASURED:,} lines of 1 to {MOST_COLUMNS} columns",
-        )  # fmt: skip
-        return None
-    before = report.found
-    for row in rows[1:]:
-        if len(row.cells) != columns:
-            hint = "; with decimal commas, columns are separated by semicolons" if len(row.cells) > columns else ""
-            report.fault(
-                where,
-                "unequal-lengths",
-                f"line {row.line} has {len(row.cells)} cells",
-                allowed=f"{columns} cells{hint}",
-            )
-        if report.full:
-            break
-    return None if report.found > before else rows
 
 
 def _read_headings(report: Report, where: str, row: CsvRow) -> list[Column]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import httpx
@@ -15,7 +15,6 @@ from anyio.from_thread import BlockingPortal
 
 from sprag.service.cli import calibrations
 from sprag.service.client import AsyncClient, Client
-from sprag.service.client.plain import ServiceClient
 from tests.conftest import Finished
 from tests.service.calibrating import calibration, spec_of
 from tests.service.conftest import PortalTransport, Service
@@ -31,21 +30,16 @@ def test_both_clients_and_the_command_give_a_calibration(
     service: Service,
     portal: BlockingPortal,
     sprag: Callable[..., Finished],
-    monkeypatch: pytest.MonkeyPatch,
+    connected: Callable[[ModuleType], None],
     tmp_path: Path,
 ) -> None:
-    @contextmanager
-    def connection(*_: object) -> Iterator[ServiceClient]:
-        with ServiceClient("http://localhost", transport=PortalTransport(service.app, portal)) as client:
-            yield client
-
     study_id = calibration(service)
     found = service.get(f"/studies/{study_id}/calibration")
     with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
         assert client.study(study_id).calibration() == found
     assert portal.call(partial(asynchronous, service, study_id)) == found
 
-    monkeypatch.setattr(calibrations, "connection", connection)
+    connected(calibrations)
     shown = sprag("calibration", study_id, "-o", tmp_path / "points.csv")
     assert shown.code == 0
     for sentence in found["sentences"]:

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import httpx
-import pytest
 from anyio.from_thread import BlockingPortal
 
 from sprag.service.cli import fronts
 from sprag.service.client import AsyncClient, Client
-from sprag.service.client.plain import ServiceClient
 from tests.conftest import Finished
 from tests.service.conftest import PortalTransport, Service
 from tests.service.searching import search
@@ -41,17 +39,11 @@ def test_both_clients_give_the_designs(service: Service, portal: BlockingPortal)
 
 def test_the_command_shows_the_best_designs(
     service: Service,
-    portal: BlockingPortal,
     sprag: Callable[..., Finished],
-    monkeypatch: pytest.MonkeyPatch,
+    connected: Callable[[ModuleType], None],
     tmp_path: Path,
 ) -> None:
-    @contextmanager
-    def connection(*_: object) -> Iterator[ServiceClient]:
-        with ServiceClient("http://localhost", transport=PortalTransport(service.app, portal)) as client:
-            yield client
-
-    monkeypatch.setattr(fronts, "connection", connection)
+    connected(fronts)
     study_id = search(service)
     found = service.get(f"/studies/{study_id}/front")
     shown = sprag("front", study_id, "--limit", 3, "-o", tmp_path / "front.csv")

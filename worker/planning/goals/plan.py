@@ -43,16 +43,31 @@ class Variable:
     values: tuple[float, ...] = ()
 
 
-def name_of(item: Goal | Limit) -> str:
-    """What a goal or a limit is about: "torque.max", "torque.max (95 % quantile)", "yield (torque.max at most 3)"."""
-    if not item.conditions:
-        return item.result + ("" if item.quantile is None else f" ({100.0 * item.quantile:.10g} % quantile)")
-    words = {"is": "is", "at_least": "at least", "at_most": "at most"}
-    return f"yield ({' and '.join(f'{one.result} {words[one.kind]} {one.value:.6g}' for one in item.conditions)})"
+class _Quantity:
+    """What a goal or a limit is about: a result, a quantile of it over the drawn drives, or a yield."""
+
+    __slots__ = ()
+
+    result: str
+    quantile: float | None
+    conditions: tuple[Limit, ...]
+
+    @property
+    def robust(self) -> bool:
+        """Whether it is about the drawn drives."""
+        return self.quantile is not None or bool(self.conditions)
+
+    @property
+    def name(self) -> str:
+        """Its name: "torque.max", "torque.max (95 % quantile)", "yield (torque.max at most 3)"."""
+        if not self.conditions:
+            return self.result + ("" if self.quantile is None else f" ({100.0 * self.quantile:.10g} % quantile)")
+        words = {"is": "is", "at_least": "at least", "at_most": "at most"}
+        return f"yield ({' and '.join(f'{one.result} {words[one.kind]} {one.value:.6g}' for one in self.conditions)})"
 
 
 @dataclass(frozen=True, slots=True)
-class Goal:
+class Goal(_Quantity):
     """A result that is to be as large (``max``) or as small as possible.
 
     Attributes
@@ -72,23 +87,13 @@ class Goal:
     conditions: tuple[Limit, ...] = ()
 
     @property
-    def robust(self) -> bool:
-        """Whether it is about the drawn drives."""
-        return self.quantile is not None or bool(self.conditions)
-
-    @property
     def upwards(self) -> bool:
         """Whether larger values are better."""
         return self.max
 
-    @property
-    def name(self) -> str:
-        """The name of what it is about: that of its result, with its quantile, or the yield with its conditions."""
-        return name_of(self)
-
 
 @dataclass(frozen=True, slots=True)
-class Limit:
+class Limit(_Quantity):
     """What a result must be, at every operating point; SI, or the code of a category.
 
     Attributes
@@ -109,19 +114,9 @@ class Limit:
     conditions: tuple[Limit, ...] = ()
 
     @property
-    def robust(self) -> bool:
-        """Whether it is about the drawn drives."""
-        return self.quantile is not None or bool(self.conditions)
-
-    @property
     def upwards(self) -> bool:
         """Whether larger values are better."""
         return self.kind == "at_least"
-
-    @property
-    def name(self) -> str:
-        """The name of what it is about: that of its result, with its quantile, or the yield with its conditions."""
-        return name_of(self)
 
     def holds(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Where values meet it; a missing one (NaN) does not."""

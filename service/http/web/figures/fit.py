@@ -10,6 +10,7 @@ import numpy as np
 
 from sprag.service.results.wording import number
 from sprag.service.spec.units import parse_quantity
+from sprag.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -55,7 +56,7 @@ def fit_chart(fit: ClutchFit, clutch: Mapping[str, Any], backlash: float) -> Fit
     offset = backlash if clutch.get("angles_include_backlash") else 0.0
     windup, torque = np.maximum(rows[:, 0] - offset, 0.0), rows[:, 1]
     u = np.linspace(0.0, fit.windup_limit, _LINE_POINTS)
-    law = np.polynomial.polynomial.polyval(u, fit.coefficients)
+    law = models.clutch_torque(fit.coefficients, fit.windup_limit, u)
     low, high = min(float(torque.min()), float(law.min()), 0.0), max(float(torque.max()), float(law.max()))
     most = max(fit.max_residual, fit.accuracy) * 1.15
     right, law_end = WIDTH - _RIGHT, _TOP + _LAW

@@ -12,9 +12,6 @@ from sprag.engine import Ending
 from sprag.engine.catalogue import Parameter, ResultInfo
 from sprag.service.settings import Settings
 from sprag.service.storage.part import SystemClock
-from sprag.service.storage.session import Session
-from sprag.service.storage.tables import METADATA, results_table
-from sprag.worker import models
 from sprag.worker.dispatcher import Dispatcher
 from sprag.worker.executors.inline import InlineExecutor
 from sprag.worker.models.common import ChunkResult, ChunkTask, KernelShape, chunk_result
@@ -22,6 +19,7 @@ from sprag.worker.models.model import Model
 from sprag.worker.models.presentation import Presentation
 from sprag.worker.study import Study
 from tests.service.conftest import Service
+from tests.service.registered import create_table, registered
 
 NAME = "linear-drive"
 
@@ -81,20 +79,14 @@ DEVIATION = float(np.sqrt(14.0))
 @pytest.fixture(autouse=True)
 def linear() -> Iterator[None]:
     """The model, for the time of a test."""
-    models.register(LinearDrive())
-    yield
-    METADATA.remove(results_table(NAME, ""))
-    results_table.cache_clear()
-    models.unregister(NAME)
+    with registered(LinearDrive()):
+        yield
 
 
 @pytest.fixture
 def settings(settings: Settings) -> Settings:
     """Settings of a service whose database has the model's table."""
-    session = Session(settings.database_url)
-    with session.write() as connection:
-        results_table(NAME, "").create(connection)
-    session.close()
+    create_table(settings, NAME)
     return settings
 
 

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import httpx
-import pytest
 from anyio.from_thread import BlockingPortal
 
 from sprag.service.cli import batches
 from sprag.service.client import AsyncClient, Client
-from sprag.service.client.plain import ServiceClient
 from tests.conftest import Finished
 from tests.service.conftest import PortalTransport, Service
 from tests.service.results.tolerances.conftest import SPEC, finish
@@ -55,17 +53,11 @@ def test_both_clients_give_tables(service: Service, portal: BlockingPortal) -> N
 
 def test_the_commands_show_and_write_them(
     service: Service,
-    portal: BlockingPortal,
     sprag: Callable[..., Finished],
-    monkeypatch: pytest.MonkeyPatch,
+    connected: Callable[[ModuleType], None],
     tmp_path: Path,
 ) -> None:
-    @contextmanager
-    def connection(*_: object) -> Iterator[ServiceClient]:
-        with ServiceClient("http://localhost", transport=PortalTransport(service.app, portal)) as client:
-            yield client
-
-    monkeypatch.setattr(batches, "connection", connection)
+    connected(batches)
     study_id = finish(service, {**SPEC, "drives": 128})
     own = f"/studies/{study_id}"
     file = tmp_path / "ribbon.csv"

@@ -1,0 +1,54 @@
+"""A study run to its end by a command, without a service, with a progress bar on standard error."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from sprag.service.cli.console import progress_bar
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from datetime import datetime
+
+    from sprag.service.jobs.local import LocalRun
+    from sprag.service.settings import Settings
+    from sprag.service.spec.document import ParsedSpec
+    from sprag.service.storage.records import Progress
+
+
+@contextmanager
+def run_parsed(
+    parsed: ParsedSpec,
+    settings: Settings,
+    remark: Callable[[Progress], str],
+    *,
+    title: str = "study",
+    db: str | None,
+    processes: int | None,
+    fresh: bool = False,
+    finish_by: datetime | None = None,
+) -> Iterator[LocalRun]:
+    """Run a study as `run_here` does: in the database of ``settings`` where ``db`` is given.
+
+    ``db`` and ``processes`` are the options of the command. ``title`` stands beside the bar where the study has no
+    name, ``remark`` behind it.
+    """
+    from sprag.service.jobs.local import pool_size, run_here
+
+    with (
+        progress_bar(parsed.study.name or title) as update,
+        run_here(
+            parsed.spec,
+            parsed.study,
+            processes=pool_size(parsed.study, settings.pool_processes, asked=processes is not None),
+            database_url=settings.database_url if db is not None else None,
+            chunk_cases=settings.chunk_cases,
+            chunk_timeout=settings.chunk_timeout,
+            warnings=parsed.warnings,
+            fresh=fresh,
+            finish_by=finish_by,
+            on_progress=lambda now: update(now.done, now.total, remark(now)),
+        ) as done,
+    ):
+        yield done
