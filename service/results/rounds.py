@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.results.wording import percent
+from sprag.service.results.wording import counted, percent
 from sprag.worker.planning.calibrate.plan import CALIBRATE
 from sprag.worker.planning.goals.plan import GOAL
 
@@ -44,8 +44,7 @@ def sentence(rounds: RoundProgress) -> str:
         return ", ".join(_calibration(_number(rounds), rounds.latest.summary))
     told = [f"round {_number(rounds)} of at most {_most(rounds)}"]
     if not rounds.latest.cases:
-        number = _number(rounds)
-        told = [f"{number} round" if number == 1 else f"{number} rounds"]
+        told = [counted(_number(rounds), "round")]
     ended = not rounds.latest.cases
     return ", ".join([*told, *_state(rounds.latest.summary, ended=ended)])
 
@@ -75,7 +74,8 @@ def _calibration(number: int, summary: dict[str, Any]) -> list[str]:
     """What a calibration is at: "round 5", "fit", "chi-square 21.3 of 26 degrees of freedom"."""
     phases = {"scan": "scan", "fit": "fit", "intervals": "refits for the intervals", "curve": "fitted curve"}
     phase = "calibrated" if summary["complete"] else "ended before all was run"
-    told = [f"{number} rounds", phase] if summary["phase"] == "ended" else [f"round {number}", phases[summary["phase"]]]
+    ended = summary["phase"] == "ended"
+    told = [counted(number, "round"), phase] if ended else [f"round {number}", phases[summary["phase"]]]
     square = summary["chi_square"]
     freedom = summary["freedom"]
     return [*told, *([f"chi-square {square:.3g} for {freedom} degrees of freedom"] if square is not None else [])]
@@ -86,7 +86,7 @@ def _search(summary: dict[str, Any]) -> list[str]:
     generation, generations, feasible = summary["generation"], summary["generations"], summary["feasible"]
     told = [f"generation {generation + 1} of {generations}"]
     if summary["phase"] != "search":
-        ended = f"{generation} generation" if generation == 1 else f"{generation} generations"
+        ended = counted(generation, "generation")
         told = [ended] if summary["phase"] == "ended" else [ended, "polish of equalities"]
     best = [f"{value:.3g}" for value in summary["best"] if value is not None]
     exact = (summary["polish"] or {}).get("met", 0)

@@ -67,6 +67,11 @@ def words(name: str) -> str:
     return text[:1].upper() + text[1:] if text[:1].isascii() else text
 
 
+def counted(value: int, noun: str) -> str:
+    """How many there are: "1 drive", "1,000 drives"; the plural has an s."""
+    return f"{value:,} {noun}{'' if value == 1 else 's'}"
+
+
 def percent(share: float) -> str:
     """A share for display."""
     return f"{100.0 * share:.2g} %"

@@ -13,7 +13,7 @@ from markupsafe import Markup, escape
 from starlette.responses import Response
 
 from sprag.service.http.access import ASKING
-from sprag.service.results.wording import number, symbol, unit_text, words
+from sprag.service.results.wording import counted, number, symbol, unit_text, words
 from sprag.service.storage.scopes import TokenScope
 
 
@@ -28,6 +28,7 @@ def _templates() -> Environment:
     )
     environment.filters |= {
         "number": number,
+        "counted": counted,
         "unit": unit_text,
         "spec": spec_text,
         "marked": marked,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.results.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag.service.results.wording import counted
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -104,8 +105,7 @@ def _approach(made: Portrait, shown: Presentation) -> tuple[str, str, list[tuple
 
 def described(made: Portrait) -> str:
     """A sentence that describes the figure."""
-    count = made.strobes.times.size
-    strobes = f"{count:,} strobe{'' if count == 1 else 's'}"
+    strobes = counted(made.strobes.times.size, "strobe")
     if made.order:
         turn = "one excitation period" if made.order == 1 else f"{made.order} excitation periods"
         return f"{made.regime}: {strobes} on the way to an orbit of {turn}"

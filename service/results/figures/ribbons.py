@@ -11,7 +11,7 @@ from sprag.service.results.curves import Map
 from sprag.service.results.figures.figure import Figure, Fill, Line, Panel, Quantity, line_colours
 from sprag.service.results.selection import refused
 from sprag.service.results.tolerances.written import percent
-from sprag.service.results.wording import number
+from sprag.service.results.wording import counted, number
 from sprag.worker.models import ResultInfo
 
 if TYPE_CHECKING:
@@ -68,10 +68,10 @@ def _legend(found: Ribbon) -> str:
     """What band and lines are."""
     low, high = percent(found.probabilities[0]), percent(found.probabilities[-1])
     middle = percent(found.probabilities[_middle(found)])
-    drives = f"{found.places.study.drives:,} drives"
+    drives = counted(found.places.study.drives, "drive")
     failed = max(int(one.failed.max(initial=0)) for one in found.lines)
     told = f"Solid: {middle} quantile of {drives}; band: {low} to {high}; dashed: the nominal drive."
-    return told + (f" At a place, up to {failed:,} drives have no result (failed or unsettled)." if failed else "")
+    return told + (f" Drives without a result (failed or unsettled) at a place: up to {failed:,}." if failed else "")
 
 
 def _middle(found: Ribbon) -> int:

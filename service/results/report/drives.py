@@ -13,6 +13,7 @@ from sprag.service.results.selection import SelectionError
 from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.ribbons import QUANTILES, ribbon
 from sprag.service.results.tolerances.yields import yields
+from sprag.service.results.wording import counted
 
 if TYPE_CHECKING:
     from sprag.service.results.curves import Fetch
@@ -45,7 +46,7 @@ def drives_part(study: Study, infos: Sequence[ResultInfo], fetch: Fetch) -> Driv
         reached = yields(study, infos, [wanted], Asked(), _WORST, fetch)
     except SelectionError as error:
         return DrivesPart(None, (f"There are no ribbons here: {error}.",))
-    sentences = [f"{study.drives:,} drives were drawn."]
+    sentences = [f"{counted(study.drives, 'drive')} {'was' if study.drives == 1 else 'were'} drawn."]
     for one, line in zip(drawn.lines, reached.lines, strict=True):
         at = ", ".join(f"{path} = {value:.6g}" for path, value in line.line.by.items())
         told = [*_yield(line, reached.conditions[0].text)]
@@ -61,7 +62,7 @@ def _yield(line: YieldLine, condition: str) -> Iterator[str]:
         return
     value, low, high = (f"{100.0 * float(part):.1f} %" for part in (share.value, share.low, share.high))
     where = " at every place" if line.line.x else ""
-    yield f"{value} of {int(share.drives):,} drives (95 % interval {low} to {high}) have {condition}{where}."
+    yield f"{value} of {counted(int(share.drives), 'drive')} (95 % interval {low} to {high}) have {condition}{where}."
     worst = [
         f"{one.drive} (case {one.case}, {'no result' if math.isinf(one.margin) else f'{100.0 * one.margin:.1f} %'})"
         for one in line.worst

@@ -66,15 +66,16 @@ def variance_causes(study: Study, values: Numbers) -> Causes:
     found = shares(spread.array[: len(values)][known], values[known])
     nothing: tuple[None, ...] = (None,) * len(spread.tolerances)
     if found is None:
-        few = int(known.sum()) < LEAST_DRIVES
-        note = f"shares need {LEAST_DRIVES} drives with results, {int(known.sum())} have them" if few else "no variance"
+        enough = int(known.sum())
+        short = f"shares need {LEAST_DRIVES} drives with results, {enough} have them"
+        note = short if enough < LEAST_DRIVES else "all drives have the same result"
         return Causes(nothing, None, note)
     own = tuple(None if name in tied else share for name, share in zip(spread.names, found, strict=True))
     notes = []
     if tied:
         notes.append(f"{', '.join(sorted(tied))} are correlated: they have no shares of their own")
     if missing:
-        notes.append(f"{missing} drives without results are left out of the shares")
+        notes.append(f"drives without results, left out of the shares: {missing:,}")
     # Estimates of shares that are 0 scatter around it; added up they would count as interactions.
     rest = None if tied else max(1.0 - sum(max(share.value, 0.0) for share in found), 0.0)
     return Causes(own, rest, "; ".join(notes))

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 SIGMA: Final = "sigma"
 #: Columns at most.
 MOST_COLUMNS: Final = 32
-_PERCENT: Final = "%"
 _COMMA: Final = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 _EXAMPLE: Final = "as in shaft.load [N*m],shaft.speed.mean [rad/s],sigma"
 
@@ -83,6 +82,10 @@ def read_table(report: Report, where: str, text: object, machine: Machine) -> Me
     results = _paired(report, where, others)
     if report.found > before:
         return None
+    for column in paths:
+        _check_unit(report, where, column, machine.parameters[column.name].unit)
+    if report.found > before:
+        return None
     values = [_conditions(report, where, rows[1:], column, machine) for column in paths]
     if report.found > before:
         return None
@@ -130,6 +133,16 @@ def _paired(report: Report, where: str, columns: Sequence[Column]) -> tuple[tupl
     return tuple(pairs)
 
 
+def _check_unit(report: Report, where: str, column: Column, unit: str) -> bool:
+    """Whether the unit of a heading fits; a fault recorded, once for the whole column, where it does not."""
+    try:
+        _number("1", column.unit, unit)
+    except QuantityError as error:
+        report.fault(where, error.code, f"column {shorten_text(str(column))}: {error}", column.unit, unit=unit)
+        return False
+    return True
+
+
 def _conditions(report: Report, where: str, rows: Sequence[CsvRow], column: Column, machine: Machine) -> list[float]:
     """The values of a parameter; NaN, and a fault recorded, for those that are invalid."""
     entry = machine.parameters[column.name]
@@ -165,6 +178,8 @@ def read_results(
             else:
                 report.fault(where, "not-numeric", "has a column of a category", column.name, allowed="a number")
             continue
+        if not _check_unit(report, where, column, info.unit):
+            continue
         rows = [(row, at) for row, at in zip(table.rows, table.at, strict=True) if row.cells[column.place].strip()]
         values = [_value(report, where, row, column, info.unit) for row, _ in rows]
         if not rows:
@@ -181,7 +196,7 @@ def read_results(
 
 def _value(report: Report, where: str, row: CsvRow, column: Column, unit: str) -> float:
     try:
-        return parse_quantity(_quantity(_plain(row.cells[column.place]), column.unit), unit) + 0.0
+        return _number(_plain(row.cells[column.place]), column.unit, unit) + 0.0
     except QuantityError as error:
         _fault(report, where, row, column, error, f"a number of {unit}", unit)
         return math.nan
@@ -215,6 +230,13 @@ def _plain(cell: str) -> str:
     """A cell with a decimal point; commas can only be decimal ones, as they do not separate columns then."""
     cell = cell.strip()
     return cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell
+
+
+def _number(cell: str, written: str, unit: str) -> float:
+    """A cell in SI; a number of no unit may be in percent."""
+    if unit == "1" and (share := re.fullmatch(r"(.*?)\s*%", f"{cell} {written}" if written else cell)):
+        return parse_quantity(_quantity(share[1], ""), unit) / 100.0
+    return parse_quantity(_quantity(cell, written), unit)
 
 
 def _quantity(cell: str, unit: str) -> str | float:

@@ -83,7 +83,7 @@ def test_drives_that_fail_are_failed_drives(service: Service) -> None:
     (line,) = service.get(f"/studies/{study_id}/ribbon", y="speed")["lines"]
     assert line["failed"] == [failed] * 5
     assert line["results"]["speed"]["drives"] == [256 - failed] * 5
-    assert f"{failed} drives without results are left out" in line["results"]["speed"]["causes"]["note"]
+    assert f"left out of the shares: {failed}" in line["results"]["speed"]["causes"]["note"]
     (line,) = service.get(f"/studies/{study_id}/yield", condition="speed >= -1000 m", worst=2)["lines"]
     assert line["all"]["reached"] == 256 - failed
     assert line["all"]["drives"] == 256

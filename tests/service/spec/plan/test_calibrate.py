@@ -108,6 +108,20 @@ def test_a_column_sigma_holds_for_the_results_before_it_and_empty_cells_were_not
     ]
 
 
+def test_a_number_of_no_unit_may_be_in_percent() -> None:
+    text = "shaft.load,efficiency [%],shaft.irregularity,sigma [%]\n0.1,30,50 %,2\n0.2,25.5,0.4,2\n"
+    plan = read(text).study.plan
+    assert plan is not None
+    assert [one["values"] for one in plan["measured"]] == [[0.3, 0.255], [0.5, 0.4]]
+    assert plan["measured"][0]["sigma"] == pytest.approx([0.006, 0.0051])
+
+
+def test_a_wrong_unit_is_one_fault_however_many_lines_there_are() -> None:
+    with pytest.raises(SpecError) as error:
+        read("shaft.load [N],shaft.speed.mean\n0.1,20\n0.2,18\n0.3,15\n")
+    assert [fault.code for fault in error.value.faults] == ["wrong-unit"]
+
+
 _HEAD = "shaft.load,shaft.speed.mean,sigma\n"
 
 
@@ -120,8 +134,8 @@ _HEAD = "shaft.load,shaft.speed.mean,sigma\n"
         (_HEAD + "-0.1,20,1\n", "out-of-range", "line 2, column shaft.load"),
         (_HEAD + "0.1,20,1\n", "out-of-range", "1 measured values"),
         (_HEAD, "out-of-range", "0 lines"),
-        ("shaft.load [N],shaft.speed.mean\n0.1,20\n", "wrong-unit", "line 2, column shaft.load [N]"),
-        ("shaft.load,shaft.speed.mean [N]\n0.1,20\n", "wrong-unit", "line 2, column shaft.speed.mean [N]"),
+        ("shaft.load [N],shaft.speed.mean\n0.1,20\n", "wrong-unit", "column shaft.load [N]"),
+        ("shaft.load,shaft.speed.mean [N]\n0.1,20\n", "wrong-unit", "column shaft.speed.mean [N]"),
         ("shaft.load,shaft.speed.meen\n0.1,20\n", "unknown-name", "shaft.speed.mean"),
         ("shaft.load,regime\n0.1,1\n", "not-numeric", "category"),
         ("shaft.load\n0.1\n", "required", "no column of a result"),
