@@ -32,11 +32,13 @@ def _inertia(path: str, symbol: str, help_: str) -> Parameter:
     return Parameter(path, symbol, "kg*m^2", 0.0, 1e12, False, 0.0, help_)
 
 
-def _rod_and_ram(kind: str) -> tuple[Parameter, ...]:
+def _rod_and_ram(kind: str, *, offset: bool = True) -> tuple[Parameter, ...]:
     p = f"mechanism.{kind}"
+    line = "height of the ram's line above its crank's centre"
+    beside = (Parameter(f"{p}.offset", "e", "m", -1e3, 1e3, False, 0.0, line),) if offset else ()
     return (
         _length(f"{p}.rod", "L", "length of the connecting rod"),
-        Parameter(f"{p}.offset", "e", "m", -1e3, 1e3, False, 0.0, "height of the ram's line above its crank's centre"),
+        *beside,
         Parameter(f"{p}.rod_centre", "s", "m", -1e3, 1e3, False, 0.0, "crank pin to the rod's centre of mass"),
         _mass(f"{p}.rod_mass", "m2", "mass of the rod"),
         _inertia(f"{p}.rod_inertia", "J2", "inertia of the rod about its centre of mass"),
@@ -55,6 +57,20 @@ def _cam_angle(path: str, symbol: str, help_: str, default: float | None, low_op
     return Parameter(path, symbol, "rad", 0.0, _TURN, low_open, default, help_)
 
 
+def _angle(path: str, symbol: str, help_: str) -> Parameter:
+    return Parameter(path, symbol, "rad", -_TURN, _TURN, False, 0.0, help_)
+
+
+def _coupler(kind: str) -> tuple[Parameter, ...]:
+    p = f"mechanism.{kind}.coupler"
+    return (
+        _length(p, "b", "length of the coupler"),
+        Parameter(f"{p}_centre", "s_2", "m", -1e3, 1e3, False, 0.0, "crank pin to its centre of mass"),
+        _mass(f"{p}_mass", "m_2", "mass of the coupler"),
+        _inertia(f"{p}_inertia", "J_2", "inertia of the coupler about its centre of mass"),
+    )
+
+
 #: Parameters of each mechanism.
 MECHANISM_PARAMETERS: Mapping[MechanismKind, tuple[Parameter, ...]] = {
     "none": (),
@@ -63,6 +79,38 @@ MECHANISM_PARAMETERS: Mapping[MechanismKind, tuple[Parameter, ...]] = {
     "slider_crank": (
         _length("mechanism.slider_crank.crank", "r", "length of the crank"),
         *_rod_and_ram("slider_crank"),
+    ),
+    "scotch_yoke": (
+        _length("mechanism.scotch_yoke.crank", "r", "length of the crank"),
+        _mass("mechanism.scotch_yoke.yoke_mass", "m", "mass of the yoke and what slides with it"),
+        _mass("mechanism.scotch_yoke.block_mass", "m_b", "mass of the sliding block on the crank pin"),
+        _inclination("mechanism.scotch_yoke"),
+    ),
+    "parallel_crank": (
+        _length("mechanism.parallel_crank.crank", "r", "length of both cranks"),
+        _mass("mechanism.parallel_crank.coupler_mass", "m", "mass of the coupler and what goes round with it"),
+        _inertia("mechanism.parallel_crank.driven_inertia", "J_3", "inertia of the second crank about its pivot"),
+        _inclination("mechanism.parallel_crank"),
+    ),
+    "drag_link": (
+        _length("mechanism.drag_link.frame", "d", "distance of the fixed pivots"),
+        _angle("mechanism.drag_link.frame_angle", "beta_0", "direction of the follower's pivot from the far side"),
+        _length("mechanism.drag_link.crank", "a", "length of the crank"),
+        *_coupler("drag_link"),
+        _length("mechanism.drag_link.follower", "c", "follower's pivot to the coupler's pin"),
+        _length("mechanism.drag_link.arm", "R", "follower's pivot to the rod's pin"),
+        _angle("mechanism.drag_link.arm_angle", "beta_1", "angle by which the rod's pin is ahead of the coupler's"),
+        _inertia("mechanism.drag_link.follower_inertia", "J_3", "inertia of the follower about its pivot"),
+        *_rod_and_ram("drag_link"),
+    ),
+    "toggle": (
+        _length("mechanism.toggle.frame", "d", "distance of the fixed pivots"),
+        _length("mechanism.toggle.crank", "a", "length of the crank"),
+        *_coupler("toggle"),
+        _length("mechanism.toggle.rocker", "c", "length of the rocker"),
+        _angle("mechanism.toggle.line_angle", "lambda", "direction of the ram's line from the frame beyond the pivot"),
+        _inertia("mechanism.toggle.rocker_inertia", "J_3", "inertia of the rocker about its pivot"),
+        *_rod_and_ram("toggle", offset=False),
     ),
     "four_bar": (
         _length("mechanism.four_bar.frame", "d", "distance of the fixed pivots"),

@@ -4,6 +4,7 @@ A machine has one such part or several. The angle of a part is that of the shaft
 whole cycle: the mechanism stands at that angle, and the diagram of the operation is read at it.
 """
 
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -13,12 +14,14 @@ from numpy.typing import NDArray
 from sprag.engine.machine_shaft.cams import Cam
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.expressions import Expression
-from sprag.engine.machine_shaft.linkages import CrankShaper, FourBar, SliderCrank, Whitworth
+from sprag.engine.machine_shaft.four_bars import FourBar, ParallelCrank
+from sprag.engine.machine_shaft.linkages import CrankShaper, ScotchYoke, SliderCrank, Whitworth
+from sprag.engine.machine_shaft.linked_rams import DragLink, Toggle
 from sprag.engine.machine_shaft.mechanisms import Mechanism, Motion
 from sprag.engine.machine_shaft.operations import Operation, Stroke, every_revolution, formula_breaks
 from sprag.engine.machine_shaft.pieces import Formula
 from sprag.engine.machine_shaft.problems import TableError
-from sprag.engine.machine_shaft.spec import MechanismChoice, PartChoice
+from sprag.engine.machine_shaft.spec import MechanismChoice, MechanismKind, PartChoice
 from sprag.engine.machine_shaft.tables import Curve, periodic
 
 Floats = NDArray[np.float64]
@@ -26,15 +29,25 @@ Floats = NDArray[np.float64]
 _TURN = 2.0 * np.pi
 
 
+#: Mechanisms without choices of their own.
+_PLAIN: Mapping[MechanismKind, type[Mechanism]] = {
+    "slider_crank": SliderCrank,
+    "scotch_yoke": ScotchYoke,
+    "four_bar": FourBar,
+    "parallel_crank": ParallelCrank,
+    "drag_link": DragLink,
+    "toggle": Toggle,
+}
+
+
 def mechanism_of(choice: MechanismChoice) -> Mechanism | None:
     """The mechanism with dimensions, or None for none, a table or a formula."""
-    if choice.kind == "slider_crank":
-        return SliderCrank()
-    if choice.kind == "four_bar":
-        return FourBar()
     if choice.kind == "quick_return":
         return Whitworth() if choice.quick_return == "whitworth" else CrankShaper()
-    return Cam(choice.rise, choice.fall) if choice.kind == "cam" else None
+    if choice.kind == "cam":
+        return Cam(choice.rise, choice.fall)
+    plain = _PLAIN.get(choice.kind)
+    return None if plain is None else plain()
 
 
 def _inertia_curve(choice: MechanismChoice, revolutions: int) -> Curve | None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from sprag.engine.machine_shaft.cams import CamLaw
 from sprag.engine.machine_shaft.tables import Interpolation, Table
@@ -12,7 +12,10 @@ Balance = Literal["scale", "constant", "refuse", "motor"]
 Motor = Literal["linear", "kloss"]
 Flywheel = Literal["rim", "disc"]
 Stage = Literal["gear", "belt", "chain", "worm", "screw_nut", "rack"]
-MechanismKind = Literal["none", "table", "formula", "slider_crank", "four_bar", "quick_return", "cam"]
+MechanismKind = Literal[
+    "none", "table", "formula", "slider_crank", "scotch_yoke", "four_bar", "parallel_crank",
+    "quick_return", "drag_link", "toggle", "cam",
+]  # fmt: skip
 QuickReturn = Literal["whitworth", "crank_shaper"]
 Form = Literal["constant", "table", "formula", "steps"]
 Quantity = Literal["none", "torque", "force", "gas"]
@@ -21,7 +24,7 @@ During = Literal["forward", "return", "both"]
 Sense = Literal["resisting", "fixed"]
 
 #: Mechanisms with dimensions: those whose working part a force can act on.
-LINKED: frozenset[str] = frozenset({"slider_crank", "four_bar", "quick_return", "cam"})
+LINKED: frozenset[str] = frozenset(get_args(MechanismKind)) - {"none", "table", "formula"}
 #: Stages that move a mass beside the shaft on which they sit.
 MOVING: frozenset[str] = frozenset({"screw_nut", "rack"})
 MAX_STAGES = 16

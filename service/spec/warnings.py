@@ -59,7 +59,7 @@ _PLAUSIBLE_SHAFT: Final[dict[str, tuple[float, str, str]]] = {
     "mean_speed": (1e3, "rad/s", "was it in rpm?"),
     **dict.fromkeys(
         ("crank", "rod", "offset", "rod_centre", "frame", "coupler", "rocker", "coupler_centre", "pivot_distance",
-         "link_arm", "lift"),
+         "link_arm", "lift", "follower", "arm"),
         (10.0, "m", "was it in mm?"),
     ),
     "inclination": (2.0 * math.pi, "rad", "was it in degrees?"),

@@ -25,6 +25,7 @@ from sprag.engine.machine_shaft.spec import (
     Drive,
     MachineSpec,
     MechanismChoice,
+    MechanismKind,
     OperationChoice,
     PartChoice,
     Stage,
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from sprag.engine.catalogue import Parameter, ResultInfo
-    from sprag.engine.machine_shaft.spec import MechanismKind
     from sprag.engine.outcome import Trajectory
     from sprag.worker.study import Study
 
@@ -84,7 +84,7 @@ def catalogue() -> tuple[Parameter, ...]:
     Each part of a machine of several has the parameters of mechanisms and operations under ``parts.N.``. Where the unit
     depends on the machine, it is that of a force or of the shaft's angle.
     """
-    kinds: tuple[MechanismKind, ...] = ("slider_crank", "four_bar", "quick_return", "cam")
+    kinds: tuple[MechanismKind, ...] = tuple(kind for kind in get_args(MechanismKind) if kind in LINKED)
     every: list[MachineSpec] = [MachineSpec(cycle=max(REVOLUTIONS), constants=("NAME",))]
     every += [MachineSpec(drive=Drive("formula")), MachineSpec(balance="motor", drive=Drive(motor="linear"))]
     every += [MachineSpec(balance="motor", drive=Drive(motor="kloss"))]

@@ -28,8 +28,7 @@ INTERPOLATION: Final = choice(
 )
 #: What of a mechanism is no number.
 MECHANISM_CHOICES: Final[dict[str, dict[str, Described]]] = {
-    "slider_crank": {},
-    "four_bar": {},
+    **{kind: {} for kind in ("slider_crank", "scotch_yoke", "four_bar", "parallel_crank", "drag_link", "toggle")},
     "quick_return": named(choice("kind", "kind of the quick return", "crank_shaper", "whitworth")),
     "cam": named(*(choice(part, f"law of the {part}", *_LAWS, default=_LAWS[0]) for part in ("rise", "fall"))),
 }

@@ -70,24 +70,54 @@ def _quick_return(v: dict[str, float], p: Array) -> tuple[list[Body], Array]:
     return [*bodies, link, (v["block_mass"], 0.0, x, y, cos, sin)], -ram
 
 
-def _four_bar(v: dict[str, float], p: Array) -> tuple[list[Body], Array]:
-    """The way is no position but the arc: its derivative is taken of the direction, in `way_slope`."""
+def _links(v: dict[str, float], third: str, p: Array) -> tuple[list[Body], Array, Array]:
+    """Coupler and third link of a four-bar, and the direction of the latter."""
     x, y = v["crank"] * np.cos(p), v["crank"] * np.sin(p)
     gap_x, gap_y = v["frame"] - x, -y
     distance = np.sqrt(gap_x**2 + gap_y**2)
-    along = (v["coupler"] ** 2 - v["rocker"] ** 2 + distance**2) / (2.0 * distance)
+    along = (v["coupler"] ** 2 - v[third] ** 2 + distance**2) / (2.0 * distance)
     across = np.sqrt(v["coupler"] ** 2 - along**2)
     pin_x = x + (gap_x * along - gap_y * across) / distance
     pin_y = y + (gap_y * along + gap_x * across) / distance
     cos, sin = (pin_x - x) / v["coupler"], (pin_y - y) / v["coupler"]
     s = v["coupler_centre"]
     coupler = (v["coupler_mass"], v["coupler_inertia"], x + s * cos, y + s * sin, cos, sin)
-    swing = ((pin_x - v["frame"]) / v["rocker"], pin_y / v["rocker"])
-    return [coupler, (v["tray_mass"], v["rocker_inertia"], pin_x, pin_y, *swing)], 0.0 * x
+    swing = ((pin_x - v["frame"]) / v[third], pin_y / v[third])
+    return [coupler, (v.get("tray_mass", 0.0), v[f"{third}_inertia"], pin_x, pin_y, *swing)], *swing
+
+
+def _four_bar(v: dict[str, float], p: Array) -> tuple[list[Body], Array]:
+    """The way is no position but the arc: its derivative is taken of the direction, in `way_slope`."""
+    return _links(v, "rocker", p)[0], 0.0 * p
+
+
+def _turned(cos: Array, sin: Array, angle: float) -> tuple[Array, Array]:
+    return cos * math.cos(angle) - sin * math.sin(angle), sin * math.cos(angle) + cos * math.sin(angle)
+
+
+def _drag_link(v: dict[str, float], p: Array) -> tuple[list[Body], Array]:
+    bodies, *swing = _links(v, "follower", p - v["frame_angle"])
+    cos, sin = _turned(*swing, v["frame_angle"] + v["arm_angle"])
+    rest, ram = _rod_and_ram(v, v["arm"] * cos, v["arm"] * sin)
+    return [*bodies, *rest], -ram
+
+
+def _toggle(v: dict[str, float], p: Array) -> tuple[list[Body], Array]:
+    bodies, *swing = _links(v, "rocker", p)
+    cos, sin = _turned(*swing, -v["line_angle"])
+    rest, ram = _rod_and_ram(v | {"offset": 0.0}, v["rocker"] * cos, v["rocker"] * sin)
+    return [*bodies, *rest], ram
+
+
+def _scotch_yoke(v: dict[str, float], p: Array) -> tuple[list[Body], Array]:
+    x, y = v["crank"] * np.cos(p), v["crank"] * np.sin(p)
+    still = (1.0 + 0.0 * p, 0.0 * p)
+    return [(v["yoke_mass"], 0.0, x, 0.0 * p, *still), (v["block_mass"], 0.0, x, y, *still)], -x
 
 
 _POSITIONS: dict[str, Callable[[dict[str, float], Array], tuple[list[Body], Array]]] = {
-    "slider_crank": _slider_crank, "quick_return": _quick_return, "four_bar": _four_bar,
+    "slider_crank": _slider_crank, "quick_return": _quick_return, "four_bar": _four_bar, "drag_link": _drag_link,
+    "toggle": _toggle, "scotch_yoke": _scotch_yoke,
 }  # fmt: skip
 
 
@@ -148,7 +178,8 @@ def resistance(part: PartData, phi: Array, machine: MachineData) -> Array:
     slope, load = way_slope(part, phi), part.load
     torque = np.zeros(phi.shape)
     if "inclination" in part.dimensions:
-        weight = part.dimensions["ram_mass"] * machine.gravity * math.sin(part.dimensions["inclination"])
+        ram = part.dimensions.get("ram_mass", part.dimensions.get("yoke_mass", 0.0))
+        weight = ram * machine.gravity * math.sin(part.dimensions["inclination"])
         torque -= weight * slope
     if part.operation == "step":
         own = np.mod(phi + part.angle - load["from"], TURN * machine.cycle)
@@ -267,7 +298,7 @@ def random_machine(rng: np.random.Generator) -> MachineData:
 def _random_part(rng: np.random.Generator, cycle: int) -> PartData:
     kind = str(rng.choice(list(_RANDOM)))
     part = PartData(kind, _RANDOM[kind](rng), float(rng.uniform(-TURN, TURN)))
-    choices = ["none", "step", "resisting"] + (["gas"] if kind in {"slider_crank", "quick_return"} else [])
+    choices = ["none", "step", "resisting"] + ([] if kind == "four_bar" else ["gas"])
     part.operation = str(rng.choice(choices))
     if part.operation == "step":
         low = float(rng.uniform(0.0, TURN * cycle - 1.5))
@@ -307,17 +338,51 @@ def _random_quick_return(rng: np.random.Generator) -> dict[str, float]:
     }  # fmt: skip
 
 
+def _coupler(rng: np.random.Generator, length: float) -> dict[str, float]:
+    return {
+        "coupler": length, "coupler_centre": float(rng.uniform(0.2, 0.8)) * length,
+        "coupler_mass": float(rng.uniform(0.0, 5.0)), "coupler_inertia": float(rng.uniform(0.0, 0.1)),
+    }  # fmt: skip
+
+
 def _random_four_bar(rng: np.random.Generator) -> dict[str, float]:
     crank = float(rng.uniform(0.03, 0.15))
     coupler, rocker = crank * float(rng.uniform(3.0, 4.0)), crank * float(rng.uniform(2.2, 2.8))
     return {
-        "crank": crank, "coupler": coupler, "rocker": rocker, "frame": coupler * float(rng.uniform(0.95, 1.05)),
-        "coupler_centre": float(rng.uniform(0.2, 0.8)) * coupler, "coupler_mass": float(rng.uniform(0.0, 5.0)),
-        "coupler_inertia": float(rng.uniform(0.0, 0.1)), "rocker_inertia": float(rng.uniform(0.0, 0.3)),
-        "tray_mass": float(rng.uniform(0.0, 10.0)),
+        "crank": crank, **_coupler(rng, coupler), "rocker": rocker, "frame": coupler * float(rng.uniform(0.95, 1.05)),
+        "rocker_inertia": float(rng.uniform(0.0, 0.3)), "tray_mass": float(rng.uniform(0.0, 10.0)),
+    }  # fmt: skip
+
+
+def _random_drag_link(rng: np.random.Generator) -> dict[str, float]:
+    frame = float(rng.uniform(0.03, 0.1))
+    return {
+        "frame": frame, "crank": frame * float(rng.uniform(2.0, 3.0)), **_coupler(rng, frame * 2.5),
+        "follower": frame * float(rng.uniform(2.0, 3.0)), "follower_inertia": float(rng.uniform(0.0, 0.3)),
+        "arm": frame, "frame_angle": float(rng.uniform(-3.0, 3.0)), "arm_angle": float(rng.uniform(-3.0, 3.0)),
+        "offset": float(rng.uniform(-0.5, 0.5)) * frame, **_rod(rng, 4.0 * frame),
+    }  # fmt: skip
+
+
+def _random_toggle(rng: np.random.Generator) -> dict[str, float]:
+    crank = float(rng.uniform(0.03, 0.08))
+    rocker, frame, reach = 4.0 * crank, 5.5 * crank, 6.0 * crank
+    last = math.pi - math.acos((frame**2 + rocker**2 - reach**2) / (2.0 * frame * rocker))
+    return {
+        "crank": crank, **_coupler(rng, 5.0 * crank), "rocker": rocker, "frame": frame,
+        "line_angle": last - float(rng.uniform(0.05, 0.4)), "rocker_inertia": float(rng.uniform(0.0, 0.3)),
+        **_rod(rng, 1.2 * rocker),
+    }  # fmt: skip
+
+
+def _random_scotch_yoke(rng: np.random.Generator) -> dict[str, float]:
+    return {
+        "crank": float(rng.uniform(0.03, 0.2)), "yoke_mass": float(rng.uniform(0.5, 20.0)),
+        "block_mass": float(rng.uniform(0.0, 3.0)), "inclination": float(rng.uniform(-3.0, 3.0)),
     }  # fmt: skip
 
 
 _RANDOM: dict[str, Callable[[np.random.Generator], dict[str, float]]] = {
     "slider_crank": _random_slider_crank, "quick_return": _random_quick_return, "four_bar": _random_four_bar,
+    "drag_link": _random_drag_link, "toggle": _random_toggle, "scotch_yoke": _random_scotch_yoke,
 }  # fmt: skip

@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from sprag.engine.machine_shaft.cams import Cam
-from sprag.engine.machine_shaft.linkages import CrankShaper, FourBar, SliderCrank, Whitworth
+from sprag.engine.machine_shaft.four_bars import FourBar, ParallelCrank
+from sprag.engine.machine_shaft.linkages import CrankShaper, ScotchYoke, SliderCrank, Whitworth
+from sprag.engine.machine_shaft.linked_rams import DragLink, Toggle
 from sprag.engine.machine_shaft.mechanisms import Mechanism
 from sprag.engine.machine_shaft.operations import Stroke
 
@@ -202,3 +204,126 @@ def test_angles_of_a_fraction_of_the_stroke() -> None:
         assert stroke.fraction(angles) == pytest.approx(asked, abs=1e-14)
         assert np.all(stroke.forward(angles) == forward)
     assert np.isnan(stroke.angles(np.array([[[-0.1, 1.2]]]), forward=True)).all()
+
+
+@given(crank=st.floats(0.02, 0.5), masses=st.tuples(*[st.floats(0.1, 50.0)] * 2))
+@settings(max_examples=5, deadline=None)
+def test_scotch_yoke(crank: float, masses: tuple[float, float]) -> None:
+    v = {"crank": crank, "yoke_mass": masses[0], "block_mass": masses[1], "inclination": 0.0}
+
+    def bodies(phi: Floats) -> Bodies:
+        pin = crank * np.exp(1j * phi)
+        return [(masses[0], 0.0, pin.real + 0j, 1.0 + 0.0 * pin), (masses[1], 0.0, pin, 1.0 + 0.0 * pin)]
+
+    compare(ScotchYoke(), v, bodies, lambda p: -crank * np.cos(p))
+
+
+@given(crank=st.floats(0.02, 0.5), masses=st.tuples(*[st.floats(0.1, 50.0)] * 2))
+@settings(max_examples=5, deadline=None)
+def test_parallel_crank(crank: float, masses: tuple[float, float]) -> None:
+    v = {"crank": crank, "coupler_mass": masses[0], "driven_inertia": masses[1], "inclination": 0.0}
+
+    def bodies(phi: Floats) -> Bodies:
+        pin = crank * np.exp(1j * phi)
+        return [(masses[0], 0.0, pin, 1.0 + 0.0 * pin), (0.0, masses[1], 0.0 * pin, pin / crank)]
+
+    compare(ParallelCrank(), v, bodies, lambda p: -crank * np.cos(p))
+
+
+def four_bar_pins(v: Mapping[str, float], third: str, phi: Floats) -> tuple[Complex, Complex]:
+    """Crank pin, and the pin between coupler and third link."""
+    driven = v["crank"] * np.exp(1j * phi)
+    gap = v["frame"] - driven
+    distance = np.abs(gap)
+    along = (v["coupler"] ** 2 - v[third] ** 2 + distance**2) / (2.0 * distance)
+    return driven, driven + gap / distance * (along + 1j * np.sqrt(v["coupler"] ** 2 - along**2))
+
+
+def of_links(v: Mapping[str, float], third: str, phi: Floats) -> tuple[Bodies, Complex]:
+    """Coupler and third link, and the direction of the latter."""
+    driven, end = four_bar_pins(v, third, phi)
+    link, swing = (end - driven) / v["coupler"], (end - v["frame"]) / v[third]
+    coupler = (v["coupler_mass"], v["coupler_inertia"], driven + v["coupler_centre"] * link, link)
+    return [coupler, (0.0, v[f"{third}_inertia"], 0.0 * swing, swing)], swing
+
+
+LINK_MASSES = st.fixed_dictionaries(
+    {"coupler_mass": st.floats(0.0, 20.0), "coupler_inertia": st.floats(0.0, 1.0), "third": st.floats(0.0, 3.0)}
+)
+
+
+@given(
+    frame=st.floats(0.03, 0.2), ratios=st.tuples(*[st.floats(2.0, 3.0)] * 3), angles=st.tuples(*[st.floats(-3, 3)] * 2),
+    links=LINK_MASSES, m=MASSES,
+)  # fmt: skip
+@settings(max_examples=15, deadline=None)
+def test_drag_link(
+    frame: float, ratios: tuple[float, ...], angles: tuple[float, float], links: dict[str, float], m: dict[str, float]
+) -> None:
+    crank, coupler, follower = (frame * ratio for ratio in ratios)
+    v = {
+        "frame": frame, "crank": crank, "coupler": coupler, "follower": follower, "arm": 1.5 * frame,
+        "rod": 6.0 * frame, "offset": 0.5 * frame, "frame_angle": angles[0], "arm_angle": angles[1],
+        "coupler_centre": 0.4 * coupler,
+        "coupler_mass": links["coupler_mass"], "coupler_inertia": links["coupler_inertia"],
+        "follower_inertia": links["third"], "rod_centre": frame, **m,
+    }  # fmt: skip
+
+    def parts(phi: Floats) -> tuple[Bodies, Floats]:
+        bodies, swing = of_links(v, "follower", phi - angles[0])
+        rest, ram = rod_and_ram(v, 1.5 * frame * swing * np.exp(1j * sum(angles)), v["offset"])
+        return [*bodies, *rest], ram
+
+    compare(DragLink(), v, lambda p: parts(p)[0], lambda p: -parts(p)[1])
+
+
+@given(crank=st.floats(0.03, 0.1), spare=st.floats(0.02, 0.6), rod=st.floats(1.0, 1.6), links=LINK_MASSES, m=MASSES)
+@settings(max_examples=15, deadline=None)
+def test_toggle(crank: float, spare: float, rod: float, links: dict[str, float], m: dict[str, float]) -> None:
+    coupler, rocker, frame = 5.0 * crank, 4.0 * crank, 5.5 * crank
+    v = {
+        "frame": frame, "crank": crank, "coupler": coupler, "rocker": rocker, "rod": rod * rocker,
+        "coupler_centre": 0.4 * coupler, "coupler_mass": links["coupler_mass"],
+        "coupler_inertia": links["coupler_inertia"], "rocker_inertia": links["third"], "rod_centre": 0.3 * rocker, **m,
+    }  # fmt: skip
+    # The links are nearly straight at the end of the stroke.
+    reach = coupler + crank
+    last = math.pi - math.acos((frame**2 + rocker**2 - reach**2) / (2.0 * frame * rocker))
+    v["line_angle"] = last - spare
+
+    def parts(phi: Floats) -> tuple[Bodies, Floats]:
+        bodies, swing = of_links(v, "rocker", phi)
+        rest, ram = rod_and_ram(v | {"offset": 0.0}, rocker * swing * np.exp(-1j * v["line_angle"]), 0.0)
+        return [*bodies, *rest], ram
+
+    compare(Toggle(), v, lambda p: parts(p)[0], lambda p: parts(p)[1])
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "numbers", "reason"),
+    [
+        (FourBar(), {"crank": 0.2, "coupler": 0.5, "rocker": 0.2, "frame": 0.5}, "a parallel_crank"),
+        (FourBar(), {"crank": 0.3, "coupler": 0.35, "rocker": 0.32, "frame": 0.1}, "turn fully: a drag_link"),
+        (FourBar(), {"crank": 0.1, "coupler": 0.3, "rocker": 0.2, "frame": 0.2}, "could continue either way"),
+        (
+            DragLink(),
+            {"crank": 0.3, "coupler": 0.35, "follower": 0.32, "frame": 0.33},
+            "must be shorter than the crank",
+        ),
+        (DragLink(), {"crank": 0.3, "coupler": 0.3, "follower": 0.4, "frame": 0.2}, "could continue either way"),
+        (DragLink(), {"crank": 0.3, "coupler": 0.3, "follower": 0.5, "frame": 0.2}, "cannot turn fully"),
+        (DragLink(), {"crank": 0.3, "coupler": 0.35, "follower": 0.32, "frame": 0.1, "rod": 0.2, "arm": 0.3}, None),
+        (DragLink(), {"crank": 0.3, "coupler": 0.35, "follower": 0.32, "frame": 0.1, "rod": 0.3, "arm": 0.3}, "folds"),
+        (Toggle(), {"crank": 0.05, "coupler": 0.25, "rocker": 0.2, "frame": 0.28, "line_angle": 2.0}, "turn back"),
+        (Toggle(), {"crank": 0.3, "coupler": 0.25, "rocker": 0.2, "frame": 0.28}, "crank-rocker must be shorter"),
+        (Toggle(), {"crank": 0.05, "coupler": 0.25, "rocker": 0.2, "frame": 0.28, "rod": 0.05}, "does not reach"),
+    ],
+)
+def test_what_cannot_be_assembled_is_given_its_reason(
+    mechanism: Mechanism, numbers: dict[str, float], reason: str | None
+) -> None:
+    rest = {"frame_angle": 0.0, "arm_angle": 0.0, "arm": 0.1, "rod": 0.5, "offset": 0.0, "line_angle": 0.0}
+    values = arrays(rest | numbers)
+    assert not np.isnan(mechanism.unassembled(values)[0])
+    told = mechanism.broken_rule(values)
+    assert told is None if reason is None else reason in str(told)

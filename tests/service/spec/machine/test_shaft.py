@@ -98,6 +98,16 @@ def test_what_is_given_decides_the_balance(changes: dict[str, Any], balance: str
     ("mechanism", "expected"),
     [
         ({"four_bar": {"frame": 0.5, "crank": 0.1, "coupler": 0.4, "rocker": 0.3}}, {"kind": "four_bar"}),
+        ({"scotch_yoke": {"crank": "50 mm", "yoke_mass": "8 kg"}}, {"kind": "scotch_yoke"}),
+        ({"parallel_crank": {"crank": 0.1, "coupler_mass": 20}}, {"kind": "parallel_crank"}),
+        (
+            {"drag_link": {"frame": 0.05, "crank": 0.12, "coupler": 0.12, "follower": 0.12, "arm": 0.06, "rod": 0.3}},
+            {"kind": "drag_link"},
+        ),
+        (
+            {"toggle": {"frame": 0.28, "crank": 0.05, "coupler": 0.25, "rocker": 0.2, "rod": 0.25}},
+            {"kind": "toggle"},
+        ),
         (
             {"quick_return": {"kind": "whitworth", "crank": 0.1, "pivot_distance": 0.05, "link_arm": 0.1, "rod": 0.5}},
             {"kind": "quick_return", "quick_return": "whitworth"},

@@ -1,0 +1,168 @@
+"""Four-bar linkages: kinematics, the crank-rocker and parallel cranks."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sprag.engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, number_of, reduced
+
+Floats = NDArray[np.float64]
+
+
+class Links:
+    """Crank, coupler and a third link at angles of the crank, counted from the frame: the pin is on the left of it.
+
+    ``a``, ``b``, ``c``, ``d`` are the lengths of crank, coupler, third link and frame. ``psi`` is the angle of the
+    third link from its pivot, ``theta`` that of the coupler from the crank pin, ``cos_gamma`` the cosine of the angle
+    at the pivot between crank pin and third link: beyond -1 .. 1 the links do not reach each other.
+    """
+
+    def __init__(self, a: Floats, b: Floats, c: Floats, d: Floats, phi: Floats) -> None:
+        self.a, self.b, self.c, self.phi = a, b, c, phi
+        x, y = a * np.cos(phi) - d, a * np.sin(phi)
+        reach = np.sqrt(x**2 + y**2)
+        self.cos_gamma = (c**2 + reach**2 - b**2) / (2.0 * c * reach)
+        with np.errstate(invalid="ignore"):
+            self.psi = np.pi + np.arctan2(-y, -x) - np.arccos(self.cos_gamma)
+        self.theta = np.arctan2(c * np.sin(self.psi) - y, c * np.cos(self.psi) - x)
+
+    @classmethod
+    def of(cls, values: Values, phi: Floats, third: str = "rocker") -> "Links":
+        """Those of the parameters ``crank``, ``coupler``, ``third`` and ``frame``."""
+        return cls(values["crank"], values["coupler"], values[third], values["frame"], phi)
+
+    def turning(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """First derivatives of ``psi`` and ``theta`` by the crank's angle, and second ones."""
+        a, b, c, phi, psi, theta = self.a, self.b, self.c, self.phi, self.psi, self.theta
+        turn = np.sin(psi - theta)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            psi1 = a * np.sin(phi - theta) / (c * turn)
+            theta1 = a * np.sin(phi - psi) / (b * turn)
+            across = np.cos(psi - theta)
+            psi2 = (a * np.cos(phi - theta) + b * theta1**2 - c * psi1**2 * across) / (c * turn)
+            theta2 = (a * np.cos(phi - psi) + b * theta1**2 * across - c * psi1**2) / (b * turn)
+        return psi1, theta1, psi2, theta2
+
+    def coupler(self, values: Values, theta1: Floats, theta2: Floats) -> Body:
+        """The coupler, with its centre at ``coupler_centre`` from the crank pin."""
+        a, s, phi = self.a, values["coupler_centre"], self.phi
+        sin, cos = np.sin(self.theta), np.cos(self.theta)
+        return Body(
+            values["coupler_mass"],
+            values["coupler_inertia"],
+            -a * np.sin(phi) - s * sin * theta1,
+            a * np.cos(phi) + s * cos * theta1,
+            theta1,
+            -a * np.cos(phi) - s * (cos * theta1**2 + sin * theta2),
+            -a * np.sin(phi) - s * (sin * theta1**2 - cos * theta2),
+            theta2,
+        )
+
+
+def swinging(inertia: Floats, turn1: Floats, turn2: Floats) -> Body:
+    """A link that turns about a fixed pivot, with its inertia about that."""
+    zero = np.zeros((1, 1, 1))
+    return Body(zero, inertia, zero, zero, turn1, zero, zero, turn2)
+
+
+def crank_at(distance: Floats, values: Values) -> Floats:
+    """Angle between frame and crank, or its extension, at which the rocker's pin is ``distance`` from the shaft."""
+    c, d = values["rocker"], values["frame"]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.arccos((d**2 + distance**2 - c**2) / (2.0 * d * distance)))
+
+
+def rocker_dead_centres(values: Values) -> tuple[Floats, Floats]:
+    """Angles of the crank at which the rocker of a crank-rocker is nearest to the shaft, and farthest."""
+    a, b = values["crank"], values["coupler"]
+    return np.pi + crank_at(b - a, values), crank_at(b + a, values)
+
+
+def rocking(values: Values) -> Floats:
+    """Positive where the crank is shorter than frame and coupler, so that the third link rocks."""
+    return np.asarray((np.minimum(values["frame"], values["coupler"]) - values["crank"]) / values["frame"])
+
+
+def crank_rocker_rule(values: Values) -> str | None:
+    """Why the links are not a crank-rocker, as a clause; None where they are merely too short."""
+    sizes = {name: number_of(values, name) for name in ("crank", "coupler", "rocker", "frame")}
+    crank, ordered = sizes["crank"], sorted(sizes.values())
+    short = [name for name in ("frame", "coupler") if sizes[name] <= crank]
+    spare = ordered[1] + ordered[2] - ordered[0] - ordered[3]
+    pairs = np.isclose(crank, sizes["rocker"], rtol=1e-9) and np.isclose(sizes["frame"], sizes["coupler"], rtol=1e-9)
+    hint = "; links that are equal in pairs are a parallel_crank" if pairs else ""
+    if not short:
+        folds = abs(spare) <= 1e-9 * ordered[3]
+        return f"all its links lie in one line there, and the rocker could continue either way{hint}" if folds else None
+    told = " and ".join(f"the {name} ({sizes[name]:.6g} m)" for name in short)
+    if sizes["frame"] == ordered[0] and spare > 1e-9 * ordered[3]:
+        hint = "; with the frame as the shortest link both links turn fully: a drag_link"
+    return f"the crank ({crank:.6g} m) of a crank-rocker must be shorter than {told}{hint}"
+
+
+class FourBar(Mechanism):
+    """Crank and rocker; the crank's angle is counted from the frame, towards the side on which the rocker's pin is.
+
+    ``frame``, ``crank``, ``coupler``, ``rocker`` are lengths. The coupler's centre of mass is at ``coupler_centre``
+    from the crank pin on the line of the pins; ``rocker_inertia`` is about the rocker's pivot; ``tray_mass`` hangs on
+    the rocker's pin and moves along its arc without turning, as a conveyor's trough on parallel rockers does. The way
+    is the arc of that pin; the forward stroke leads away from the crank.
+    """
+
+    def motion(self, values: Values, phi: Floats) -> Motion:
+        """See Mechanism."""
+        links, c = Links.of(values, phi), values["rocker"]
+        psi1, theta1, psi2, theta2 = links.turning()
+        carried = values["rocker_inertia"] + values["tray_mass"] * c**2
+        inertia, slope = reduced([links.coupler(values, theta1, theta2), swinging(carried, psi1, psi2)])
+        start = Links.of(values, self.dead_centres(values)[0]).psi
+        return Motion(inertia, slope, c * (start - links.psi), -c * psi1)
+
+    def dead_centres(self, values: Values) -> tuple[Floats, Floats]:
+        """See Mechanism."""
+        return rocker_dead_centres(values)
+
+    def margin(self, values: Values, phi: Floats) -> Floats:
+        """See Mechanism."""
+        return np.asarray(np.minimum(1.0 - np.abs(Links.of(values, phi).cos_gamma), rocking(values)))
+
+    def broken_rule(self, values: Values) -> str | None:
+        """See Mechanism."""
+        return crank_rocker_rule(values)
+
+    def worst_angles(self, values: Values) -> Sequence[Floats]:
+        """See Mechanism."""
+        one = np.ones_like(values["crank"])
+        return 0.0 * one, np.pi * one
+
+
+class ParallelCrank(Mechanism):
+    """A parallelogram: two equal cranks joined by a coupler as long as the frame, which moves without turning.
+
+    Every point of the coupler goes round a circle of the crank's radius. Its travel is counted along the direction in
+    which the crank points at 0, towards the near side: the forward stroke ends half a turn later. Where the cranks lie
+    along the frame, a bare parallelogram could go over into an antiparallel one; guidance (a third crank, wheels,
+    gears) is taken to prevent it. ``driven_inertia`` is that of the second crank about its pivot.
+    """
+
+    ram_mass = "coupler_mass"
+    has_singular_positions = False
+
+    def motion(self, values: Values, phi: Floats) -> Motion:
+        """See Mechanism; the inertia is constant."""
+        r = values["crank"]
+        inertia = values["coupler_mass"] * r**2 + values["driven_inertia"]
+        return Motion(inertia, np.zeros((1, 1, 1)), r * (1.0 - np.cos(phi)), r * np.sin(phi))
+
+    def dead_centres(self, values: Values) -> tuple[Floats, Floats]:
+        """See Mechanism."""
+        return np.zeros_like(values["crank"]), np.full_like(values["crank"], np.pi)
+
+    def margin(self, values: Values, phi: Floats) -> Floats:
+        """See Mechanism; any crank can be assembled."""
+        return np.ones(np.broadcast_shapes(values["crank"].shape, phi.shape))
+
+    def worst_angles(self, values: Values) -> Sequence[Floats]:
+        """See Mechanism."""
+        return (np.zeros_like(values["crank"]),)
