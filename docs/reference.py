@@ -1,4 +1,6 @@
-"""The tables of docs/reference.md, from what the program says of itself; the sentences between them are by hand.
+"""The tables of docs/reference.md, and of docs/theory.md where it has some, from what the program says of itself.
+
+The sentences between them are by hand.
 
 python -m docs.reference           write the tables anew
 python -m docs.reference --check   exit code 1 where a table is not what the program says
@@ -22,7 +24,7 @@ from sprag.worker import models
 from sprag.worker.models import machine_shaft
 from sprag.worker.states import StudyState
 
-PAGE = Path(__file__).with_name("reference.md")
+FOLDER = Path(__file__).parent
 Row = Iterable[str]
 
 
@@ -110,6 +112,8 @@ TIMED, SETTLED = (
     {info.name.replace("pendulums.0.", "pendulums.N.") for info in models.result_infos(DRIVE, variant)}
     for variant in ("1", "1-settled")
 )
+#: Endings of cases of the drive that come from the engine.
+DRIVE_ENDINGS = {k: v for k, v in models.endings_of(DRIVE).items() if k not in set(models.WorkerEnding)}
 #: Results that cases of a given time have not, and those of cases with starts only.
 SETTLED_ONLY = SETTLED - TIMED
 STARTS_ONLY = {info.name for info in models.result_catalogue(DRIVE)} - SETTLED
@@ -129,9 +133,18 @@ TABLES: dict[str, tuple[str, Iterable[Row]]] = {
 }
 
 
-def page(text: str) -> str:
-    """The page with its tables made anew."""
-    for name, (heads, rows) in TABLES.items():
+#: The tables of each page.
+PAGES: dict[str, dict[str, tuple[str, Iterable[Row]]]] = {
+    "reference.md": TABLES,
+    "theory.md": {
+        "endings of the vibration drive": ("ending | meaning ", meanings(DRIVE_ENDINGS)),
+    },
+}
+
+
+def page(text: str, tables: dict[str, tuple[str, Iterable[Row]]]) -> str:
+    """The text of a page with its tables made anew."""
+    for name, (heads, rows) in tables.items():
         lines = [f"| {heads}|".replace("|  |", "| |"), "|" + "---|" * (heads.count("|") + 1)]
         lines += [f"| {' | '.join(cells)} |" for cells in rows]
         pattern = rf"(<!-- table: {name} -->\n\n)(?:\|.*\n)*"
@@ -143,19 +156,23 @@ def page(text: str) -> str:
 
 
 def main() -> int:
-    """Write the page, or check it."""
-    text = PAGE.read_text(encoding="utf-8")
-    made = page(text)
-    if "--check" not in sys.argv:
-        PAGE.write_text(made, encoding="utf-8")
-        return 0
-    lines = set(text.splitlines())
-    for line in made.splitlines():
-        if line not in lines:
-            print(f"docs/reference.md lacks: {line}")
-    if made != text:
-        print("docs/reference.md is not what the program says: python -m docs.reference writes it anew.")
-    return int(made != text)
+    """Write the pages, or check them."""
+    changed = False
+    for name, tables in PAGES.items():
+        file = FOLDER / name
+        text = file.read_text(encoding="utf-8")
+        made = page(text, tables)
+        if "--check" not in sys.argv:
+            file.write_text(made, encoding="utf-8")
+            continue
+        lines = set(text.splitlines())
+        for line in made.splitlines():
+            if line not in lines:
+                print(f"docs/{name} lacks: {line}")
+        if made != text:
+            print(f"docs/{name} is not what the program says: python -m docs.reference writes it anew.")
+            changed = True
+    return int(changed)
 
 
 if __name__ == "__main__":
