@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag.engine.machine_shaft.panels import Panels
-from sprag.engine.machine_shaft.spec import Balance
+from sprag.engine.machine_shaft.spec import Balance, BalanceSide
 
 Floats = NDArray[np.float64]
 
@@ -16,12 +16,14 @@ TOLERANCE = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Balanced:
-    """A driving torque after balancing.
+    """Torques after balancing.
 
     Attributes
     ----------
-    drive : array, shape (cases, panels, nodes)
-        M_d in N*m.
+    drive, resistance : arrays, shape (cases, panels, nodes)
+        M_d and M_r in N*m.
+    factor : array, shape (cases,)
+        On the drive or the operation; NaN where it was made constant.
     wrong : array of bool, shape (cases,)
         Where the works cannot be balanced in the requested way.
     drive_work, resistance_work : arrays, shape (cases,)
@@ -29,6 +31,8 @@ class Balanced:
     """
 
     drive: Floats
+    resistance: Floats
+    factor: Floats
     wrong: NDArray[np.bool_]
     drive_work: Floats
     resistance_work: Floats
@@ -43,24 +47,44 @@ def largest_work(panels: Panels, *torques: Floats) -> Floats:
     return most
 
 
-def balanced(balance: Balance, panels: Panels, cycle: float, drive: Floats, resistance: Floats) -> Balanced:
-    """Balance the works over a cycle by scaling the drive, making it constant, or not at all.
+def balanced(
+    balance: Balance,
+    side: BalanceSide,
+    panels: Panels,
+    cycle: float,
+    drive: Floats,
+    resistance: Floats,
+    operation: Floats,
+) -> Balanced:
+    """Balance the works over a cycle on one side: by scaling that torque, making it constant, or not at all.
 
-    "constant" replaces the given torque by M_d = -(1/cycle) * integral of M_r. "scale" multiplies M_d by the factor
-    that makes the works opposite, which is impossible where they have the same sign or the drive does no work. "refuse"
-    accepts the torques unchanged if the residual work is at most TOLERANCE of the largest work within the cycle.
+    "constant" replaces the torque of the side (``drive``, or ``operation``, which is a part of ``resistance``) by the
+    constant that makes the works opposite. "scale" multiplies it by the factor that does, which is impossible where
+    the torque does no work or the factor is not positive. "refuse" accepts the torques unchanged if the residual work
+    is at most TOLERANCE of the largest work within the cycle.
     """
-    drive_work, resistance_work = panels.integral(drive), panels.integral(resistance)
-    none = np.zeros(len(drive), dtype=np.bool_)
-    if balance == "constant":
-        mean = -resistance_work / cycle
-        return Balanced(mean[:, None, None] + 0.0 * drive, none, drive_work, resistance_work)
+    works = panels.integral(drive), panels.integral(resistance)
+    none, one = np.zeros(len(drive), dtype=np.bool_), np.ones(len(drive))
+    own = drive if side == "drive" else operation
     if balance == "motor":
-        return Balanced(drive, none, drive_work, resistance_work)
+        return Balanced(drive, resistance, one, none, *works)
+    if balance == "constant":
+        rest = resistance if side == "drive" else drive + (resistance - operation)
+        mean = (-(works[1] if side == "drive" else panels.integral(rest)) / cycle)[:, None, None] + 0.0 * own
+        lost = np.full(len(drive), np.nan)
+        if side == "drive":
+            return Balanced(mean, resistance, lost, none, *works)
+        return Balanced(drive, mean + (resistance - operation), lost, none, *works)
     largest = largest_work(panels, drive, resistance)
-    within = np.abs(drive_work + resistance_work) <= TOLERANCE * largest
+    within = np.abs(works[0] + works[1]) <= TOLERANCE * largest
     if balance == "refuse":
-        return Balanced(drive, ~within, drive_work, resistance_work)
-    opposite = (drive_work * resistance_work < 0.0) & (np.abs(drive_work) > 1e-9 * largest)
-    factor = np.where(opposite, -resistance_work / np.where(opposite, drive_work, 1.0), 1.0)
-    return Balanced(factor[:, None, None] * drive, ~(opposite | within), drive_work, resistance_work)
+        return Balanced(drive, resistance, one, ~within, *works)
+    own_work = works[0] if side == "drive" else panels.integral(operation)
+    rest_work = works[1] if side == "drive" else works[0] + panels.integral(resistance - operation)
+    opposite = (own_work * rest_work < 0.0) & (np.abs(own_work) > 1e-9 * largest)
+    factor = np.where(opposite, -rest_work / np.where(opposite, own_work, 1.0), 1.0)
+    wrong = ~(opposite | within)
+    if side == "drive":
+        return Balanced(factor[:, None, None] * drive, resistance, factor, wrong, *works)
+    found = (resistance - operation) + factor[:, None, None] * operation
+    return Balanced(drive, found, factor, wrong, *works)

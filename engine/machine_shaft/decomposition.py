@@ -55,10 +55,12 @@ class Decomposition:
         The one from which works are counted, NaN where there is none.
     """
 
-    def __init__(self, panels: Panels, cycle: float, fields: Fields, drive: Floats, start: Floats) -> None:
+    def __init__(
+        self, panels: Panels, cycle: float, fields: Fields, drive: Floats, resistance: Floats, start: Floats
+    ) -> None:
         self.panels, self.cycle, self.fields, self.start = panels, cycle, fields, start
-        self.drive, self.resistance = Work.of(panels, drive), Work.of(panels, fields.resistance)
-        self.total = Work.of(panels, drive + fields.resistance)
+        self.drive, self.resistance = Work.of(panels, drive), Work.of(panels, resistance)
+        self.total = Work.of(panels, drive + resistance)
         self.shape = Shape(panels, cycle, fields.inertia, self.total.nodes)
         self.squares = self.shape.squares(start)
         self.mean_work = panels.integral(self.total.nodes) / cycle

@@ -48,7 +48,9 @@ def check_structure(spec: MachineSpec) -> None:
     if spec.phi_c is not None and spec.phi_c < 0:
         raise StructureError(f"phi_c counts the angles with T = T_mean from 0; it cannot be {spec.phi_c}.")
     if spec.cycle not in REVOLUTIONS:
-        raise StructureError(f"A cycle has 1, 2 or 3 revolutions, not {spec.cycle}.")
+        raise StructureError(f"A cycle has 1 to {max(REVOLUTIONS)} revolutions, not {spec.cycle}.")
+    if spec.balance == "motor" and spec.balance_side == "operation":
+        raise StructureError("With a motor the speed follows from the operation, which is not to be found then.")
     if spec.balance == "motor" and spec.drive.motor is None:
         raise StructureError('The balance "motor" needs a motor in the drive.')
     if len(spec.constants) > MAX_CONSTANTS:
@@ -93,13 +95,16 @@ class Fields:
     inertia, slope : arrays
         I in kg*m^2 and dI/dphi.
     drive, resistance : arrays
-        M_d as given and M_r in N*m; M_d is zero where it is still to be determined.
+        M_d and M_r as given, in N*m; M_d is zero where it is still to be determined.
+    operation : array
+        The part of M_r that operations have, without weights and springs.
     """
 
     inertia: Floats
     slope: Floats
     drive: Floats
     resistance: Floats
+    operation: Floats
 
 
 class Machine:
@@ -151,9 +156,12 @@ class Machine:
         return breaks
 
     def formulas(self) -> list[Formula]:
-        """The formulas of the fields, except a drive that balancing replaces."""
+        """The formulas of the fields, except of torques that balancing replaces."""
         own = [formula for part in self.parts for formula in part.formulas()]
-        drive = None if self.spec.balance == "constant" else self._drive_formula
+        replaced = self.spec.balance_side if self.spec.balance == "constant" else None
+        if replaced == "operation":
+            own = [formula for formula in own if formula.part != "resistance"]
+        drive = None if replaced == "drive" else self._drive_formula
         if drive is not None:
             used = {name: value for name, value in self.constants.items() if name in drive.used}
             own.append(Formula("drive", drive, used))
@@ -175,9 +183,9 @@ class Machine:
     def fields(self, phi: Floats) -> Fields:
         """Inertia and torques at ``phi``, shape (cases or 1, panels, nodes), none of it at a jump."""
         own = [part.fields(phi) for part in self.parts]
-        inertia, slope, resistance = (reduce(np.add, same) for same in zip(*own, strict=True))
+        inertia, slope, resistance, operation = (reduce(np.add, same) for same in zip(*own, strict=True))
         shape = (self.columns.cases, *phi.shape[1:])
-        fields = (inertia + self.train.inertia, slope, self._drive(phi), resistance)
+        fields = (inertia + self.train.inertia, slope, self._drive(phi), resistance, operation)
         return Fields(*(np.ascontiguousarray(np.broadcast_to(field, shape)) for field in fields))
 
     def inertia_jumps(self) -> list[Jumps]:

@@ -73,11 +73,14 @@ class PartFields(NamedTuple):
         I'' in kg*m^2 and dI''/dphi.
     resistance : array
         Torque of the operation, the weight and the spring on the shaft in N*m, negative where it resists.
+    operation : array
+        Torque of the operation alone.
     """
 
     inertia: Floats
     slope: Floats
     resistance: Floats
+    operation: Floats
 
 
 class Jumps(NamedTuple):
@@ -182,7 +185,7 @@ class ShaftPart:
         motion = None if self.mechanism is None else self.mechanism.motion(self.values, own)
         inertia, slope = self._inertia(own, motion)
         torque = self._operation.torque(own, None if motion is None else motion.way_slope)
-        return PartFields(inertia, slope, torque + self._carried(motion))
+        return PartFields(inertia, slope, torque + self._carried(motion), torque)
 
     def _inertia(self, own: Floats, motion: Motion | None) -> tuple[Floats, Floats]:
         if motion is not None:

@@ -95,12 +95,23 @@ class UnbalancedWorkError(MachineError):
 
     ending = Ending.UNBALANCED_WORK
 
-    def __init__(self, drive: float, resistance: float) -> None:
+    def __init__(self, drive: float, resistance: float, scaled: str = "") -> None:
         super().__init__(
             f"The work over a cycle is not zero: the drive does {drive:.6g} J and the resistance {resistance:.6g} J. "
-            'Steady motion needs opposite works: choose balance "scale" or "constant", or correct the torques.'
+            + self._advice(drive, resistance, scaled)
         )
         self.drive, self.resistance = drive, resistance
+
+    @staticmethod
+    def _advice(drive: float, resistance: float, scaled: str) -> str:
+        if not scaled:
+            return 'Steady motion needs opposite works: choose balance "scale" or "constant", or correct the torques.'
+        own, other = (drive, resistance) if scaled == "driving torque" else (resistance, drive)
+        if abs(own) <= 1e-9 * abs(other):
+            return f"No factor on the {scaled} balances that, since it does no work over a cycle of its own."
+        if drive < 0.0 and resistance < 0.0:
+            return f"No positive factor on the {scaled} balances that: the driving torque brakes, too."
+        return f"No positive factor on the {scaled} balances that: the operation drives instead of resisting."
 
 
 class InsufficientInertiaError(MachineError):

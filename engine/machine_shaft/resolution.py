@@ -21,8 +21,9 @@ def rough_panels(d: Decomposition) -> tuple[Bools, Bools]:
     panels, still = d.panels, np.isnan(d.start)[:, None]
     # A case without motion is judged by the given torques and inertia.
     drive = np.where(still[..., None], d.fields.drive, d.drive.torque)
-    torque = panels.roughness(drive) + panels.roughness(d.fields.resistance)
-    scale = (largest_work(panels, drive, d.fields.resistance) if still.any() else d.most_work)[:, None]
+    resistance = np.where(still[..., None], d.fields.resistance, d.resistance.torque)
+    torque = panels.roughness(drive) + panels.roughness(resistance)
+    scale = (largest_work(panels, drive, resistance) if still.any() else d.most_work)[:, None]
     fine = (torque * panels.half <= 1e-10 * scale) & _resolved(panels, d.fields.inertia, 1e-11)
     with np.errstate(invalid="ignore"):
         square = _resolved(panels, d.squares, 1e-10) | still

@@ -79,6 +79,8 @@ MACHINE_RESULTS: tuple[ResultInfo, ...] = (
     *(_R(f"s{k}.share", "1", f"amplitude of S{k} / sum of the amplitudes of S1 to S4") for k in range(1, 5)),
     *_harmonics("omega", "rad/s", "speed's oscillation"),
     *_harmonics("torque", "N*m", "oscillation of the sum of driving and resisting torque"),
+    _R("resisting_torque.mean", "N*m", "mean resisting torque over the angle, negative where it resists"),
+    _R("balance.factor", "1", "factor on the driving torque or the operation that balances their works"),
     _R("required_inertia.energy", "kg*m^2", "inertia from the energy alone: fluctuation/(irregularity*speed^2)"),
     _R("flywheel.inertia", "kg*m^2", "inertia of the flywheel that is given by its dimensions"),
     _R("flywheel.speed", "m/s", "largest speed of the rim (at its mean diameter) or of the disc's edge"),

@@ -179,20 +179,23 @@ def _attempt(spec: MachineSpec, columns: Columns, cuts: Floats) -> Solved:
     endings[negative] = _CODE[Ending.NEGATIVE_INERTIA]
     if spec.balance == "motor":
         found = _motored(spec, columns, panels, cycle, fields)
-        drive, start = found.drive, found.start
+        drive, resistance, start = found.drive, fields.resistance, found.start
         endings[found.stalled & ~negative] = _CODE[Ending.MOTOR_STALLED]
         endings[found.overrun & ~negative] = _CODE[Ending.MOTOR_OVERRUN]
-        least = np.full(columns.cases, np.nan)
+        least = factor = np.full(columns.cases, np.nan)
     else:
-        balance = balanced(spec.balance, panels, cycle, fields.drive, fields.resistance)
-        drive = balance.drive
+        balance = balanced(
+            spec.balance, spec.balance_side, panels, cycle, fields.drive, fields.resistance, fields.operation
+        )
+        drive, resistance, factor = balance.drive, balance.resistance, balance.factor
         endings[balance.wrong & ~negative] = _CODE[Ending.UNBALANCED_WORK]
-        start, least = _started(spec, columns, panels, cycle, fields, drive, endings)
+        start, least = _started(spec, columns, panels, cycle, fields.inertia, drive + resistance, endings)
     start = np.where(endings == _CODE[Ending.OK], start, np.nan)
-    d = Decomposition(panels, cycle, fields, drive, start)
+    d = Decomposition(panels, cycle, fields, drive, resistance, start)
     results = characteristics(d, spec.phi_c)
     results["work.drive"], results["work.resistance"] = d.drive.ends[:, -1], d.resistance.ends[:, -1]
-    results["least_mean_speed"] = least
+    results["least_mean_speed"], results["balance.factor"] = least, factor
+    results["resisting_torque.mean"] = d.resistance.ends[:, -1] / cycle
     for name in ("omega.angle_at_max", "omega.angle_at_min"):
         results[name] = np.where(np.isnan(start), np.nan, results[name])
     results["inertia.min"] = np.where(negative, least_inertia, results["inertia.min"])
@@ -218,7 +221,7 @@ def _motored(spec: MachineSpec, columns: Columns, panels: Panels, cycle: float, 
 
 
 def _started(
-    spec: MachineSpec, columns: Columns, panels: Panels, cycle: float, fields: Fields, drive: Floats, endings: Codes
+    spec: MachineSpec, columns: Columns, panels: Panels, cycle: float, inertia: Floats, torques: Floats, endings: Codes
 ) -> tuple[Floats, Floats]:
     """Energy at the start for the required mean speed, and the least feasible mean speed; marks ``endings``."""
     wanted, kind = columns.row("mean_speed"), spec.mean_speed_is
@@ -228,8 +231,8 @@ def _started(
         return start, least
     own = panels.take(rows)
     with np.errstate(all="ignore"):
-        torque = (drive + fields.resistance)[rows]
-        shape = Shape(own, cycle, fields.inertia[rows], own.running(torque)[0])
+        torque = torques[rows]
+        shape = Shape(own, cycle, inertia[rows], own.running(torque)[0])
         stop = Stop.of(shape)
         least[rows] = least_mean_speed(shape, stop, kind, torque)
         feasible = wanted[rows] > least[rows]
@@ -364,21 +367,21 @@ def check(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> None:
         machine = Machine(model, row)
         machine.check_finite()
         machine.check_closed()
-    problem = _problem(ending, result, row, Machine(model, row).broken_rule())
+    problem = _problem(model, ending, result, row)
     if problem is not None:
         raise problem
 
 
-def _problem(
-    ending: Ending, result: Mapping[str, float], row: Columns, broken: tuple[str, str | None]
-) -> MachineError | None:
+def _problem(spec: MachineSpec, ending: Ending, result: Mapping[str, float], row: Columns) -> MachineError | None:
     if ending is Ending.CANNOT_ASSEMBLE:
-        prefix, rule = broken
+        prefix, rule = Machine(spec, row).broken_rule()
         return AssemblyError(float(result["assembly.angle"]), rule, prefix)
     if ending is Ending.NEGATIVE_INERTIA:
         return NegativeInertiaError(float(result["inertia.min"]))
     if ending is Ending.UNBALANCED_WORK:
-        return UnbalancedWorkError(float(result["work.drive"]), float(result["work.resistance"]))
+        scaled = {"drive": "driving torque", "operation": "operation"}[spec.balance_side]
+        works = float(result["work.drive"]), float(result["work.resistance"])
+        return UnbalancedWorkError(*works, scaled if spec.balance == "scale" else "")
     if ending is Ending.INERTIA_INSUFFICIENT:
         return InsufficientInertiaError(float(row.row("mean_speed")[0]), float(result["least_mean_speed"]))
     plain = _PLAIN_PROBLEMS.get(ending)

@@ -9,6 +9,7 @@ from sprag.engine.machine_shaft.tables import Interpolation, Table
 
 MeanSpeed = Literal["midrange", "angle", "time"]
 Balance = Literal["scale", "constant", "refuse", "motor"]
+BalanceSide = Literal["drive", "operation"]
 Motor = Literal["linear", "kloss"]
 Flywheel = Literal["rim", "disc"]
 Stage = Literal["gear", "belt", "chain", "worm", "screw_nut", "rack"]
@@ -33,7 +34,7 @@ MAX_STEPS = 32
 HARMONICS = 6
 MAX_CONSTANTS = 32
 MAX_PARTS = 16
-REVOLUTIONS = (1, 2, 3)
+REVOLUTIONS = tuple(range(1, 13))
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,11 +118,13 @@ class MachineSpec:
     Attributes
     ----------
     cycle : int
-        Revolutions of a cycle, 1 to 3.
+        Revolutions of a cycle, 1 to 12.
     mean_speed_is : {"midrange", "angle", "time"}
         Which mean of the speed the required mean speed and the irregularity refer to.
     balance : {"scale", "constant", "refuse", "motor"}
         How the work over a cycle is made zero.
+    balance_side : {"drive", "operation"}
+        Which torque "constant" replaces and "scale" multiplies: the drive's, or that of all operations.
     drive : Drive
     mechanism, operation :
         Those of a machine without ``parts``.
@@ -141,6 +144,7 @@ class MachineSpec:
     operation: OperationChoice = field(default_factory=OperationChoice)
     constants: tuple[str, ...] = ()
     phi_c: int | None = None
+    balance_side: BalanceSide = "drive"
     parts: tuple[PartChoice, ...] = ()
 
     def every_part(self) -> tuple[tuple[str, PartChoice], ...]:

@@ -10,7 +10,7 @@ from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.decomposition import Decomposition
 from sprag.engine.machine_shaft.machine import Machine, check_structure
 from sprag.engine.machine_shaft.panels import Points
-from sprag.engine.machine_shaft.simulate import attempts, settle
+from sprag.engine.machine_shaft.simulate import Solved, attempts, settle
 from sprag.engine.machine_shaft.spec import LINKED, MachineSpec
 from sprag.engine.outcome import Trajectory
 
@@ -94,7 +94,7 @@ def trajectory(model: MachineSpec, columns: Mapping[str, ArrayLike], angles: Arr
         return made(nothing[:, 0], nothing, ending)
     table = _table(solved.decomposition, model.phi_c, np.minimum(asked, cycle))
     if model.parts:
-        table |= _part_table(Machine(model, row), solved.decomposition, np.minimum(asked, cycle))
+        table |= _part_table(Machine(model, row), solved, np.minimum(asked, cycle))
     values = np.column_stack([table[name] for name in names])
     every = np.sort(np.mod(solved.decomposition.crossings.angle, cycle))
     return made(asked, values, ending, tuple(float(angle) for angle in every))
@@ -139,14 +139,18 @@ def _table(d: Decomposition, chosen: int | None, angles: Floats) -> dict[str, Fl
     }
 
 
-def _part_table(machine: Machine, d: Decomposition, angles: Floats) -> dict[str, Floats]:
-    """Travel, inertia and torque of each part."""
-    panels, cases = d.panels, np.zeros(len(angles), dtype=np.int64)
+def _part_table(machine: Machine, solved: Solved, angles: Floats) -> dict[str, Floats]:
+    """Travel, inertia and torque of each part; a constant load in place of the operations belongs to none."""
+    panels, cases = solved.decomposition.panels, np.zeros(len(angles), dtype=np.int64)
     points = panels.locate(0, angles)
+    factor = 1.0
+    if machine.spec.balance_side == "operation":
+        factor = float(np.nan_to_num(solved.results["balance.factor"][0], nan=0.0))
     table = {}
     for part in machine.parts:
         fields, motion = part.fields(panels.angles), part.motion(panels.angles)
-        own = {"inertia": fields.inertia, "resisting_torque": fields.resistance}
+        resistance = fields.resistance if factor == 1.0 else fields.resistance + (factor - 1.0) * fields.operation
+        own = {"inertia": fields.inertia, "resisting_torque": resistance}
         if motion is not None:
             own["way"] = motion.way
         for name, values in own.items():

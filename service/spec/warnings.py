@@ -71,8 +71,18 @@ def warn_machine_shaft(report: Report, study: Study) -> None:
     for path in dict.fromkeys((*study.base, *study.axis_paths)):
         _plausible(report, study, path, _PLAUSIBLE_SHAFT)
     structure = study.structure or {}
-    if structure["balance"] == "constant" and (
-        structure["drive"]["form"] != "constant" or _values(study, "drive.torque").any()
+    operation_found = structure.get("balance_side") == "operation"
+    acts = any(part["operation"]["quantity"] != "none" for _, part in _parts(study))
+    if structure["balance"] == "constant" and operation_found and acts:
+        report.warn(
+            "replaced-value",
+            '/base/operation: is not used: the balance "constant" on the side of the operation replaces it by a '
+            'constant torque; choose "scale" to keep its shape',
+        )
+    if (
+        structure["balance"] == "constant"
+        and not operation_found
+        and (structure["drive"]["form"] != "constant" or _values(study, "drive.torque").any())
     ):
         report.warn(
             "replaced-value",

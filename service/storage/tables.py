@@ -8,7 +8,7 @@ from sprag.worker import models
 from sprag.worker.states import ChunkState
 
 #: Revision of the schema below; the last file in migrations/versions.
-HEAD_REVISION = "0019"
+HEAD_REVISION = "0020"
 
 METADATA = sa.MetaData(
     naming_convention={

@@ -17,6 +17,7 @@ _MEANINGS: Final = {
     "cycle": "revolutions of a cycle",
     "mean_speed_is": shaft.MEAN_SPEED_IS.help,
     "balance": shaft_drive.BALANCE.help,
+    "balance_side": shaft_drive.BALANCE_SIDE.help,
     "phi_c": shaft_parts.PHI_C.help,
     "drive.motor.kind": shaft_drive.MOTOR.help,
     "drive.flywheel.kind": shaft_drive.FLYWHEEL.help,
@@ -69,6 +70,8 @@ def _chosen(structure: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "cycle", f"{cycle} revolution{'s' if cycle > 1 else ''}"
     yield "mean_speed_is", structure["mean_speed_is"]
     yield "balance", structure["balance"]
+    if "balance_side" in structure:
+        yield "balance_side", structure["balance_side"]
     yield "phi_c", "the first at which T rises" if phi_c is None else str(phi_c)
     if drive["motor"]:
         yield "drive.motor.kind", drive["motor"]

@@ -29,8 +29,8 @@ from sprag.worker.models import machine_shaft
 from sprag.worker.models.parameters import model_parameter
 
 FIELDS: Final = (
-    "cycle", "mean_speed", "mean_speed_is", "drive", "mechanism", "operation", "parts", "balance", "phi_c", "constants",
-    "wanted_irregularity", "gravity",
+    "cycle", "mean_speed", "mean_speed_is", "drive", "mechanism", "operation", "parts", "balance", "balance_side",
+    "phi_c", "constants", "wanted_irregularity", "gravity",
 )  # fmt: skip
 _MEAN_HELP: Final = "which mean of the speed mean_speed and the irregularity refer to"
 MEAN_SPEED_IS: Final = choice("mean_speed_is", _MEAN_HELP, "midrange", "angle", "time", default="midrange")
@@ -121,6 +121,8 @@ def _read_structure(report: Report, found: Mapping[str, Any], places: dict[str, 
         "cycle": cycle, "mean_speed_is": mean, "balance": balance, "drive": drive, "mechanism": mechanism,
         "operation": operation, "constants": constants, "phi_c": phi_c,
     }  # fmt: skip
+    if found.get("balance_side") == "operation":
+        structure["balance_side"] = "operation"
     return structure | {"parts": several} if several else structure
 
 

@@ -18,6 +18,9 @@ from sprag.service.spec.machine.shaft_parts import (
 from sprag.service.spec.report import Report, join
 from sprag.worker.models import machine_shaft
 
+BALANCE_SIDE: Final = choice(
+    "balance_side", "which torque the balance makes constant or scales", "drive", "operation", default="drive"
+)
 _BALANCE_HELP: Final = (
     "what makes the work over a cycle zero; by default constant, refuse where a torque is given, motor where there is "
     "one"
@@ -33,7 +36,13 @@ def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, A
     """Read how the work over a cycle is made zero; by default a motor does it, and a given torque is kept."""
     motor = drive is not None and drive["motor"] is not None
     given = isinstance(found.get("drive"), Mapping) and "torque" in found["drive"]
+    side = BALANCE_SIDE.read(report, "/base", found)
+    if side is None or (side == "operation" and not _has_drive(report, motor, given)):
+        return None
+    acts = found.get("operation") is not None or found.get("parts") is not None
     default = "motor" if motor else "refuse" if given else "constant"
+    if side == "operation":
+        default = "scale" if acts else "constant"
     balance: str | None = BALANCE.read(report, "/base", {"balance": default, **found})
     if balance is None or drive is None:
         return balance
@@ -47,6 +56,10 @@ def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, A
             "/base/balance", "conflict", "is not possible for a machine with a motor", balance, allowed="'motor'"
         )
         return None
+    if balance == "scale" and side == "operation" and not acts:
+        told = 'is required by the balance "scale" on its side, which multiplies it by a factor'
+        report.fault("/base/operation", "required", told, allowed="an operation")
+        return None
     if balance == "scale" and not given:
         report.fault(
             "/base/drive/torque",
@@ -56,6 +69,17 @@ def read_balance(report: Report, found: Mapping[str, Any], drive: Mapping[str, A
         )
         return None
     return balance
+
+
+def _has_drive(report: Report, motor: bool, given: bool) -> bool:
+    """Whether the drive is given, as a balance on the side of the operation needs; else a fault is recorded."""
+    if motor:
+        report.fault("/base/balance_side", "conflict", "is not possible with a motor: the speed follows from the load",
+                     "operation", allowed="'drive', or a torque instead of the motor")  # fmt: skip
+    elif not given:
+        report.fault("/base/drive/torque", "required", "is required where the operation is to be found",
+                     allowed="a torque, a table or a formula")  # fmt: skip
+    return given and not motor
 
 
 def read_drive(report: Report, data: object, places: dict[str, str]) -> dict[str, Any] | None:

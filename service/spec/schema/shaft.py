@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from sprag.service.spec.described import schemas
 from sprag.service.spec.machine.shaft import MEAN_SPEED_IS
-from sprag.service.spec.machine.shaft_drive import BALANCE, FLYWHEEL, MOTOR, STAGE, STAGES
+from sprag.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE, STAGES
 from sprag.service.spec.machine.shaft_parts import (
     FORMS,
     INTERPOLATION,
@@ -40,7 +40,7 @@ _PART: Final = "a mechanism with its operation; their angle is that of the shaft
 
 def shaft_schema() -> Schema:
     """Schema of `base` for machine shafts."""
-    choices = {field.name: field.schema() for field in (MEAN_SPEED_IS, BALANCE, PHI_C)}
+    choices = {field.name: field.schema() for field in (MEAN_SPEED_IS, BALANCE, BALANCE_SIDE, PHI_C)}
     mechanism = {"mechanism": _mechanism(), "operation": _operation()}
     part = object_schema({**quantities(numbers_under("parts.N.")), **mechanism}, description=_PART)
     parts = {"drive": _drive(), **mechanism, "parts": PARTS.schema(part)}

@@ -15,6 +15,8 @@ from sprag.engine.endings import Ending
 from sprag.engine.machine_shaft.columns import Columns
 from sprag.engine.machine_shaft.machine import Machine
 from sprag.engine.machine_shaft.motor import motor_torque, steady_speed
+from sprag.engine.machine_shaft.problems import UnbalancedWorkError
+from sprag.engine.machine_shaft.simulate import check
 from sprag.engine.machine_shaft.spec import Drive, MachineSpec, Motor, OperationChoice
 from sprag.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS, ending_of, one
@@ -113,3 +115,61 @@ def test_a_motor_that_is_too_weak_stalls() -> None:
     motor = {"drive.inertia": 2.0, "drive.motor.no_load_speed": 10.0, "drive.motor.stall_torque": 30.0}
     assert ending_of(linear, motor | {"operation.value": 31.0}) is Ending.MOTOR_STALLED
     assert one(linear, motor | {"operation.value": 15.0})["omega.mean"] == pytest.approx(5.0, rel=1e-12)
+
+
+ENGINE = replace(
+    PRESS, balance="scale", balance_side="operation", drive=Drive("formula", formula="100 + 40*cos(phi)"),
+)  # fmt: skip
+
+
+def test_an_operation_is_scaled_to_the_drive() -> None:
+    """With the ram's weight, whose work over a cycle is zero, and which no factor belongs to."""
+    numbers = PRESS_NUMBERS | {"mechanism.slider_crank.inclination": -math.pi / 2.0}
+    got = one(ENGINE, numbers)
+    # 20 kN over the last 60 degrees before the dead centre, against 100 N*m over a revolution.
+    own = one(replace(PRESS, balance="constant"), numbers)
+    assert got["balance.factor"] == pytest.approx(200.0 * math.pi / -own["work.resistance"], rel=1e-12)
+    assert got["resisting_torque.mean"] == pytest.approx(-100.0, rel=1e-12)
+    assert got["drive_torque.max"] == pytest.approx(140.0, rel=1e-12)
+    assert got["balance.work"] < 1e-12
+    same = one(replace(ENGINE, balance_side="drive", balance="refuse"),
+               numbers | {"operation.scale": got["balance.factor"]})  # fmt: skip
+    for name in ("irregularity", "energy.fluctuation", "s4.max", "required_inertia"):
+        assert got[name] == pytest.approx(same[name], rel=1e-10, nan_ok=True)
+
+
+def test_an_operation_is_made_constant() -> None:
+    spec = replace(ENGINE, balance="constant")
+    numbers = PRESS_NUMBERS | {"mechanism.slider_crank.inclination": -math.pi / 2.0}
+    table = trajectory(spec, numbers, np.linspace(0.0, math.tau, 61))
+    weight = trajectory(replace(PRESS, operation=OperationChoice()), {
+        path: value for path, value in numbers.items() if not path.startswith("operation")
+    }, table.times)  # fmt: skip
+    column = table.names.index("resisting_torque")
+    assert table.values[:, column] == pytest.approx(weight.values[:, column] - 100.0, abs=1e-9)
+    got = one(spec, numbers)
+    assert math.isnan(got["balance.factor"])
+    assert got["balance.work"] < 1e-12
+
+
+def test_what_no_factor_balances_is_named() -> None:
+    numbers = PRESS_NUMBERS | {"operation.steps.0.value": -20e3}
+    assert ending_of(ENGINE, numbers) is Ending.UNBALANCED_WORK
+    with pytest.raises(UnbalancedWorkError, match="the operation drives instead of resisting"):
+        check(ENGINE, numbers)
+    with pytest.raises(UnbalancedWorkError, match=r"No factor on the operation .* no work over a cycle"):
+        check(ENGINE, PRESS_NUMBERS | {"operation.scale": 0.0})
+    with pytest.raises(UnbalancedWorkError, match="the driving torque brakes, too"):
+        check(replace(ENGINE, balance_side="drive", drive=Drive("formula", formula="-50 + cos(phi)")), PRESS_NUMBERS)
+
+
+def test_a_cycle_of_many_revolutions_has_the_closed_form() -> None:
+    """One blow in eight revolutions: fluctuation E (1 - theta/(16 pi))."""
+    spec = MachineSpec(cycle=8, operation=OperationChoice("torque", "steps", steps=1))
+    work, width = 6e3, 0.5
+    step = {"from": 40.0, "to": 40.0 + width, "value": work / width}
+    got = one(spec, {"mean_speed": 30.0, "drive.inertia": 50.0} | {
+        f"operation.steps.0.{name}": value for name, value in step.items()
+    })  # fmt: skip
+    assert got["energy.fluctuation"] == pytest.approx(work * (1.0 - width / (16.0 * math.pi)), rel=1e-11)
+    assert got["work.drive"] == pytest.approx(work, rel=1e-12)

@@ -88,3 +88,27 @@ def test_a_flywheel_is_given_by_its_dimensions() -> None:
     found = problems({"/base/drive": {"flywheel": {"kind": "ring", "mass": 3}}, "/axes": []})
     assert found["/base/drive/flywheel/kind"].code == "invalid-choice"
     assert "/base/drive/flywheel/diameter" in problems({"/base/drive": {"flywheel": {"kind": "disc"}}, "/axes": []})
+
+
+def test_the_side_that_is_balanced() -> None:
+    given = {"/base/balance": ..., "/base/drive/torque": 100, "/base/balance_side": "operation", "/axes": []}
+    parsed = parse_spec(changed(given))
+    assert parsed.warnings == ()
+    assert parsed.study.structure is not None
+    assert (parsed.study.structure["balance"], parsed.study.structure["balance_side"]) == ("scale", "operation")
+    jsonschema.Draft202012Validator(spec_schema()).validate(changed(given))
+    alone = parse_spec(changed(given | {"/base/operation": ...})).study.structure
+    assert alone is not None
+    assert alone["balance"] == "constant"
+    replaced = parse_spec(changed(given | {"/base/balance": "constant"})).warnings
+    assert [warning.code for warning in replaced] == ["replaced-value"]
+    del given["/base/drive/torque"]
+    assert problems(given)["/base/drive/torque"].code == "required"
+    motor = {"kind": "linear", "no_load_speed": "130 rpm", "stall_torque": "3 kN*m"}
+    found = problems(given | {"/base/drive": {"inertia": 15, "motor": motor}, "/base/mean_speed": ...})
+    assert found["/base/balance_side"].code == "conflict"
+    given["/base/drive/torque"] = 100
+    both = given | {"/base/operation": ..., "/base/balance": "scale"}
+    assert problems(both)["/base/operation"].code == "required"
+    wrong = given | {"/base/operation/steps/0/value": "-20 kN"}
+    assert "the operation drives instead of resisting" in problems(wrong)["/base/balance"].message
