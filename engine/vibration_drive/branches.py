@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.catalogue import ResultInfo
 from sprag.engine.continuation.follow import Range, follow
 from sprag.engine.continuation.problem import End, Point, Special
 from sprag.engine.endings import ENDINGS, Ending
@@ -18,7 +17,7 @@ from sprag.engine.vibration_drive.integration import integrate
 from sprag.engine.vibration_drive.kernel import kernel_of
 from sprag.engine.vibration_drive.orbits import find_units
 from sprag.engine.vibration_drive.regimes import Regime, settled_infos
-from sprag.engine.vibration_drive.results import result_infos
+from sprag.engine.vibration_drive.results import OF_RUNS, result_infos
 from sprag.engine.vibration_drive.return_map import DriveMap, Machines
 from sprag.engine.vibration_drive.settle import settle
 from sprag.engine.vibration_drive.strobes import BEGIN
@@ -28,15 +27,6 @@ Floats = NDArray[np.float64]
 
 class NoOrbitError(ValueError):
     """The settled motion of the case has no orbit that can be followed."""
-
-
-#: Results that belong to a run from its start.
-_OF_RUNS = frozenset({"runup.time", "run.steps", "run.events"})
-
-
-def branch_infos(pendulums: int) -> tuple[ResultInfo, ...]:
-    """Every result of an orbit of a branch."""
-    return tuple(info for info in result_infos(pendulums) if info.name not in _OF_RUNS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +40,7 @@ class DriveBranch:
     points : tuple of Point
         Their states are strobes (``strobes.width``).
     values : array, shape (points, results)
-        Results over one turn of each orbit, in the order of ``branch_infos``.
+        Results over one turn of each orbit, in the order of ``orbit_infos``.
     specials : tuple of Special
     ends : tuple of two End
     start : int
@@ -127,6 +117,6 @@ def _results(map_: DriveMap, points: tuple[Point, ...]) -> Floats:
     matrix = case_matrix(map_.machines(np.array([point.parameter for point in points])), map_.run, len(points))
     matrix = with_lengths(matrix, states[:, BEGIN], np.full(len(points), float(map_.order)), windowed=True)
     sums = integrate(map_.kernel, matrix, map_.run, starts=states).sums
-    kept = [info.name not in _OF_RUNS for info in result_infos(map_.kernel.LAYOUT.n)]
+    kept = [info.name not in OF_RUNS for info in result_infos(map_.kernel.LAYOUT.n)]
     values: Floats = characteristics(map_.kernel.LAYOUT, matrix, sums)[:, kept]
     return values

@@ -88,3 +88,12 @@ def result_infos(pendulums: int) -> tuple[ResultInfo, ...]:
     for index in range(pendulums):
         infos += _pendulum(index)
     return infos
+
+
+#: Results that belong to a run from its start.
+OF_RUNS = frozenset({"runup.time", "run.steps", "run.events"})
+
+
+def orbit_infos(pendulums: int) -> tuple[ResultInfo, ...]:
+    """Every result of an orbit that no run has come to, such as those of a branch."""
+    return tuple(info for info in result_infos(pendulums) if info.name not in OF_RUNS)

@@ -318,3 +318,44 @@ class Portrait(TypedDict):
         Doc("one whole turn of the settled motion, from the start of an excitation period; null where there is none"),
     ]
     ending: str
+
+
+class BranchContact(TypedDict):
+    """How often a part of the machine is in a state in one turn, on the two sides of a grazing."""
+
+    part: str
+    state: str
+    before: int
+    after: int
+
+
+class BranchSpecial(TypedDict):
+    """A special point of a branch."""
+
+    kind: Annotated[str, Doc("fold, doubling, torus, branching or grazing")]
+    meaning: str
+    parameter: Annotated[float, Doc("where it is, SI")]
+    index: Annotated[int, Doc("its place among the points; of a grazing, the last point before it")]
+    multipliers: Annotated[list[list[float]], Doc("real and imaginary part of each multiplier, the largest first")]
+    contacts: Annotated[list[BranchContact], Doc("of a grazing, which events appear or disappear")]
+
+
+class Branch(TypedDict):
+    """The branch of orbits through the settled motion of one case, in order along the branch."""
+
+    case: int
+    parameters: dict[str, float]
+    along: Annotated[list[str], Doc("paths that have the value of the branch's parameter")]
+    unit: Annotated[str, Doc("SI unit of the parameter")]
+    low: Annotated[float, Doc("start of the range, SI")]
+    high: Annotated[float, Doc("end of the range, SI")]
+    value: Annotated[float, Doc("the parameter in the case, SI")]
+    order: Annotated[int | None, Doc("excitation periods in one turn of each orbit; null where there is no branch")]
+    parameter: Annotated[list[float], Doc("the parameter at each point, SI")]
+    stable: Annotated[list[bool], Doc("whether the motion of each point is stable")]
+    multiplier: Annotated[list[float], Doc("largest modulus of the multipliers of each point")]
+    variables: Annotated[dict[str, dict[str, str]], Doc("unit of each result")]
+    values: Annotated[dict[str, list[Number]], Doc("results over one turn of each point")]
+    specials: list[BranchSpecial]
+    ends: Annotated[list[str], Doc("why the branch ends before its first point, and after its last one")]
+    note: Annotated[str | None, Doc("why there is no branch; null where there is one")]

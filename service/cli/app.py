@@ -14,6 +14,7 @@ import typer
 
 from sprag.service.cli import (
     batches,
+    branches,
     calibrations,
     cases,
     database,
@@ -74,6 +75,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "calibrate": calibrations.calibrate,
         "trajectory": local.trajectory,
         "engagements": engagements.engagements,
+        "branch": branches.branch,
         "fit": fit.fit,
         "presets": local.presets,
     },

@@ -18,6 +18,7 @@ from sprag.service.client.frames import Curves, grid_of, table_of
 from sprag.service.client.queries import (
     Progressing,
     Value,
+    branch_query,
     case_query,
     curve_query,
     extension,
@@ -59,7 +60,7 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.calibration import CalibrationReport
     from sprag.service.answers.goals import FrontReport
-    from sprag.service.answers.results import Case
+    from sprag.service.answers.results import Branch, Case
     from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
     from sprag.service.client.queries import Spec
 
@@ -271,6 +272,10 @@ class AsyncStudy:
     async def strobes(self, case: int) -> dict[str, Any]:
         """The state of one case once per excitation period, and its orbit, as `Study.strobes` gives them."""
         return await self._client.request("GET", strobes_path(self.id, case))
+
+    async def branch(self, case: int, along: str, low: Value | None = None, high: Value | None = None) -> Branch:
+        """The branch of periodic motions through that of one case, as `Study.branch` gives it."""
+        return cast("Branch", await self._get(f"/cases/{case:d}/branch", branch_query(along, low, high)))
 
     async def cases(
         self, *, ending: str | None = None, regime: str | None = None, flag: str | None = None

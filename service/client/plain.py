@@ -17,6 +17,7 @@ from sprag.service.client.wire import (
     FILE_TIMEOUT,
     Drawn,
     Query,
+    branch_path,
     calibration_path,
     connection_options,
     document,
@@ -157,6 +158,10 @@ class ServiceClient:
     def strobes(self, study_id: str, case: int) -> dict[str, Any]:
         """The state of one case once per excitation period, and its orbit."""
         return self._json("GET", strobes_path(study_id, case))
+
+    def branch(self, study_id: str, case: int, query: Query) -> dict[str, Any]:
+        """The branch through the motion of one case; the query says along which parameter."""
+        return self._json("GET", branch_path(study_id, case), params=list(query))
 
     def download(self, path: str, query: Query = ()) -> Iterator[bytes]:
         """The bytes of a document under the API, such as ``/studies/ID/results`` with ``format=csv``, as they come."""

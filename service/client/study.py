@@ -13,6 +13,7 @@ from sprag.service.client.plain import ServiceClient
 from sprag.service.client.queries import (
     Progressing,
     Value,
+    branch_query,
     case_query,
     curve_query,
     extension,
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 
     from sprag.service.answers.calibration import CalibrationReport
     from sprag.service.answers.goals import FrontReport
-    from sprag.service.answers.results import Case
+    from sprag.service.answers.results import Branch, Case
     from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
     from sprag.service.client.queries import Spec
 
@@ -221,6 +222,19 @@ class Study:
     def strobes(self, case: int) -> dict[str, Any]:
         """The state of one case once per excitation period ("strobes"), and its "orbit" if it has one."""
         return self._client.plain.strobes(self.id, case)
+
+    def branch(self, case: int, along: str, low: Value | None = None, high: Value | None = None) -> Branch:
+        """The branch of periodic motions through that of one case, stable and unstable, with its special points.
+
+        Parameters
+        ----------
+        case : int
+        along : str
+            Path of the parameter, such as "shaft.load"; several joined by commas get one value.
+        low, high : float or str, optional
+            Range of the parameter, SI numbers or texts with a unit; by default the ends of its axis.
+        """
+        return cast("Branch", self._client.plain.branch(self.id, case, branch_query(along, low, high)))
 
     def cases(self, *, ending: str | None = None, regime: str | None = None, flag: str | None = None) -> Iterator[Case]:
         """Every finished case in order of the numbers, or those with an ending, a regime and a flag only."""

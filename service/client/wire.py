@@ -106,6 +106,11 @@ def strobes_path(study_id: str, case: int) -> str:
     return f"{study_path(study_id)}/cases/{case:d}/strobes"
 
 
+def branch_path(study_id: str, case: int) -> str:
+    """Address of the branch of a case under the API."""
+    return f"{study_path(study_id)}/cases/{case:d}/branch"
+
+
 def schedule_path(schedule_id: str) -> str:
     """Address of a schedule under the API."""
     return f"/schedules/{quote(schedule_id, safe='')}"

@@ -41,6 +41,7 @@ from sprag.service.http.metrics import Metrics
 from sprag.service.http.request_log import Noted, RequestLog
 from sprag.service.http.shares import Shares
 from sprag.service.http.views import API_PREFIX
+from sprag.service.http.web import branch as branch_pages
 from sprag.service.http.web import (
     calibrate,
     calibration,
@@ -240,6 +241,7 @@ def _routes() -> APIRouter:
         table,
         case,
         engagement_pages,
+        branch_pages,
         compare,
         laboratory,
         schedule_pages,

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from sprag.engine import Ending
     from sprag.engine.catalogue import Parameter, ResultInfo
     from sprag.engine.outcome import Engagements, Portrait, Trajectory
+    from sprag.worker.models.branches import Along, CaseBranch
     from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
     from sprag.worker.study import Study
 
@@ -118,6 +119,10 @@ class Model(Protocol):
     def lanes_per_case(self, study: Study) -> int:
         """Runs of the engine that one case of the study takes side by side."""
         return 1
+
+    def branch(self, study: Study, case: int, along: Along) -> CaseBranch:
+        """The branch through the settled motion of a case; ValueError where there are no strobes."""
+        raise ValueError(f"a machine of model {self.name} has no strobes")
 
     def estimate_seconds_per_case(self, study: Study) -> float:
         """Rough time of one case on one core, in s."""

@@ -21,6 +21,7 @@ from sprag.engine.vibration_drive.parameters import (
 from sprag.engine.vibration_drive.regimes import Regime, settled_infos
 from sprag.engine.vibration_drive.results import result_infos
 from sprag.engine.vibration_drive.start_results import NUMBER, started_infos
+from sprag.worker.models.branches import Along, CaseBranch, drive_branch
 from sprag.worker.models.common import (
     ChunkResult,
     ChunkTask,
@@ -271,6 +272,9 @@ class VibrationDrive(Model):
 
     def lanes_per_case(self, study: Study) -> int:
         return count_of(study.run)
+
+    def branch(self, study: Study, case: int, along: Along) -> CaseBranch:
+        return drive_branch(study, case, along)
 
     def estimate_seconds_per_case(self, study: Study) -> float:
         from sprag.engine.vibration_drive.simulate import estimate_seconds

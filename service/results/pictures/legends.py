@@ -41,7 +41,15 @@ def handle(line: Line) -> Artist:
 
     style, marker = STYLES[line.style % len(STYLES)]
     marker = "" if line.joined and line.cases is None else marker
-    return Line2D([], [], color=line.colour, linestyle=style, marker=marker, markersize=3.0)
+    return Line2D(
+        [],
+        [],
+        color=line.colour,
+        linestyle=style if line.joined else "none",
+        marker=marker,
+        markersize=6.0 if line.ring else 3.0,
+        markerfacecolor="none" if line.ring else line.colour,
+    )
 
 
 def explain(figure: Figure, plots: list[Axes], drawn: Described) -> None:

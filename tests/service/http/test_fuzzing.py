@@ -41,6 +41,7 @@ NEVER_SERVED = {
             "map",
             "cases/{case}/engagements",
             "cases/{case}/strobes",
+            "cases/{case}/branch",
             "cases/{case}/trajectory",
         )
     ),

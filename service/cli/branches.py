@@ -1,0 +1,84 @@
+"""``sprag branch``: the branch of periodic motions through the motion of a case, along a parameter."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sprag.service.cli.console import ExitCode, WrongInputError, say, write_json, wrong_option
+from sprag.service.cli.files import is_json, output, read_study, require_cases, to_file
+from sprag.service.cli.local import ValueFormat
+from sprag.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
+from sprag.service.faults import Fault, FaultError
+from sprag.service.json_text import to_bytes
+
+if TYPE_CHECKING:
+    from sprag.worker.models.branches import Along, CaseBranch
+    from sprag.worker.study import Study
+
+
+def branch(
+    spec: SpecFile,
+    along: Annotated[
+        str, typer.Option("--along", metavar="PATH", help="Parameter, or several joined by commas with one value.")
+    ],
+    case: Annotated[int, typer.Option("--case", min=0, metavar="N", help="Number of the case, from 0.")] = 0,
+    low: Annotated[
+        str | None, typer.Option("--from", metavar="VALUE", help="Start of the range; default: that of its axis.")
+    ] = None,
+    high: Annotated[
+        str | None, typer.Option("--to", metavar="VALUE", help="End of the range; default: that of its axis.")
+    ] = None,
+    points: PointsFile = None,
+    file: OutputFile = None,
+    form: Annotated[
+        ValueFormat | None, typer.Option("--format", help="Default: by the name of FILE, otherwise csv.")
+    ] = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Follow the periodic motion of one case along a parameter: stable and unstable, folds, doublings, grazings."""
+    from sprag.service.results.branches import branch_csv, branch_json
+    from sprag.worker.models.branches import run_branch
+
+    study = read_study(spec, points).study
+    require_cases(study, [case])
+    asked = _along(study, case, along, low, high)
+    with output(file) as write:
+        made = run_branch(study, case, asked)
+        written = is_json(file, as_json) if form is None else form is ValueFormat.JSON
+        content = to_bytes(branch_json(made, study, case, asked)) + b"\n" if written else branch_csv(made, asked)
+        write(content)
+    _report(made, study, asked, case)
+    if as_json and to_file(file):
+        write_json({"file": file, "case": case, "points": len(made.parameters), "specials": len(made.specials)})
+    if made.note:
+        raise typer.Exit(ExitCode.NOT_ALL_OK)
+
+
+def _along(study: Study, case: int, along: str, low: str | None, high: str | None) -> Along:
+    from sprag.service.results.branches import along_of
+
+    try:
+        return along_of(study, case, along, low, high)
+    except FaultError as error:
+        if not error.faults:
+            raise wrong_option("/model", "wrong-type", "has no strobes", study.model, detail=error.detail) from error
+        raise WrongInputError("invalid-parameter", "invalid option", tuple(map(_option, error.faults))) from error
+
+
+def _option(fault: Fault) -> Fault:
+    return Fault(f"--{fault.where}", fault.code, fault.message, fault.value, fault.allowed)
+
+
+def _report(made: CaseBranch, study: Study, asked: Along, case: int) -> None:
+    """Say on standard error what has been found."""
+    from sprag.service.results.figures.branch import special_text
+    from sprag.service.spec.catalogue import unit_of
+
+    if made.note:
+        say(f"case {case}: there is no branch: {made.note}")
+        return
+    unit = unit_of(study, asked.paths[0])
+    say(f"case {case}: {len(made.parameters)} orbits of order {made.order}; from {made.ends[0]} to {made.ends[1]}")
+    say(*(special_text(special, unit) for special in made.specials))

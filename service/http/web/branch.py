@@ -1,0 +1,97 @@
+"""The page of a branch: the periodic motions that the motion of a case becomes along a parameter."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+from urllib.parse import urlencode
+
+import numpy as np
+from fastapi import APIRouter, Query
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from sprag.service.faults import FaultError
+from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
+from sprag.service.http.respond import json_response
+from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.http.web.study import study_frame
+from sprag.service.http.web.templates import page
+from sprag.service.http.work import Attended
+from sprag.service.results.branches import along_of, neighbours, result_of, usual_along
+from sprag.service.results.figures.branch import OwnCases, branch_figure
+from sprag.service.results.portraits import require_strobes
+from sprag.service.results.selection import axis_name
+from sprag.worker.models.branches import branch_results, run_branch
+
+if TYPE_CHECKING:
+    from sprag.service.http.context import Context
+    from sprag.worker.models.branches import Along
+    from sprag.worker.study import Study
+
+router = APIRouter(include_in_schema=False)
+
+Text = Annotated[str, Query(max_length=400)]
+Begin = Annotated[str, Query(alias="from", max_length=80)]
+End = Annotated[str, Query(alias="to", max_length=80)]
+
+
+@router.get("/studies/{study_id:study}/cases/{case:case}/branch")
+def branch_page(
+    context: Ctx, study_id: StudyId, case: CaseNumber, along: Text = "", low: Begin = "", high: End = "", y: Text = ""
+) -> Response:
+    """The form of a branch, and its figure."""
+    study = study_with(context, study_id, case)
+    require_strobes(study)
+    path = along or usual_along(study)
+    faults: tuple[Any, ...] = ()
+    query = ""
+    try:
+        result = result_of(study, y)
+        if path:
+            along_of(study, case, path, low, high)
+            given = {"along": path, "from": low.strip(), "to": high.strip(), "y": result}
+            query = urlencode({name: value for name, value in given.items() if value})
+    except FaultError as error:
+        result, faults = y, error.faults
+    own = f"/studies/{study_id}/cases/{case}"
+    return page(
+        "branch.html",
+        status=422 if faults else 200,
+        **study_frame(context, study_id),
+        tab="/cases",
+        case=case,
+        along=path,
+        low=low,
+        high=high,
+        y=result,
+        faults=faults,
+        choices=[(axis.paths[0], axis_name(study, axis.paths[0])) for axis in study.axes],
+        results=branch_results(study),
+        figure=f"{own}/branch/figure?{query}" if query else "",
+        file=f"/api/v1{own}/branch?{query}",
+    )
+
+
+@router.get("/studies/{study_id:study}/cases/{case:case}/branch/figure")
+async def branch_drawn(
+    work: Attended, study_id: StudyId, case: CaseNumber, along: Text, low: Begin = "", high: End = "", y: Text = ""
+) -> Response:
+    """The figure of a branch, with the cases of the study along its parameter."""
+
+    def look(study: Study, number: int) -> tuple[Along, str]:
+        return along_of(study, number, along, low, high), result_of(study, y)
+
+    study, _, (asked, result) = await work.case_of(study_id, case, look)
+    made = await work.run_case(run_branch, study, case, asked)
+    own = await run_in_threadpool(_own_cases, work.context, study_id, study, case, asked, result)
+    return json_response(plotly_figure(branch_figure(made, study, asked, result, own)))
+
+
+def _own_cases(context: Context, study_id: str, study: Study, case: int, along: Along, result: str) -> OwnCases:
+    """The finished cases of the study that differ from this one in the parameter only."""
+    cases = neighbours(study, case, along)
+    columns = context.store.rows_for_cases(study_id, cases, [result])
+    y = columns.values[result]
+    x = study.columns(cases)[along.paths[0]] if cases.size else np.empty(0)
+    kept = np.isfinite(y)
+    return OwnCases(x[kept], y[kept], cases[kept])

@@ -1,0 +1,176 @@
+"""The branch of a case's motion along a parameter: what is asked for, the document, and the table as CSV."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sprag.service.answers import filled
+from sprag.service.answers.results import Branch, BranchContact
+from sprag.service.faults import choice_of, parameter_error
+from sprag.service.json_text import numbers, to_bytes
+from sprag.service.results.exports import table_csv
+from sprag.service.results.portraits import require_strobes
+from sprag.service.spec.catalogue import unit_of
+from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
+from sprag.worker import models
+from sprag.worker.models.branches import Along, allowed_values, branch_results, run_branch
+from sprag.worker.models.common import case_machine
+from sprag.worker.spread import DRIVE
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sprag.service.formats import Format
+    from sprag.worker.models.branches import CaseBranch
+    from sprag.worker.study import Study
+
+_OUTSIDE = "outside the range of the parameter"
+
+
+def usual_along(study: Study) -> str:
+    """The parameter along which a branch is usually followed: the first axis with a range; "" where there is none."""
+    axes = [axis for axis in study.axes if axis.paths != (DRIVE,) and np.ptp(axis.array) > 0.0]
+    wanted = [axis.paths[0] for axis in axes]
+    return next((path for path in models.presentation_of(study).along if path in wanted), wanted[0] if wanted else "")
+
+
+def along_of(study: Study, case: int, along: str, low: str | None = None, high: str | None = None) -> Along:
+    """The parameter of a branch and its range.
+
+    Parameters
+    ----------
+    study : Study
+    case : int
+    along : str
+        A path of a spec, or several joined by commas, which all get one value. All paths of an axis belong together.
+    low, high : str, optional
+        SI numbers or quantities with a unit; by default the ends of the axis.
+
+    Raises
+    ------
+    FaultError
+        About the parameters ``along``, ``from`` or ``to``, or because the machine has no strobes.
+    """
+    require_strobes(study)
+    own = case_machine(study, case)
+    paths: list[str] = []
+    for path in filter(None, (part.strip() for part in along.split(","))):
+        if path not in own or path in study.derive:
+            message = "is derived from others" if path in study.derive else "is not a numeric parameter of the study"
+            free = ", ".join(name for name in own if name not in study.derive)
+            raise parameter_error("along", "unknown-name", message, path, free)
+        axis = study.axis_of(path)
+        paths += [path] if axis is None else study.axes[axis].paths
+    if not paths:
+        raise parameter_error("along", "required", "a branch needs a parameter", along, "the path of a parameter")
+    paths = list(dict.fromkeys(paths))
+    value = own[paths[0]]
+    for path in paths:
+        if own[path] != value:
+            raise parameter_error(
+                "along", "conflict", f"{path} has another value in case {case} than {paths[0]}", along, f"{value!r}"
+            )
+    ends = _axis_ends(study, paths[0])
+    unit = unit_of(study, paths[0])
+    first = _value("from", low, unit, None if ends is None else ends[0])
+    last = _value("to", high, unit, None if ends is None else ends[1])
+    least, most = allowed_values(study, tuple(paths))
+    for name, number, text in (("from", first, low), ("to", last, high)):
+        if not least <= number <= most:
+            raise parameter_error(name, "out-of-range", _OUTSIDE, text, f"{least:g} .. {most:g}")
+    if not first <= value <= last or first == last:
+        message = f"the range {first:g} .. {last:g} must contain the value of the case, {value:g}"
+        raise parameter_error("from", "invalid-range", message, low, f"from <= {value:g} <= to")
+    return Along(tuple(paths), first, last)
+
+
+def result_of(study: Study, name: str | None) -> str:
+    """The result that a picture shows, by default the first main one; FaultError about ``y`` for an unknown one."""
+    known = branch_results(study)
+    if name is None or not name.strip():
+        drawn = (*models.presentation_of(study).drawn, *models.presentation_of(study).main)
+        return next((usual for usual in drawn if usual in known), known[0])
+    return choice_of("y", name, known)
+
+
+def _axis_ends(study: Study, path: str) -> tuple[float, float] | None:
+    axis = study.axis_of(path)
+    if axis is None or not np.ptp(study.axes[axis].array) > 0.0:
+        return None
+    values = study.axes[axis].array
+    return float(values.min()), float(values.max())
+
+
+def _value(name: str, text: str | None, unit: str, usual: float | None) -> float:
+    if text is None or not text.strip():
+        if usual is None:
+            message = "is required, because the parameter is not on an axis of the study with a range"
+            raise parameter_error(name, "required", message, text, f"a value in {unit}")
+        return usual
+    try:
+        number, given = split_quantity(text)
+        return parse_quantity(text, unit) if given else to_float(number)
+    except QuantityError as error:
+        raise parameter_error(name, error.code, str(error), text, f"a value in {unit}") from error
+
+
+def branch_file(study: Study, case: int, along: Along, form: Format) -> bytes:
+    """Follow the branch and write the file. For the computing process."""
+    made = run_branch(study, case, along)
+    return branch_csv(made, along) if form == "csv" else to_bytes(branch_json(made, study, case, along))
+
+
+def branch_json(made: CaseBranch, study: Study, case: int, along: Along) -> Branch:
+    """The branch as JSON data."""
+    return {
+        "case": case,
+        "parameters": study.case_parameters(case),
+        "along": list(along.paths),
+        "unit": unit_of(study, along.paths[0]),
+        "low": along.low,
+        "high": along.high,
+        "value": made.value,
+        "order": made.order or None,
+        "parameter": made.parameters.tolist(),
+        "stable": made.stable.tolist(),
+        "multiplier": made.multipliers.tolist(),
+        "variables": {name: {"unit": unit} for name, unit in zip(made.names, made.units, strict=True)},
+        "values": {name: numbers(made.values[:, column]) for column, name in enumerate(made.names)},
+        "specials": [
+            {
+                "kind": special.kind,
+                "meaning": special.meaning,
+                "parameter": special.parameter,
+                "index": special.index,
+                "multipliers": [[value.real, value.imag] for value in special.multipliers],
+                "contacts": [filled(BranchContact, contact) for contact in special.contacts],
+            }
+            for special in made.specials
+        ],
+        "ends": list(made.ends) if made.order else [],
+        "note": made.note or None,
+    }
+
+
+def branch_csv(made: CaseBranch, along: Along) -> bytes:
+    """The points as CSV: the parameter, whether the motion is stable, its multiplier, what is special, the results."""
+    kinds = [""] * len(made.parameters)
+    for special in made.specials:
+        kinds[special.index] = special.kind
+    stable = ["true" if stable else "false" for stable in made.stable.tolist()]
+    header = [along.paths[0], "stable", "multiplier", "special", *made.names]
+    results = (made.values[:, column].tolist() for column in range(len(made.names)))
+    return table_csv(header, [made.parameters.tolist(), stable, made.multipliers.tolist(), kinds, *results])
+
+
+def neighbours(study: Study, case: int, along: Along) -> NDArray[np.int64]:
+    """The cases of a grid that differ from one only in the parameter of a branch; none of other studies."""
+    axis = study.axis_of(along.paths[0])
+    if axis is None or study.combine != "grid":
+        return np.empty(0, dtype=np.int64)
+    places = [int(index[0]) for index in study.indices([case])]
+    values = study.axes[axis].array
+    within = np.flatnonzero((values >= along.low) & (values <= along.high))
+    return np.array([study.case_number([*places[:axis], int(k), *places[axis + 1 :]]) for k in within], dtype=np.int64)

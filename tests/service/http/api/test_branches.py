@@ -1,0 +1,92 @@
+"""Branches over HTTP, on their page and through the client."""
+
+from __future__ import annotations
+
+import csv
+import io
+from typing import Any
+
+import pytest
+from pydantic import TypeAdapter
+
+from sprag.service.answers.results import Branch
+from sprag.service.client import Client
+from tests.service.conftest import API, PortalTransport, Service
+from tests.service.spec_sample import changed
+
+LOADS = [0.215, 0.225, 0.23]
+
+
+@pytest.fixture
+def settled(service: Service) -> str:
+    """25 Hz, 2 mm: the motion of order 1 at 0.225 N*m is unstable below 0.22299."""
+    return service.submit(changed({"/run": {"until": "settled"}, "/axes": [{"path": "shaft.load", "values": LOADS}]}))
+
+
+def asked(service: Service, study_id: str, query: str, case: int = 2) -> Any:
+    return service.http.get(f"{API}/studies/{study_id}/cases/{case}/branch?{query}")
+
+
+def test_a_branch_is_the_same_everywhere(service: Service, settled: str, portal: Any) -> None:
+    response = asked(service, settled, "along=shaft.load")
+    assert response.status_code == 200, response.text
+    body = response.json()
+    TypeAdapter(Branch).validate_python(body)
+    assert (body["along"], body["low"], body["high"], body["value"]) == (["shaft.load"], 0.215, 0.23, 0.23)
+    (doubling,) = body["specials"]
+    assert (body["order"], doubling["kind"]) == (1, "doubling")
+    assert doubling["parameter"] == pytest.approx(0.2229896, abs=1e-6)
+    assert doubling["multipliers"][0] == pytest.approx([-1.0, 0.0], abs=1e-7)
+    assert body["stable"] == [value > doubling["parameter"] for value in body["parameter"]]
+    assert service.get(f"/studies/{settled}/cases/2")["links"]["branch"].endswith("/cases/2/branch")
+    rows = list(csv.DictReader(io.StringIO(asked(service, settled, "along=shaft.load&format=csv").text)))
+    assert [float(row["shaft.load"]) for row in rows] == body["parameter"]
+    assert [row["stable"] == "true" for row in rows] == body["stable"]
+    assert [row["special"] for row in rows if row["special"]] == ["doubling"]
+    with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
+        assert client.study(settled).branch(2, "shaft.load", 0.215, "0.23 N*m") == body
+    figure = service.http.get(f"/studies/{settled}/cases/2/branch/figure?along=shaft.load").json()
+    names = [trace["name"] for trace in figure["data"]]
+    assert names[:2] == ["stable", "unstable"]
+    assert names[-1].startswith("doubling at 0.22298965")
+    full, dashed = figure["data"][:2]
+    assert min(full["x"]) == max(dashed["x"]) == doubling["parameter"]
+    assert (full["line"]["dash"], dashed["line"]["dash"]) == ("solid", "dash")
+    assert asked(service, settled, "along=shaft.load&format=svg").content.startswith(b"<?xml")
+
+
+def test_the_page_has_a_form_and_the_figure(service: Service, settled: str) -> None:
+    page = service.http.get(f"/studies/{settled}/cases/2/branch").text
+    assert f"/studies/{settled}/cases/2/branch/figure?along=shaft.load&amp;y=shaft.speed.mean" in page
+    assert f"/studies/{settled}/cases/2/branch" in service.http.get(f"/studies/{settled}/cases/2").text
+    refused = service.http.get(f"/studies/{settled}/cases/2/branch?along=shaft.lode")
+    assert refused.status_code == 422
+    assert "is not a numeric parameter of the study" in refused.text
+
+
+@pytest.mark.parametrize(
+    ("query", "parameter", "code"),
+    [
+        ("along=shaft.lode", "along", "unknown-name"),
+        ("along=", "along", "required"),
+        ("along=shaft.inertia", "from", "required"),
+        ("along=shaft.inertia,shaft.load", "along", "conflict"),
+        ("along=shaft.load&from=0.225&to=0.228", "from", "invalid-range"),
+        ("along=shaft.load&from=-1", "from", "out-of-range"),
+        ("along=shaft.load&to=2 mm", "to", "wrong-unit"),
+        ("along=shaft.load&y=speed", "y", "invalid-choice"),
+    ],
+)
+def test_what_cannot_be_followed_is_refused(
+    service: Service, settled: str, query: str, parameter: str, code: str
+) -> None:
+    (error,) = asked(service, settled, query).json()["errors"]
+    assert (error["parameter"], error["code"]) == (parameter, code)
+
+
+def test_a_case_without_an_orbit_has_a_note(service: Service) -> None:
+    still = {"path": ["excitation.amplitude_x", "excitation.amplitude_y"], "values": [0.0]}
+    study_id = service.submit(changed({"/run": {"until": "settled"}, "/axes": [still]}))
+    body = asked(service, study_id, "along=shaft.load&from=0.1&to=0.3", case=0).json()
+    assert (body["order"], body["parameter"]) == (None, [])
+    assert body["note"].startswith("the case has no periodic motion of a turning shaft")

@@ -1,0 +1,163 @@
+"""Branches of a case's motion along a parameter: what is asked for, what is answered, and the vibration drive's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sprag.engine.vibration_drive.cases import pendulum_count
+from sprag.engine.vibration_drive.results import orbit_infos
+from sprag.worker.models.common import case_machine
+from sprag.worker.models.formulas import evaluate
+from sprag.worker.models.model import model_of
+from sprag.worker.models.parameters import parameter_of
+from sprag.worker.models.settled import settings_of, settled_study
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from sprag.engine.continuation.problem import Special
+    from sprag.worker.study import Study
+
+
+@dataclass(frozen=True, slots=True)
+class Along:
+    """The parameter of a branch: its flat paths, which all have the same value, and its range (SI)."""
+
+    paths: tuple[str, ...]
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class BranchContact:
+    """How often a part of the machine is in a state in one turn, before and after a grazing."""
+
+    part: str
+    state: str
+    before: int
+    after: int
+
+
+@dataclass(frozen=True, slots=True)
+class SpecialPoint:
+    """A special point of a branch: its kind with a sentence, the parameter, the place among the points, the
+    multipliers, and what differs on the two sides of a grazing.
+    """
+
+    kind: str
+    meaning: str
+    parameter: float
+    index: int
+    multipliers: tuple[complex, ...]
+    contacts: tuple[BranchContact, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CaseBranch:
+    """The branch through the settled motion of a case.
+
+    Attributes
+    ----------
+    value : float
+        The parameter in the case, SI.
+    order : int
+        Excitation periods in one turn of each orbit; 0 where there is no branch.
+    parameters, multipliers : float64 arrays, shape (points,)
+        The parameter (SI) and the largest modulus of the multipliers, in order along the branch.
+    stable : bool array, shape (points,)
+    names, units : tuples, length R
+        Results over one turn of each orbit.
+    values : float64 array, shape (points, R)
+    specials : tuple of SpecialPoint
+    ends : tuple of two str
+        Why the branch ends before its first point, and after its last one; "" without a branch.
+    note : str
+        Why there is no branch; "" where there is one.
+    """
+
+    value: float
+    order: int
+    parameters: NDArray[np.float64]
+    multipliers: NDArray[np.float64]
+    stable: NDArray[np.bool_]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: NDArray[np.float64]
+    specials: tuple[SpecialPoint, ...]
+    ends: tuple[str, str]
+    note: str = ""
+
+
+def machines_along(
+    study: Study, case: int, paths: tuple[str, ...]
+) -> Callable[[NDArray[np.float64]], Mapping[str, ArrayLike]]:
+    """The machine of a case for values of some of its parameters, with what is derived from them."""
+    own = case_machine(study, case)
+
+    def machines(values: NDArray[np.float64]) -> Mapping[str, ArrayLike]:
+        found = dict.fromkeys(paths, values)
+        return {**own, **found, **evaluate(study.derive, own, found, len(values))}
+
+    return machines
+
+
+def allowed_values(study: Study, paths: tuple[str, ...]) -> tuple[float, float]:
+    """Smallest and largest value (SI) that all parameters allow."""
+    entries = [parameter_of(study, path) for path in paths]
+    lows = [entry.low for entry in entries if entry is not None]
+    highs = [entry.high for entry in entries if entry is not None]
+    return max(lows, default=-np.inf), min(highs, default=np.inf)
+
+
+def run_branch(study: Study, case: int, along: Along) -> CaseBranch:
+    """The branch through the settled motion of one case; ValueError where its machine has no strobes."""
+    return model_of(study.model).branch(study, case, along)
+
+
+def branch_results(study: Study) -> tuple[str, ...]:
+    """Names of the results of a branch of a vibration drive."""
+    return tuple(info.name for info in orbit_infos(pendulum_count(case_machine(study, 0))))
+
+
+def drive_branch(study: Study, case: int, along: Along) -> CaseBranch:
+    """The branch of a vibration drive; a study of runs of a given time is settled for it."""
+    from sprag.engine.continuation.follow import Range
+    from sprag.engine.vibration_drive.branches import NoOrbitError, branch
+
+    own = case_machine(study, case)
+    value = own[along.paths[0]]
+    infos = orbit_infos(pendulum_count(own))
+    names, units = tuple(info.name for info in infos), tuple(info.unit for info in infos)
+    settings = settings_of(settled_study(study).run)
+    bounds = allowed_values(study, along.paths)
+    try:
+        made = branch(machines_along(study, case, along.paths), value, settings, Range(along.low, along.high), bounds)
+    except NoOrbitError as error:
+        nothing = np.empty(0)
+        return CaseBranch(
+            value, 0, nothing, nothing, np.empty(0, dtype=np.bool_), names, units, np.empty((0, len(names))), (),
+            ("", ""), str(error),
+        )  # fmt: skip
+    return CaseBranch(
+        value,
+        made.order,
+        np.array([point.parameter for point in made.points]),
+        np.array([point.multiplier for point in made.points]),
+        np.array([point.stable for point in made.points]),
+        names,
+        units,
+        made.values,
+        tuple(map(_special, made.specials)),
+        (made.ends[0].sentence, made.ends[1].sentence),
+    )
+
+
+def _special(found: Special) -> SpecialPoint:
+    contacts = tuple(BranchContact(one.part, one.state, one.before, one.after) for one in found.contacts)
+    kind, meaning = found.kind.value, found.kind.sentence
+    return SpecialPoint(kind, meaning, found.parameter, found.index, found.multipliers, contacts)
