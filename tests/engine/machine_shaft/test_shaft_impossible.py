@@ -38,9 +38,9 @@ def values_of(spec: MachineSpec, numbers: dict[str, Any], cases: int = 1) -> tup
     return [ENDINGS[code] for code in batch.endings], dict(zip(NAMES, batch.values.T, strict=True))
 
 
-@pytest.mark.parametrize(("pressure", "says"), [(0.5e5, "below"), (MOST * 1.01, "cannot be reached"), (1e8, "81032")])
-def test_a_discharge_out_of_reach_is_refused(pressure: float, says: str) -> None:
-    with pytest.raises(RelationError, match=says) as error:
+@pytest.mark.parametrize("pressure", [0.5e5, MOST * 1.01, 1e8])
+def test_a_discharge_out_of_reach_is_refused(pressure: float) -> None:
+    with pytest.raises(RelationError) as error:
         check(GAS, GAS_NUMBERS | {"operation.gas.discharge_pressure": pressure})
     assert (error.value.path, error.value.value) == ("operation.gas.discharge_pressure", pressure)
     assert error.value.allowed == f">= 100000 Pa and <= {MOST:.6g} Pa"
@@ -66,7 +66,7 @@ def test_a_compressor_that_delivers_nothing_does_no_work() -> None:
 def test_a_step_over_the_stroke_that_ends_before_it_begins() -> None:
     spec = replace(PRESS, operation=OperationChoice("force", "steps", over="stroke", steps=1))
     numbers = BASE | {"operation.steps.0.from": 0.7, "operation.steps.0.to": 0.2, "operation.steps.0.value": 100.0}
-    with pytest.raises(RelationError, match="would never act") as error:
+    with pytest.raises(RelationError) as error:
         check(spec, numbers)
     assert (error.value.path, error.value.value, error.value.allowed) == (
         "operation.steps.0.to",

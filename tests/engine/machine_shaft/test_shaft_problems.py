@@ -45,7 +45,7 @@ def formula(text: str) -> MachineSpec:
 
 def test_insufficient_inertia_tells_the_least_mean_speed() -> None:
     check(PRESS, PRESS_NUMBERS)
-    with pytest.raises(InsufficientInertiaError, match=r"least feasible mean speed is 4\.738") as error:
+    with pytest.raises(InsufficientInertiaError) as error:
         check(PRESS, PRESS_NUMBERS | {"mean_speed": 40 * RPM})
     assert error.value.least_mean_speed == pytest.approx(4.738, abs=5e-4)
     speeds = np.array([4.7, 4.8, 10.0])
@@ -73,7 +73,7 @@ CRANK_ROCKER = MachineSpec(mechanism=MechanismChoice("four_bar"))
     ],
 )
 def test_assembly_tells_the_angle(spec: MachineSpec, numbers: dict[str, Any], degrees: float) -> None:
-    with pytest.raises(AssemblyError, match="cannot be assembled at a shaft angle of") as error:
+    with pytest.raises(AssemblyError) as error:
         check(spec, numbers)
     assert math.degrees(error.value.angle) == pytest.approx(degrees, abs=1e-6)
     batch = simulate(spec, numbers, cases=1)
@@ -102,13 +102,15 @@ def test_cam_that_takes_more_than_a_revolution() -> None:
 
 
 def test_other_base_errors() -> None:
-    with pytest.raises(NegativeInertiaError, match=r"falls to -0\.5"):
+    with pytest.raises(NegativeInertiaError) as negative:
         check(formula("2.5*sin(phi) "), FLAT)
+    assert negative.value.inertia == pytest.approx(-0.5, abs=1e-6)
     with pytest.raises(NegativeInertiaError):
         check(MachineSpec(), FLAT | {"drive.inertia": 0.0})
     refused = MachineSpec(balance="refuse", operation=OperationChoice("torque", "constant"))
-    with pytest.raises(UnbalancedWorkError, match=r"does 6\.28319 J and the resistance -12\.5664 J"):
+    with pytest.raises(UnbalancedWorkError) as works:
         check(refused, FLAT | {"drive.torque": 1.0, "operation.value": 2.0})
+    assert (works.value.drive, works.value.resistance) == pytest.approx((2.0 * math.pi, -4.0 * math.pi))
     motor = replace(refused, balance="motor", drive=Drive(motor="linear"))
     weak = {
         "drive.inertia": 1.0, "operation.value": 5.0, "drive.motor.no_load_speed": 9.0, "drive.motor.stall_torque": 4.0,

