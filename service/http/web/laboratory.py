@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
@@ -53,6 +54,9 @@ _TOLD: Final = (
 QUESTIONS: Final = {"inertia": "the drive's inertia", "masses": "the masses", "load": "the operation's load"}
 _QUESTION_VALUES: Final = 25
 _QUESTION: Final = "question_"
+
+
+_PART: Final = re.compile(r"parts\.(\d+)\.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,26 +134,40 @@ def _value(text: str, unit: str, otherwise: float) -> float:
     return otherwise if found is None or not math.isfinite(found) else found
 
 
+def _of_part(path: str) -> tuple[int, str]:
+    """Number of the part that ``path`` belongs to, from 1, and the path within it; 0 for the machine itself."""
+    found = _PART.match(path)
+    return (0, path) if found is None else (int(found[1]) + 1, path[found.end() :])
+
+
 def _limits(study: Study, path: str) -> tuple[float, float] | None:
-    if path in _SLIDERS:
-        return _SLIDERS[path]
+    own = _of_part(path)[1]
+    if own in _SLIDERS:
+        return _SLIDERS[own]
     entry = parameter_of(study, path)
-    massive = path.startswith("mechanism.") and entry is not None and entry.unit == "kg"
+    massive = own.startswith("mechanism.") and entry is not None and entry.unit == "kg"
     return _MASSES if massive and study.base[path] > 0.0 else None
 
 
 def _in_order(sliders: list[Slider]) -> list[Slider]:
     order = list(_SLIDERS)
-    return sorted(sliders, key=lambda slider: (slider.path not in order, slider.path))
+
+    def place(slider: Slider) -> tuple[int, bool, str]:
+        part, own = _of_part(slider.path)
+        return part, own not in order, own
+
+    return sorted(sliders, key=place)
 
 
 def _slider(own: Study, study: Study, path: str, text: str) -> Slider:
     low, high = _limits(own, path) or (0.0, 1.0)
     entry = parameter_of(own, path)
     first = own.base[path]
+    part, name = _of_part(path)
+    label = "Load, as a multiple of the diagram" if name == "operation.scale" else words(path.rsplit(".", 1)[-1])
     return Slider(
         path,
-        "Load, as a multiple of the diagram" if path == "operation.scale" else words(path.rsplit(".", 1)[-1]),
+        f"Part {part}: {label}" if part else label,
         "" if entry is None else entry.symbol,
         "" if entry is None else entry.unit,
         "" if entry is None else entry.help,
@@ -241,15 +259,28 @@ async def laboratory_study(work: Attended, question: str = "inertia") -> Respons
         raise ApiError("not-found", f"Unknown question; known questions: {', '.join(QUESTIONS)}.")
     paths = {
         "inertia": [s.path for s in chosen.sliders if s.path == "drive.inertia"],
-        "masses": [s.path for s in chosen.sliders if s.unit == "kg" and s.path.startswith("mechanism.")],
-        "load": [s.path for s in chosen.sliders if s.path == "operation.scale"],
+        "masses": [s.path for s in chosen.sliders if s.unit == "kg" and _of_part(s.path)[1].startswith("mechanism.")],
+        "load": [s.path for s in chosen.sliders if _of_part(s.path)[1] == "operation.scale"],
     }[question]
-    axes = []
-    for path in paths[:1] if question != "masses" else paths:
-        slider = next(s for s in chosen.sliders if s.path == path)
+    axes, groups = [], _alike(chosen, paths)
+    for group in groups[:1] if question != "masses" else groups:
+        slider = next(s for s in chosen.sliders if s.path == group[0])
         way = "geomspace" if slider.logarithmic else "linspace"
-        count = _QUESTION_VALUES if len(paths) == 1 or question != "masses" else 9
-        axes.append({"path": path, way: [float(number_text(slider.low)), float(number_text(slider.high)), count]})
+        count = _QUESTION_VALUES if len(groups) == 1 or question != "masses" else 9
+        axes.append(
+            {
+                "path": group if len(group) > 1 else group[0],
+                way: [float(number_text(slider.low)), float(number_text(slider.high)), count],
+            }
+        )
     spec = {**chosen.spec, "name": f"{chosen.study.name}: irregularity against {QUESTIONS[question]}", "axes": axes}
     values = {"/text": spec_text(spec), "format": "json"}
     return await run_in_threadpool(form_page, work.request, values, await look_over(work.context, work, values))
+
+
+def _alike(chosen: Setting, paths: list[str]) -> list[list[str]]:
+    """The paths, those together that are the same number of parts that are alike: they vary together."""
+    groups: dict[tuple[str, float], list[str]] = {}
+    for path in paths:
+        groups.setdefault((_of_part(path)[1], chosen.study.base[path]), []).append(path)
+    return list(groups.values())

@@ -95,3 +95,18 @@ def test_the_laboratory_answers_a_moved_slider(visitor: Visitor, office: Office)
     page.wait_for_url("**/studies/st_*")
     expect(page.locator("#progress .state")).to_have_text("finished", timeout=60_000)
     drawn(page)
+
+
+def test_a_machine_of_several_parts_has_sliders_for_each_and_varies_equal_parts_together(visitor: Visitor) -> None:
+    page = visitor.page
+    page.goto("/laboratory?machine=two_cylinder_compressor")
+    drawn(page, "#lab-plot")
+    fill(page, {"parts.1.operation.scale": "0"})
+    expect(page.get_by_text("Part 2: ram mass").first).to_be_visible()
+    page.wait_for_url("**parts.1.operation.scale=0&**")
+    page.get_by_role("link", name="the masses").click()
+    spec = json.loads(named(page, "/text").input_value())
+    assert spec["base"]["parts"][1]["operation"]["scale"] == 0
+    assert [axis["path"] for axis in spec["axes"]] == [
+        [f"parts.{k}.mechanism.slider_crank.{name}" for k in range(2)] for name in ("ram_mass", "rod_mass")
+    ]
