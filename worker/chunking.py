@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sprag.worker import models
+from sprag.worker.sweeps import line_length
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,6 +24,8 @@ SHORT_SHARE = 0.5
 MIN_CASES = 16
 #: Fewest chunks per process, if there are enough cases, so that all processes finish at about the same time.
 CHUNKS_PER_PROCESS = 4
+#: Most lines of a sweep in one chunk: about as many as the engine has lanes.
+MAX_LINES = 40
 #: Most chunks of one study, which are kept in memory and listed in the database.
 MAX_CHUNKS = 100_000
 
@@ -41,6 +44,8 @@ class Chunking:
     def cases_of(self, study: Study, count: int | None = None) -> int:
         """Cases of one chunk of ``study``, or of a round of ``count`` of its cases."""
         cases = study.cases if count is None else count
+        if study.sweep is not None:
+            return self._cases_of_lines(study)
         if self.cases:
             return chunk_cases(cases, 0.0, self.processes, fixed=self.cases)
         # A case with many starts fills the lanes by itself.
@@ -49,14 +54,29 @@ class Chunking:
         found = chunk_cases(cases * lanes, seconds, self.processes, timeout=self.timeout) // lanes
         return max(found, math.ceil(cases / MAX_CHUNKS), 1)
 
+    def _cases_of_lines(self, study: Study) -> int:
+        """Cases of one chunk of a swept study: whole lines.
+
+        The cases of one line run one after the other, so only lines fill the engine's lanes.
+        """
+        length = line_length(study)
+        lines = study.cases // length
+        if self.cases:
+            wanted = self.cases // length
+        else:
+            in_time = SHORT_SHARE * self.timeout / (work_of(1) * length * models.estimate_seconds_per_case(study))
+            wanted = int(min(MAX_LINES, math.ceil(lines / self.processes), in_time))
+        return max(wanted, 1, math.ceil(lines / MAX_CHUNKS)) * length
+
     def warnings(self, study: Study) -> tuple[str, ...]:
         """Warnings about ``study`` before it runs: a single case may exceed the time limit."""
-        lanes = models.lanes_per_case(study)
-        seconds = models.estimate_seconds_per_case(study) / lanes * work_of(lanes)
+        length, lanes = line_length(study), models.lanes_per_case(study)
+        seconds = models.estimate_seconds_per_case(study) / lanes * work_of(lanes) * length
         if seconds <= self.timeout:
             return ()
+        what = "case" if length == 1 else "line of the sweep"
         text = (
-            f"One case takes about {seconds:.3g} s, and {self.timeout:g} s are allowed (SPRAG_CHUNK_TIMEOUT): cases "
+            f"One {what} takes about {seconds:.3g} s, and {self.timeout:g} s are allowed (SPRAG_CHUNK_TIMEOUT): cases "
             "will probably end as timed_out."
         )
         return (models.WarningText(text, "exceeds-chunk-timeout"),)

@@ -48,6 +48,9 @@ FLAG_MASKS: Final[dict[str, int]] = {
     "not_settled": 1 << 1,
     "irregular": 1 << 2,
     "unsettled": 1 << 3,
+    "jumped": 1 << 4,
+    "arbitrary_start": 1 << 5,
+    "restarted": 1 << 6,
 }
 
 

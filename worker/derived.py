@@ -33,7 +33,7 @@ def involved(study: Study, paths: Iterable[str]) -> Study:
     if spread is not None:
         roots |= {DRIVE}
     axes = tuple(axis for axis in study.axes if not roots.isdisjoint(axis.paths))
-    return replace(study, axes=axes, derive=needed(study.derive, study.base, paths), spread=spread)
+    return replace(study, axes=axes, derive=needed(study.derive, study.base, paths), spread=spread, sweep=None)
 
 
 def blocks(study: Study) -> Iterator[range]:

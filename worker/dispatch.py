@@ -1,7 +1,8 @@
 """Decisions of the dispatcher, without I/O: events in, instructions out.
 
 A chunk whose process dies or times out is run once more, then split until the faulty case is found. A case that fails
-alone twice is quarantined: it gets its ending and is not run again. A crashed case is quarantined only when a success
+alone twice is quarantined: it gets its ending and is not run again; so is a line of a sweep, whose cases cannot be run
+apart. A crashed case is quarantined only when a success
 or the end of the study shows that the engine works.
 
 Three chunks without a common case that crash with no success of the study between them indicate a fault of the engine,
@@ -127,7 +128,7 @@ class Split:
 
 @dataclass(frozen=True, slots=True)
 class Quarantine:
-    """Give the chunk's single case that ending and do not run it again."""
+    """Give the chunk's single case, or the cases of its single line, that ending and do not run them again."""
 
     chunk: Chunk
     ending: WorkerEnding
@@ -196,13 +197,14 @@ def disjoint(chunks: Iterable[Chunk]) -> int:
 
 
 def pieces(chunk: Chunk) -> tuple[Chunk, ...]:
-    """The chunk in parts of nearly equal size. Parts with several cases are split at their next failure; a single case
-    may fail twice.
+    """The chunk in parts of nearly equal size, of whole units. Parts with several units are split at their next
+    failure; a single one may fail twice.
     """
-    count = min(PARTS, chunk.count)
-    edges = [chunk.count * k // count for k in range(count + 1)]
+    units = chunk.count // chunk.unit
+    count = min(PARTS, units)
+    edges = [units * k // count * chunk.unit for k in range(count + 1)]
     return tuple(
-        Chunk(chunk.study, chunk.first + a, b - a, failures=0 if b - a == 1 else MAX_FAILURES - 1)
+        replace(chunk, first=chunk.first + a, count=b - a, failures=0 if b - a == chunk.unit else MAX_FAILURES - 1)
         for a, b in pairwise(edges)
     )
 
@@ -317,10 +319,10 @@ class Dispatch:
         if failed.failures < MAX_FAILURES:
             known.waiting.appendleft(failed)
             return [PutBack(failed, event.detail)]
-        if chunk.count == 1 and crashed:
+        if chunk.count == chunk.unit and crashed:
             known.suspects.append(Quarantine(chunk, WorkerEnding.CRASHED, event.detail))
             return []
-        if chunk.count == 1:
+        if chunk.count == chunk.unit:
             return [Quarantine(chunk, WorkerEnding.TIMED_OUT, event.detail)]
         parts = pieces(chunk)
         known.waiting.extendleft(reversed(parts))

@@ -14,6 +14,8 @@ their values; within a pass they keep their given order, which for samples cover
 Of a study with tolerances the passes of the nominal drive come first. Then come the drives at all places together, in
 passes that double their number: every pass ends with complete ribbons of the first 1, 2, 4, 8, .. drives, and a number
 that is a power of two is what Sobol draws are balanced for.
+
+The cases of a swept study are run line by line instead (`sprag.worker.sweeps`), with or without a deadline.
 """
 
 from __future__ import annotations
@@ -23,6 +25,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
+
+from sprag.worker.sweeps import LineOrder
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,6 +43,7 @@ class Order(Protocol):
     ----------
     passes : tuple of int
         The positions before each entry form a complete, coarser study; ascending, the last is the number of cases.
+        None for an order without coarser studies.
     """
 
     @property
@@ -99,7 +104,9 @@ def levels_of(values: NDArray[np.float64]) -> Numbers:
 
 
 def order_of(study: Study) -> Order:
-    """The order of ``study``, coarse to fine."""
+    """The order of ``study``, coarse to fine; of a swept one, line by line."""
+    if study.sweep is not None:
+        return LineOrder(study)
     if study.combine == "grid" and study.axes:
         return GridOrder(_levels(study))
     own = _levels(study)

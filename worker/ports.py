@@ -24,15 +24,17 @@ if TYPE_CHECKING:
 class Chunk:
     """Consecutive cases of one study, the unit of claim and commit.
 
-    They are consecutive in the order in which the study runs: by number, or coarse to fine (`sprag.worker.order`).
+    They are consecutive in the order in which the study runs: by number, or as `sprag.worker.order` says.
     ``study`` is the study's number in order of submission. ``failures`` counts how often these cases, as one chunk,
-    crashed their process or timed out.
+    crashed their process or timed out. ``unit`` is the number of cases that cannot be run apart: those of a line of a
+    sweep, otherwise 1. A chunk has whole units.
     """
 
     study: int
     first: int
     count: int
     failures: int = 0
+    unit: int = 1
 
     @property
     def last(self) -> int:

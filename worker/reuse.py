@@ -18,6 +18,7 @@ from sprag.worker import models
 from sprag.worker.derived import distinct_values
 from sprag.worker.spread import DRIVE
 from sprag.worker.study import Axis
+from sprag.worker.sweeps import whole_lines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,12 +37,17 @@ _LARGEST_CODE: Final = 2**62
 def kin_hash(study: Study, engine_version: str) -> str:
     """SHA-256 (hexadecimal) of what studies with a common case share: model, engine, run and set of parameters.
 
-    It includes the structure of the machine, where the model has one.
+    It includes the structure of the machine, where the model has one, and the axis of a sweep with its values.
     """
     paths = _paths(study)
     shared: dict[str, Any] = {"engine": engine_version, "model": study.model, "run": study.run, "paths": paths}
     if study.structure is not None:
         shared["structure"] = study.structure
+    if study.sweep is not None:
+        # A case depends on all those before it in its line.
+        axis = study.axis_of(study.sweep)
+        assert axis is not None
+        shared["sweep"] = [sorted(study.axes[axis].paths), np.sort(study.axes[axis].array).tolist()]
     text = json.dumps(
         shared,
         sort_keys=True,
@@ -131,7 +137,8 @@ class Wanted:
 def shared_cases(new: Study | Wanted, old: Study) -> tuple[Cases, Cases]:
     """Numbers of the cases of ``new`` that ``old`` also has, ascending, and their numbers there.
 
-    Both must have the same `kin_hash`. Values are equal when they are equal doubles.
+    Both must have the same `kin_hash`. Values are equal when they are equal doubles; cases of sweeps are the same where
+    their directions are, too.
     """
     ours, theirs = new if isinstance(new, Wanted) else Wanted(new), Wanted(old)
     nothing = np.empty(0, dtype=np.int64)
@@ -287,7 +294,12 @@ def _positions(study: Study, axis: int, cases: Cases) -> Cases:
 
 
 def taken(study: Study, cases: Cases) -> Study:
-    """A study of only these cases of ``study``, in this order, numbered from 0."""
+    """A study of only these cases of ``study``, in this order, numbered from 0.
+
+    Raises ValueError for cases of a sweep that are not whole lines.
+    """
+    if study.sweep is not None and not whole_lines(study, cases).all():
+        raise ValueError("a part of a line cannot be run by itself")
     axes = tuple(Axis(axis.paths, axis.array[_positions(study, index, cases)]) for index, axis in enumerate(study.axes))
     return replace(study, axes=axes, combine="zip")
 

@@ -12,75 +12,16 @@ from typing import Any, Literal, cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.worker.axis import SAME_VALUE, Axis
 from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_COLUMNS
 from sprag.worker.models.formulas import evaluate
 from sprag.worker.packed import packed, unpacked
 from sprag.worker.spread import DRIVE, Spread
+from sprag.worker.sweeps import check_sweep
+
+__all__ = ["SAME_VALUE", "Axis", "Combine", "Study"]
 
 Combine = Literal["grid", "zip"]
-
-#: Two numbers closer than this (relative to the larger one) count as the same value of an axis.
-SAME_VALUE = 1e-9
-
-
-class Axis:
-    """Values of one parameter, or of several tied ones. Immutable.
-
-    Parameters
-    ----------
-    paths : tuple of str
-        Flat spec paths that share the values, for instance ``("excitation.amplitude_x", "excitation.amplitude_y")``.
-    values : sequence of float
-        SI numbers, finite, in the user's order.
-
-    Attributes
-    ----------
-    array : float64 array, shape (values,)
-        The values, read-only. A million of them take 8 MB here and 40 MB as Python numbers.
-    """
-
-    def __init__(self, paths: tuple[str, ...], values: Sequence[float] | NDArray[np.float64]) -> None:
-        array = np.array(values, dtype=np.float64)
-        if not paths or not array.size:
-            raise ValueError("an axis needs at least one path and one value")
-        if not np.isfinite(array).all():
-            raise ValueError(f"axis {paths[0]}: every value must be a finite number")
-        array.flags.writeable = False
-        self.paths = paths
-        self.array = array
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """All values as Python numbers, created at each call; `value` returns a single one."""
-        return tuple(self.array.tolist())
-
-    def value(self, index: int) -> float:
-        """The value at a position."""
-        return float(self.array[index])
-
-    def __reduce__(self) -> tuple[type[Axis], tuple[Any, ...]]:
-        return Axis, (self.paths, self.array)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Axis):
-            return NotImplemented
-        return self.paths == other.paths and np.array_equal(self.array, other.array)
-
-    def __hash__(self) -> int:
-        return hash((self.paths, self.array.tobytes()))
-
-    def __repr__(self) -> str:
-        return f"Axis({self.paths!r}, {len(self)} values)"
-
-    def __len__(self) -> int:
-        return int(self.array.size)
-
-    def index_of(self, value: float) -> int | None:
-        """Position of the value that equals ``value`` (SI) within `SAME_VALUE`; None when there is none."""
-        if not math.isfinite(value):
-            return None
-        nearest = int(np.argmin(np.abs(self.array - value)))
-        return nearest if math.isclose(float(self.array[nearest]), value, rel_tol=SAME_VALUE) else None
 
 
 @dataclass(frozen=True)
@@ -113,6 +54,9 @@ class Study:
     spread : Spread or None
         Tolerances and the draws of the drives. The axis with the path `DRIVE`, the last one, then says which drive a
         case belongs to, and the base and the other axes hold nominal values.
+    sweep : str or None
+        A path of the axis along which each case starts from the settled motion of its neighbour
+        (`sprag.worker.sweeps`). The axis with the path `SWEEP`, the last one, then gives the direction of each case.
 
     Raises
     ------
@@ -130,6 +74,7 @@ class Study:
     plan: dict[str, Any] | None = None
     derive: dict[str, str] = field(default_factory=dict)
     spread: Spread | None = None
+    sweep: str | None = None
 
     def __post_init__(self) -> None:
         if self.combine not in get_args(Combine):
@@ -144,7 +89,9 @@ class Study:
         if self.combine == "zip" and len({len(axis) for axis in self.axes}) > 1:
             raise ValueError("axes that are zipped must have equal lengths")
         self._check_spread(paths)
-        most = (MAX_AXES if self.combine == "grid" else MAX_COLUMNS) + (self.spread is not None)
+        check_sweep(self, paths)
+        own = (self.spread is not None) + (self.sweep is not None)
+        most = (MAX_AXES if self.combine == "grid" else MAX_COLUMNS) + own
         if len(self.axes) > most or sum(map(len, self.axes)) > MAX_AXIS_VALUES or self.cases > MAX_CASES:
             raise ValueError("the study is larger than the limits allow")
 
@@ -351,6 +298,7 @@ class Study:
             **({} if self.plan is None else {"plan": self.plan}),
             **({"derive": dict(self.derive)} if self.derive else {}),
             **({} if self.spread is None else {"spread": self.spread.to_json()}),
+            **({} if self.sweep is None else {"sweep": self.sweep}),
         }
 
     def to_text(self) -> str:
@@ -377,6 +325,7 @@ class Study:
             plan=data.get("plan"),
             derive=dict(data.get("derive", {})),
             spread=Spread.from_json(data["spread"]) if data.get("spread") else None,
+            sweep=data.get("sweep"),
         )
 
     def physics_hash(self, engine_version: str) -> str:

@@ -56,7 +56,12 @@ class DriveBranch:
 
 
 def branch(
-    machines: Machines, parameter: float, settings: SettledRun, along: Range, bounds: tuple[float, float]
+    machines: Machines,
+    parameter: float,
+    settings: SettledRun,
+    along: Range,
+    bounds: tuple[float, float],
+    start: Floats | None = None,
 ) -> DriveBranch:
     """Follow the orbit that a case settles to along a parameter, in both directions.
 
@@ -71,6 +76,8 @@ def branch(
     along : Range
     bounds : tuple of float
         Smallest and largest value of the parameter that a machine may have.
+    start : array, shape (1, strobes.width(n)), optional
+        The state from which the case starts, as ``starts`` of ``settle``.
 
     Raises
     ------
@@ -82,7 +89,7 @@ def branch(
     """
     case = machines(np.array([parameter]))
     columns = scalars({path: np.asarray(value).reshape(-1)[0] for path, value in case.items()})
-    found = settle(columns, settings, cases=1)
+    found = settle(columns, settings, cases=1, starts=start)
     regime, ending = Regime(int(found.regimes[0])), ENDINGS[int(found.endings[0])]
     if regime != Regime.PERIODIC:
         what = ending.sentence if ending != Ending.OK else regime.sentence

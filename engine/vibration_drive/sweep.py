@@ -1,5 +1,6 @@
 """Sweeps: lines of cases, each of which starts from the settled motion of the case before it."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
@@ -9,19 +10,33 @@ from numpy.typing import ArrayLike, NDArray
 
 from sprag.engine.endings import ENDINGS, Ending
 from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.cases import case_matrix, pendulum_count, with_lengths
+from sprag.engine.vibration_drive.cases import Column, case_matrix, pendulum_count, with_lengths
 from sprag.engine.vibration_drive.integration import integrate
 from sprag.engine.vibration_drive.kernel import kernel_of
 from sprag.engine.vibration_drive.layout import OUT_ENDING
 from sprag.engine.vibration_drive.regimes import Regime, settled_infos
 from sprag.engine.vibration_drive.settle import SettledBatch, settle
-from sprag.engine.vibration_drive.strobes import BEGIN, continued, from_rest, width
+from sprag.engine.vibration_drive.strobes import (
+    ANGLE,
+    BEGIN,
+    PENDULUM_WIDTH,
+    SHAFT_SPEED,
+    SHAFT_WIDTH,
+    SPEED,
+    continued,
+    from_rest,
+    width,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 _OK = ENDINGS.index(Ending.OK)
 _REPEATS = [int(regime) for regime in Regime if regime.repeats]
+#: Orbits are apart where they are so many times as far from each other as those around them in the line (the median of
+#: so many pairs to either side), and at least this far (scaled); without any others around, the last number.
+_TIMES, _AROUND, _LEAST, _ALONE = 4.0, 3, 0.02, 0.2
 
 
 class Begun(IntEnum):
@@ -49,11 +64,15 @@ class Sweep:
         Members of ``Begun``.
     starts : array, shape (cases, strobes.width(n))
         The state from which each case began, as ``settle`` takes it.
+    jumped : bool array, shape (cases,)
+        Whether a case's motion does not continue that of the case before it: regime or order differ, or the orbits are
+        much further apart than those of the neighbours.
     """
 
     batch: SettledBatch
     begun: NDArray[np.int8]
     starts: Floats
+    jumped: Flags
 
 
 def sweep(columns: Mapping[str, ArrayLike], settings: SettledRun, lines: Ints) -> Sweep:
@@ -102,7 +121,7 @@ def sweep(columns: Mapping[str, ArrayLike], settings: SettledRun, lines: Ints) -
         batch.values[cases], batch.endings[cases], batch.regimes[cases] = found.values, found.endings, found.regimes
         batch.points[cases], batch.spent[cases] = found.points, found.spent
         before = cases
-    return Sweep(batch, begun, starts)
+    return Sweep(batch, begun, starts, _jumped(columns, settings, batch, starts, begun, lines))
 
 
 def _rows(columns: Mapping[str, ArrayLike], cases: Ints) -> dict[str, ArrayLike]:
@@ -123,9 +142,7 @@ def _after(
     return starts, np.where(ok, begun, Begun.AGAIN).astype(np.int8)
 
 
-def whole_periods(
-    columns: Mapping[str, ArrayLike], settings: SettledRun, points: Floats
-) -> tuple[Floats, NDArray[np.bool_]]:
+def whole_periods(columns: Mapping[str, ArrayLike], settings: SettledRun, points: Floats) -> tuple[Floats, Flags]:
     """States at the ends of excitation periods, as ``settle`` takes them, from those at any strobes.
 
     Strobes within the period are carried on to its end.
@@ -155,3 +172,66 @@ def whole_periods(
         starts[moved] = continued(done.strobes[:, 0])
         arrived[moved] = done.sums[:, OUT_ENDING] == _OK
     return starts, arrived
+
+
+def _jumped(
+    columns: Mapping[str, ArrayLike],
+    settings: SettledRun,
+    batch: SettledBatch,
+    starts: Floats,
+    begun: NDArray[np.int8],
+    lines: Ints,
+) -> Flags:
+    """Which cases do not continue the motion of the case before them."""
+    names = [info.name for info in settled_infos((starts.shape[1] - SHAFT_WIDTH) // PENDULUM_WIDTH)]
+    order = np.nan_to_num(batch.values[:, names.index("regime.order")]).astype(np.int64)
+    # Without a load a drive coasts, as the limit of a vanishing load.
+    kind = np.where(batch.regimes == Regime.COASTING, Regime.PERIODIC, batch.regimes)
+    found = np.zeros(len(starts), dtype=np.bool_)
+    known = (begun == Begun.ON_ORBIT) | (begun == Begun.ARBITRARY)
+    before = np.arange(len(starts))
+    before[lines[:, 1:]] = lines[:, :-1]
+    same = (kind == kind[before]) & (order == order[before])
+    found[known & (batch.endings == _OK) & ~same] = True
+    compared = np.flatnonzero(known & same & (order > 0))
+    apart = np.full(len(starts), np.nan)
+    if len(compared):
+        apart[compared] = _apart(columns, settings, batch.points, starts[compared], order, compared, before[compared])
+    for line in lines:
+        for place, case in enumerate(line.tolist()):
+            if not math.isnan(apart[case]):
+                around = apart[np.delete(line[max(0, place - _AROUND) : place + _AROUND + 1], min(place, _AROUND))]
+                around = around[~np.isnan(around)]
+                usual = max(_LEAST, _TIMES * float(np.median(around))) if around.size else _ALONE
+                found[case] = apart[case] > usual
+    return found
+
+
+def _apart(
+    columns: Mapping[str, ArrayLike],
+    settings: SettledRun,
+    points: Floats,
+    starts: Floats,
+    order: Ints,
+    cases: Ints,
+    before: Ints,
+) -> Floats:
+    """Largest scaled difference between the ``starts`` of some cases, on the orbits of those ``before``, and their own
+    orbits at the nearest phase.
+    """
+    own = np.union1d(cases, before)
+    begin = points[own, BEGIN]
+    matrix = case_matrix(_rows(columns, own), settings.run, len(own))
+    matrix = with_lengths(matrix, begin, order[own] - begin + (begin > 0.0), windowed=False)
+    module, most = kernel_of(columns, settings.tolerance), int(order[own].max()) + 1
+    orbits = integrate(module, matrix, settings.run, starts=continued(points[own]), strobes=most).strobes
+    angles = np.arange(SHAFT_WIDTH + ANGLE, points.shape[1], PENDULUM_WIDTH)
+    speeds = np.append(angles + SPEED - ANGLE, SHAFT_SPEED)
+    # Strobes after a turn are NaN.
+    top = np.nanmax(np.abs(orbits[:, :, speeds]), axis=(1, 2), initial=1e-300)
+    top = np.maximum(top, np.nanmax(np.abs(orbits[:, :, angles]), axis=(1, 2)) * matrix[:, Column.NU])
+    here, there = np.searchsorted(own, cases), np.searchsorted(own, before)
+    scale = np.maximum(top[here], top[there])[:, None]
+    off = np.abs(orbits[here] - starts[:, None, :])
+    far = np.maximum(off[:, :, speeds].max(axis=2), off[:, :, angles].max(axis=2) * matrix[here, None, Column.NU])
+    return np.asarray(np.nanmin(far / scale, axis=1))

@@ -102,12 +102,16 @@ class ResultMeaning(TypedDict):
 
 
 class Jump(TypedDict):
-    """A part of a refined curve that is not interpolated."""
+    """A part of a refined curve that is not interpolated, or the step of a sweep in which the motion jumps."""
 
     low: Annotated[float, Doc("its ends, values of x, SI")]
     high: float
-    why: Annotated[str, Doc("failed, irregular, regime, order, no_value, steep or sensitive")]
-    results: Annotated[list[str], Doc("the results that are not interpolated there, of those with a requested error")]
+    why: Annotated[
+        str, Doc("failed, irregular, regime, order, no_value, steep or sensitive; of a sweep regime, order or orbit")
+    ]
+    results: Annotated[
+        list[str], Doc("the results that are not interpolated there, of those with a requested error; none of a sweep")
+    ]
 
 
 class Curve(TypedDict):
@@ -134,7 +138,9 @@ class Curve(TypedDict):
             ),
         ]
     ]
-    jumps: NotRequired[Annotated[list[Jump], Doc("of a refined curve: where it is not interpolated")]]
+    jumps: NotRequired[
+        Annotated[list[Jump], Doc("of a refined curve: where it is not interpolated; of a sweep: jumps")]
+    ]
     passed: NotRequired[
         Annotated[bool, Doc("of a refined curve: whether no more points are needed for the requested error")]
     ]

@@ -187,6 +187,8 @@ def show_curves(found: dict[str, Any]) -> None:
         show_table(title, columns, [(*row[:-1], "" if row[-1] == OK else row[-1]) for row in rows])
         if "error" in drawn:
             say(*_refined(drawn, found["error_asked"], x["unit"]))
+        elif "jumps" in drawn:
+            say(*(f"jump at {_ends(jump, x['unit'])} ({jump['why']})" for jump in drawn["jumps"]))
 
 
 def _refined(drawn: dict[str, Any], asked: float, unit: str) -> Iterator[str]:
@@ -195,8 +197,12 @@ def _refined(drawn: dict[str, Any], asked: float, unit: str) -> Iterator[str]:
         told = "not known yet" if error is None else f"{100.0 * error:.2g} % of the range"
         yield f"error of {name}: {told}, {100.0 * asked:.2g} % asked"
     for jump in drawn["jumps"]:
-        ends = f"{cell_text(jump['low'])} to {cell_text(jump['high'])}" + ("" if unit == "1" else f" {unit}")
-        yield f"jump at {ends} ({jump['why'].replace('_', ' ')}): {', '.join(jump['results'])} not interpolated"
+        why, results = jump["why"].replace("_", " "), ", ".join(jump["results"])
+        yield f"jump at {_ends(jump, unit)} ({why}): {results} not interpolated"
+
+
+def _ends(jump: dict[str, Any], unit: str) -> str:
+    return f"{cell_text(jump['low'])} to {cell_text(jump['high'])}" + ("" if unit == "1" else f" {unit}")
 
 
 def held_text(values: Mapping[str, float], units: Mapping[str, str]) -> str:

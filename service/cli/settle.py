@@ -15,6 +15,9 @@ from sprag.service.json_text import to_bytes
 from sprag.worker.limits import MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from sprag.service.storage.records import RowBlock
     from sprag.worker.study import Study
 
@@ -90,6 +93,8 @@ def _blocks(study: Study, cases: list[int]) -> list[RowBlock]:
     from sprag.worker.models import run_chunk, study_results
     from sprag.worker.reuse import taken
 
+    if study.sweep is not None:
+        return [_of_lines(study, np.array(cases, dtype=np.int64))]
     blocks = []
     with progress_bar(study.name or "study") as update:
         for first in range(0, len(cases), _BATCH):
@@ -98,6 +103,24 @@ def _blocks(study: Study, cases: list[int]) -> list[RowBlock]:
             blocks.append(RowBlock(study_results(study), part, done.endings, done.flags, done.values))
             update(first + part.size, len(cases), "")
     return blocks
+
+
+def _of_lines(study: Study, cases: NDArray[np.int64]) -> RowBlock:
+    """The rows of cases of a sweep: whole lines are run, because every case needs those before it."""
+    import numpy as np
+
+    from sprag.service.storage.records import RowBlock
+    from sprag.worker.models import run_chunk, study_results
+    from sprag.worker.reuse import taken
+    from sprag.worker.sweeps import LineOrder
+
+    order = LineOrder(study)
+    lines = np.unique(order.positions(cases) // order.unit)
+    every = np.sort(order.cases((lines[:, None] * order.unit + np.arange(order.unit)).reshape(-1)))
+    done = run_chunk(taken(study, every), 0, every.size)
+    rows = np.searchsorted(every, cases)
+    endings, flags = ([column[row] for row in rows.tolist()] for column in (done.endings, done.flags))
+    return RowBlock(study_results(study), cases, endings, flags, done.values[rows])
 
 
 def _show(block: RowBlock) -> None:

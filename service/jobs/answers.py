@@ -48,7 +48,8 @@ def curves_json(library: Library, study_id: str, query: CurveQuery) -> bytes:
 def curves_csv(library: Library, study_id: str, query: CurveQuery) -> bytes:
     """Every point of every curve as one row: fixed parameters, case, x, results, regime and its order, ending.
 
-    Of refined curves also the results that are not interpolated up to the next point.
+    Of refined curves also the results that are not interpolated up to the next point, of a sweep whether the motion
+    jumps between this point and the next.
     """
     curves = curves_of(library, study_id, query)
     names = kind_columns(curves.selection.regime)
@@ -62,12 +63,21 @@ def curves_csv(library: Library, study_id: str, query: CurveQuery) -> bytes:
             curves.selection.x: list(curve.line.x),
             **{info.name: numbers(curve.y[info.name], info.kind == "count") for info in curves.selection.results},
             **dict(kinds),
+            **_jumped(curve),
             **_not_joined(curve, [info.name for info in curves.selection.results]),
             "ending": curve.endings,
         }
         for name, part in parts.items():
             columns.setdefault(name, []).extend(part)
     return exports.table_csv(list(columns), list(columns.values()))
+
+
+def _jumped(curve: Curve) -> dict[str, list[Any]]:
+    """A column of a sweep: 1 where the motion jumps between the point of a row and the next one."""
+    if curve.jumps is None:
+        return {}
+    lows = {jump["low"] for jump in curve.jumps}
+    return {"jump": [int(x in lows) for x in curve.line.x]}
 
 
 def _not_joined(curve: Curve, names: list[str]) -> dict[str, list[Any]]:

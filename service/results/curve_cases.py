@@ -30,10 +30,12 @@ from sprag.service.results.selection import (
     require_axis,
     with_nominal,
 )
+from sprag.service.results.sweeps import jumps_of_line, swept_along
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker.codes import PENDING
 from sprag.worker.limits import MAX_CURVE_VALUES
 from sprag.worker.models import regime_info
+from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -46,8 +48,8 @@ if TYPE_CHECKING:
 def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Selection:
     """Select the cases of the curves of ``query``.
 
-    Of refined curves, a fixed axis without a role is one of ``by``. Curves are those of the nominal drive, unless the
-    query gives the drives another role.
+    Of refined curves, a fixed axis without a role is one of ``by``, and so is the direction of a sweep. Curves are
+    those of the nominal drive, unless the query gives the drives another role.
 
     Raises
     ------
@@ -64,6 +66,8 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
         axis = require_axis(study, "by", path)
         if axis not in {x_axis, *by_axes.values(), *fixed}:
             by_axes[path] = axis
+    if study.sweep is not None and SWEEP not in {query.x, *by_axes} and (last := len(study.axes) - 1) not in fixed:
+        by_axes |= {SWEEP: last} if len(study.axes[last]) > 1 else {}
     _no_axis_twice({query.x: x_axis}, "by", by_axes, fixed)
     fixed = with_nominal(study, fixed, {x_axis, *by_axes.values()})
     chooser = _zip_lines if study.combine == "zip" else _grid_lines
@@ -71,9 +75,8 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
     made = tuple(lines)
     units = {path: unit_of(study, path) for path in (query.x, *made[0].by, *made[0].at)}
     names = {path: axis_name(study, path) for path in (query.x, *made[0].by)}
-    return Selection(
-        query.x, units, names, held_texts(study, made[0].at), x_values, results, made, regime_info(infos), plan
-    )
+    held, regime = held_texts(study, made[0].at), regime_info(infos)
+    return Selection(query.x, units, names, held, x_values, results, made, regime, plan, swept_along(study, query.x))
 
 
 def draw(selection: Selection, fetch: Fetch) -> Curves:
@@ -93,7 +96,10 @@ def draw(selection: Selection, fetch: Fetch) -> Curves:
         part = slice(start, start + line.cases.size)
         y = {name: columns.values[name][part] for name in names}
         own = None if refined is None else refined[place]
-        curves.append(Curve(line, y, endings[part], regimes and regimes[part], orders and orders[part], own))
+        jumps = None
+        if selection.swept and regimes and orders:
+            jumps = jumps_of_line(line, columns.flags[part], regimes[part], orders[part])
+        curves.append(Curve(line, y, endings[part], regimes and regimes[part], orders and orders[part], own, jumps))
         start = part.stop
     return Curves(selection, tuple(curves))
 

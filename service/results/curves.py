@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sprag.service.answers import filled
 from sprag.service.answers.results import Curve as CurveData
-from sprag.service.answers.results import CurvesData, MapData, MapPoints, MapResult, ResultMeaning
+from sprag.service.answers.results import CurvesData, Jump, MapData, MapPoints, MapResult, ResultMeaning
 from sprag.service.json_text import numbers
 from sprag.service.results.refined import jumps_of
 from sprag.worker.codes import PENDING
@@ -58,7 +58,7 @@ class Selection:
 
     For display: ``names`` of the drawn paths with those tied to them, and ``held``, the fixed ones with their values,
     including constant ones of the operating point. ``regime`` is the result that gives the kind of motion, where the
-    study has one; ``plan`` is that of curves that were refined over x.
+    study has one; ``plan`` is that of curves that were refined over x; ``swept``: x is the axis of a sweep.
     """
 
     x: str
@@ -70,6 +70,7 @@ class Selection:
     lines: tuple[Line, ...]
     regime: ResultInfo | None = None
     plan: RefinePlan | None = None
+    swept: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +78,7 @@ class Curve:
     """One curve: a line of cases with their results (NaN where there is none) and endings.
 
     Of a settled study also with their regimes, and the excitation periods after which their motions repeat;
-    of a refined curve what its planner says of it.
+    of a refined curve what its planner says of it, of a sweep its jumps.
     """
 
     line: Line
@@ -86,6 +87,7 @@ class Curve:
     regimes: list[str | None] | None = None
     orders: list[int | None] | None = None
     refined: Refined | None = None
+    jumps: list[Jump] | None = None
 
     def run(self) -> NDArray[np.intp]:
         """Indices of the cases that were run, ascending, which a picture joins; of a coarser study, its own points."""
@@ -103,6 +105,8 @@ class Curve:
         }
         if self.regimes is not None and self.orders is not None:
             data = {**data, "regime": self.regimes, "order": self.orders}
+        if self.jumps is not None:
+            data = {**data, "jumps": self.jumps}
         if self.refined is None:
             return data
         errors = {info.name: self.refined.errors[info.name] for info in results if info.name in self.refined.errors}

@@ -14,7 +14,8 @@ from sprag.service.results.refined_maps import map_plan, squares
 from sprag.service.results.selection import axis_name, held_text, refused
 from sprag.service.spec.catalogue import unit_of
 from sprag.worker import models
-from sprag.worker.spread import DRIVE
+from sprag.worker.models import NO_PARAMETERS
+from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from sprag.worker.models import ResultInfo
@@ -30,7 +31,8 @@ def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
     """What to draw for ``study``; None when nothing varies.
 
     Axes that are not drawn are held at the base's value where they contain it, otherwise at their middle value, and the
-    drives at the nominal one. Refined curves are drawn with every result whose error was asked for, all of them.
+    drives at the nominal one. Sweeps are drawn along their axis, in both directions. Refined curves are drawn with
+    every result whose error was asked for, all of them.
     """
     plan = curve_plan(study)
     if plan is not None:
@@ -41,7 +43,9 @@ def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
     shown = models.presentation_of(study)
     names = [info.name for info in infos]
     y = tuple(name for name in shown.drawn if name in names) or (names[0],)
-    x = next((path for path in shown.along for axis in varying if path in axis.paths), varying[0].paths[0])
+    x = study.sweep or next(
+        (path for path in shown.along for axis in varying if path in axis.paths), varying[0].paths[0]
+    )
     if study.combine == "zip":
         return CurveQuery(x, y)
     others = [axis for axis in varying if x not in axis.paths]
@@ -49,7 +53,8 @@ def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
     by = next((path for path in shown.apart for axis in few if path in axis.paths), few[0].paths[0] if few else None)
     held = [axis for axis in others if by not in axis.paths]
     at = tuple((axis.paths[0], repr(usual_value(study, axis))) for axis in held)
-    return CurveQuery(x, y if by is None else y[:1], () if by is None else (by,), at)
+    both = (SWEEP,) if study.sweep is not None and len(study.axes[-1]) > 1 else ()
+    return CurveQuery(x, y if by is None and not both else y[:1], (*(() if by is None else (by,)), *both), at)
 
 
 def completed(
@@ -96,16 +101,16 @@ def main_results(study: Study, infos: Sequence[ResultInfo]) -> tuple[str, ...]:
 
 
 def varying_axes(study: Study) -> list[Axis]:
-    """The axes with more than one value; that of the drives is not among them."""
-    return [axis for axis in study.axes if len(axis) > 1 and axis.paths != (DRIVE,)]
+    """The axes with more than one value; those of drives and of directions of a sweep are not among them."""
+    return [axis for axis in study.axes if len(axis) > 1 and NO_PARAMETERS.isdisjoint(axis.paths)]
 
 
 def usual_value(study: Study, axis: Axis) -> float:
     """The value at which an undrawn axis is held: the base's where the axis contains it, otherwise its middle one.
 
-    Of the drives it is the nominal one.
+    Of the drives it is the nominal one, of the directions of a sweep up, where there are both.
     """
-    base = 0.0 if axis.paths == (DRIVE,) else study.base.get(axis.paths[0])
+    base = 0.0 if not NO_PARAMETERS.isdisjoint(axis.paths) else study.base.get(axis.paths[0])
     index = None if base is None else axis.index_of(base)
     return float(np.sort(axis.array)[len(axis) // 2]) if index is None else axis.value(index)
 

@@ -15,6 +15,7 @@ from sprag.service.spec.units import QuantityError, parse_quantity, split_quanti
 from sprag.worker import models
 from sprag.worker.spread import DRIVE
 from sprag.worker.study import SAME_VALUE
+from sprag.worker.sweeps import DIRECTIONS, SWEEP, direction
 
 if TYPE_CHECKING:
     from sprag.worker.models import ResultInfo
@@ -100,7 +101,11 @@ def own_paths(study: Study) -> list[str]:
 
 
 def with_nominal(study: Study, fixed: Fixed, roles: Iterable[int]) -> Fixed:
-    """The fixed axes with that of the drives at the nominal one, where the drives have no other role."""
+    """The fixed axes with that of the drives at the nominal one, where the drives have no other role; of a sweep with
+    that of the directions at its first, up where there are both.
+    """
+    if study.sweep is not None and (last := len(study.axes) - 1) not in {*fixed, *roles}:
+        return {**fixed, last: (SWEEP, 0)}
     position = study.axis_of(DRIVE)
     if position is None or position in {*fixed, *roles}:
         return fixed
@@ -116,6 +121,8 @@ def axis_name(study: Study, path: str) -> str:
 
 def held_text(study: Study, path: str, value: float) -> str:
     """A parameter held at ``value`` (SI) for display: ``excitation.frequency = 25 Hz``."""
+    if path == SWEEP:
+        return f"{SWEEP} {direction(value)}"
     unit = unit_of(study, path)
     return f"{axis_name(study, path)} = {value:.6g}" + ("" if unit == "1" else f" {unit}")
 
@@ -164,6 +171,8 @@ def locate_axes(study: Study, at: Sequence[tuple[str, str]]) -> Fixed:
 
 
 def _value(path: str, text: str, unit: str) -> float:
+    if path == SWEEP and text in DIRECTIONS:
+        return float(DIRECTIONS.index(text))
     try:
         number, unit_text = split_quantity(text)
         return parse_quantity(text, unit) if unit_text else to_float(number)

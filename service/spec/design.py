@@ -8,6 +8,7 @@ from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.derive import with_values
 from sprag.service.spec.fields import TOLERANCE_FIELDS, WHICH_CASES
 from sprag.worker.limits import MAX_NAME_LENGTH
+from sprag.worker.models import NO_PARAMETERS
 from sprag.worker.models.parameters import parameter_of
 from sprag.worker.spread import DRIVE
 
@@ -32,7 +33,8 @@ def design_spec(spec: Mapping[str, Any], study: Study, case: int, along: str | N
     along : path of a parameter that the study varies from 0, or a small value where 0 is not allowed, to twice its
         value; by default nothing varies
     """
-    values = {path: value for path, value in study.case_parameters(case).items() if path not in {*study.derive, DRIVE}}
+    apart = {*study.derive, *NO_PARAMETERS}
+    values = {path: value for path, value in study.case_parameters(case).items() if path not in apart}
     # The nominal drive of a design keeps its tolerances; a drawn drive has its own values in the base.
     nominal = not study.case_parameters(case).get(DRIVE)
     kept = {

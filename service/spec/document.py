@@ -12,6 +12,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.spec.axes.design import read_design
+from sprag.service.spec.axes.sweep import read_sweep, with_sweep
 from sprag.service.spec.derive import check_derived, layout, read_machine
 from sprag.service.spec.draws.tolerances import read_tolerances, warn_of_invalid_drives, with_drives
 from sprag.service.spec.fields import TOLERANCE_FIELDS, read_object
@@ -89,6 +90,7 @@ def parse_spec(data: object) -> ParsedSpec:
         raise report.error()
     part = part_of(model)
     machine = read_machine(report, part, found)
+    swept = read_sweep(report, found)
     outline: Outline | None = None
     combine: Combine = "zip"
     if chooses(found):
@@ -113,6 +115,8 @@ def parse_spec(data: object) -> ParsedSpec:
     study = Study(model, name, _in_order(machine), run, structure=machine.structure, derive=machine.derive)
     given = replace(study, axes=axes or (), combine=combine)
     study = given if outline is None else first_round(report, study, outline, spread)
+    if swept is not None:
+        study = with_sweep(report, study, swept)
     if spread is not None and outline is None:
         study = with_drives(report, study, spread)
         warn_of_invalid_drives(report, study)

@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.faults import Fault
 from sprag.service.spec.axes.axes import axis_values
+from sprag.service.spec.axes.sweep import sweep_of
 from sprag.service.spec.derive import read_machine
 from sprag.service.spec.document import ParsedSpec, parse_spec
 from sprag.service.spec.fields import TOLERANCE_FIELDS, WHICH_CASES, read_object
 from sprag.service.spec.machine.registry import part_of
 from sprag.service.spec.report import Report, SpecError, join, quantity_text
 from sprag.worker.spread import without_drives
+from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from sprag.service.spec.machine.machine import Machine
@@ -73,6 +75,11 @@ def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> di
             allowed="a new study with another error, other results or other goals: it reuses the cases of this one",
         )  # fmt: skip
         raise report.error()
+    if study.sweep is not None and given == ["cases"]:
+        report.fault(
+            "/cases", "conflict", "cannot be added to a sweep, whose cases depend on each other", allowed="`axes`"
+        )
+        raise report.error()
     items = found[given[0]]
     if not isinstance(items, list) or not items:
         report.fault(
@@ -83,7 +90,15 @@ def extended_spec(spec: Mapping[str, Any], study: Study, addition: object) -> di
     kept = {key: value for key, value in spec.items() if key not in WHICH_CASES or key in TOLERANCE_FIELDS}
     kept["name"] = found.get("name", study.name)
     places = without_drives(study)
-    own: list[dict[str, Any]] = [{"path": list(axis.paths), "values": list(axis.values)} for axis in places.axes]
+    own: list[dict[str, Any]] = [
+        {
+            "path": list(axis.paths),
+            "values": list(axis.values),
+            **(sweep_of(study) if study.sweep in axis.paths else {}),
+        }
+        for axis in places.axes
+        if axis.paths != (SWEEP,)
+    ]
     if given == ["cases"]:
         first = [{"combine": study.combine, "axes": own}] if own else []
         return {**kept, "combine": "union", "axes": [*first, *items]}
@@ -104,6 +119,8 @@ def _add(
     read = axis_values(report, pointer, item, machine)
     if read is None:
         return
+    if isinstance(item, Mapping) and SWEEP in item:
+        report.fault(join(pointer, SWEEP), "conflict", "is as in the study", item[SWEEP])
     paths, values = read
     positions = {study.axis_of(path) for path in paths}
     position = next(iter(positions))

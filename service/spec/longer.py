@@ -28,7 +28,8 @@ _SUFFIX: Final = ", longer"
 def longer_spec(
     spec: Mapping[str, Any], study: Study, cases: NDArray[np.int64], at_most: int | None = None
 ) -> dict[str, Any]:
-    """The spec of a study of these cases only, run for (settled motion: at most) ``at_most`` excitation periods each.
+    """The spec of a study of these cases only (of a sweep: of all), run for (settled motion: at most) ``at_most``
+    excitation periods each.
 
     Parameters
     ----------
@@ -46,6 +47,8 @@ def longer_spec(
         times = (*SETTLED_FIELDS, *TIMED_FIELDS)
         run = {key: value for key, value in spec.get("run", {}).items() if key not in times}
         run |= _longer_run(study, at_most)
+    if study.sweep is not None:  # every case depends on those before it in its line
+        return {**spec, "name": study.name[: MAX_NAME_LENGTH - len(_SUFFIX)] + _SUFFIX, "run": run}
     axes = [{"path": list(axis.paths), "values": axis.array.tolist()} for axis in _listed(study, cases)]
     return {
         **kept,

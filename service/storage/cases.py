@@ -200,22 +200,23 @@ class Cases(Orders):
         """
         wanted: NDArray[np.int64] = np.asarray(cases, dtype=np.int64).reshape(-1)
         unique, position = np.unique(wanted, return_inverse=True)
-        endings = np.full(unique.size, None, dtype=object)
+        endings, flags = np.full(unique.size, None, dtype=object), np.full(unique.size, "", dtype=object)
         values = np.full((unique.size, len(names)), np.nan)
         with self.session.read() as connection:
             rows = self._rows(connection, study_id)
             columns = {info.name: info.column for info in rows.infos}
             wanted_columns = [columns[name] for name in names]
-            _fill(connection, rows, rows.table, wanted_columns if number == 0 else [], unique, endings, values)
+            _fill(connection, rows, rows.table, wanted_columns if number == 0 else [], unique, endings, flags, values)
             if number and rows.further is not None and rows.numbered is not None:
                 own = rows.further.c[columns[rows.numbered]] == number
-                _fill(connection, rows, rows.further, wanted_columns, unique, endings, values, own)
+                _fill(connection, rows, rows.further, wanted_columns, unique, endings, flags, values, own)
         if rows.cancelled:
             endings[[ending is None for ending in endings]] = WorkerEnding.CANCELLED.value
         return CaseColumns(
             wanted,
             endings[position].tolist(),
             {name: values[position, index] for index, name in enumerate(names)},
+            flags[position].tolist(),
         )
 
     def _never_run(self, connection: sa.Connection, rows: _Rows, after_case: int) -> Iterator[int]:
@@ -248,18 +249,20 @@ def _fill(
     columns: Sequence[str],
     cases: NDArray[np.int64],
     endings: NDArray[np.object_],
+    flags: NDArray[np.object_],
     values: NDArray[np.float64],
     *which: sa.ColumnElement[bool],
 ) -> None:
-    """Write endings (shape (m,)) and columns (shape (m, columns)) of ``cases`` (ascending) that are in a table."""
+    """Write endings, flags (shape (m,)) and columns (shape (m, columns)) of ``cases`` (ascending) that a table has."""
     c = table.c
-    query = sa.select(c.case_number, c.ending, *(c[name] for name in columns)).where(c.study == rows.number, *which)
+    query = sa.select(c.case_number, c.ending, c.flags, *(c[name] for name in columns))
+    query = query.where(c.study == rows.number, *which)
     for condition in conditions(c.case_number, cases):
         found = connection.execute(query.where(condition)).all()
         if found:
-            numbers, ended, *results = zip(*found, strict=True)
+            numbers, ended, flagged, *results = zip(*found, strict=True)
             at = np.searchsorted(cases, np.array(numbers, dtype=np.int64))
-            endings[at] = np.array(ended, dtype=object)
+            endings[at], flags[at] = np.array(ended, dtype=object), np.array(flagged, dtype=object)
             for index, column in enumerate(results):
                 values[at, index] = np.array(column, dtype=np.float64)
 

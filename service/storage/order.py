@@ -1,4 +1,4 @@
-"""The cases of a chunk: consecutive numbers, or those at its positions in the order coarse to fine."""
+"""The cases of a chunk: consecutive numbers, or those at its positions in the order of the study."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from sprag.service.storage.tables import CHUNKS, STUDIES
 from sprag.worker.order import coverage, order_of
 from sprag.worker.states import ChunkState
 from sprag.worker.study import Study
+from sprag.worker.sweeps import LineOrder
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -61,10 +62,15 @@ class Orders(Part):
         order = self._order(chunk.study, connection)
         return positions if order is None else np.sort(order.cases(positions))
 
+    def _unit(self, number: int, connection: sa.Connection) -> int:
+        """Cases of a study that cannot be run apart: those of a line of a sweep, otherwise 1."""
+        order = self._order(number, connection)
+        return order.unit if isinstance(order, LineOrder) else 1
+
     def _coverage(self, connection: sa.Connection, number: int, cases: int) -> Coverage | None:
         """The complete part of a study of ``cases`` cases; None where it is not run coarse to fine."""
         order = self._order(number, connection)
-        if order is None:
+        if order is None or not order.passes:
             return None
         c = CHUNKS.c
         first_open, done = connection.execute(

@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from sprag.service.storage.part import moment, optional_moment
-from sprag.service.storage.tables import HELD_AT_DEADLINE
+from sprag.service.storage.tables import COARSE_TO_FINE, HELD_AT_DEADLINE
 from sprag.service.storage.warning_texts import read_warnings
 from sprag.worker.states import StudyState
 
@@ -214,11 +214,14 @@ class CaseColumns:
         None where the case has no row yet, "cancelled" where it never gets one.
     values : dict of float64 arrays, each shape (m,)
         By result name; NaN for null and for missing rows.
+    flags : list of str, length m, or empty where they are not known
+        Names of the flags of each case joined by commas.
     """
 
     cases: NDArray[np.int64]
     endings: list[str | None]
     values: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    flags: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -263,7 +266,7 @@ def record_of(row: sa.Row[Any]) -> StudyRecord:
         "state": StudyState(row.state),
         "warnings": read_warnings(row.warnings),
         "created_at": moment(row.created_at),
-        "coarse": bool(row.coarse),
+        "coarse": row.coarse == COARSE_TO_FINE,
         "time_over": row.waits_for == HELD_AT_DEADLINE,
         **times,
     }

@@ -1,4 +1,4 @@
-"""Running the failed cases of a study again, and no others."""
+"""Running the failed cases of a study again, and no others; of a sweep the lines that have them."""
 
 from __future__ import annotations
 
@@ -9,18 +9,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sqlalchemy as sa
 
+from sprag.service.storage.cases import conditions
 from sprag.service.storage.errors import NothingToRetryError
 from sprag.service.storage.order import Orders
 from sprag.service.storage.records import StudyRecord, record_of
+from sprag.service.storage.reuse import endings_of
 from sprag.service.storage.tables import CHUNKS, ENDINGS, RECORD_COLUMNS, STUDIES, results_table
 from sprag.worker import models
 from sprag.worker.chunking import MAX_CHUNKS
 from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
+from sprag.worker.sweeps import LineOrder
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
+    from numpy.typing import NDArray
+
     from sprag.worker.order import Order
+
+    Cases = NDArray[np.int64]
 
 #: First and count of consecutive places: case numbers, or positions in the study's order.
 Run = tuple[int, int]
@@ -43,8 +50,9 @@ class Retries(Orders):
     def retry_study(self, study_id: str, endings: Collection[str] | None = None) -> StudyRecord:
         """Run the cases of an ended study again that did not end ok, or that have one of ``endings``.
 
-        All other rows are kept. Raises StudyNotFoundError, TransitionError when the study has not ended or was
-        cancelled, and NothingToRetryError when there is no such case.
+        All other rows are kept; of a sweep those of lines without such a case. Raises StudyNotFoundError,
+        TransitionError when the study has not ended or was cancelled, and NothingToRetryError when there is no such
+        case.
         """
         c = STUDIES.c
         while True:
@@ -57,11 +65,15 @@ class Retries(Orders):
                 order = self._order(row.number, connection)
                 ended = tuple(counts)
                 runs = _runs(connection, row, ended) if order is None else _places(connection, row, ended, order)
+                cases = None
+                if isinstance(order, LineOrder):
+                    cases = np.sort(order.cases(np.concatenate([np.arange(a, a + n) for a, n in runs])))
+                    counts = dict(endings_of(connection, row.model, row.variant, row.number, cases))
             with self.session.write() as connection:
                 now = self._row(connection, study_id, c.revision)
                 if now.revision != row.revision:  # it was run again or deleted in the meantime
                     continue
-                _give_back(connection, row, runs, counts)
+                _give_back(connection, row, runs, counts, cases)
                 self._move(connection, row.number, StudyEvent.RETRY)
                 self._lift_deadline(connection, row.number)
                 # The cases must be run, not copied from a study in which they failed in the same way.
@@ -98,10 +110,13 @@ def _runs(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...])
 
 
 def _places(connection: sa.Connection, row: sa.Row[Any], endings: tuple[str, ...], order: Order) -> list[Run]:
-    """The same for a study that is run coarse to fine: runs of positions in its order."""
+    """The same for a study with an order of its own: runs of positions in it; of a sweep whole lines."""
     c = results_table(row.model, row.variant).c
     query = sa.select(c.case_number).where(c.study == row.number, c.ending.in_(endings))
     places = np.sort(order.positions(np.fromiter(connection.execute(query).scalars(), dtype=np.int64)))
+    if isinstance(order, LineOrder):
+        lines = np.unique(places // order.unit)
+        places = (lines[:, None] * order.unit + np.arange(order.unit)).reshape(-1)
     edges = np.flatnonzero(np.diff(places) > 1) + 1
     return _few([(int(run[0]), run.size) for run in np.split(places, edges)])
 
@@ -115,14 +130,26 @@ def _few(runs: list[Run]) -> list[Run]:
     return runs
 
 
-def _give_back(connection: sa.Connection, row: sa.Row[Any], runs: Sequence[Run], counts: dict[str, int]) -> None:
-    """Delete the rows with those endings and cut the chunks so that exactly these cases wait."""
+def _give_back(
+    connection: sa.Connection, row: sa.Row[Any], runs: Sequence[Run], counts: dict[str, int], cases: Cases | None
+) -> None:
+    """Delete the rows that are run again and cut the chunks so that exactly these cases wait.
+
+    They are ``cases``, ascending, or all with the endings of ``counts``, which has their number by ending.
+    """
     table = results_table(row.model, row.variant)
-    connection.execute(sa.delete(table).where(table.c.study == row.number, table.c.ending.in_(tuple(counts))))
+    own = [table.c.ending.in_(tuple(counts))] if cases is None else conditions(table.c.case_number, cases)
+    for condition in own:
+        connection.execute(sa.delete(table).where(table.c.study == row.number, condition))
     _cut(connection, row.number, runs)
-    connection.execute(sa.delete(ENDINGS).where(ENDINGS.c.study == row.number, ENDINGS.c.ending.in_(tuple(counts))))
+    for ending, count in counts.items():
+        this = (ENDINGS.c.study == row.number) & (ENDINGS.c.ending == ending)
+        connection.execute(sa.update(ENDINGS).where(this).values(cases=ENDINGS.c.cases - count))
+    connection.execute(sa.delete(ENDINGS).where(ENDINGS.c.study == row.number, ENDINGS.c.cases == 0))
     connection.execute(
-        sa.update(STUDIES).where(STUDIES.c.number == row.number).values(done=STUDIES.c.done - sum(counts.values()))
+        sa.update(STUDIES)
+        .where(STUDIES.c.number == row.number)
+        .values(done=STUDIES.c.done - sum(counts.values()), ok=STUDIES.c.ok - counts.get(models.OK, 0))
     )
 
 

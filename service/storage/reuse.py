@@ -23,6 +23,7 @@ from sprag.worker.ports import Known
 from sprag.worker.reuse import Wanted, kin_hash, shared_cases, span, taken
 from sprag.worker.states import ChunkState, StudyState
 from sprag.worker.study import Study
+from sprag.worker.sweeps import whole_lines
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -195,6 +196,11 @@ def _find(connection: sa.Connection, spans: _Spans, study: Study, kin: str, numb
     cases = np.concatenate([ours for ours, _, _ in found])
     studies = np.concatenate([np.full(ours.size, source, dtype=np.int64) for ours, source, _ in found])
     order = np.argsort(cases)
+    if study.sweep is not None:
+        # A line of which some cases are missing is run as a whole.
+        order = order[whole_lines(study, cases[order])]
+        if not order.size:
+            return None
     return _Found(cases[order], studies[order], np.concatenate([theirs for _, _, theirs in found])[order])
 
 

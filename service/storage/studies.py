@@ -37,6 +37,7 @@ from sprag.service.storage.schedules import lift_window
 from sprag.service.storage.study_row import study_row
 from sprag.service.storage.tables import (
     CHUNKS,
+    COARSE_TO_FINE,
     DISPATCHER,
     ENDINGS,
     HELD_AT_DEADLINE,
@@ -127,7 +128,7 @@ class Studies(Orders):
             "fresh": int(fresh),
             "finish_by": None if finish_by is None else micros_of(finish_by),
             # The cases of a round are in order of their value already.
-            "coarse": int(finish_by is not None and row["most_cases"] is None),
+            "coarse": row["coarse"] or COARSE_TO_FINE * (finish_by is not None and row["most_cases"] is None),
             "revision": 1,
             "created_at": self._now(),
         }
@@ -271,7 +272,7 @@ class Studies(Orders):
             [RunningChunk(begin / 1e6, count) for begin, count in claimed],
             micros_of(now) / 1e6,
             row.done,
-            bool(row.coarse),
+            row.coarse == COARSE_TO_FINE,
             uneven,
         )
         if left is not None and rounds is not None and rate:

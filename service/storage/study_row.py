@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from sprag.service.storage.tables import LINE_BY_LINE
 from sprag.service.storage.warning_texts import write_warnings
 from sprag.worker import models
 from sprag.worker.planning import planner_of
@@ -37,6 +38,7 @@ def study_row(
         "study": study.to_text(),
         "warnings": write_warnings(warnings),
         "kin_hash": kin_hash(study, models.ENGINE_VERSION),
+        "coarse": 0 if study.sweep is None else LINE_BY_LINE,
         "most_cases": None if planner is None else planner.most_cases,
         "most_rounds": None if planner is None else planner.most_rounds,
     }

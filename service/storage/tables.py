@@ -57,7 +57,8 @@ STUDIES = sa.Table(
     sa.Column("reused", sa.Integer, nullable=False, server_default="0"),
     # Deadline at which the study is held; NULL where it has none.
     sa.Column("finish_by", sa.BigInteger),
-    # 1: it is run coarse to fine, and its chunks are ranges of positions in that order (`sprag.worker.order`).
+    # 1: it is run coarse to fine, `LINE_BY_LINE`: line by line; its chunks are ranges of positions in that order
+    # (`sprag.worker.order`).
     sa.Column("coarse", sa.Integer, nullable=False, server_default="0"),
     # Fingerprint of the processes that computed its rows (`sprag.worker.fingerprint`); NULL: no rows yet, "": unknown,
     # or several.
@@ -77,6 +78,8 @@ GO_ON = frozenset({WAITS_FOR_ROOM, WAITS_FOR_WINDOW})
 
 #: The study is held at its deadline; it does not resume by itself.
 HELD_AT_DEADLINE = "deadline"
+#: Values of `STUDIES.c.coarse` of studies that are not run in the order of their case numbers.
+COARSE_TO_FINE, LINE_BY_LINE = 1, 2
 
 #: The columns of a `StudyRecord`, without the long texts.
 RECORD_COLUMNS = tuple(

@@ -159,7 +159,8 @@ class Work(Reuse):
                 .where(c.study == number, c.state != ChunkState.DONE)
                 .order_by(c["first"])
             ).all()
-        return [Chunk(number, first, count, failures) for first, count, failures in rows]
+            unit = self._unit(number, connection)
+        return [Chunk(number, first, count, failures, unit) for first, count, failures in rows]
 
     def claim(self, epoch: int, chunks: Sequence[Chunk]) -> list[Chunk]:
         """Claim waiting chunks of queued or running studies before their deadline; returns the claimed ones."""

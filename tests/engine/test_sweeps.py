@@ -54,6 +54,8 @@ def test_the_direction_of_a_sweep_decides_between_two_motions() -> None:
     np.testing.assert_allclose(_speeds(up.batch)[others], _speeds(down.batch)[others], rtol=1e-9)
     assert up.begun.tolist() == [Begun.FIRST, *[Begun.ON_ORBIT] * 3]
     assert down.begun.tolist() == [*[Begun.ON_ORBIT] * 3, Begun.FIRST]
+    assert up.jumped.tolist() == [False, False, True, False]
+    assert down.jumped.tolist() == [True, False, False, False]
     # The first of a line is a case from rest, to the bit.
     assert up.batch.values[0].tobytes() == rest.values[0].tobytes()
 
@@ -99,6 +101,7 @@ def test_past_irregular_motion_a_line_goes_on_from_an_arbitrary_state() -> None:
     found = sweep(columns, SettledRun(), np.array([[0, 1]]))
     assert found.batch.regimes[0] == Regime.IRREGULAR
     assert found.begun.tolist() == [Begun.FIRST, Begun.ARBITRARY]
+    assert not found.jumped.any()
     # The strobes of the search lie within the period; the next case begins with a whole one.
     assert found.batch.points[0, BEGIN] == 0.375
     starts, arrived = whole_periods(_case(columns, 0), SettledRun(), found.batch.points[:1])

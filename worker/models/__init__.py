@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import platform
 from contextlib import suppress
-from dataclasses import replace
-from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from sprag.engine import ENGINE_VERSION, Ending, Run, Span
@@ -42,11 +40,26 @@ from sprag.engine.vibration_drive.parameters import (
 )
 from sprag.engine.warning_text import WarningText
 from sprag.worker.models import machine_shaft, vibration_drive
-from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, FurtherRows, KernelShape, run_accepted
+from sprag.worker.models.common import (
+    NO_PARAMETERS,
+    ChunkResult,
+    ChunkTask,
+    Extent,
+    FurtherRows,
+    KernelShape,
+    WorkerEnding,
+)
 from sprag.worker.models.model import Model, all_models, model_names, model_of, register, unregister
-from sprag.worker.models.parameters import refused_cases
 from sprag.worker.models.presentation import Panel, Presentation
-from sprag.worker.models.settled import REGIME_SENTENCES, SETTLED, is_settled, motion_sentence, settled_study
+from sprag.worker.models.settled import (
+    JUMPED,
+    REGIME_SENTENCES,
+    SETTLED,
+    is_settled,
+    motion_sentence,
+    settled_study,
+)
+from sprag.worker.models.tasks import chunk_task, run_chunk, run_task
 from sprag.worker.models.vibration_drive import (
     NOT_SETTLED,
     WINDUP_OUT_OF_DATA,
@@ -55,10 +68,9 @@ from sprag.worker.models.vibration_drive import (
     kernel_source,
     run_of,
 )
-from sprag.worker.spread import DRIVE
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from sprag.worker.study import Study
@@ -68,11 +80,13 @@ __all__ = [
     "CLUTCH_WINDUP_LIMIT",
     "ENDING_SENTENCES",
     "ENGINE_VERSION",
+    "JUMPED",
     "MACHINE_SHAFT",
     "MAX_COEFFICIENTS",
     "MAX_PENDULUMS",
     "MEANS_FROM_PERIODS",
     "NOT_SETTLED",
+    "NO_PARAMETERS",
     "OK",
     "REGIME_SENTENCES",
     "SETTLED",
@@ -108,6 +122,7 @@ __all__ = [
     "WorkerEnding",
     "cache_folder",
     "cache_is_wanted",
+    "can_sweep",
     "check_law",
     "chunk_task",
     "clutch_torque",
@@ -164,15 +179,6 @@ register(vibration_drive.VibrationDrive())
 register(machine_shaft.MachineShaft())
 
 OK = Ending.OK.value
-
-
-class WorkerEnding(StrEnum):
-    """Endings given by the worker to cases that the engine did not run, or from which it did not return."""
-
-    CRASHED = "crashed"
-    TIMED_OUT = "timed_out"
-    CANCELLED = "cancelled"
-    INVALID = "invalid_parameters"
 
 
 #: Every ending of a case, stored by its key, and its description for users.
@@ -270,34 +276,6 @@ def shape_of(study: Study) -> KernelShape:
     return model_of(study.model).shape_of(study)
 
 
-def chunk_task(study: Study, first: int, count: int) -> ChunkTask:
-    """The cases ``first`` .. ``first + count - 1`` of ``study``, ready for `run_task`."""
-    columns: dict[str, Any] = {**study.base, **study.columns(range(first, first + count))}
-    columns.pop(DRIVE, None)
-    task = ChunkTask(first, count, shape_of(study), study.run, columns, study.structure)
-    if study.spread is None:
-        return task
-    refused = refused_cases(study, columns, count) | model_of(study.model).invalid(study, columns, count)
-    return replace(task, refused=refused, results=len(study_results(study))) if refused.any() else task
-
-
-def run_task(task: ChunkTask) -> ChunkResult:
-    """Run the cases of a task.
-
-    A physical failure is an ending in the result, never an exception; an exception is a bug.
-    """
-    from sprag.engine.faults import inject
-
-    inject(task.columns, task.count)
-    model = model_of(task.shape.model)
-    return model.run(task) if task.refused is None else run_accepted(task, model.run, WorkerEnding.INVALID)
-
-
-def run_chunk(study: Study, first: int, count: int) -> ChunkResult:
-    """Run the cases ``first`` .. ``first + count - 1`` of ``study`` here."""
-    return run_task(chunk_task(study, first, count))
-
-
 def extent(study: Study, case: int) -> Extent:
     """The independent variable of a case's instantaneous values: the time of its run, or the angle of its shaft."""
     return model_of(study.model).extent(study, case)
@@ -306,6 +284,11 @@ def extent(study: Study, case: int) -> Extent:
 def run_trajectory(study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
     """Instantaneous values of one case at ``points`` equally spaced points of its `extent`."""
     return model_of(study.model).trajectory(study, case, start, end, points)
+
+
+def can_sweep(model: str, run: Mapping[str, Any]) -> bool:
+    """Whether cases of ``model`` with that run can start from the settled motion of their neighbours."""
+    return model_of(model).sweeps(run)
 
 
 def has_clutches(study: Study) -> bool:

@@ -14,6 +14,7 @@ from sprag.worker.models.formulas import evaluate
 from sprag.worker.models.model import model_of
 from sprag.worker.models.parameters import parameter_of
 from sprag.worker.models.settled import settings_of, settled_study
+from sprag.worker.models.swept import start_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -136,7 +137,10 @@ def drive_branch(study: Study, case: int, along: Along) -> CaseBranch:
     settings = settings_of(settled_study(study).run)
     bounds = allowed_values(study, along.paths)
     try:
-        made = branch(machines_along(study, case, along.paths), value, settings, Range(along.low, along.high), bounds)
+        made = branch(
+            machines_along(study, case, along.paths), value, settings, Range(along.low, along.high), bounds,
+            start_of(study, case),
+        )  # fmt: skip
     except NoOrbitError as error:
         nothing = np.empty(0)
         return CaseBranch(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from sprag.engine.endings import ENDINGS
 from sprag.worker.spread import DRIVE
+from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,6 +18,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.worker.study import Study
+
+
+#: Paths of axes that are not parameters of a machine.
+NO_PARAMETERS: Final = frozenset({DRIVE, SWEEP})
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +40,15 @@ class FurtherRows:
     of: NDArray[np.int64]
     flags: list[str]
     values: NDArray[np.float64]
+
+
+class WorkerEnding(StrEnum):
+    """Endings given by the worker to cases that the engine did not run, or from which it did not return."""
+
+    CRASHED = "crashed"
+    TIMED_OUT = "timed_out"
+    CANCELLED = "cancelled"
+    INVALID = "invalid_parameters"
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +102,8 @@ class ChunkTask:
 
     ``columns`` maps flat spec paths to SI numbers, or to arrays of shape (count,) where they vary. ``run`` and
     ``structure`` are those of the study. ``refused``, shape (count,), marks cases that are not to be run; then
-    ``results`` is the number of their results.
+    ``results`` is the number of their results. ``lines``, shape (lines, steps), are the lines of a sweep: positions of
+    cases in the task in the order in which they are run.
     """
 
     first: int
@@ -98,6 +114,7 @@ class ChunkTask:
     structure: dict[str, Any] | None = None
     refused: NDArray[np.bool_] | None = None
     results: int = 0
+    lines: NDArray[np.int64] | None = None
 
 
 def run_accepted(task: ChunkTask, run: Callable[[ChunkTask], ChunkResult], ending: str) -> ChunkResult:
@@ -123,8 +140,7 @@ def run_accepted(task: ChunkTask, run: Callable[[ChunkTask], ChunkResult], endin
 def case_machine(study: Study, case: int) -> dict[str, float]:
     """Every parameter of one case, SI: the base with what the case has for itself. IndexError outside the study."""
     machine = {**study.base, **study.case_parameters(case)}
-    machine.pop(DRIVE, None)
-    return machine
+    return {path: value for path, value in machine.items() if path not in NO_PARAMETERS}
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,6 +79,10 @@ class Model(Protocol):
         """The compiled kernel that the cases of the study need."""
         ...
 
+    def sweeps(self, run: Mapping[str, Any]) -> bool:
+        """Whether cases with that run can start from the settled motion of their neighbours (`ChunkTask.lines`)."""
+        return False
+
     def invalid(self, study: Study, columns: Mapping[str, Any], count: int) -> NDArray[np.bool_]:
         """Which of some cases, shape (count,), are no machine although each of their numbers is in its range.
 

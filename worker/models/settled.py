@@ -24,6 +24,21 @@ REGIME_SENTENCES: Final[dict[str, str]] = {regime.name.lower(): regime.sentence 
 REGIME_FLAGS: Final[dict[str, str]] = {
     regime.name.lower(): regime.sentence for regime in (Regime.IRREGULAR, Regime.UNSETTLED)
 }
+#: Flag of a case of a sweep whose motion does not continue that of the case before it.
+JUMPED: Final = "jumped"
+#: Flags of a case of a sweep that did not start from an orbit of the case before it.
+ARBITRARY_START: Final = "arbitrary_start"
+RESTARTED: Final = "restarted"
+SWEEP_FLAGS: Final[dict[str, str]] = {
+    JUMPED: (
+        "The motion of the previous case of the sweep ends or becomes unstable between the two values: this case went "
+        "to another motion."
+    ),
+    ARBITRARY_START: (
+        "The previous case of the sweep has no periodic motion, so this case started from an arbitrary state of it."
+    ),
+    RESTARTED: "The previous case of the sweep did not end ok, so this case started from its own initial values.",
+}
 #: Mean periods of a periodic case, share of cases that exhaust their limit, and the periods of these relative to the
 #: limit, all with disturbed runs (docs/performance.md).
 _PERIODIC_PERIODS, _IRREGULAR_SHARE, _IRREGULAR_COST = 135.0, 0.15, 1.3

@@ -33,8 +33,16 @@ from sprag.worker.models.common import (
 )
 from sprag.worker.models.drive_presentation import PRESENTATION
 from sprag.worker.models.model import Model
-from sprag.worker.models.settled import REGIME_FLAGS, followed_periods, is_settled, mean_periods, settings_of
+from sprag.worker.models.settled import (
+    REGIME_FLAGS,
+    SWEEP_FLAGS,
+    followed_periods,
+    is_settled,
+    mean_periods,
+    settings_of,
+)
 from sprag.worker.models.starts import count_of, further_starts, has_starts
+from sprag.worker.models.swept import start_of, swept
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -59,6 +67,7 @@ FLAG_SENTENCES: dict[str, str] = {
     ),
     WINDUP_OUT_OF_DATA: "A clutch was wound up beyond the measured data, where its law was extrapolated linearly.",
     **REGIME_FLAGS,
+    **SWEEP_FLAGS,
 }
 #: Most cases whose frequency is evaluated for an estimate.
 _SPREAD = 1_000
@@ -202,6 +211,9 @@ class VibrationDrive(Model):
     def shape_of(self, study: Study) -> KernelShape:
         return KernelShape(MODEL, DriveKey(pendulums(study), coefficients(study), run_of(study.run).tolerance))
 
+    def sweeps(self, run: Mapping[str, Any]) -> bool:
+        return is_settled(run) and not has_starts(run)
+
     def invalid(self, study: Study, columns: Mapping[str, Any], count: int) -> NDArray[np.bool_]:
         """The cases with a clutch whose torque is negative somewhere in its range, or zero everywhere."""
         found = np.zeros(count, dtype=np.bool_)
@@ -221,6 +233,8 @@ class VibrationDrive(Model):
         number = _key_of(task.shape).pendulums
         if has_starts(task.run):
             return _run_starts(task, number)
+        if task.lines is not None:
+            return swept(task, lambda values: _flags(settled_infos(number), values))
         if is_settled(task.run):
             settled = settle(task.columns, settings_of(task.run), cases=task.count)
             flags = _flags(settled_infos(number), settled.values)
@@ -243,7 +257,7 @@ class VibrationDrive(Model):
         from sprag.engine.vibration_drive.simulate import trajectory
 
         columns = case_machine(study, case)
-        return trajectory(columns, run_of(study.run), np.linspace(start, end, points))
+        return trajectory(columns, run_of(study.run), np.linspace(start, end, points), start_of(study, case))
 
     @property
     def has_clutches(self) -> bool:
@@ -255,7 +269,7 @@ class VibrationDrive(Model):
 
         columns = case_machine(study, case)
         if is_settled(study.run):
-            return settled_engagements(columns, settings_of(study.run))
+            return settled_engagements(columns, settings_of(study.run), start_of(study, case))
         return engagements(columns, run_of(study.run))
 
     @property
@@ -267,7 +281,7 @@ class VibrationDrive(Model):
 
         columns = case_machine(study, case)
         if is_settled(study.run):
-            return settled_portrait(columns, settings_of(study.run))
+            return settled_portrait(columns, settings_of(study.run), start_of(study, case))
         return portrait(columns, run_of(study.run))
 
     def lanes_per_case(self, study: Study) -> int:

@@ -12,6 +12,7 @@ from sprag.service.results.refined import curve_plan, families, plan_along
 from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.selection import refused
 from sprag.worker import models
+from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from starlette.datastructures import QueryParams
@@ -74,13 +75,16 @@ def map_query(study: Study, infos: Sequence[ResultInfo], given: QueryParams) -> 
     y = given.get("y") or (main.by[0] if main.by and main.by[0] != x else others[0])
     if _same_axis(study, y, x):
         y = others[0]
-    return MapQuery(x, y, given.get("z") or main.y[0], held(study, given.getlist("at"), (x, y)))
+    return MapQuery(x, y, given.get("z") or main.y[0], held(study, given.getlist("at"), (x, y), one_direction=True))
 
 
-def held(study: Study, given: Sequence[str], drawn: Sequence[str]) -> tuple[tuple[str, str], ...]:
+def held(
+    study: Study, given: Sequence[str], drawn: Sequence[str], *, one_direction: bool = False
+) -> tuple[tuple[str, str], ...]:
     """Pairs of path and value for the axes that are not drawn: as given, others at their usual value.
 
-    Axes of listed cases are only held as given, except the fixed ones of refined curves.
+    The direction of a sweep is left open unless ``one_direction``: curves show both. Axes of listed cases are only held
+    as given, except the fixed ones of refined curves.
     """
     pairs: dict[str, str] = {}
     for item in given:
@@ -93,6 +97,8 @@ def held(study: Study, given: Sequence[str], drawn: Sequence[str]) -> tuple[tupl
     plan = plan_along(study, drawn[0]) or map_plan(study)
     fixed = families(plan) if plan is not None else study.axis_paths if study.combine == "grid" else ()
     for axis in study.axes:
+        if axis.paths == (SWEEP,) and not one_direction:
+            continue
         if len(axis) > 1 and axis.paths[0] in fixed and not any(path in axis.paths for path in (*drawn, *pairs)):
             pairs[axis.paths[0]] = repr(usual_value(study, axis))
     return tuple(pairs.items())

@@ -40,6 +40,7 @@ from sprag.worker.models.parameters import parameter_of
 from sprag.worker.planning.calibrate.plan import CALIBRATE
 from sprag.worker.planning.goals.plan import GOAL
 from sprag.worker.states import TRANSITIONS, StudyEvent, StudyState
+from sprag.worker.sweeps import DIRECTIONS, SWEEP
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -295,7 +296,8 @@ def fixed_choices(study: Study, drawn: tuple[str, ...], at: tuple[tuple[str, str
                 "unit": unit,
                 "values": [] if len(axis) > _MOST_CHOICES else sorted(set(axis.values)),
                 "chosen": text,
-                "number": _plain(text),
+                "number": _direction(text) if axis.paths == (SWEEP,) else _plain(text),
+                "names": dict(enumerate(DIRECTIONS)) if axis.paths == (SWEEP,) else {},
             }
         )
     return found
@@ -303,6 +305,11 @@ def fixed_choices(study: Study, drawn: tuple[str, ...], at: tuple[tuple[str, str
 
 #: Most values of an axis in a selection list; beyond this the value is typed.
 _MOST_CHOICES: Final = 200
+
+
+def _direction(text: str | None) -> float | None:
+    """A direction of a sweep given in words or as its number."""
+    return float(DIRECTIONS.index(text)) if text in DIRECTIONS else _plain(text)
 
 
 def _plain(text: str | None) -> float | None:

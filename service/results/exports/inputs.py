@@ -13,6 +13,7 @@ from sprag.service.spec.catalogue import unit_of
 from sprag.service.spec.machine.registry import part_of
 from sprag.worker.models.parameters import parameter_of
 from sprag.worker.spread import DRIVE
+from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from sprag.worker.study import Study
@@ -45,6 +46,8 @@ def description_of(study: Study, path: str) -> str:
     """A short description of a flat path of a spec; "" where the catalogue does not contain it."""
     if path == DRIVE:
         return "number of the drive; 0 is the nominal one"
+    if path == SWEEP:
+        return "direction of the sweep: 0 is up, 1 is down"
     entry = parameter_of(study, path)
     return "" if entry is None else entry.help
 

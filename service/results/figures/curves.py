@@ -12,9 +12,11 @@ from sprag.service.results.figures.orders import TITLE, order_map, strip_of
 from sprag.service.results.refined import jumps_of, sentence
 from sprag.service.results.refined import stretches as refined_stretches
 from sprag.service.results.regimes import DOUBTFUL, MARKED, regimes_of, stretches
+from sprag.service.results.sweeps import broken_at, hysteresis, value_text, without_direction
 from sprag.service.results.wording import number, unit_text
 from sprag.worker.codes import PENDING
 from sprag.worker.models import WorkerEnding
+from sprag.worker.sweeps import DIRECTIONS, SWEEP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -55,7 +57,8 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1, *, by_u
     for index, infos in enumerate(groups.values()):
         y = Quantity(infos[0].name if len(infos) == 1 else "", infos[0].unit)
         parts = tuple(_lines(lines, labels, infos, listed=index == 0))
-        styles = tuple(info.name for info in infos) if len(infos) > 1 else ()
+        directions = [f", {word}" for word in DIRECTIONS] if _both(lines) else [""]
+        styles = tuple(f"{info.name}{word}" for info in infos for word in directions) if len(infos) > 1 else ()
         bands = tuple(_bands(lines, infos)) if len(drawn) == 1 else ()
         panels.append(Panel(y, parts, tuple(_marks(lines, infos, regimes)), styles, bands=bands))
     most = min(max(_MOST_POINTS // len(lines), _LEAST_POINTS), _LINE_POINTS)
@@ -78,51 +81,73 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1, *, by_u
 
 
 def _told(curves: Curves) -> str:
-    """How right refined curves are."""
+    """How right refined curves are, or what a sweep up and down differ in."""
+    if curves.selection.swept:
+        return hysteresis(curves)
     plan, refined = curves.selection.plan, [curve.refined for curve in curves.curves if curve.refined is not None]
     return "" if plan is None else sentence(plan, refined, (info.name for info in curves.selection.results))
 
 
 def _bands(lines: Sequence[tuple[int, Curve]], infos: Sequence[ResultInfo]) -> Iterator[Band]:
-    """The jumps of refined curves."""
-    for index, ((_, curve), colour) in enumerate(zip(lines, line_colours(len(lines)), strict=True)):
+    """The jumps of refined curves and of sweeps."""
+    for index, ((_, curve), colour) in enumerate(zip(lines, _colours(lines), strict=True)):
+        for jump in curve.jumps or ():
+            yield Band(jump["low"], jump["high"], colour, str(index))
         if curve.refined is not None:
             for jump in jumps_of(curve.refined, (info.name for info in infos)):
                 yield Band(jump["low"], jump["high"], colour, str(index))
 
 
+def _both(lines: Sequence[tuple[int, Curve]]) -> bool:
+    """Whether there are curves of both directions of a sweep: dashes tell them apart."""
+    return any(SWEEP in curve.line.by for _, curve in lines)
+
+
+def _colours(lines: Sequence[tuple[int, Curve]]) -> list[str]:
+    """The colour of each line: one for both directions of a sweep."""
+    keys = [(study, without_direction(curve.line.by)) if SWEEP in curve.line.by else place
+            for place, (study, curve) in enumerate(lines)]  # fmt: skip
+    different = list(dict.fromkeys(keys))
+    colours = line_colours(len(different))
+    return [colours[different.index(key)] for key in keys]
+
+
 def _lines(
     lines: Sequence[tuple[int, Curve]], labels: Sequence[str], infos: Sequence[ResultInfo], *, listed: bool
 ) -> Iterator[Line]:
-    for index, ((study, curve), colour) in enumerate(zip(lines, line_colours(len(lines)), strict=True)):
+    both = _both(lines)
+    for index, ((study, curve), colour) in enumerate(zip(lines, _colours(lines), strict=True)):
+        down = int({**curve.line.at, **curve.line.by}.get(SWEEP, 0.0))
         run = curve.run()
         x = np.asarray(curve.line.x)[run]
         regimes = None if curve.regimes is None else [curve.regimes[place] for place in run.tolist()]
-        values = ", ".join(number(value) for value in curve.line.by.values())
+        values = ", ".join(value_text(path, value) for path, value in curve.line.by.items())
         for place, info in enumerate(infos):
             yield Line(
                 values or labels[study],
                 x,
                 curve.y[info.name][run],
                 colour,
-                style=study if len(infos) == 1 else place,
+                style=place * (1 + both) + down if both or len(infos) > 1 else study,
                 key=str(index),
                 heading=labels[study] if values else "",
                 listed=listed and place == 0,
                 cases=curve.line.cases[run],
-                stretches=_stretches(curve, info, regimes, x.size),
+                stretches=_stretches(curve, info, regimes, x),
                 # A line needs y as a function of x; the points of a zip may go back and forth.
                 joined=bool(np.all(np.diff(x) > 0.0)),
             )
 
 
 def _stretches(
-    curve: Curve, info: ResultInfo, regimes: Sequence[str | None] | None, points: int
+    curve: Curve, info: ResultInfo, regimes: Sequence[str | None] | None, x: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], ...] | None:
     """The points that lines join; None for all of them."""
-    if curve.refined is not None and points:
-        return refined_stretches(curve.refined, info.name, stretches(regimes, points))
-    return None if regimes is None else tuple(stretches(regimes, points))
+    if curve.refined is not None and x.size:
+        return refined_stretches(curve.refined, info.name, stretches(regimes, x.size))
+    if curve.jumps is not None:
+        return broken_at(stretches(regimes, x.size), x, curve.jumps)
+    return None if regimes is None else tuple(stretches(regimes, x.size))
 
 
 def _marks(lines: Sequence[tuple[int, Curve]], infos: Sequence[ResultInfo], regimes: Sequence[str]) -> Iterator[Marks]:

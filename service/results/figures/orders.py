@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.service.results.regimes import MARKS, ORDER
-from sprag.service.results.wording import number
+from sprag.service.results.sweeps import value_text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -100,7 +100,7 @@ def strip_of(curves: Sequence[Curve]) -> tuple[dict[str, tuple[Span, ...]], dict
         if curve.regimes is None or curve.orders is None or len(curves) > MOST_ROWS or np.any(np.diff(x) <= 0.0):
             return {}, {}
         names = [motion_name(curve.regimes[place], curve.orders[place]) for place in run.tolist()]
-        label = ", ".join(number(value) for value in curve.line.by.values())
+        label = ", ".join(value_text(path, value) for path, value in curve.line.by.items())
         rows[label] = tuple(_spans(names, edges(x) if x.size else x))
     looks = looks_of(name for spans in rows.values() for name, _, _ in spans)
     return (rows, looks) if set(looks) - {"1 period"} else ({}, {})

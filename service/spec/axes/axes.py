@@ -19,6 +19,7 @@ from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_TIED_P
 from sprag.worker.models import Parameter
 from sprag.worker.models.parameters import in_range
 from sprag.worker.study import Axis, Combine
+from sprag.worker.sweeps import SWEEP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -68,7 +69,7 @@ def read_axis(
     report: Report, pointer: str, data: object, machine: Machine
 ) -> tuple[tuple[str, ...] | None, Plan | None]:
     """The paths of one axis and the plan of its values; None for what could not be read."""
-    found = read_object(report, pointer, data, ("path", *PLANS))
+    found = read_object(report, pointer, data, ("path", *PLANS, SWEEP))
     if found is None:
         return None, None
     paths = read_paths(report, join(pointer, "path"), found.get("path"), machine)

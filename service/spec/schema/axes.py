@@ -6,6 +6,7 @@ from sprag.service.spec.axes.axes import AXES
 from sprag.service.spec.axes.design import COMBINE, GROUPED
 from sprag.service.spec.axes.exclude import FIELDS as EXCLUDE_FIELDS
 from sprag.service.spec.axes.sample import RANGES, SAMPLE, SCALE
+from sprag.service.spec.axes.sweep import SWEPT
 from sprag.service.spec.described import Listed, schemas
 from sprag.service.spec.schema.draws import correlations_schema, distribution_schema
 from sprag.service.spec.schema.plan import adaptive_schema
@@ -27,7 +28,8 @@ def axis_schema() -> Schema:
         "geomspace": three(count, "[from, to, count], each value the same multiple of the previous one"),
         "range": three(QUANTITY, "[from, to, step], the end included when a whole number of steps leads there"),
     }
-    return one_of(object_schema({"path": path_schema(), **ways}, required=("path",)), ways)
+    fields = {"path": path_schema(), **ways, SWEPT.name: SWEPT.schema()}
+    return one_of(object_schema(fields, required=("path",)), ways)
 
 
 def sample_schema() -> Schema:

@@ -1,0 +1,123 @@
+"""Swept studies: the jumps of their curves, the words of directions, and what up and down differ in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sprag.service.results.wording import number, unit_text
+from sprag.worker.models import JUMPED
+from sprag.worker.sweeps import DOWN, SWEEP, direction
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sprag.service.answers.results import Jump
+    from sprag.service.results.curves import Curve, Curves, Line
+    from sprag.worker.study import Study
+
+#: Difference of up and down, relative to the range of both, from which on it is reported.
+_DIFFERENT: Final = 0.01
+#: Most intervals that are named.
+_NAMED: Final = 4
+
+
+def swept_along(study: Study, path: str) -> bool:
+    """Whether ``path`` is on the swept axis of a study."""
+    axis = None if study.sweep is None else study.axis_of(study.sweep)
+    return axis is not None and axis == study.axis_of(path)
+
+
+def value_text(path: str, value: float) -> str:
+    """The value of a parameter that tells curves apart, for display."""
+    return direction(value) if path == SWEEP else number(value)
+
+
+def jumps_of_line(
+    line: Line, flags: Sequence[str], regimes: Sequence[str | None], orders: Sequence[int | None]
+) -> list[Jump]:
+    """The intervals in which the motion jumps along a line of a sweep: between a case and the one before it.
+
+    All lists are aligned with the cases of the line, whose x ascends.
+    """
+    back = 1 if {**line.at, **line.by}[SWEEP] == DOWN else -1
+    found: list[Jump] = []
+    for place, own in enumerate(flags):
+        before = place + back
+        if JUMPED not in own.split(",") or not 0 <= before < len(flags):
+            continue
+        why = "regime" if regimes[place] != regimes[before] else "order"
+        if why == "order" and orders[place] == orders[before]:
+            why = "orbit"
+        low, high = sorted((line.x[place], line.x[before]))
+        found.append({"low": low, "high": high, "why": why, "results": []})
+    return found
+
+
+def broken_at(
+    stretches: Sequence[NDArray[np.int64]], x: NDArray[np.float64], jumps: Sequence[Jump]
+) -> tuple[NDArray[np.int64], ...]:
+    """The stretches of points that a line joins, broken at jumps; ``x`` has the value of each point."""
+    lows = [jump["low"] for jump in jumps]
+    found: list[NDArray[np.int64]] = []
+    for part in stretches:
+        found += np.split(part, np.flatnonzero(np.isin(x[part[:-1]], lows)) + 1)
+    return tuple(found)
+
+
+def _pairs(curves: Curves) -> list[tuple[Curve, Curve]]:
+    """Each curve up with that down at the same values of all other axes."""
+    by_place: dict[tuple[float, ...], dict[float, Curve]] = {}
+    for curve in curves.curves:
+        own = tuple(value for path, value in curve.line.by.items() if path != SWEEP)
+        by_place.setdefault(own, {})[{**curve.line.at, **curve.line.by}[SWEEP]] = curve
+    return [(pair[0.0], pair[1.0]) for pair in by_place.values() if len(pair) == 2]
+
+
+def hysteresis(curves: Curves) -> str:
+    """What the curves of a sweep up and down differ in, in a sentence about the first result; "" for other curves."""
+    if not curves.selection.swept:
+        return ""
+    name, x = curves.selection.results[0].name, curves.selection.x
+    unit = unit_text(curves.selection.units[x])
+    count = sum(len(curve.jumps or ()) for curve in curves.curves)
+    jumps = f"{count} jump{'s' if count != 1 else ''}"
+    pairs = _pairs(curves)
+    if not pairs:
+        return (
+            f"{jumps[0].upper()}{jumps[1:]} along the sweep." if count else "The motion does not jump along the sweep."
+        )
+    largest, at, wide = 0.0, 0.0, list[tuple[float, float]]()
+    for up, down in pairs:
+        both = np.array([up.y[name], down.y[name]])
+        if not np.isfinite(both).any():
+            continue
+        span = float(np.nanmax(both) - np.nanmin(both)) or 1.0
+        off = np.nan_to_num(np.abs(both[0] - both[1]) / span)
+        place = int(np.argmax(off))
+        if off[place] > largest:
+            largest, at = float(off[place]), up.line.x[place]
+        wide += _intervals(np.asarray(up.line.x), off > _DIFFERENT)
+    if not wide:
+        return f"Up and down agree within {100.0 * _DIFFERENT:g} % of the range of {name}; {jumps}."
+    named = [number(low) if low == high else f"{number(low)} to {number(high)}" for low, high in sorted(set(wide))]
+    more = f" and {len(named) - _NAMED} more" if len(named) > _NAMED else ""
+    where = ", ".join(named[:_NAMED]) + (f" {unit}" if unit else "") + more
+    return (
+        f"Hysteresis: up and down differ at {where}, by up to {100.0 * largest:.2g} % of the range of {name} "
+        f"(at {number(at)}{f' {unit}' if unit else ''}); {jumps}."
+    )
+
+
+def _intervals(x: NDArray[np.float64], off: NDArray[np.bool_]) -> list[tuple[float, float]]:
+    """The first and the last x of each run of points that are marked."""
+    places = np.flatnonzero(off)
+    runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if places.size else []
+    return [(float(x[run[0]]), float(x[run[-1]])) for run in runs]
+
+
+def without_direction(by: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
+    """What tells curves apart beside their direction: curves with the same have one colour."""
+    return tuple((path, value) for path, value in by.items() if path != SWEEP)

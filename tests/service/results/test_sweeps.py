@@ -1,0 +1,143 @@
+"""Curves of sweeps: directions in words, jumps with their intervals, what up and down differ in; in every format."""
+
+from __future__ import annotations
+
+import csv
+import io
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.jobs.answers import curves_of
+from sprag.service.results.curves import CurveQuery
+from sprag.service.results.defaults import main_query
+from sprag.service.results.figures.curves import curves_figure
+from sprag.service.results.sweeps import hysteresis
+from sprag.worker import models
+from sprag.worker.models import ChunkResult
+from sprag.worker.study import Study
+from tests.service.conftest import API, Service
+from tests.service.spec_sample import changed
+
+FREQUENCIES = [16.0, 17.0, 18.0, 19.0, 20.0]
+SPEC: dict[str, Any] = changed(
+    {
+        "/run": {"until": "settled"},
+        "/axes": [
+            {"path": "excitation.frequency", "values": FREQUENCIES, "sweep": "both"},
+            {"path": "shaft.load", "values": [0.1, 0.2]},
+        ],
+    }
+)
+QUERY = {"x": "excitation.frequency", "y": "shaft.speed.mean"}
+#: The lower branch ends above 18 Hz on the way up, the upper one below 17 Hz on the way down.
+UP, DOWN = [1.0, 2.0, 3.0, 14.0, 15.0], [1.0, 12.0, 13.0, 14.0, 15.0]
+
+
+def rows_of(study: Study) -> ChunkResult:
+    """Rows of two branches with a jump each way; those of the larger load have no other numbers."""
+    names = [info.name for info in models.study_results(study)]
+    values = np.full((study.cases, len(names)), 1.0)
+    columns = study.columns(range(study.cases))
+    place = np.searchsorted(FREQUENCIES, columns["excitation.frequency"])
+    down = columns["sweep"] == 1.0
+    values[:, names.index("shaft.speed.mean")] = np.where(down, np.take(DOWN, place), np.take(UP, place))
+    values[:, names.index("regime.order")] = np.where(place >= 3, 2, 1)
+    jumped = np.where(down, place == 0, place == 3)
+    return ChunkResult(0, ["ok"] * study.cases, ["jumped" if one else "" for one in jumped], values)
+
+
+@pytest.fixture
+def study_id(service: Service) -> str:
+    found = service.submit(SPEC)
+    record, study = service.store.get_study(found), service.store.study(found)
+    whole, epoch = rows_of(study), service.store.take_over("test")
+    for chunk in service.store.claim(epoch, service.store.open_chunks(record.number)):
+        known = service.store.known(study, chunk)
+        assert known is not None
+        rows = known.missing.tolist()
+        part = ChunkResult(0, ["ok"] * len(rows), [whole.flags[row] for row in rows], whole.values[rows])
+        assert service.store.commit(epoch, chunk, part, known)
+    service.store.settle(epoch, record.number)
+    return found
+
+
+def test_curves_have_both_directions_and_their_jumps(service: Service, study_id: str) -> None:
+    curves = service.get(f"/studies/{study_id}/curves", **QUERY, at="shaft.load=0.1")["curves"]
+    assert [curve["by"] for curve in curves] == [{"sweep": 0.0}, {"sweep": 1.0}]
+    assert [curve["y"]["shaft.speed.mean"] for curve in curves] == [UP, DOWN]
+    assert [curve["jumps"] for curve in curves] == [
+        [{"low": 18.0, "high": 19.0, "why": "order", "results": []}],
+        [{"low": 16.0, "high": 17.0, "why": "orbit", "results": []}],
+    ]
+    down = service.get(f"/studies/{study_id}/curves", **QUERY, at=["shaft.load=0.1", "sweep=down"])["curves"]
+    assert [curve["y"] for curve in down] == [curves[1]["y"]]
+
+
+def test_csv_and_maps_have_them_too(service: Service, study_id: str) -> None:
+    text = service.http.get(
+        f"{API}/studies/{study_id}/curves", params={**QUERY, "at": "shaft.load=0.1", "format": "csv"}
+    ).text
+    rows = list(csv.DictReader(io.StringIO(text)))
+    assert [row["jump"] for row in rows] == ["0", "0", "1", "0", "0", "1", "0", "0", "0", "0"]
+    maps = {"x": "excitation.frequency", "y": "shaft.load", "z": "shaft.speed.mean"}
+    up = service.get(f"/studies/{study_id}/map", **maps)
+    assert (up["at"], up["z"]["values"]) == ({"sweep": 0.0}, [UP, UP])
+    assert service.get(f"/studies/{study_id}/map", **maps, at="sweep=down")["z"]["values"] == [DOWN, DOWN]
+
+
+def test_a_figure_tells_directions_by_dashes_and_loads_by_colours(service: Service, study_id: str) -> None:
+    study = service.store.study(study_id)
+    query = main_query(study, models.study_results(study))
+    assert query is not None
+    assert (query.x, query.by) == ("excitation.frequency", ("shaft.load", "sweep"))
+
+    class Library:
+        store = service.store
+
+    drawn = curves_of(Library(), study_id, query)  # type: ignore[arg-type]
+    figure = curves_figure([("", drawn)])
+    (panel,) = figure.panels
+    assert [(line.name, line.style) for line in panel.lines] == [
+        ("0.1, up", 0), ("0.1, down", 1), ("0.2, up", 0), ("0.2, down", 1),
+    ]  # fmt: skip
+    colours = [line.colour for line in panel.lines]
+    assert colours[0] == colours[1] != colours[2] == colours[3]
+    assert [[part.tolist() for part in line.stretches or ()] for line in panel.lines[:2]] == [
+        [[0, 1, 2], [3, 4]],
+        [[0], [1, 2, 3, 4]],
+    ]
+    assert [(band.low, band.high) for band in panel.bands[:2]] == [(18.0, 19.0), (16.0, 17.0)]
+    told = hysteresis(drawn)
+    assert told == figure.below
+    assert (
+        "up and down differ at 17 to 18 Hz, by up to 71 % of the range of shaft.speed.mean (at 17 Hz); 4 jumps" in told
+    )
+    dashes = [trace["line"]["dash"] for trace in plotly_figure(figure)["data"] if "line" in trace][:2]
+    assert dashes == ["solid", "dash"]
+    alone = curves_of(
+        Library(),
+        study_id,
+        CurveQuery(query.x, query.y, (), (("shaft.load", "0.1"), ("sweep", "up"))),  # type: ignore[arg-type]
+    )
+    assert hysteresis(alone) == "1 jump along the sweep."
+
+
+def test_pictures_pages_and_files_of_a_sweep(service: Service, study_id: str) -> None:
+    picture = service.http.get(
+        f"{API}/studies/{study_id}/curves", params={**QUERY, "by": "shaft.load", "format": "svg"}
+    )
+    assert picture.status_code == 200
+    for page in ("", "/cases", "/cases/0", "/curves?x=excitation.frequency&y=shaft.speed.mean&at=sweep%3Ddown"):
+        found = service.http.get(f"/studies/{study_id}{page}")
+        assert found.status_code == 200, page
+    figure = service.http.get(f"/studies/{study_id}/figures/curves", params=QUERY)
+    assert "Hysteresis: up and down differ at 17 to 18 Hz" in figure.text
+    rows = list(csv.DictReader(io.StringIO(service.http.get(f"{API}/studies/{study_id}/results?format=csv").text)))
+    assert [row["sweep"] for row in rows[:4]] == ["0.0", "1.0", "0.0", "1.0"]
+    assert [row["flags"] for row in rows if row["flags"]] == ["jumped"] * 4
+    for form in ("xlsx", "parquet", "netcdf", "json"):
+        assert service.http.get(f"{API}/studies/{study_id}/results", params={"format": form}).status_code == 200
+    assert service.http.get(f"{API}/studies/{study_id}/report").status_code == 200
