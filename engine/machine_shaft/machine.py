@@ -77,9 +77,11 @@ def _check_part(part: PartChoice) -> None:
         raise StructureError(f"An operation has at most {MAX_STEPS} steps.")
     has_formula = bool(mechanism.formula)
     _check_form("The inertia of the mechanism", mechanism.kind, mechanism.table is not None, has_formula)
-    if operation.quantity in {"torque", "force"}:
+    if operation.quantity in {"torque", "force", "pressure"}:
         _check_form("The operation", operation.form, operation.table is not None, bool(operation.formula))
-    needs = operation.quantity in {"force", "gas"} or (operation.quantity == "torque" and operation.over == "stroke")
+    needs = operation.quantity in {"force", "gas", "pressure"} or (
+        operation.quantity == "torque" and operation.over == "stroke"
+    )
     if needs and mechanism.kind not in LINKED:
         raise StructureError(
             "A force, a gas or a diagram over the stroke needs a mechanism with dimensions, such as a slider_crank."

@@ -10,7 +10,7 @@ from sprag.engine.machine_shaft.expressions import Expression
 from sprag.engine.machine_shaft.mechanisms import Mechanism, Values
 from sprag.engine.machine_shaft.roots import bracketed_roots, switches
 from sprag.engine.machine_shaft.spec import OperationChoice
-from sprag.engine.machine_shaft.tables import Curve, over_stroke, periodic
+from sprag.engine.machine_shaft.tables import Curve, along_strokes, over_stroke, periodic
 
 Floats = NDArray[np.float64]
 
@@ -147,7 +147,10 @@ class Operation:
         self._cycle = _TURN * revolutions
         self._curve: Curve | None = None
         self._expression: Expression | None = None
-        if choice.table is not None and choice.form == "table":
+        self._strokes: tuple[Curve, ...] = ()
+        if choice.quantity == "pressure" and choice.over == "stroke" and choice.table is not None:
+            self._strokes = along_strokes(choice.table, 2 * revolutions)
+        elif choice.table is not None and choice.form == "table":
             self._curve = over_stroke(choice.table) if choice.over == "stroke" else periodic(choice.table, self._cycle)
         if choice.formula is not None and choice.form == "formula":
             names = ("phi", "x", *constants) if stroke is not None else ("phi", *constants)
@@ -214,8 +217,23 @@ class Operation:
             raise AssertionError("a force needs a mechanism")
         if choice.quantity == "gas":
             return np.asarray(scale * self._gas(phi, self._stroke) * way_slope)
+        if choice.quantity == "pressure":
+            v = self._values
+            force = (self._pressure(phi, self._stroke) - v["indicator.back_pressure"]) * v["indicator.piston_area"]
+            return np.asarray(scale * force * way_slope)
         against = np.abs(way_slope) if choice.sense == "resisting" else way_slope
         return np.asarray(-scale * self._diagram(phi) * against)
+
+    def _pressure(self, phi: Floats, stroke: Stroke) -> Floats:
+        """Pressure on the piston in Pa; the strokes of a cycle are counted from the start of the first forward one."""
+        if self._curve is not None:
+            return self._curve(phi)
+        x, forward = stroke.fraction(phi), stroke.forward(phi)
+        turn = np.floor(np.mod(phi - stroke.start, self._cycle) / _TURN)
+        pressure: Floats = 0.0 * x
+        for index, curve in enumerate(self._strokes):
+            pressure = np.where((turn == index // 2) & (forward == (index % 2 == 0)), curve(x), pressure)
+        return pressure
 
     def _gas(self, phi: Floats, stroke: Stroke) -> Floats:
         """Force on the piston towards the forward stroke, in N; the cylinder's head is where that stroke starts."""
@@ -252,6 +270,14 @@ class Operation:
             return []
         if choice.quantity == "gas" and self._stroke is not None:
             return self._gas_breaks(self._stroke)
+        if self._strokes and self._stroke is not None:
+            return [
+                np.mod(
+                    self._stroke.angles(curve.knots[None, None, :], forward=index % 2 == 0) + _TURN * (index // 2),
+                    self._cycle,
+                )[:, 0, :]
+                for index, curve in enumerate(self._strokes)
+            ]
         if choice.form == "formula" and self._expression is not None:
             return formula_breaks(self._expression, self._environment, self._revolutions)
         if choice.form == "steps":

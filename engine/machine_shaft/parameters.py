@@ -176,12 +176,22 @@ _GAS = (
 )
 
 
+_INDICATOR = (
+    Parameter("operation.indicator.piston_area", "A", "m^2", 0.0, 1e6, True, None, "area of the piston"),
+    Parameter(
+        "operation.indicator.back_pressure", "p_0", "Pa", 0.0, 1e12, False, 101325.0, "pressure on the piston's back"
+    ),
+)
+
+
 def _operation(operation: OperationChoice, cycle: int) -> tuple[Parameter, ...]:
     if operation.quantity == "none":
         return ()
     scale = Parameter("operation.scale", "k", "1", -_ANY, _ANY, False, 1.0, "factor on the whole diagram")
     if operation.quantity == "gas":
         return (scale, *_GAS)
+    if operation.quantity == "pressure":
+        return (scale, *_INDICATOR)
     unit = "N*m" if operation.quantity == "torque" else "N"
     if operation.form == "constant":
         own = Parameter("operation.value", "F", unit, -_ANY, _ANY, False, None, "resistance, the same at every angle")

@@ -19,7 +19,7 @@ MechanismKind = Literal[
 ]  # fmt: skip
 QuickReturn = Literal["whitworth", "crank_shaper"]
 Form = Literal["constant", "table", "formula", "steps"]
-Quantity = Literal["none", "torque", "force", "gas"]
+Quantity = Literal["none", "torque", "force", "gas", "pressure"]
 Over = Literal["angle", "stroke"]
 During = Literal["forward", "return", "both"]
 Sense = Literal["resisting", "fixed"]
@@ -74,9 +74,9 @@ class OperationChoice:
 
     Attributes
     ----------
-    quantity : {"none", "torque", "force", "gas"}
-        Torque on the shaft (N*m, positive where it resists), force on the mechanism's working part (N), or a gas
-        compressed by it.
+    quantity : {"none", "torque", "force", "gas", "pressure"}
+        Torque on the shaft (N*m, positive where it resists), force on the mechanism's working part (N), a gas
+        compressed by it, or the pressure of a gas on it as a table (Pa; over the stroke its rows go to and fro).
     form : {"constant", "table", "formula", "steps"}
         How a torque or force is given.
     over : {"angle", "stroke"}

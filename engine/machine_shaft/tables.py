@@ -154,6 +154,32 @@ def periodic(table: Table, period: float) -> Curve:
 
 
 @cache
+def along_strokes(table: Table, strokes: int) -> tuple[Curve, ...]:
+    """The table as functions of the stroke's fraction, one for each of ``strokes``: from 0 to 1, back to 0, and so on.
+
+    Raises
+    ------
+    TableError
+    """
+    ends, first = (1.0, 0.0), 0
+    curves: list[Curve] = []
+    if not table.rows or abs(table.rows[0][0]) > 1e-9:
+        raise TableError("An indicator diagram over the stroke begins at 0, where the forward stroke does.")
+    while first < len(table.rows) - 1:
+        end = ends[len(curves) % 2]
+        last = next((k for k in range(first + 1, len(table.rows)) if abs(table.rows[k][0] - end) <= 1e-9), None)
+        if last is None:
+            raise TableError(f"Stroke {len(curves) + 1} of the indicator diagram does not come to {end:g}.")
+        rows = table.rows[first : last + 1]
+        curves.append(over_stroke(Table(rows if end == 1.0 else rows[::-1], table.interpolation)))
+        # Two rows at a dead centre are a jump there.
+        first = last + 1 if last + 1 < len(table.rows) and abs(table.rows[last + 1][0] - end) <= 1e-9 else last
+    if len(curves) != strokes:
+        raise TableError(f"The indicator diagram has {len(curves)} strokes, but the cycle has {strokes}.")
+    return tuple(curves)
+
+
+@cache
 def over_stroke(table: Table) -> Curve:
     """The table as a function of the stroke's fraction; its rows run from 0 to 1.
 

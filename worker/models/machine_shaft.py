@@ -91,7 +91,12 @@ def catalogue() -> tuple[Parameter, ...]:
     every += [MachineSpec(drive=Drive(flywheel="rim"))]
     every += [MachineSpec(drive=Drive(stages=(stage,))) for stage in get_args(Stage)]
     every += [MachineSpec(mechanism=MechanismChoice(kind)) for kind in kinds]
-    forms = (OperationChoice("force"), OperationChoice("force", "steps", steps=1), OperationChoice("gas"))
+    forms = (
+        OperationChoice("force"),
+        OperationChoice("force", "steps", steps=1),
+        OperationChoice("gas"),
+        OperationChoice("pressure"),
+    )
     every += [MachineSpec(cycle=max(REVOLUTIONS), operation=form) for form in forms]
     every += [MachineSpec(parts=(PartChoice(),))]
     found: dict[str, Parameter] = {}

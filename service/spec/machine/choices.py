@@ -100,6 +100,11 @@ def _mechanism_choices(mechanism: Mapping[str, Any]) -> Iterator[tuple[str, str]
 
 def _operation_choices(operation: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     form = operation.get("form", operation["quantity"])  # a gas has no form; without an operation there is neither
+    if operation["quantity"] == "pressure":
+        yield "operation", "indicator"
+        yield "operation.over", operation["over"]
+        yield "operation.interpolation", operation["table"]["interpolation"]
+        return
     yield "operation", "value" if form == "constant" else form
     if "form" not in operation:
         return

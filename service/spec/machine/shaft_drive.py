@@ -111,11 +111,12 @@ def read_drive(report: Report, data: object, places: dict[str, str]) -> dict[str
     torque = found.get("torque")
     if not isinstance(torque, Mapping):
         return drive
-    given = read_object(report, "/base/drive/torque", torque, ("table", "formula", "interpolation"))
+    given = read_object(report, "/base/drive/torque", torque, ("table", "csv", "formula", "interpolation"))
     diagram = None if given is None else read_diagram(report, "/base/drive/torque", given, ANGLE, value_in("N*m"))
     if diagram is None:
         return None
-    places["drive"] = f"/base/drive/torque/{diagram['form']}"
+    form = "csv" if "csv" in torque else diagram["form"]
+    places["drive"] = f"/base/drive/torque/{form}"
     return drive | diagram
 
 

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from sprag.service.spec.described import Described, Listed, choice, named
 from sprag.service.spec.fields import read_object, read_one
+from sprag.service.spec.machine.shaft_tables import read_csv_rows
 from sprag.service.spec.report import Report, join
 from sprag.service.spec.units import QuantityError, parse_quantity
 from sprag.worker import models
@@ -32,9 +33,12 @@ MECHANISM_CHOICES: Final[dict[str, dict[str, Described]]] = {
     "quick_return": named(choice("kind", "kind of the quick return", "crank_shaper", "whitworth")),
     "cam": named(*(choice(part, f"law of the {part}", *_LAWS, default=_LAWS[0]) for part in ("rise", "fall"))),
 }
-MECHANISMS: Final = ("table", "formula", *MECHANISM_CHOICES)
+MECHANISMS: Final = ("table", "csv", "formula", *MECHANISM_CHOICES)
 #: Ways to give an operation.
-FORMS: Final = ("value", "steps", "table", "formula", "gas")
+FORMS: Final = ("value", "steps", "table", "csv", "formula", "gas", "indicator")
+#: What of an indicator diagram is no number: its rows over the shaft's angle, or along the strokes of the cycle.
+INDICATOR_OVER: Final = choice("over", "against the shaft's angle, or the volume as fraction of the stroke", "angle",
+                               "stroke", default="angle")  # fmt: skip
 _OVER: Final = "against the shaft's angle, or the fraction of the stroke"
 _DURING: Final = "strokes in which a diagram over the stroke holds"
 _SENSE: Final = "a force against the motion, or always against the forward stroke"
@@ -130,9 +134,13 @@ def read_mechanism(report: Report, data: object, places: dict[str, str], prefix:
     if kind is None:
         return None
     places[f"{prefix}mechanism"] = pointer = join(where, kind)
-    if kind in {"table", "formula"}:
+    if kind in {"table", "csv", "formula"}:
         diagram = read_diagram(report, where, found, ANGLE, value_in("kg*m^2"))
-        return None if diagram is None else {"kind": kind, "table": diagram["table"], "formula": diagram["formula"]}
+        return (
+            None
+            if diagram is None
+            else {"kind": diagram["form"], "table": diagram["table"], "formula": diagram["formula"]}
+        )
     if "interpolation" in found:
         told = "applies to a table, and there is none"
         report.fault(join(where, "interpolation"), "not-used", told, found["interpolation"])
@@ -156,6 +164,8 @@ def read_operation(report: Report, data: object, places: dict[str, str], prefix:
         return None
     if "gas" in found:
         return _read_gas(report, where, found)
+    if "indicator" in found:
+        return _read_indicator(report, where, found, places, prefix)
     form = read_one(report, where, found, FORMS)
     if form is None:
         return None
@@ -174,17 +184,40 @@ def read_operation(report: Report, data: object, places: dict[str, str], prefix:
     return None if diagram is None else operation | diagram
 
 
-def _read_gas(report: Report, where: str, found: Mapping[str, Any]) -> dict[str, Any] | None:
-    foreign = [name for name in found if name not in {"gas", "scale"}]
+def _beside(report: Report, where: str, found: Mapping[str, Any], form: str) -> bool:
+    """Whether there are fields beside a gas or an indicator diagram that do not belong to it; each is a fault."""
+    foreign = [name for name in found if name not in {form, "scale"}]
     for name in foreign:
-        report.fault(
-            join(where, name),
-            "not-used",
-            "does not belong to a gas, which is compressed by the working part over the whole cycle",
-            found[name],
-            allowed="gas, scale",
-        )
-    if foreign or read_object(report, join(where, "gas"), found["gas"], numbers_under("operation.gas.")) is None:
+        told = "does not belong to a gas, which acts on the working part over the whole cycle"
+        report.fault(join(where, name), "not-used", told, found[name], allowed=f"{form}, scale")
+    return bool(foreign)
+
+
+def _read_indicator(
+    report: Report, where: str, found: Mapping[str, Any], places: dict[str, str], prefix: str
+) -> dict[str, Any] | None:
+    """Read an indicator diagram: pressure over the angle or along the strokes."""
+    pointer = join(where, "indicator")
+    names = ("over", "table", "csv", "interpolation", *numbers_under("operation.indicator."))
+    own = (
+        None if _beside(report, where, found, "indicator") else read_object(report, pointer, found["indicator"], names)
+    )
+    over = None if own is None else INDICATOR_OVER.read(report, pointer, own)
+    if own is None or over is None:
+        return None
+    form = read_one(report, pointer, own, ("table", "csv"))
+    if form is None:
+        return None
+    places[f"{prefix}operation"] = join(pointer, form)
+    diagram = read_diagram(report, pointer, own, ANGLE if over == "angle" else _FRACTION, value_in("Pa"))
+    return None if diagram is None else {"quantity": "pressure", "over": over, "steps": 0} | diagram
+
+
+def _read_gas(report: Report, where: str, found: Mapping[str, Any]) -> dict[str, Any] | None:
+    if (
+        _beside(report, where, found, "gas")
+        or read_object(report, join(where, "gas"), found["gas"], numbers_under("operation.gas.")) is None
+    ):
         return None
     return {"quantity": "gas", "over": "angle", "steps": 0}
 
@@ -216,12 +249,15 @@ def value_in(unit: str) -> Parameter:
 def read_diagram(
     report: Report, pointer: str, found: Mapping[str, Any], place: Parameter, value: Parameter
 ) -> dict[str, Any] | None:
-    """Form, table and formula of a diagram that is given either as a table or as a formula."""
-    form = read_one(report, pointer, found, ("table", "formula"))
-    if form != "table":
+    """Form, table and formula of a diagram that is given as a table, the text of a CSV file or a formula."""
+    form = read_one(report, pointer, found, ("table", "csv", "formula"))
+    if form not in {"table", "csv"}:
         return None if form is None else _formula(report, pointer, found)
     before = report.found
-    rows = ROWS.read_rows(report, join(pointer, "table"), found["table"], place, value)
+    if form == "csv":
+        rows = read_csv_rows(report, join(pointer, "csv"), found["csv"], place, value)
+    else:
+        rows = ROWS.read_rows(report, join(pointer, "table"), found["table"], place, value)
     interpolation = INTERPOLATION.read(report, pointer, found)
     if report.found > before:
         return None

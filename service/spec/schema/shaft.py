@@ -9,6 +9,7 @@ from sprag.service.spec.machine.shaft import MEAN_SPEED_IS
 from sprag.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE, STAGES
 from sprag.service.spec.machine.shaft_parts import (
     FORMS,
+    INDICATOR_OVER,
     INTERPOLATION,
     MECHANISM_CHOICES,
     MECHANISMS,
@@ -56,6 +57,7 @@ def _diagram(table: str, formula: str) -> Schema:
     row = {"type": "array", "minItems": 2, "maxItems": 2, "items": QUANTITY}
     return {
         "table": {**ROWS.schema(row), "description": f"rows of {table}"},
+        "csv": {"type": "string", "description": f"{table} as the text of a CSV file, headings with units in brackets"},
         "interpolation": INTERPOLATION.schema(),
         "formula": {"type": "string", "minLength": 1, "description": formula},
     }
@@ -103,13 +105,27 @@ def _mechanism() -> Schema:
 
 def _operation() -> Schema:
     step, gas = numbers_under("operation.steps.K."), numbers_under("operation.gas.")
+    indicator = numbers_under("operation.indicator.")
     table = "angle (rad) or fraction of the stroke, and force (N) or torque (N*m)"
+    pressure = "angle (rad) or fraction of the stroke, to and fro in every revolution, and absolute pressure (Pa)"
     schema = object_schema(
         {
             **schemas(OPERATION_CHOICES),
             **quantities(numbers_under("operation.")),
             "steps": STEPS.schema(object_schema(quantities(step), required_of(step))),
             **_diagram(table, "force or torque as a formula of phi (rad) and x (fraction of the stroke)"),
+            "indicator": one_of(
+                object_schema(
+                    {
+                        "over": INDICATOR_OVER.schema(),
+                        **quantities(indicator),
+                        **{name: field for name, field in _diagram(pressure, "").items() if name != "formula"},
+                    },
+                    required_of(indicator),
+                    "the pressure on the piston as measured",
+                ),
+                ("table", "csv"),
+            ),
             "gas": object_schema(
                 quantities(gas), required_of(gas), "a gas drawn in and compressed by the working part"
             ),

@@ -1,0 +1,64 @@
+"""Tables of a machine shaft that are given as the text of a CSV file: two columns with headings and units."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+from sprag.service.spec.csv_text import HEADING, read_csv
+from sprag.service.spec.fields import exact
+from sprag.service.spec.numbers import parse_number
+from sprag.service.spec.report import Report
+from sprag.service.spec.units import QuantityError, parse_exact, to_float
+from sprag.worker.models import Parameter, machine_shaft
+
+_COMMA: Final = re.compile(r"\s*[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?\s*")
+
+
+def read_csv_rows(report: Report, where: str, text: object, *columns: Parameter) -> list[list[float]]:
+    """Rows with an SI number for each of ``columns``; faults, with their lines, are recorded.
+
+    A heading is a name and, in brackets, a unit, which is SI where there is none: ``angle [deg],torque [kN*m]``.
+    """
+    example = "headings, then at least two lines, as in " + ",".join(f"{c.path} [{c.unit}]" for c in columns)
+    rows = read_csv(report, where, text, (machine_shaft.MAX_ROWS, len(columns)), example)
+    if rows is None:
+        return []
+    headings = [HEADING.fullmatch(cell) for cell in rows[0].cells]
+    if len(headings) != len(columns) or None in headings:
+        report.fault(where, "wrong-type", f"must have {len(columns)} columns with headings", allowed=example)
+        return []
+    units = [(heading[2] or "") if heading else "" for heading in headings]
+    before = report.found
+    for unit, column in zip(units, columns, strict=True):
+        try:
+            parse_exact(f"1 {unit}" if unit else 1, column.unit)
+        except QuantityError as error:
+            report.fault(where, error.code, f"the heading of column {column.path} {error}", unit, unit=column.unit)
+    if report.found > before:
+        return []
+    found: list[list[float]] = []
+    for row in rows[1:]:
+        numbers = [
+            _read_cell(report, where, row.line, cell, unit, column)
+            for cell, unit, column in zip(row.cells, units, columns, strict=True)
+        ]
+        found.append([number for number in numbers if number is not None])
+        if report.full:
+            break
+    return found
+
+
+def _read_cell(report: Report, where: str, line: int, cell: str, unit: str, column: Parameter) -> float | None:
+    text = cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell.strip()
+    try:
+        value: object = f"{text} {unit}" if unit else text
+        if not unit:
+            value = parse_number(text)
+            if value is None:
+                raise QuantityError("wrong-type", "is not a number")
+        return to_float(exact(value, column))
+    except QuantityError as error:
+        report.fault(where, error.code, f"line {line}, column {column.path}: {error}", cell,
+                       allowed=column.range_text(), unit=column.unit)  # fmt: skip
+        return None

@@ -1,0 +1,78 @@
+"""Tables of machine shafts as the text of CSV files, and indicator diagrams in specs."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import jsonschema
+import pytest
+
+from sprag.service.spec.document import parse_spec
+from sprag.service.spec.machine.registry import part_of
+from sprag.service.spec.schema.document import spec_schema
+from tests.service.spec.machine.test_shaft import changed, problems
+
+TORQUE = "angle [deg];torque [kN*m]\n0;0,1\n90;0,3\n360;0,1\n"
+INDICATOR: dict[str, Any] = {
+    "over": "stroke", "piston_area": "60 cm^2", "interpolation": "linear",
+    "csv": "x,p [bar]\n0,20\n1,2\n1,1\n0,6\n",
+}  # fmt: skip
+
+
+def test_a_csv_text_is_a_table() -> None:
+    operation = {"quantity": "torque", "csv": TORQUE, "interpolation": "linear"}
+    spec = changed({"/base/operation": operation, "/base/mechanism": {"csv": "phi,I\n0,2\n3,4\n"}, "/axes": []})
+    structure = parse_spec(spec).study.structure
+    assert structure is not None
+    assert structure["operation"]["form"] == "table"
+    rows = structure["operation"]["table"]["rows"]
+    assert [row[1] for row in rows] == [100.0, 300.0, 100.0]
+    assert [row[0] for row in rows] == pytest.approx([0.0, 0.5 * math.pi, 2.0 * math.pi], rel=1e-15)
+    assert structure["mechanism"] == {
+        "kind": "table", "formula": None, "table": {"rows": [[0.0, 2.0], [3.0, 4.0]], "interpolation": "smooth"},
+    }  # fmt: skip
+    jsonschema.Draft202012Validator(spec_schema()).validate(spec)
+    torque = {"csv": "angle [deg],M [N*m]\n0,60\n180,70\n"}
+    drive = parse_spec(changed({"/base/drive/torque": torque, "/base/balance": "scale", "/axes": []})).study.structure
+    assert drive is not None
+    assert drive["drive"]["table"]["rows"][1] == [math.pi, 70.0]
+
+
+def test_an_indicator_diagram() -> None:
+    spec = changed({"/base/operation": {"indicator": INDICATOR}, "/base/mean_speed": "600 rpm", "/axes": []})
+    study = parse_spec(spec).study
+    assert study.structure is not None
+    assert study.structure["operation"]["table"]["rows"] == [[0.0, 2e6], [1.0, 2e5], [1.0, 1e5], [0.0, 6e5]]
+    assert study.base["operation.indicator.piston_area"] == 6e-3
+    assert study.base["operation.indicator.back_pressure"] == 101325.0
+    jsonschema.Draft202012Validator(spec_schema()).validate(spec)
+    chosen = {choice.path: choice.text for choice in part_of("machine-shaft").choices(study, spec)}
+    assert (chosen["operation"], chosen["operation.over"]) == ("indicator", "stroke")
+
+
+@pytest.mark.parametrize(
+    ("operation", "pointer", "text"),
+    [
+        ({"quantity": "torque", "csv": "angle [deg],torque\n0,1\n90,x\n"}, "csv", "line 3, column value"),
+        (
+            {"quantity": "torque", "csv": "angle [kg],torque\n0,1\n90,2\n"},
+            "csv",
+            "the heading of column angle is in 'kg'",
+        ),
+        ({"quantity": "torque", "csv": "angle\n0\n1\n"}, "csv", "must have 2 columns"),
+        ({"quantity": "torque", "csv": [[0, 1]]}, "csv", "must be the text of a CSV file"),
+        ({"quantity": "torque", "csv": TORQUE, "table": [[0, 1], [1, 2]]}, "", "exactly one"),
+        ({"indicator": INDICATOR, "quantity": "force"}, "quantity", "does not belong to a gas"),
+        ({"indicator": {**INDICATOR, "csv": ...}}, "indicator", "needs exactly one of table, csv"),
+        ({"indicator": {**INDICATOR, "piston_area": ...}}, "indicator/piston_area", "is required"),
+        ({"indicator": {**INDICATOR, "csv": "x,p\n0,1\n1,2\n"}}, "indicator/csv", "has 1 strokes"),
+        ({"indicator": {**INDICATOR, "csv": "x,p\n0,1\n1.5,2\n"}}, "indicator/csv", "line 3, column fraction"),
+    ],
+)
+def test_wrong_tables(operation: dict[str, Any], pointer: str, text: str) -> None:
+    if "indicator" in operation:
+        own = {name: value for name, value in operation["indicator"].items() if value is not ...}
+        operation = operation | {"indicator": own}
+    found = problems({"/base/operation": operation, "/base/mean_speed": "600 rpm", "/axes": []})
+    assert text in found[f"/base/operation/{pointer}".rstrip("/")].message
