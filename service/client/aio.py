@@ -25,6 +25,7 @@ from sprag.service.client.queries import (
     finish_text,
     form_of,
     front_query,
+    given,
     longer_query,
     reporting,
     result_query,
@@ -61,6 +62,7 @@ if TYPE_CHECKING:
     from sprag.service.answers.calibration import CalibrationReport
     from sprag.service.answers.goals import FrontReport
     from sprag.service.answers.results import Branch, Case
+    from sprag.service.answers.sections import Sections
     from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
     from sprag.service.client.queries import Spec
 
@@ -276,6 +278,27 @@ class AsyncStudy:
     async def branch(self, case: int, along: str, low: Value | None = None, high: Value | None = None) -> Branch:
         """The branch of periodic motions through that of one case, as `Study.branch` gives it."""
         return cast("Branch", await self._get(f"/cases/{case:d}/branch", branch_query(along, low, high)))
+
+    async def diagram(
+        self,
+        case: int,
+        along: str,
+        low: Value | None = None,
+        high: Value | None = None,
+        *,
+        phase: Value | None = None,
+        points: int | None = None,
+        strobes: int | None = None,
+    ) -> Sections:
+        """The bifurcation diagram of one case, as `Study.diagram` gives it."""
+        query = branch_query(along, low, high, phase=phase, points=points, strobes=strobes)
+        return cast("Sections", await self._get(f"/cases/{case:d}/diagram", query))
+
+    async def section(self, case: int, phase: Value | None = None, strobes: int | None = None) -> Sections:
+        """The Poincare section of one case, as `Study.section` gives it."""
+        return cast(
+            "Sections", await self._get(f"/cases/{case:d}/section", given({"phase": phase, "strobes": strobes}))
+        )
 
     async def cases(
         self, *, ending: str | None = None, regime: str | None = None, flag: str | None = None

@@ -17,8 +17,8 @@ from sprag.service.client.wire import (
     FILE_TIMEOUT,
     Drawn,
     Query,
-    branch_path,
     calibration_path,
+    case_path,
     connection_options,
     document,
     engagements_path,
@@ -159,9 +159,9 @@ class ServiceClient:
         """The state of one case once per excitation period, and its orbit."""
         return self._json("GET", strobes_path(study_id, case))
 
-    def branch(self, study_id: str, case: int, query: Query) -> dict[str, Any]:
-        """The branch through the motion of one case; the query says along which parameter."""
-        return self._json("GET", branch_path(study_id, case), params=list(query))
+    def of_case(self, study_id: str, case: int, part: str, query: Query) -> dict[str, Any]:
+        """A part of one case: the "branch" or "diagram" of its motion along a parameter, or its "section"."""
+        return self._json("GET", case_path(study_id, case, part), params=list(query))
 
     def download(self, path: str, query: Query = ()) -> Iterator[bytes]:
         """The bytes of a document under the API, such as ``/studies/ID/results`` with ``format=csv``, as they come."""

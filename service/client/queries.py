@@ -95,10 +95,14 @@ def longer_query(regime: str | None, at_most: int | None) -> list[tuple[str, str
     return [(name, str(value)) for name, value in given if value is not None]
 
 
-def branch_query(along: str, low: Value | None, high: Value | None) -> list[tuple[str, str]]:
-    """Query of a branch; None leaves an end of the range to the service."""
-    ends = (("from", low), ("to", high))
-    return [("along", along), *((name, str(value)) for name, value in ends if value is not None)]
+def branch_query(along: str, low: Value | None, high: Value | None, **more: Value | None) -> list[tuple[str, str]]:
+    """Query of a branch, or of a diagram with ``more`` parameters; None leaves one to the service."""
+    return [("along", along), *given({"from": low, "to": high, **more})]
+
+
+def given(query: Mapping[str, Value | None]) -> list[tuple[str, str]]:
+    """Those parameters of a query that are not None."""
+    return [(name, str(value)) for name, value in query.items() if value is not None]
 
 
 def result_query(y: str | Sequence[str]) -> list[tuple[str, str]]:

@@ -20,6 +20,7 @@ from sprag.service.client.queries import (
     finish_text,
     form_of,
     front_query,
+    given,
     reporting,
     result_query,
     ribbon_query,
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from sprag.service.answers.calibration import CalibrationReport
     from sprag.service.answers.goals import FrontReport
     from sprag.service.answers.results import Branch, Case
+    from sprag.service.answers.sections import Sections
     from sprag.service.answers.studies import Preview, StudyDetail, StudySummary
     from sprag.service.client.queries import Spec
 
@@ -234,7 +236,31 @@ class Study:
         low, high : float or str, optional
             Range of the parameter, SI numbers or texts with a unit; by default the ends of its axis.
         """
-        return cast("Branch", self._client.plain.branch(self.id, case, branch_query(along, low, high)))
+        return cast("Branch", self._client.plain.of_case(self.id, case, "branch", branch_query(along, low, high)))
+
+    def diagram(
+        self,
+        case: int,
+        along: str,
+        low: Value | None = None,
+        high: Value | None = None,
+        *,
+        phase: Value | None = None,
+        points: int | None = None,
+        strobes: int | None = None,
+    ) -> Sections:
+        """The bifurcation diagram of one case: strobes of its settled motions at ``points`` values of a parameter.
+
+        ``along``, ``low`` and ``high`` are as of `branch`; ``phase`` is that of the excitation, in rad or a text with a
+        unit; ``strobes`` is the most for each motion.
+        """
+        query = branch_query(along, low, high, phase=phase, points=points, strobes=strobes)
+        return cast("Sections", self._client.plain.of_case(self.id, case, "diagram", query))
+
+    def section(self, case: int, phase: Value | None = None, strobes: int | None = None) -> Sections:
+        """The Poincare section of one case: strobes of its settled motion at a phase of the excitation."""
+        query = given({"phase": phase, "strobes": strobes})
+        return cast("Sections", self._client.plain.of_case(self.id, case, "section", query))
 
     def cases(self, *, ending: str | None = None, regime: str | None = None, flag: str | None = None) -> Iterator[Case]:
         """Every finished case in order of the numbers, or those with an ending, a regime and a flag only."""

@@ -106,9 +106,9 @@ def strobes_path(study_id: str, case: int) -> str:
     return f"{study_path(study_id)}/cases/{case:d}/strobes"
 
 
-def branch_path(study_id: str, case: int) -> str:
-    """Address of the branch of a case under the API."""
-    return f"{study_path(study_id)}/cases/{case:d}/branch"
+def case_path(study_id: str, case: int, part: str) -> str:
+    """Address of a part of a case under the API, such as its branch."""
+    return f"{study_path(study_id)}/cases/{case:d}/{part}"
 
 
 def schedule_path(schedule_id: str) -> str:

@@ -20,6 +20,7 @@ from sprag.service.http.access import Access
 from sprag.service.http.api import (
     batches,
     calibrations,
+    case_branches,
     case_tables,
     cases,
     catalogues,
@@ -57,6 +58,7 @@ from sprag.service.http.web import (
     study,
     table,
 )
+from sprag.service.http.web import diagram as diagram_pages
 from sprag.service.http.web import engagements as engagement_pages
 from sprag.service.http.web import schedules as schedule_pages
 from sprag.service.http.web.form import page as form
@@ -220,6 +222,7 @@ def _routes() -> APIRouter:
         calibrations,
         fronts,
         cases,
+        case_branches,
         case_tables,
         clutch_fits,
         schedules,
@@ -242,6 +245,7 @@ def _routes() -> APIRouter:
         case,
         engagement_pages,
         branch_pages,
+        diagram_pages,
         compare,
         laboratory,
         schedule_pages,

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from sprag.engine.outcome import Engagements, Portrait, Trajectory
     from sprag.worker.models.branches import Along, CaseBranch
     from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
+    from sprag.worker.models.sections import CaseSections, Sampling
     from sprag.worker.study import Study
 
 
@@ -126,6 +127,10 @@ class Model(Protocol):
 
     def branch(self, study: Study, case: int, along: Along) -> CaseBranch:
         """The branch through the settled motion of a case; ValueError where there are no strobes."""
+        raise ValueError(f"a machine of model {self.name} has no strobes")
+
+    def sections(self, study: Study, case: int, asked: Sampling) -> CaseSections:
+        """Strobes of settled motions along a parameter of a case; ValueError where there are no strobes."""
         raise ValueError(f"a machine of model {self.name} has no strobes")
 
     def estimate_seconds_per_case(self, study: Study) -> float:

@@ -33,6 +33,7 @@ from sprag.worker.models.common import (
 )
 from sprag.worker.models.drive_presentation import PRESENTATION
 from sprag.worker.models.model import Model
+from sprag.worker.models.sections import CaseSections, Sampling, drive_sections
 from sprag.worker.models.settled import (
     REGIME_FLAGS,
     SWEEP_FLAGS,
@@ -289,6 +290,9 @@ class VibrationDrive(Model):
 
     def branch(self, study: Study, case: int, along: Along) -> CaseBranch:
         return drive_branch(study, case, along)
+
+    def sections(self, study: Study, case: int, asked: Sampling) -> CaseSections:
+        return drive_sections(study, case, asked)
 
     def estimate_seconds_per_case(self, study: Study) -> float:
         from sprag.engine.vibration_drive.simulate import estimate_seconds

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query
 from starlette.responses import Response
 
-from sprag.service.answers.results import Branch, EngagementTables, Portrait
+from sprag.service.answers.results import EngagementTables, Portrait
 from sprag.service.faults import choice_of
 from sprag.service.http.api.document import files, format_query, one_of, problems
 from sprag.service.http.context import CaseNumber, StartNumber, StudyId
@@ -16,15 +16,9 @@ from sprag.service.http.drawing import table as written
 from sprag.service.http.requests import strict_query
 from sprag.service.http.respond import choose_format
 from sprag.service.http.work import Attended
-from sprag.service.results import branches, engagements, portraits
-from sprag.service.results.figures.branch import branch_figure
-from sprag.service.results.pictures.curves import draw_figure, draw_portrait
+from sprag.service.results import engagements, portraits
+from sprag.service.results.pictures.curves import draw_portrait
 from sprag.worker import models
-from sprag.worker.models.branches import run_branch
-
-if TYPE_CHECKING:
-    from sprag.worker.models.branches import Along
-    from sprag.worker.study import Study
 
 router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
 
@@ -92,49 +86,3 @@ async def get_strobes(
     made = await work.run_case(models.run_portrait, study, number)
     title = f"{study.name}, case {case}"
     return await picture(draw_portrait, chosen, made, models.presentation_of(study), title).response(work)
-
-
-@router.get(
-    "/{case:case}/branch",
-    response_model=Branch,
-    responses={
-        **files("The branch as JSON, its points as CSV, or a picture.", DRAWN_FORMATS.values()),
-        **problems(*_PROBLEMS, "too-costly"),
-    },
-)
-async def get_branch(
-    work: Attended,
-    study_id: StudyId,
-    case: CaseNumber,
-    along: Annotated[
-        str,
-        Query(
-            description="path of the parameter, or several joined by commas that have one value",
-            examples=["shaft.load"],
-            max_length=400,
-        ),
-    ],
-    low: Annotated[
-        str | None,
-        Query(alias="from", description="start of the range, SI or with a unit; by default the smallest on its axis"),
-    ] = None,
-    high: Annotated[
-        str | None, Query(alias="to", description="end of the range, likewise; by default the largest on its axis")
-    ] = None,
-    y: Annotated[str | None, Query(description="the result that a picture shows")] = None,
-    which: StartNumber = None,
-    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
-) -> Response:
-    """The periodic motions that the motion of one case becomes along a parameter, stable and unstable ones."""
-    chosen = choose_format(work.request, form, DRAWN_FORMATS)
-
-    def look(study: Study, number: int) -> tuple[Along, str]:
-        return branches.along_of(study, number, along, low, high), branches.result_of(study, y)
-
-    study, number, (asked, result) = await work.case_of(study_id, case, look, which)
-    if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - so that the types are told apart
-        content = await work.run_case(branches.branch_file, study, number, asked, chosen)
-        return written(content, chosen, f"{study_id}-case-{case}-branch")
-    made = await work.run_case(run_branch, study, number, asked)
-    figure = branch_figure(made, study, asked, result)
-    return await picture(draw_figure, chosen, figure, f"{study.name}, case {case}").response(work)

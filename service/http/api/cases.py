@@ -103,7 +103,7 @@ def get_case(context: Ctx, study_id: StudyId, case: CaseNumber) -> Response:
         links["engagements"] = f"{own}/engagements"
     if models.has_strobes(study):
         links["strobes"] = f"{own}/strobes"
-        links["branch"] = f"{own}/branch"
+        links |= {name: f"{own}/{name}" for name in ("branch", "diagram", "section")}
     return json_response(
         {
             **row_json(row, parameters),

@@ -53,7 +53,7 @@ def branch_figure(made: CaseBranch, study: Study, along: Along, result: str, own
     ]
     lines = [line for line in lines if line.x.size]
     if own is not None and own.x.size:
-        lines.append(Line("cases of the study", own.x, own.y, _OWN, 2, key="own", cases=own.cases, joined=False))
+        lines.append(Line("cases of the study", own.x, own.y, _OWN, 2, key="2", cases=own.cases, joined=False))
     lines += _marks(made, values, x.unit)
     turn = "one excitation period" if made.order == 1 else f"{made.order} excitation periods"
     return Figure(x, (Panel(y, tuple(lines), x=x),), heading=f"orbits of {turn}", below=_below(made))

@@ -42,6 +42,8 @@ NEVER_SERVED = {
             "cases/{case}/engagements",
             "cases/{case}/strobes",
             "cases/{case}/branch",
+            "cases/{case}/diagram",
+            "cases/{case}/section",
             "cases/{case}/trajectory",
         )
     ),

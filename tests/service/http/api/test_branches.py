@@ -47,6 +47,11 @@ def test_a_branch_is_the_same_everywhere(service: Service, settled: str, portal:
         assert client.study(settled).branch(2, "shaft.load", 0.215, "0.23 N*m") == body
     figure = service.http.get(f"/studies/{settled}/cases/2/branch/figure?along=shaft.load").json()
     names = [trace["name"] for trace in figure["data"]]
+    assert "cases of the study" not in names
+    service.fill(settled)
+    drawn = service.http.get(f"/studies/{settled}/cases/2/branch/figure?along=shaft.load").json()["data"]
+    (own,) = (trace for trace in drawn if trace["name"] == "cases of the study")
+    assert (own["x"], own["customdata"]) == (LOADS, [0, 1, 2])
     assert names[:2] == ["stable", "unstable"]
     assert names[-1].startswith("doubling at 0.22298965")
     full, dashed = figure["data"][:2]

@@ -1,0 +1,164 @@
+"""The motions of one case along a parameter: its branch, its bifurcation diagram, and its Poincare section."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from fastapi import APIRouter, Depends, Query
+from starlette.responses import Response
+
+from sprag.service.answers.results import Branch
+from sprag.service.answers.sections import Sections
+from sprag.service.http.api.document import files, format_query, problems
+from sprag.service.http.context import CaseNumber, StartNumber, StudyId
+from sprag.service.http.drawing import DRAWN_FORMATS, picture
+from sprag.service.http.drawing import table as written
+from sprag.service.http.requests import strict_query
+from sprag.service.http.respond import choose_format
+from sprag.service.http.work import Attended
+from sprag.service.results import branches, sections
+from sprag.service.results.figures.branch import branch_figure
+from sprag.service.results.figures.sections import diagram_figure, section_figure
+from sprag.service.results.pictures.curves import draw_figure
+from sprag.worker.models.branches import run_branch
+from sprag.worker.models.sections import run_sections
+
+if TYPE_CHECKING:
+    from sprag.worker.models.branches import Along
+    from sprag.worker.models.sections import Sampling
+    from sprag.worker.study import Study
+
+router = APIRouter(prefix="/studies/{study_id:study}/cases", tags=["cases"], dependencies=[Depends(strict_query)])
+
+_PROBLEMS = (
+    "invalid-parameter", "study-not-found", "case-not-found", "not-found", "not-acceptable", "not-computed",
+    "timed-out", "too-costly", "too-many-requests", "unavailable",
+)  # fmt: skip
+
+Paths = Annotated[
+    str,
+    Query(
+        description="path of the parameter, or several joined by commas that have one value",
+        examples=["shaft.load"],
+        max_length=400,
+    ),
+]
+Low = Annotated[
+    str | None,
+    Query(alias="from", description="start of the range, SI or with a unit; by default the smallest on its axis"),
+]
+High = Annotated[
+    str | None, Query(alias="to", description="end of the range, likewise; by default the largest on its axis")
+]
+Phase = Annotated[
+    str | None,
+    Query(description="phase of the excitation at the strobes, rad or with a unit; by default 0", examples=["90 deg"]),
+]
+
+
+@router.get(
+    "/{case:case}/branch",
+    response_model=Branch,
+    responses={
+        **files("The branch as JSON, its points as CSV, or a picture.", DRAWN_FORMATS.values()),
+        **problems(*_PROBLEMS),
+    },
+)
+async def get_branch(
+    work: Attended,
+    study_id: StudyId,
+    case: CaseNumber,
+    along: Paths,
+    low: Low = None,
+    high: High = None,
+    y: Annotated[str | None, Query(description="the result that a picture shows")] = None,
+    which: StartNumber = None,
+    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
+) -> Response:
+    """The periodic motions that the motion of one case becomes along a parameter, stable and unstable ones."""
+    chosen = choose_format(work.request, form, DRAWN_FORMATS)
+
+    def look(study: Study, number: int) -> tuple[Along, str]:
+        return branches.along_of(study, number, along, low, high), branches.result_of(study, y)
+
+    study, number, (asked, result) = await work.case_of(study_id, case, look, which)
+    if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - so that the types are told apart
+        content = await work.run_case(branches.branch_file, study, number, asked, chosen)
+        return written(content, chosen, f"{study_id}-case-{case}-branch")
+    made = await work.run_case(run_branch, study, number, asked)
+    figure = branch_figure(made, study, asked, result)
+    return await picture(draw_figure, chosen, figure, f"{study.name}, case {case}").response(work)
+
+
+@router.get(
+    "/{case:case}/diagram",
+    response_model=Sections,
+    responses={
+        **files("The strobes as JSON or CSV, or a picture.", DRAWN_FORMATS.values()),
+        **problems(*_PROBLEMS),
+    },
+)
+async def get_diagram(
+    work: Attended,
+    study_id: StudyId,
+    case: CaseNumber,
+    along: Paths,
+    low: Low = None,
+    high: High = None,
+    phase: Phase = None,
+    points: Annotated[
+        int, Query(ge=2, le=sections.MAX_VALUES, description="equally spaced values of the parameter", examples=[20])
+    ] = 200,
+    strobes: Annotated[
+        int, Query(ge=1, le=sections.MAX_STROBES, description="most strobes of each motion", examples=[16])
+    ] = 64,
+    y: Annotated[str | None, Query(description="the variable that a picture shows")] = None,
+    which: StartNumber = None,
+    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
+) -> Response:
+    """Strobes of the settled motions of one case along a parameter, each from its own start: a bifurcation diagram."""
+    chosen = choose_format(work.request, form, DRAWN_FORMATS)
+
+    def look(study: Study, number: int) -> tuple[Sampling, str]:
+        asked = sections.diagram_of(study, number, along, (low, high), phase, (points, strobes))
+        return asked, sections.variable_of(study, y)
+
+    study, number, (asked, variable) = await work.case_of(study_id, case, look, which)
+    if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - so that the types are told apart
+        content = await work.run_case(sections.sections_file, study, number, asked, chosen)
+        return written(content, chosen, f"{study_id}-case-{case}-diagram")
+    made = await work.run_case(run_sections, study, number, asked)
+    figure = diagram_figure(made, study, asked, variable)
+    return await picture(draw_figure, chosen, figure, f"{study.name}, case {case}").response(work)
+
+
+@router.get(
+    "/{case:case}/section",
+    response_model=Sections,
+    responses={
+        **files("The strobes as JSON or CSV, or a picture.", DRAWN_FORMATS.values()),
+        **problems(*_PROBLEMS),
+    },
+)
+async def get_section(
+    work: Attended,
+    study_id: StudyId,
+    case: CaseNumber,
+    phase: Phase = None,
+    strobes: Annotated[int, Query(ge=1, le=sections.MAX_SECTION, description="most strobes", examples=[50])] = 1000,
+    which: StartNumber = None,
+    form: Annotated[str | None, format_query(DRAWN_FORMATS)] = None,
+) -> Response:
+    """Strobes of the settled motion of one case at a phase of the excitation: its Poincare section."""
+    chosen = choose_format(work.request, form, DRAWN_FORMATS)
+
+    def look(study: Study, number: int) -> Sampling:
+        return sections.section_of(study, number, phase, strobes)
+
+    study, number, asked = await work.case_of(study_id, case, look, which)
+    if chosen == "json" or chosen == "csv":  # noqa: PLR1714 - so that the types are told apart
+        content = await work.run_case(sections.sections_file, study, number, asked, chosen, True)
+        return written(content, chosen, f"{study_id}-case-{case}-section")
+    made = await work.run_case(run_sections, study, number, asked)
+    figure = section_figure(made, study, asked)
+    return await picture(draw_figure, chosen, figure, f"{study.name}, case {case}").response(work)

@@ -1,0 +1,116 @@
+"""The page of a bifurcation diagram and a Poincare section: strobes of settled motions at a phase of the excitation."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Final
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query
+from starlette.responses import Response
+
+from sprag.service.faults import FaultError
+from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
+from sprag.service.http.drawing import unchanging
+from sprag.service.http.respond import json_response
+from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.http.web.study import study_frame
+from sprag.service.http.web.templates import page
+from sprag.service.http.work import Attended
+from sprag.service.results.branches import usual_along
+from sprag.service.results.figures.sections import diagram_figure, section_figure
+from sprag.service.results.portraits import require_strobes
+from sprag.service.results.sections import diagram_of, section_of, variable_of, variables
+from sprag.service.results.selection import axis_name
+from sprag.worker.models.sections import run_sections
+
+if TYPE_CHECKING:
+    from sprag.worker.models.sections import Sampling
+    from sprag.worker.study import Study
+
+router = APIRouter(include_in_schema=False)
+
+Text = Annotated[str, Query(max_length=400)]
+Begin = Annotated[str, Query(alias="from", max_length=80)]
+End = Annotated[str, Query(alias="to", max_length=80)]
+Phase = Annotated[str, Query(max_length=80)]
+
+#: Values of the parameter and strobes of each; strobes of a section.
+_SIZE: Final = (200, 64)
+_SECTION: Final = 1000
+
+
+@router.get("/studies/{study_id:study}/cases/{case:case}/diagram")
+def diagram_page(
+    context: Ctx, study_id: StudyId, case: CaseNumber, along: Text = "", low: Begin = "", high: End = "",
+    phase: Phase = "", y: Text = "",
+) -> Response:  # fmt: skip
+    """The form of a diagram, its figure, and the section of the case."""
+    study = study_with(context, study_id, case)
+    require_strobes(study)
+    path = along or usual_along(study)
+    faults: tuple[Any, ...] = ()
+    diagram = section = ""
+    try:
+        shown = variable_of(study, y)
+        section_of(study, case, phase, _SECTION)
+        section = urlencode([("phase", phase.strip())] if phase.strip() else [])
+        if path:
+            diagram_of(study, case, path, (low, high), phase, _SIZE)
+            asked = {"along": path, "from": low.strip(), "to": high.strip(), "phase": phase.strip(), "y": shown}
+            diagram = urlencode({name: value for name, value in asked.items() if value})
+    except FaultError as error:
+        shown, faults = y, error.faults
+    own = f"/studies/{study_id}/cases/{case}"
+    return page(
+        "diagram.html",
+        status=422 if faults else 200,
+        **study_frame(context, study_id),
+        tab="/cases",
+        case=case,
+        along=path,
+        low=low,
+        high=high,
+        phase=phase,
+        y=shown,
+        faults=faults,
+        choices=[(axis.paths[0], axis_name(study, axis.paths[0])) for axis in study.axes],
+        variables=variables(study),
+        own=own,
+        diagram=diagram,
+        section=section,
+    )
+
+
+@router.get("/studies/{study_id:study}/cases/{case:case}/diagram/figure")
+async def diagram_drawn(
+    work: Attended, study_id: StudyId, case: CaseNumber, along: Text, low: Begin = "", high: End = "",
+    phase: Phase = "", y: Text = "",
+) -> Response:  # fmt: skip
+    """The figure of a bifurcation diagram."""
+
+    def look(study: Study, number: int) -> tuple[Sampling, str]:
+        return diagram_of(study, number, along, (low, high), phase, _SIZE), variable_of(study, y)
+
+    study, _, (asked, shown) = await work.case_of(study_id, case, look)
+
+    async def make() -> Response:
+        made = await work.run_case(run_sections, study, case, asked)
+        return json_response(plotly_figure(diagram_figure(made, study, asked, shown)))
+
+    return await unchanging(work, study_id, make)
+
+
+@router.get("/studies/{study_id:study}/cases/{case:case}/section/figure")
+async def section_drawn(work: Attended, study_id: StudyId, case: CaseNumber, phase: Phase = "") -> Response:
+    """The figure of a Poincare section."""
+
+    def look(study: Study, number: int) -> Sampling:
+        return section_of(study, number, phase, _SECTION)
+
+    study, _, asked = await work.case_of(study_id, case, look)
+
+    async def make() -> Response:
+        made = await work.run_case(run_sections, study, case, asked)
+        return json_response(plotly_figure(section_figure(made, study, asked)))
+
+    return await unchanging(work, study_id, make)

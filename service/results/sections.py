@@ -1,0 +1,126 @@
+"""Bifurcation diagrams and Poincare sections of a case: what is asked for, the document, and the table as CSV."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from sprag.service.faults import choice_of, parameter_error
+from sprag.service.json_text import numbers, to_bytes
+from sprag.service.results.branches import along_of
+from sprag.service.results.exports import table_csv
+from sprag.service.results.portraits import require_strobes
+from sprag.service.spec.catalogue import unit_of
+from sprag.service.spec.units import QuantityError, parse_quantity, split_quantity, to_float
+from sprag.worker.models.common import case_machine
+from sprag.worker.models.sections import Sampling, run_sections
+
+if TYPE_CHECKING:
+    from sprag.service.answers.sections import Sections
+    from sprag.service.formats import Format
+    from sprag.worker.models.sections import CaseSections
+    from sprag.worker.study import Study
+
+#: Most values of the parameter of a diagram, and most strobes of each; most strobes of a section.
+MAX_VALUES: Final = 500
+MAX_STROBES: Final = 200
+MAX_SECTION: Final = 5000
+
+
+def phase_of(text: str | None) -> float:
+    """The phase of the excitation as a part of its period; FaultError about the parameter ``phase``."""
+    if text is None or not text.strip():
+        return 0.0
+    try:
+        number, given = split_quantity(text)
+        angle = parse_quantity(text, "rad") if given else to_float(number)
+    except QuantityError as error:
+        raise parameter_error("phase", error.code, str(error), text, "an angle in rad or deg") from error
+    if not 0.0 <= angle <= 2.0 * math.pi * (1.0 + 1e-12):
+        raise parameter_error("phase", "out-of-range", "outside one period", text, "0 .. 360 deg")
+    return min(angle / (2.0 * math.pi), 1.0)
+
+
+def diagram_of(
+    study: Study, case: int, along: str, ends: tuple[str | None, str | None], phase: str | None, size: tuple[int, int]
+) -> Sampling:
+    """What a diagram asks for.
+
+    Parameters
+    ----------
+    study : Study
+    case : int
+    along, ends :
+        As `branches.along_of` takes them.
+    phase : str, optional
+    size : tuple of two int
+        Values of the parameter, equally spaced, and strobes of each.
+
+    Raises
+    ------
+    FaultError
+        As `branches.along_of`, and about ``phase``.
+    """
+    asked = along_of(study, case, along, *ends)
+    return Sampling(asked.paths, np.linspace(asked.low, asked.high, size[0]), phase_of(phase), size[1])
+
+
+def section_of(study: Study, case: int, phase: str | None, count: int) -> Sampling:
+    """What a section asks for; FaultError about ``phase``, or where the machine has no strobes."""
+    require_strobes(study)
+    own = case_machine(study, case)
+    path = next(iter(own))
+    return Sampling((path,), np.array([own[path]]), phase_of(phase), count)
+
+
+def variables(study: Study) -> list[str]:
+    """Names of the variables of a strobe."""
+    pendulums = sorted({path.split(".")[1] for path in case_machine(study, 0) if path.startswith("pendulums.")})
+    return ["shaft.speed", *(f"pendulums.{i}.{part}" for i in pendulums for part in ("angle", "speed", "windup"))]
+
+
+def variable_of(study: Study, name: str | None) -> str:
+    """The variable that the picture of a diagram shows, by default the shaft's speed; FaultError about ``y``."""
+    return choice_of("y", name, variables(study)) if name and name.strip() else "shaft.speed"
+
+
+def sections_file(study: Study, case: int, asked: Sampling, form: Format, section: bool = False) -> bytes:
+    """Settle the cases and write the file. For the computing process."""
+    made = run_sections(study, case, asked)
+    if form == "csv":
+        return sections_csv(made, asked, section=section)
+    return to_bytes(sections_json(made, study, case, asked, section=section))
+
+
+def sections_json(made: CaseSections, study: Study, case: int, asked: Sampling, *, section: bool) -> Sections:
+    """The strobes as JSON data."""
+    return {
+        "case": case,
+        "parameters": study.case_parameters(case),
+        "along": [] if section else list(asked.paths),
+        "unit": None if section else unit_of(study, asked.paths[0]),
+        "phase": 2.0 * math.pi * asked.phase,
+        "parameter": [] if section else asked.values.tolist(),
+        "regime": [regime or None for regime in made.regimes],
+        "order": [order or None for order in made.orders.tolist()],
+        "variables": {name: {"unit": unit} for name, unit in zip(made.names, made.units, strict=True)},
+        "strobes": {
+            name: [numbers(row[~np.isnan(row)]) for row in made.values[:, :, column]]
+            for column, name in enumerate(made.names)
+        },
+    }
+
+
+def sections_csv(made: CaseSections, asked: Sampling, *, section: bool) -> bytes:
+    """A row for each strobe: the parameter of a diagram, the regime, the order, the variables."""
+    kept = ~np.isnan(made.values[:, :, 0])
+    which = np.nonzero(kept)[0].tolist()
+    columns: list[list[Any]] = [[made.regimes[row] for row in which], [int(made.orders[row]) for row in which]]
+    header = ["regime", "order", *made.names]
+    if not section:
+        header.insert(0, asked.paths[0])
+        columns.insert(0, [float(asked.values[row]) for row in which])
+    values = [made.values[:, :, column][kept].tolist() for column in range(len(made.names))]
+    return table_csv(header, [*columns, *values])
