@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import csv
 import io
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from sprag.service.http.web.figures.plotly import plotly_figure
+from sprag.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag.service.jobs.answers import curves_of
+from sprag.service.jobs.local import run_here
 from sprag.service.results.curves import CurveQuery
 from sprag.service.results.defaults import main_query
 from sprag.service.results.figures.curves import curves_figure
 from sprag.service.results.sweeps import hysteresis
+from sprag.service.spec.document import parse_spec
 from sprag.worker import models
 from sprag.worker.models import ChunkResult
 from sprag.worker.study import Study
@@ -141,3 +146,26 @@ def test_pictures_pages_and_files_of_a_sweep(service: Service, study_id: str) ->
     for form in ("xlsx", "parquet", "netcdf", "json"):
         assert service.http.get(f"{API}/studies/{study_id}/results", params={"format": form}).status_code == 200
     assert service.http.get(f"{API}/studies/{study_id}/report").status_code == 200
+
+
+def test_the_example_of_the_guide_says_what_the_guide_says() -> None:
+    text = (Path(__file__).resolve().parents[3] / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    spec = json.loads(text.partition("```json")[2].partition("```")[0])
+    study = parse_spec(spec).study
+    with run_here(spec, study, processes=0) as run:
+
+        class Library:
+            store = run.store
+
+        query = main_query(study, models.study_results(study))
+        assert query is not None
+        told = hysteresis(curves_of(Library(), run.record.id, query))  # type: ignore[arg-type]
+    assert f"> {told}\n" in text
+
+
+def test_the_form_keeps_a_sweep() -> None:
+    values = values_of(SPEC)
+    assert values["/axes/0/sweep"] == "both"
+    spec, _ = spec_of(values)
+    assert [axis.get("sweep") for axis in spec["axes"]] == ["both", None]
+    assert field_of("/axes/0/sweep", values) == "/axes/0/sweep"

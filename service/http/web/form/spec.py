@@ -23,6 +23,7 @@ from sprag.service.http.web.form.goal import GOAL_DEFAULTS, field_of_goal, goal_
 from sprag.service.http.web.form.parts import count_of
 from sprag.service.http.web.form.tolerances import FIELDS as TOLERANT
 from sprag.service.http.web.form.tolerances import field_of_tolerance, tolerance_values, tolerances_of
+from sprag.service.spec.axes.sweep import SWEPT
 from sprag.service.spec.derive import formulas_of, with_values
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.service.spec.plan import refine
@@ -203,7 +204,8 @@ def _axis(values: Mapping[str, str], index: int) -> dict[str, Any] | None:
         return None
     axis: dict[str, Any] = {"path": path}
     axis[way] = list_of(texts[0]) if way == "values" else [plain(text) for text in texts]
-    return axis
+    swept = values.get(f"{pointer}/{SWEPT.name}", "")
+    return axis | ({SWEPT.name: swept} if swept else {})
 
 
 def field_of(pointer: str, values: Mapping[str, str]) -> str:
@@ -222,6 +224,8 @@ def field_of(pointer: str, values: Mapping[str, str]) -> str:
         filled = [index for index in range(count_of(values, "axes")) if _axis(values, index) is not None]
         index = filled[int(match[1])] if int(match[1]) < len(filled) else int(match[1])
         rest = match[2] or "path"
+        if rest == SWEPT.name:
+            return f"/axes/{index}/{rest}"
         way, _, item = rest.partition("/")
         names = WAYS.get(way)
         if names is None:
@@ -287,7 +291,7 @@ def with_clutch_defaults(values: Values) -> Values:
 
 def _plain_axis(axis: Mapping[str, Any]) -> bool:
     """Whether an axis gives its values in one of the form's ways."""
-    return any(set(axis) == {"path", way} for way in WAYS)
+    return any(set(axis) - {SWEPT.name} == {"path", way} for way in WAYS)
 
 
 def _clutch_values(pointer: str, clutch: Mapping[str, Any]) -> Values:
@@ -314,6 +318,7 @@ def _si(value: Any, unit: str) -> float:
 def _axis_values(pointer: str, axis: Mapping[str, Any]) -> Values:
     way = next(name for name in WAYS if name in axis)
     found = {**path_values(pointer, axis["path"]), f"{pointer}/way": way}
+    found |= {f"{pointer}/{SWEPT.name}": str(axis[SWEPT.name])} if SWEPT.name in axis else {}
     if way == "values":
         return found | {f"{pointer}/values": "; ".join(map(text_of, axis[way]))}
     return found | {f"{pointer}/{name}": text_of(item) for name, item in zip(WAYS[way], axis[way], strict=True)}

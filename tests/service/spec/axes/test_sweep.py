@@ -15,6 +15,7 @@ from sprag.service.spec.schema.document import spec_schema
 from tests.service.spec_sample import changed, parsed
 
 AXIS: dict[str, Any] = {"path": "excitation.frequency", "linspace": ["16 Hz", "35 Hz", 5]}
+STARTS: dict[str, Any] = {"count": 4, "ranges": {"shaft.initial_speed": ["0 rad/s", "30 rad/s"]}}
 SETTLED: dict[str, Any] = {"/run": {"until": "settled"}}
 LOADS: dict[str, Any] = {"path": "shaft.load", "values": [0.1, 0.2]}
 
@@ -47,6 +48,7 @@ def test_a_swept_axis_adds_an_axis_of_directions(way: str, values: tuple[float, 
         (spec(others=({"path": "shaft.load", "adaptive": [0.1, 0.2]},)), "/axes/0/sweep", "conflict"),
         (SETTLED | {"/axes": [{"axes": [{**AXIS, "sweep": "up"}]}, LOADS]}, "/axes/0", "conflict"),
         (spec() | {"/run": {"duration": "60 periods"}}, "/axes/0/sweep", "not-used"),
+        (spec() | {"/starts": STARTS}, "/axes/0/sweep", "not-used"),
         (spec(axis={"path": "shaft.initial_speed", "values": [0, 1]}), "/axes/0/sweep", "conflict"),
         (spec(axis={"path": "excitation.frequency", "values": [20]}), "/axes/0/sweep", "nothing-varies"),
     ],
